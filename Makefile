@@ -1,0 +1,58 @@
+# Both `make fit` and `make test` set up .venv themselves. Needs Python 3.11+ with venv, and git.
+
+PYTHON ?= python3
+CONFIG ?= conf/nao.yaml
+ARGS ?=
+PYTEST_ARGS ?=
+PIP_ARGS ?=
+
+BIN := .venv/bin
+# Modules are compiled when they are first imported; compiling all of them here takes minutes.
+PIP_INSTALL = $(BIN)/python -m pip install --no-compile --disable-pip-version-check $(PIP_ARGS)
+ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
+
+# Where this is set, every start compiles everything again: half a minute.
+unexport PYTHONDONTWRITEBYTECODE
+
+.DELETE_ON_ERROR:
+.PHONY: help fit test dashboard
+
+help:
+	@echo "make fit [CONFIG=conf/nao.yaml] [ARGS='trainer.max_steps=1000']   learn to retarget to a robot"
+	@echo "make test [PYTEST_ARGS='-k config']                               lint, types and tests"
+	@echo "make dashboard                                                    the runs so far, in a browser"
+	@echo "PYTHON=python3.12 chooses the interpreter of a new .venv, PIP_ARGS=... goes to pip."
+
+fit: .venv/.core
+	$(BIN)/python -m mrhubo.fit --config $(CONFIG) $(ARGS)
+
+test: .venv/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+dashboard: export MLFLOW_SERVER_ENABLE_JOB_EXECUTION = false
+dashboard: export MLFLOW_DISABLE_TELEMETRY = true
+dashboard: .venv/.core
+	$(BIN)/mlflow ui --backend-store-uri sqlite:///mlruns/mlflow.db --host 127.0.0.1 --workers 1
+
+# Stamps: an empty file each, written only when its step is complete, so that an interrupted one is repeated.
+.venv/.core: pyproject.toml .venv/.created
+	$(PIP_INSTALL) -e .
+	@touch $@
+
+.venv/.test: pyproject.toml .venv/.created
+	$(PIP_INSTALL) -e '.[test]'
+	@touch .venv/.core $@
+
+# An environment that is already there and works is kept.
+.venv/.created:
+	@if ! $(BIN)/python -c "import pip; $(ENOUGH)" 2>/dev/null; then \
+	    $(PYTHON) -c "$(ENOUGH)" 2>/dev/null || { \
+	        echo "mrhubo needs Python 3.11 or newer, and '$(PYTHON)' is not: make PYTHON=/path/to/python3.11" >&2; exit 2; }; \
+	    echo "$(PYTHON) -m venv .venv"; \
+	    $(PYTHON) -m venv --clear .venv || { \
+	        echo "'$(PYTHON) -m venv' failed: install it first (Debian, Ubuntu: apt install python3-venv)" >&2; exit 2; }; \
+	fi
+	@touch $@

@@ -1,0 +1,94 @@
+"""What Trainer and MLflow cost over a bare training loop: same network, same batches, in one process.
+
+    python benchmarks/training.py [--config conf/nao.yaml] [--steps 300] [--pairs 50000]
+
+Random numbers stand in for pairs: the time does not depend on their values.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import lightning
+import torch
+from common import print_header, print_table
+
+from mrhubo.body.training import cosine_schedule
+from mrhubo.callbacks import TrainingProgress
+from mrhubo.config import load_config
+from mrhubo.pairing import make_filter
+from mrhubo.pairing.data import PairData, PairTable
+from mrhubo.retargeter import RetargetModule, build_network
+from mrhubo.robot import build_body_map
+from mrhubo.tracking import open_logger
+
+
+def main(argv: list[str]) -> None:
+    """Prints the table."""
+    options = {"--config": "conf/nao.yaml", "--steps": "300", "--pairs": "50000"}
+    while argv and argv[0] in options:
+        options[argv[0]], argv = argv[1], argv[2:]
+    print_header()
+    logging.getLogger("lightning.pytorch").setLevel(logging.ERROR)
+    config = load_config(Path(options["--config"]), argv)
+    steps, count = int(options["--steps"]), int(options["--pairs"])
+    config.trainer.max_steps = steps
+    body_map = build_body_map(config.robot)
+    joints = len(body_map.robot.joint_names)
+
+    def module() -> RetargetModule:
+        torch.manual_seed(0)
+        return RetargetModule(build_network(config, body_map), config.trainer)
+
+    def data() -> PairData:
+        generator = torch.Generator().manual_seed(0)
+        size = module().network.features.size
+        table = PairTable(*(torch.randn(count, *s, generator=generator) for s in ((size,), (joints, 6), (joints,))))
+        chosen = make_filter(torch.rand(count, generator=generator), "linear", 1.0)
+        return PairData(table, chosen, config.trainer.batch_size, steps, 0)
+
+    def bare() -> None:
+        net, loader = module(), data().train_dataloader()
+        optimizer = torch.optim.AdamW(net.network.parameters(), config.trainer.lr)
+        schedule = cosine_schedule(optimizer, steps)
+        for batch in loader:
+            loss = net.losses(*batch)["loss"]
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+            schedule.step()
+
+    def trainer(tracked: bool) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            logger = open_logger(Path(folder), "benchmark", "run", {}) if tracked else False
+            fit = lightning.Trainer(
+                max_steps=steps, accelerator="cpu", logger=logger, log_every_n_steps=50, enable_progress_bar=False,
+                enable_model_summary=False, enable_checkpointing=False, callbacks=[TrainingProgress(quiet=True)],
+            )  # fmt: skip
+            net, pairs = module(), data()
+            start = time.perf_counter()
+            fit.fit(net, datamodule=pairs)
+            times[-1].append(time.perf_counter() - start)
+
+    names = {"bare loop": bare, "Trainer": lambda: trainer(False), "Trainer + MLflow": lambda: trainer(True)}
+    times: list[list[float]] = []
+    rows = []
+    for run in names.values():
+        times.append([])
+        for _ in range(3):
+            start = time.perf_counter()
+            run()
+            if run is bare:
+                times[-1].append(time.perf_counter() - start)
+    best = [min(t) for t in times]
+    for name, seconds in zip(names, best, strict=True):
+        rows.append([name, f"{1000 * seconds / steps:.1f}", f"{seconds / best[0] - 1:+.1%}"])
+    print_table(["loop (best of 3)", "ms a step", "over the bare loop"], rows)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,39 @@
+"""Settings: YAML plus ``key.sub=value`` -> typed dataclasses; every mistake is one sentence."""
+
+from mrhubo.config.command import parse_arguments, run_command
+from mrhubo.config.help import field_docs, help_text
+from mrhubo.config.loading import load_config
+from mrhubo.config.plain import fingerprint, to_plain, to_yaml
+from mrhubo.config.schema import (
+    BodyConfig,
+    Config,
+    EvaluationConfig,
+    ModelConfig,
+    PairsConfig,
+    RobotConfig,
+    TrackingConfig,
+    TrainerConfig,
+    bounded,
+    choice,
+)
+
+__all__ = [
+    "BodyConfig",
+    "Config",
+    "EvaluationConfig",
+    "ModelConfig",
+    "PairsConfig",
+    "RobotConfig",
+    "TrackingConfig",
+    "TrainerConfig",
+    "bounded",
+    "choice",
+    "field_docs",
+    "fingerprint",
+    "help_text",
+    "load_config",
+    "parse_arguments",
+    "run_command",
+    "to_plain",
+    "to_yaml",
+]

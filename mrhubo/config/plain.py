@@ -1,0 +1,73 @@
+"""A typed config -> plain values, YAML and a fingerprint."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from mrhubo.config.tree import scalar
+
+
+def to_plain(value: Any) -> Any:
+    """Dicts, lists, text, numbers, truth values and None only: safe for YAML, MLflow, Lightning's hyperparameters."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"a key must be text, found {key!r}")
+        return {key: to_plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int | str) or (isinstance(value, float) and math.isfinite(value)):
+        kind = int if isinstance(value, int) else str if isinstance(value, str) else float
+        return kind(value)  # no subclass such as numpy.float64, whose text differs
+    raise TypeError(f"not a plain value: {value!r}")
+
+
+def to_yaml(config: Any) -> str:
+    """YAML that `load_config` reads back to an equal config."""
+    return yaml.dump(_escaped(to_plain(config)), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
+
+
+def fingerprint(value: Any) -> str:
+    """16 hex digits of a config or of plain values: the order of keys does not count, 2 and 2.0 differ."""
+    text = json.dumps(to_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+def _escaped(value: Any) -> Any:
+    """Text that only looks like an interpolation stays what it is."""
+    if isinstance(value, dict):
+        return {key: _escaped(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_escaped(item) for item in value]
+    if isinstance(value, str):
+        return re.sub(r"(\\*)\$\{", lambda found: found[1] * 2 + "\\${", value)
+    return value
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes whatever is not one simple word, or would be read as something else than text."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    simple = re.fullmatch(r"[\w./][\w./-]*( [\w./-]+)*", text, re.ASCII) and isinstance(scalar(text), str)
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if simple else '"')
+
+
+_Dumper.add_representer(str, _text)

@@ -1,0 +1,164 @@
+"""The settings of a run, one dataclass per section of the YAML. The text under each field is what ``--help`` prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+def bounded(default: Any, low: float | None = None, high: float | None = None) -> Any:
+    """A field whose number must lie in [low, high]; None leaves that side open."""
+    return field(default=default, metadata={"low": low, "high": high})
+
+
+def choice(default: str, *choices: str) -> Any:
+    """A field that takes one of the given words."""
+    return field(default=default, metadata={"choices": choices})
+
+
+@dataclass
+class RobotConfig:
+    """The robot: its URDF, which joints move, and which links stand for which part of the human body."""
+
+    name: str
+    """Short name of the robot; runs and packages are named after it."""
+    urdf: Path
+    """URDF file; a relative path is relative to the YAML that names it."""
+    joints: list[str]
+    """Joints that are sampled and predicted, by URDF name; their order is the order of the output."""
+    keypoints: dict[str, Any]
+    """Which link stands for which part of the human body. Points: `left_` and `right_` `shoulder`, `elbow`, `wrist`, each a
+    link name or {link: NAME, offset: [x, y, z]} (m, in that link's frame). `chest`: the link that carries the arms, with
+    optional `forward` and `up` (default [1, 0, 0] and [0, 0, 1]). Optional `left_hand` and `right_hand`: {link: NAME,
+    fingers: [x, y, z], thumb: [x, y, z]}, where the fingers point and the thumb lies, in that link's frame. Optional
+    `head`: a link name or {link: NAME, forward: ..., up: ...}."""
+    key_links: list[str]
+    """Links whose position error is the link error."""
+    ranges: dict[str, list[float]] = field(default_factory=dict)
+    """Ranges narrower than the URDF's limits, [lower, upper] in rad, by joint name."""
+    hold: dict[str, float] = field(default_factory=dict)
+    """Angles in rad at which joints outside `joints` are held; default 0, clamped to the joint's limits."""
+    scale: str = choice("auto", "auto")
+    """How lengths are matched: `auto` keeps the robot's limb directions and gives each limb the human's length."""
+
+
+@dataclass
+class BodyConfig:
+    """The human body prior."""
+
+    prior: str = choice("open", "open")
+    """Which prior: `open` is the one that ships with mrhubo."""
+    prior_path: Path | None = None
+    """Weights file (.safetensors) in place of the shipped one."""
+
+
+@dataclass
+class PairsConfig:
+    """The generated pairs of robot pose and human pose."""
+
+    count: int = bounded(50_000, 100, 10_000_000_000)
+    """Number of pairs."""
+    dir: Path | None = None
+    """Folder for the pairs; default `data/pairs` beside `conf/`. Every pairing config gets a folder of its own in it."""
+    seed: int = bounded(0, 0, 2**63 - 1)
+    """Seed of the robot poses and of the amortised solver's training."""
+    solver: str = choice("fine", "fine", "fast", "paper")
+    """Latent inverse kinematics: `fine` = amortised start, then Levenberg-Marquardt; `fast` = amortised only;
+    `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
+    shard_size: int = bounded(2_500, 100, 1_000_000)
+    """Pairs per file."""
+    amortiser_steps: int = bounded(2_000, 10, 1_000_000)
+    """Training steps of the amortised solver, once per robot."""
+    lm_steps: int = bounded(12, 1, 1_000)
+    """Most Levenberg-Marquardt steps per pose; a converged pose stops earlier."""
+    w_data: float = bounded(100.0, 0.0)
+    """Weight of the squared keypoint distance, 1/m^2."""
+    w_prior: float = bounded(0.01, 0.0)
+    """Weight of the squared norm of the latent."""
+    filter: str = choice("linear", "linear", "hard", "none")
+    """Use of phi: `linear` = drop above the threshold, then draw with a probability that falls linearly with phi (the
+    paper); `hard` = drop above the threshold only; `none` = use every pair."""
+    filter_k: float = bounded(1.0, -10.0, 100.0)
+    """Threshold of phi in standard deviations above its mean."""
+
+
+@dataclass
+class ModelConfig:
+    """The two networks."""
+
+    stages: int = bounded(2, 1, 2)
+    """2 = human -> links -> joints (the paper), 1 = human -> joints directly."""
+    hidden: int = bounded(512, 1, 65_536)
+    """Width of the hidden layers."""
+    layers: int = bounded(2, 1, 64)
+    """Hidden layers of each network (the paper's text: 1, its authors' code: 2)."""
+    input_joints: list[str] | None = None
+    """Human joints that are read; default: those between the chest and the keypoints that the robot has."""
+    input_frame: str = choice("chest", "chest", "local")
+    """`chest` turns the joints' local rotations into rotations relative to the chest before the first layer; `local` feeds
+    them as they are (the paper)."""
+    bound_output: str = choice("tanh", "tanh", "clamp")
+    """How outputs are kept inside the joint limits: `tanh` squashes, `clamp` learns unbounded and cuts off."""
+    detach_student: bool = True
+    """Stop the student's gradient at the predicted links, as the authors' code does."""
+
+
+@dataclass
+class TrainerConfig:
+    """The training."""
+
+    max_steps: int = bounded(5_000, 1, 1_000_000_000)
+    """Optimiser steps."""
+    batch_size: int = bounded(2_048, 1, 10_000_000)
+    """Pairs per step."""
+    lr: float = bounded(1e-3, 1e-9, 10.0)
+    """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps."""
+    weight_decay: float = bounded(1e-6, 0.0, 10.0)
+    """Weight decay of AdamW."""
+    precision: str = choice("32", "32", "bf16")
+    """`32`, or `bf16` for bf16 autocast (faster, slightly less accurate)."""
+    validate_every: int = bounded(250, 1, 1_000_000_000)
+    """Steps between validations; a checkpoint is written at each."""
+    seed: int = bounded(0, 0, 2**32 - 1)
+    """Seed of the initial weights and of the draws."""
+    accelerator: str = choice("auto", "auto", "cpu", "gpu")
+    """Where to run."""
+
+
+@dataclass
+class EvaluationConfig:
+    """The human motions that measure the result. They never enter the training."""
+
+    motions: list[Path] = field(default_factory=list)
+    """Folders of AMASS-style .npz files; the first that exists is used. Default: the eleven CMU clips in
+    `data/external/cmu/evaluation`, else the motions that ship with mrhubo."""
+    validation: list[str] = field(default_factory=lambda: ["13_28", "54_16", "directing_traffic", "drinking"])
+    """Names of the clips of that folder that choose the checkpoint; the others are the test clips."""
+    smoothness: float = bounded(0.02, 0.0, 100.0)
+    """Weight of the reference retargeter's temporal smoothness."""
+
+
+@dataclass
+class TrackingConfig:
+    """MLflow."""
+
+    uri: str | None = None
+    """Tracking URI; default: `mlruns/mlflow.db` (SQLite) beside `conf/`."""
+    experiment: str = "mrhubo"
+    """Experiment name."""
+    run_name: str | None = None
+    """Run name; default: the robot's name and what differs from the defaults."""
+
+
+@dataclass
+class Config:
+    """Everything that a run depends on."""
+
+    robot: RobotConfig
+    body: BodyConfig = field(default_factory=BodyConfig)
+    pairs: PairsConfig = field(default_factory=PairsConfig)
+    model: ModelConfig = field(default_factory=ModelConfig)
+    trainer: TrainerConfig = field(default_factory=TrainerConfig)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)

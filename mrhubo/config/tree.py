@@ -1,0 +1,201 @@
+"""YAML text -> a tree of nodes that remember where they were written, and how.
+
+YAML 1.1 (PyYAML, and OmegaConf on top of it) reads ``13_28`` as the number 1328, ``02_05`` as 133, ``1:30`` as 90 and
+``no`` as false; clips and joints have such names. So a node keeps its text, and the schema decides what it is.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from mrhubo.errors import UserError, unknown_name
+
+MAX_BYTES = 1_000_000
+MAX_NODES = 100_000
+MAX_DEPTH = 50
+
+NULL_WORDS = ("", "~", "null", "Null", "NULL")
+BOOL_WORDS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+INT_PATTERN = re.compile(r"[-+]?(0|[1-9][0-9]{0,399})")
+FLOAT_PATTERN = re.compile(
+    r"[-+]?([0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE]))([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a value was read from: a name for messages, and the folder that relative paths start from."""
+
+    name: str
+    folder: Path
+
+
+@dataclass
+class Node:
+    """One value of the tree. `text` is what stood there, if it was an unquoted scalar."""
+
+    content: Any
+    """None, bool, int, float, str, list[Node] or dict[str, Node]."""
+    source: Source
+    line: int | None = None
+    text: str | None = None
+
+    @property
+    def where(self) -> str:
+        """The place for messages, for instance ``conf/nao.yaml, line 3``."""
+        return self.source.name if self.line is None else f"{self.source.name}, line {self.line}"
+
+    def plain(self) -> Any:
+        """The value without its origin."""
+        if isinstance(self.content, dict):
+            return {key: child.plain() for key, child in self.content.items()}
+        if isinstance(self.content, list):
+            return [child.plain() for child in self.content]
+        return self.content
+
+
+def command_line() -> Source:
+    """The source of what is typed: relative paths start from the current directory."""
+    return Source("command line", Path.cwd())
+
+
+def scalar(text: str) -> Any:
+    """What an unquoted scalar means where the schema does not say (YAML 1.2's core rules)."""
+    if text in NULL_WORDS:
+        return None
+    if text in BOOL_WORDS:
+        return BOOL_WORDS[text]
+    if INT_PATTERN.fullmatch(text):
+        return int(text)
+    if FLOAT_PATTERN.fullmatch(text):
+        return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    return text
+
+
+def read_file(file: Path) -> Node:
+    """The tree of a YAML file, a mapping at the top."""
+    source = Source(str(file), Path(os.path.abspath(file)).parent)
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise UserError(_missing_file(file)) from None
+    except IsADirectoryError:
+        raise UserError(f"{file} is a folder, not a YAML file") from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"{file} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > MAX_BYTES:
+        raise UserError(f"{file} is larger than {MAX_BYTES // 1_000_000} MB, which no config is")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UserError(f"{file} is not a YAML file: byte {error.start} is not UTF-8 text") from None
+    node = parse(text, source)
+    if node is None:
+        raise UserError(f"{file} is empty")
+    if not isinstance(node.content, dict):
+        raise UserError(f"{node.where}: a config is a mapping of `key: value` lines, found {describe(node)}")
+    return node
+
+
+def parse(text: str, source: Source, lines: bool = True) -> Node | None:
+    """The tree of a YAML text; None where it holds nothing."""
+    try:
+        root = yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"{source.name}, line {mark.line + 1}" if lines and mark else source.name
+        raise UserError(f"{place}: not valid YAML: {error.problem or error.context}") from None
+    except yaml.reader.ReaderError as error:
+        raise UserError(f"{source.name}: not a text file: character {error.position} is not printable") from None
+    except RecursionError:
+        raise UserError(f"{source.name}: nested more than {MAX_DEPTH} levels deep") from None
+    except (ValueError, OverflowError) as error:
+        raise UserError(f"{source.name}: not valid YAML: {error}") from None
+    return None if root is None else _Converter(source, lines).convert(root, 0)
+
+
+def parse_typed(text: str) -> Node:
+    """The node of a value from the command line: YAML if it starts with a bracket or a quote, else taken literally."""
+    source = command_line()
+    text = text.strip()
+    if text[:1] in ("[", "{", "'", '"'):
+        return parse(text, source, lines=False) or Node(None, source)
+    return Node(scalar(text), source, text=text)
+
+
+def describe(node: Node) -> str:
+    """What was found, short enough for a sentence."""
+    content = node.content
+    if isinstance(content, dict):
+        return "a mapping" if content else "an empty mapping"
+    if isinstance(content, list):
+        return "a list" if content else "an empty list"
+    if content is None:
+        return "nothing"
+    shown = repr(content) if isinstance(content, str) else node.text or str(content)
+    return shown if len(shown) <= 60 else shown[:57] + "..."
+
+
+class _Loader(yaml.SafeLoader):
+    """No implicit types: `scalar` and the schema decide."""
+
+    yaml_implicit_resolvers = {}
+
+
+class _Converter:
+    """PyYAML's nodes -> ours; counts them, because aliases can make a small file expand without end."""
+
+    def __init__(self, source: Source, lines: bool):
+        self.source = source
+        self.lines = lines
+        self.count = 0
+
+    def convert(self, found: yaml.Node, depth: int) -> Node:
+        node = Node(None, self.source, found.start_mark.line + 1 if self.lines else None)
+        self.count += 1
+        if self.count > MAX_NODES:
+            raise UserError(f"{self.source.name}: more than {MAX_NODES} values, which no config has")
+        if depth > MAX_DEPTH:
+            raise UserError(f"{node.where}: nested more than {MAX_DEPTH} levels deep")
+        if not found.tag.startswith("tag:yaml.org,2002:") or found.tag[18:] not in ("str", "seq", "map"):
+            raise UserError(f"{node.where}: the YAML tag '{found.tag}' is not supported")
+        if isinstance(found, yaml.MappingNode):
+            node.content = {}
+            for key, value in found.value:
+                name = self.key(key)
+                if name in node.content:
+                    raise UserError(f"{self.where(key)}: key '{name}' is given twice")
+                node.content[name] = self.convert(value, depth + 1)
+                if self.lines:
+                    node.content[name].line = key.start_mark.line + 1
+        elif isinstance(found, yaml.SequenceNode):
+            node.content = [self.convert(value, depth + 1) for value in found.value]
+        elif isinstance(found, yaml.ScalarNode) and found.style is None:
+            node.content, node.text = scalar(found.value), found.value
+        else:
+            node.content = found.value
+        return node
+
+    def key(self, found: yaml.Node) -> str:
+        if not isinstance(found, yaml.ScalarNode):
+            raise UserError(f"{self.where(found)}: a key must be text, found a list or a mapping")
+        return found.value
+
+    def where(self, found: yaml.Node) -> str:
+        return Node(None, self.source, found.start_mark.line + 1 if self.lines else None).where
+
+
+def _missing_file(file: Path) -> str:
+    folder = file.parent
+    try:
+        others = [str(folder / other.name) for other in folder.iterdir() if other.suffix in (".yaml", ".yml")]
+    except OSError:
+        return f"config file '{file}' does not exist, nor does its folder"
+    return unknown_name("config file", str(file), others)

@@ -1,0 +1,19 @@
+"""Robot poses turned into human poses: latent inverse kinematics, Algorithm 1, shards on disk, the filter."""
+
+from mrhubo.pairing.filter import PairFilter, make_filter
+from mrhubo.pairing.generate import PairGenerator, PairingReport, generate_pairs
+from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pairing.problem import LatentProblem
+from mrhubo.pairing.store import PairStore
+
+__all__ = [
+    "LatentProblem",
+    "PairFilter",
+    "PairGenerator",
+    "PairStore",
+    "PairingReport",
+    "generate_pairs",
+    "make_filter",
+    "solve_lbfgs",
+    "solve_levenberg_marquardt",
+]

@@ -1,0 +1,130 @@
+"""The amortised solver: a small network from target keypoints to the latent, trained per robot on the IK cost itself.
+
+No labels: every step draws fresh robot poses and lowers the cost of the network's own answers. Training is resumed exactly
+from its last checkpoint, because step s draws from (seed, s) alone.
+
+Legend: B batch, K used keypoints, Z latent numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from mrhubo.body.training import cosine_schedule
+from mrhubo.pairing.problem import LatentProblem
+from mrhubo.storage import DamagedFile, read_tensors, write_tensors
+
+_BATCH = 512
+_LR = 2e-3
+_CHECKPOINT_EVERY = 250
+
+
+class Amortiser(nn.Module):
+    """MLP from keypoints (B, K, 3) to latents (B, Z); inputs are standardised by a sample of targets."""
+
+    center_F: Tensor
+    scale_F: Tensor
+
+    def __init__(self, keypoints: int, latent: int, hidden: int = 512) -> None:
+        super().__init__()
+        self.register_buffer("center_F", torch.zeros(3 * keypoints))
+        self.register_buffer("scale_F", torch.ones(3 * keypoints))
+        self.layers = nn.Sequential(
+            nn.Linear(3 * keypoints, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, hidden),
+            nn.SiLU(), nn.Linear(hidden, latent),
+        )  # fmt: skip
+
+    def standardise(self, sample_BK3: Tensor) -> None:
+        """Sets centre and scale; a coordinate that never varies (a pinned keypoint) is fed as zero."""
+        flat = sample_BK3.flatten(1)
+        spread = flat.std(0)
+        self.center_F.copy_(flat.mean(0))
+        self.scale_F.copy_(torch.where(spread > 1e-4, 1 / spread.clamp_min(1e-4), torch.zeros_like(spread)))
+
+    def forward(self, target_BK3: Tensor) -> Tensor:
+        """Latents (B, Z)."""
+        return self.layers((target_BK3.flatten(1) - self.center_F) * self.scale_F)
+
+
+def train_amortiser(
+    problem: LatentProblem,
+    draw: Callable[[int, torch.Generator], Tensor],
+    steps: int,
+    seed: int,
+    path: Path,
+    header: dict[str, str],
+    progress: Callable[[int, float], None] = lambda step, cost: None,
+) -> Amortiser:
+    """Reads the trained solver from `path`, or trains it, from the last checkpoint beside it if there is one.
+
+    Args:
+        problem: the cost to lower.
+        draw: `draw(count, generator)` gives target keypoints (count, K, 3) of fresh random robot poses.
+        steps: optimiser steps.
+        seed: seed of weights and draws.
+        path: file of the result; a checkpoint is kept beside it until it is done.
+        header: what the file must have been made for; a file with another header is not used.
+        progress: called with (step, mean cost) now and then.
+    """
+    device = problem.prior.identity_F.device
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        network = Amortiser(len(problem.keypoints), problem.latent)
+    network.standardise(draw(4096, torch.Generator().manual_seed(seed)).cpu())
+    network = network.to(device)
+    if _restore(path, header, network=network):
+        return network.requires_grad_(False).eval()
+    optimizer = torch.optim.Adam(network.parameters(), _LR)
+    checkpoint = path.with_suffix(".checkpoint")
+    first = _restore(checkpoint, header, network=network, optimizer=optimizer)
+    schedule = cosine_schedule(optimizer, steps)
+    for step in range(first, steps):
+        # The schedule is a function of the step alone, so it needs no state in the checkpoint.
+        for group, rate in zip(optimizer.param_groups, schedule.base_lrs, strict=True):
+            group["lr"] = rate * schedule.lr_lambdas[0](step)
+        target = draw(_BATCH, torch.Generator().manual_seed((seed + 1) * 1_000_003 + step))
+        cost = problem.cost(network(target), target).mean()
+        optimizer.zero_grad()
+        cost.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimizer.step()
+        if step % 50 == 0 or step + 1 == steps:
+            progress(step + 1, float(cost.detach()))
+        if (step + 1) % _CHECKPOINT_EVERY == 0 and step + 1 < steps:
+            write_tensors(checkpoint, _state(network, optimizer, step + 1), header)
+    write_tensors(path, _state(network), header)
+    checkpoint.unlink(missing_ok=True)
+    return network.requires_grad_(False).eval()
+
+
+def _state(network: Amortiser, optimizer: torch.optim.Optimizer | None = None, step: int = 0) -> dict[str, Tensor]:
+    tensors = {f"network.{name}": value for name, value in network.state_dict().items()}
+    if optimizer is not None:
+        for index, entry in optimizer.state_dict()["state"].items():
+            tensors |= {f"optimizer.{index}.{name}": value for name, value in entry.items()}
+        tensors["step"] = torch.tensor(step)
+    return tensors
+
+
+def _restore(path: Path, header: dict[str, str], network: Amortiser, optimizer: torch.optim.Optimizer | None = None) -> int:
+    """Loads what `_state` gave; the step reached (1 for a finished network), or 0 if there is nothing usable."""
+    try:
+        tensors, found = read_tensors(path)
+    except DamagedFile:
+        return 0
+    if found != header:
+        return 0
+    network.load_state_dict({k.removeprefix("network."): v for k, v in tensors.items() if k.startswith("network.")})
+    if optimizer is None:
+        return 1
+    state: dict[int, dict[str, Tensor]] = {}
+    for key, value in tensors.items():
+        if key.startswith("optimizer."):
+            _, index, name = key.split(".", 2)
+            state.setdefault(int(index), {})[name] = value
+    optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
+    return int(tensors["step"])

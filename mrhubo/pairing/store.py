@@ -1,0 +1,108 @@
+"""Pairs on disk: a folder per pairing config, shards that are whole or absent, each dependent on (config, seed, index) only.
+
+The folder is named after the robot and the fingerprint of everything that decides the pairs, and each shard's header repeats
+it, so that pairs of two configs never mix. How many pairs are wanted is not part of it: more pairs reuse what is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from mrhubo.body.prior import SHIPPED_WEIGHTS
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config import Config, fingerprint, to_plain
+from mrhubo.storage import DamagedFile, checksum_file, read_tensors, write_tensors
+
+SCHEMA = "mrhubo.pairs/1"
+_NOT_IN_PAIRS = ("count", "dir", "filter", "filter_k")
+"""Keys of `pairs` that do not change what a shard holds."""
+_NOT_IN_ROBOT = ("urdf", "key_links")
+
+
+def pairs_header(config: Config) -> dict[str, str]:
+    """What decides the pairs: settings, seed, and checksums of the URDF and the prior."""
+    plain = to_plain(config)
+    pairs = {k: v for k, v in plain["pairs"].items() if k not in _NOT_IN_PAIRS}
+    robot = {k: v for k, v in plain["robot"].items() if k not in _NOT_IN_ROBOT}
+    urdf, prior = checksum_file(config.robot.urdf), checksum_file(config.body.prior_path or SHIPPED_WEIGHTS)
+    return {
+        "schema": SCHEMA,
+        "robot": config.robot.name,
+        "urdf_xxh3": urdf,
+        "prior_xxh3": prior,
+        "seed": str(config.pairs.seed),
+        "fingerprint": fingerprint({"schema": SCHEMA, "pairs": pairs, "robot": robot, "urdf": urdf, "prior": prior}),
+    }
+
+
+class PairStore:
+    """The shards of one pairing config."""
+
+    def __init__(self, folder: Path, header: Mapping[str, str], count: int, shard_size: int, joints: int) -> None:
+        """`joints` is the number N of robot joints; every shard holds `shard_size` pairs, `count` of all are used."""
+        self.folder = folder / f"{header['robot']}-{header['fingerprint']}"
+        self.header, self.count, self.shard_size, self.joints = dict(header), count, shard_size, joints
+        self.shards = -(-count // shard_size)
+
+    @classmethod
+    def of(cls, config: Config) -> PairStore:
+        """The store of a config's pairs; `pairs.dir` must be set."""
+        assert config.pairs.dir is not None
+        header = pairs_header(config)
+        return cls(config.pairs.dir, header, config.pairs.count, config.pairs.shard_size, len(config.robot.joints))
+
+    @property
+    def amortiser_path(self) -> Path:
+        """File of the amortised solver of this config."""
+        return self.folder / "amortiser.safetensors"
+
+    def path(self, index: int) -> Path:
+        """File of one shard."""
+        return self.folder / f"pairs-{index:06d}.safetensors"
+
+    def missing(self) -> list[int]:
+        """Indices of shards that are absent, damaged or foreign, and so have to be made."""
+        return [index for index in range(self.shards) if not self._whole(index)]
+
+    def _whole(self, index: int) -> bool:
+        try:
+            self.read(index)
+        except DamagedFile:
+            return False
+        return True
+
+    def write(self, index: int, tensors: Mapping[str, Tensor]) -> None:
+        """Writes one shard atomically."""
+        write_tensors(self.path(index), tensors, {**self.header, "index": str(index)})
+
+    def read(self, index: int) -> dict[str, Tensor]:
+        """One shard, checked.
+
+        Raises:
+            DamagedFile: it is missing, damaged, or was made for another config, seed or index.
+        """
+        path = self.path(index)
+        tensors, header = read_tensors(path)
+        if header != {**self.header, "index": str(index)}:
+            raise DamagedFile(f"{path}: was made for other settings than this config's")
+        size = self.shard_size
+        shapes = {
+            "q": (size, self.joints), "R": (size, self.joints, 6), "H": (size, len(POSED_JOINT_NAMES), 6),
+            "phi": (size,), "cost": (size,), "residual_m": (size,), "z_norm": (size,),
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            if name not in tensors or tuple(tensors[name].shape) != shape:
+                found = tuple(tensors[name].shape) if name in tensors else "nothing"
+                raise DamagedFile(f"{path}: '{name}' should have the shape {shape}, found {found}")
+            if not bool(torch.isfinite(tensors[name]).all()):
+                raise DamagedFile(f"{path}: '{name}' holds NaN or infinite numbers")
+        return tensors
+
+    def read_all(self) -> dict[str, Tensor]:
+        """The first `count` pairs: q (P, N), R (P, N, 6), H (P, 21, 6), phi, cost, residual_m, z_norm (P,)."""
+        parts = [self.read(index) for index in range(self.shards)]
+        return {name: torch.cat([part[name] for part in parts])[: self.count] for name in parts[0]}

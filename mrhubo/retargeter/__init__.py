@@ -1,0 +1,7 @@
+"""The retargeter: networks, their training, and the package that a user takes away."""
+
+from mrhubo.retargeter.module import RetargetModule
+from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
+from mrhubo.retargeter.package import Retargeter, RetargetResult, build_network
+
+__all__ = ["PoseFeatures", "RetargetModule", "RetargetNetwork", "RetargetResult", "Retargeter", "build_network"]

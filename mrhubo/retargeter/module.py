@@ -1,0 +1,57 @@
+"""The training of the networks: teacher-student loss, optimiser.
+
+    L_pre  = MSE(R, R^)
+    L_post = MSE(q, post(R)) + MSE(q, post(R^))          teacher (true R) + student (predicted R^)
+    L      = L_pre + L_post                              MR.HuBo (IROS 2024), section III-C
+
+Legend: B batch, F input features, M robot links, N robot joints.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import lightning
+import torch
+from torch import Tensor
+from torch.nn.functional import mse_loss
+
+from mrhubo.body.training import cosine_schedule
+from mrhubo.config import TrainerConfig
+from mrhubo.retargeter.networks import RetargetNetwork
+
+
+class RetargetModule(lightning.LightningModule):
+    """Loss and optimiser around a `RetargetNetwork`."""
+
+    def __init__(self, network: RetargetNetwork, settings: TrainerConfig, detach_student: bool = True) -> None:
+        super().__init__()
+        self.network, self.settings, self.detach_student = network, settings, detach_student
+
+    def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor) -> dict[str, Tensor]:
+        """`loss`, and for two stages `loss_pre` (6D numbers squared) and `loss_post` (rad^2)."""
+        network = self.network
+
+        def joint_loss(given: Tensor) -> Tensor:
+            return mse_loss(network.limited.unlimited(network.post(given).float()), q_BN)
+
+        if network.pre is None:
+            return {"loss": joint_loss(features_BF)}
+        links = R_BM6.flatten(1)
+        predicted = network.links(features_BF)
+        pre = mse_loss(predicted.float(), links)
+        post = joint_loss(links) + joint_loss(predicted.detach() if self.detach_student else predicted)
+        return {"loss": pre + post, "loss_pre": pre, "loss_post": post}
+
+    def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
+        """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""
+        losses = self.losses(*batch)
+        self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
+        return losses["loss"]
+
+    def configure_optimizers(self) -> Any:
+        """AdamW with warm-up and cosine decay over `max_steps`."""
+        settings = self.settings
+        optimizer = torch.optim.AdamW(self.network.parameters(), settings.lr, weight_decay=settings.weight_decay)
+        schedule = cosine_schedule(optimizer, settings.max_steps)
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}

@@ -1,0 +1,154 @@
+"""The trained retargeter as a folder that carries all it needs: weights, URDF, settings, joint names, limits, units.
+
+    retargeter = Retargeter.load("package")
+    q_TN = retargeter.predict(pose_TJ6)             # the two networks alone
+    result = retargeter.retarget(pose_TJ6)          # with a confidence for each frame
+
+Legend: T frames, J = 21 human joints, N robot joints, D directions.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body import open_prior
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config import Config, load_config, to_yaml
+from mrhubo.errors import UserError
+from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
+from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.storage import atomic_path, read_tensors, write_tensors
+
+SCHEMA = "mrhubo.retargeter/1"
+_WEIGHTS, _URDF, _CONFIG = "retargeter.safetensors", "robot.urdf", "config.yaml"
+_AGREEMENT_DEG = 20.0
+
+
+@dataclass(frozen=True)
+class RetargetResult:
+    """Joint angles and how far to trust them."""
+
+    q_TN: Tensor
+    """Joint angles [rad], inside the limits."""
+    confidence_T: Tensor
+    """0..1: plausibility of the human pose times agreement of the robot's limbs with the human's."""
+    direction_error_deg_TD: Tensor
+    """Angle [deg] between the robot's and the human's limb, hand and head directions."""
+    phi_T: Tensor
+    """Reconstruction error of the human pose under the body prior."""
+
+
+def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
+    """An untrained network for a config's robot and `model` section."""
+    model = config.model
+    features = PoseFeatures(model.input_joints or body_map.input_joints(), model.input_frame)
+    robot = body_map.robot
+    return RetargetNetwork(
+        features, robot.lower_N, robot.upper_N, model.stages, model.hidden, model.layers, model.bound_output
+    )
+
+
+class Retargeter:
+    """A trained network with its robot; on the CPU unless `to` moves it."""
+
+    def __init__(self, network: RetargetNetwork, body_map: BodyMap, config: Config, phi_threshold: float) -> None:
+        self.network = network.requires_grad_(False).eval()
+        self.body_map, self.config, self.phi_threshold = body_map, config, phi_threshold
+        self.prior = open_prior(config.body.prior_path)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joints of the output, in order."""
+        return self.body_map.robot.joint_names
+
+    @torch.no_grad()
+    def predict(self, pose_TJ6: Tensor) -> Tensor:
+        """Joint angles (T, N) [rad] of human poses (T, 21, 6); inside the limits.
+
+        Raises:
+            UserError: the poses have another shape, or hold NaN or infinite numbers.
+        """
+        if pose_TJ6.ndim != 3 or pose_TJ6.shape[1:] != (len(POSED_JOINT_NAMES), 6):
+            raise UserError(f"human poses must have the shape (frames, 21, 6), found {tuple(pose_TJ6.shape)}")
+        finite = torch.isfinite(pose_TJ6).all(dim=2).all(dim=1)
+        if not bool(finite.all()):
+            raise UserError(f"human pose {int((~finite).nonzero()[0, 0])} holds NaN or infinite numbers")
+        return self.network(pose_TJ6.float())
+
+    @torch.no_grad()
+    def retarget(self, pose_TJ6: Tensor) -> RetargetResult:
+        """Joint angles with a confidence for each frame; poses as for `predict`."""
+        q_TN = self.predict(pose_TJ6)
+        pose_TJ6 = pose_TJ6.float()
+        robot = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
+        human = self.body_map.human_directions(pose_TJ6)
+        sine, cosine = torch.linalg.cross(robot, human).norm(dim=-1), (robot * human).sum(-1)
+        error_TD = torch.rad2deg(torch.atan2(sine, cosine))
+        phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
+        plausible = (self.phi_threshold / phi_T.clamp_min(1e-12)).clamp(max=1.0)
+        agreement = torch.exp(-(error_TD.mean(dim=1) / _AGREEMENT_DEG).square())
+        return RetargetResult(q_TN, plausible * agreement, error_TD, phi_T)
+
+    def save(self, folder: Path, provenance: dict[str, str]) -> Path:
+        """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
+        folder.mkdir(parents=True, exist_ok=True)
+        robot = self.body_map.robot
+        with atomic_path(folder / _URDF) as temporary:
+            shutil.copyfile(self.config.robot.urdf, temporary)
+        with atomic_path(folder / _CONFIG) as temporary:
+            temporary.write_text(_portable(self.config))
+        metadata = {
+            "schema": SCHEMA,
+            "robot": robot.name,
+            "joint_names": json.dumps(robot.joint_names),
+            "lower_rad": json.dumps(robot.lower_N.tolist()),
+            "upper_rad": json.dumps(robot.upper_N.tolist()),
+            "input": "SMPL body joints 1..21, local rotations, 6D (first two columns, column after column)",
+            "input_joints": json.dumps(self.network.features.input_joints),
+            "output": "joint angles in rad, in the order of joint_names",
+            "phi_threshold": repr(self.phi_threshold),
+            **provenance,
+        }
+        write_tensors(folder / _WEIGHTS, self.network.state_dict(), metadata)
+        return folder
+
+    @classmethod
+    def load(cls, folder: Path | str) -> Retargeter:
+        """Reads a package.
+
+        Raises:
+            UserError: the folder is no package, a file is missing or damaged, or weights and settings do not fit.
+        """
+        folder = Path(folder)
+        if not (folder / _WEIGHTS).is_file():
+            raise UserError(f"{folder}: is no package of a retargeter: {_WEIGHTS} is missing")
+        tensors, metadata = read_tensors(folder / _WEIGHTS)
+        if metadata.get("schema") != SCHEMA:
+            raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
+        config = load_config(folder / _CONFIG)
+        body_map = build_body_map(config.robot)
+        network = build_network(config, body_map)
+        try:
+            network.load_state_dict(tensors)
+            threshold = float(metadata["phi_threshold"])
+        except (RuntimeError, KeyError, ValueError) as error:
+            raise UserError(f"{folder}: weights and settings do not fit: {error}") from error
+        return cls(network, body_map, config, threshold)
+
+
+def _portable(config: Config) -> str:
+    """The config as YAML whose only path is the URDF beside it."""
+    config = copy.deepcopy(config)
+    config.robot.urdf = Path(_URDF)
+    config.pairs.dir = None
+    config.evaluation.motions = []
+    config.tracking.uri = None
+    return to_yaml(config)

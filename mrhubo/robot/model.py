@@ -1,0 +1,195 @@
+"""A robot for batched work: which joints move, their limits, and forward kinematics of the links that matter.
+
+Frame: the robot's base frame is the root link of its URDF (x forward, y left, z up for a robot that follows REP 103).
+Legend: B batch, N joints that are sampled and predicted (`joint_names`), M = N links that they carry (`moving_links`),
+L links whose pose is computed (`links`), A angles of the kinematic chain (N joints, mimicking and held ones).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytorch_kinematics as pk
+import torch
+from lxml import etree
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.errors import UserError
+from mrhubo.robot.urdf import Description, describe, joint_range
+
+
+@dataclass(frozen=True)
+class LinkPoses:
+    """Poses of `Robot.links` in the robot's base frame."""
+
+    rotation_BL33: Tensor
+    position_BL3: Tensor
+
+
+class Robot:
+    """Joints, limits and batched forward kinematics of one robot. Tensors live on the device of `to`."""
+
+    def __init__(
+        self,
+        urdf: Path,
+        joints: Sequence[str],
+        links: Iterable[str] = (),
+        ranges: Mapping[str, list[float]] | None = None,
+        hold: Mapping[str, float] | None = None,
+        name: str | None = None,
+    ) -> None:
+        """Reads the URDF and prepares the kinematics of `joints` and of the extra `links`.
+
+        Args:
+            urdf: the URDF file.
+            joints: joints that are sampled and predicted; their order is the order of q.
+            links: links whose poses are wanted besides those that `joints` carry.
+            ranges: [lower, upper] in rad, narrower than the URDF's limits, by joint.
+            hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
+            name: short name; default: the URDF file's.
+
+        Raises:
+            UserError: the URDF cannot be used, or a joint or link does not exist (with the nearest name).
+        """
+        ranges, hold = dict(ranges or {}), dict(hold or {})
+        self.urdf, self.name = Path(urdf), name or Path(urdf).stem
+        self.description = description = describe(self.urdf)
+        if not joints:
+            raise UserError("robot.joints: is empty; name at least one joint")
+        repeated = sorted({j for j in joints if list(joints).count(j) > 1})
+        if repeated:
+            raise UserError(f"robot.joints: '{repeated[0]}' appears twice")
+        self.joint_names = tuple(joints)
+        for key in ranges:
+            if key not in self.joint_names:
+                description.joint(key)
+                raise UserError(f"robot.ranges.{key}: is not among robot.joints")
+        for key in hold:
+            description.joint(key)
+            if key in self.joint_names:
+                raise UserError(f"robot.hold.{key}: is among robot.joints, so it cannot be held")
+        limits = [joint_range(self.urdf, description.joint(j), ranges.get(j)) for j in self.joint_names]
+        self.lower_N = _inward([low for low, _ in limits], torch.inf)
+        self.upper_N = _inward([high for _, high in limits], -torch.inf)
+        self.moving_links = tuple(description.joint(j).child for j in self.joint_names)
+        self.links = tuple(dict.fromkeys((*self.moving_links, *(description.check_link(x) for x in links))))
+        self.held = {
+            j.name: _held_angle(description, j.name, hold) for j in description.joints.values() if j.kind != "fixed"
+        }
+        self._prepare_chain()
+
+    def _prepare_chain(self) -> None:
+        needed = {joint.name for link in self.links for joint in self.description.joints_above(link)}
+        self._chain = pk.build_chain_from_urdf(_chain_xml(self.description, needed)).to(dtype=torch.float32)
+        angles = self._chain.get_joint_parameter_names()
+        self.select_AN = torch.zeros(len(angles), len(self.joint_names))
+        self.constant_A = torch.zeros(len(angles))
+        for row, joint in enumerate(angles):
+            source, multiplier, offset = _drive(self.description, joint)
+            if source in self.joint_names:
+                self.select_AN[row, self.joint_names.index(source)] = multiplier
+                self.constant_A[row] = offset
+            else:
+                self.constant_A[row] = multiplier * self.held.get(source, 0.0) + offset
+        self._frames = self._chain.get_frame_indices(*self.links)
+        driven = [row for row in range(len(angles)) if self.select_AN[row].abs().sum() > 0]
+        self.driven_joints = tuple(angles[row] for row in driven)
+        """Joints of the chain that q turns: `joint_names` and those that mimic them."""
+        self.drive_DN = self.select_AN[driven]
+        """Angles of `driven_joints` per unit of q (1 for a joint itself, the multiplier for one that mimics it)."""
+
+    def to(self, device: torch.device | str) -> Robot:
+        """Moves every tensor to the device, in place."""
+        self._chain = self._chain.to(device=str(device))
+        self.lower_N, self.upper_N = self.lower_N.to(device), self.upper_N.to(device)
+        self.select_AN, self.constant_A = self.select_AN.to(device), self.constant_A.to(device)
+        self.drive_DN, self._frames = self.drive_DN.to(device), self._frames.to(device)
+        return self
+
+    def link_index(self, link: str) -> int:
+        """Position of a link in `links`."""
+        return self.links.index(link)
+
+    def forward(self, q_BN: Tensor) -> LinkPoses:
+        """Poses of `links` in the base frame for joint angles (B, N) [rad]; differentiable."""
+        matrices_FB44 = self._chain.forward_kinematics_tensor(q_BN @ self.select_AN.T + self.constant_A)
+        poses_BL44 = matrices_FB44[self._frames].transpose(0, 1)
+        return LinkPoses(poses_BL44[..., :3, :3], poses_BL44[..., :3, 3])
+
+    def moving_orientations(self, poses: LinkPoses) -> Tensor:
+        """R: orientation (B, M, 6) of `moving_links` in the base frame, 6D columns (the first M of `links`)."""
+        return rotation.matrix_to_sixd(poses.rotation_BL33[:, : len(self.moving_links)])
+
+    def sample(self, count: int, generator: torch.Generator) -> Tensor:
+        """Joint angles (count, N), uniform inside the limits."""
+        unit = torch.rand(count, len(self.joint_names), generator=generator).to(self.lower_N.device)
+        return torch.clamp(self.lower_N + unit * (self.upper_N - self.lower_N), self.lower_N, self.upper_N)
+
+    def home(self) -> Tensor:
+        """The zero configuration (N,), clamped to the limits (0 may lie outside them)."""
+        return torch.zeros_like(self.lower_N).clamp(self.lower_N, self.upper_N)
+
+    def configuration(self, q_N: np.ndarray) -> dict[str, float]:
+        """Angles [rad] of every joint of the URDF that is not fixed and mimics none, for tools that pose the whole robot."""
+        free = {n: a for n, a in self.held.items() if self.description.joints[n].mimic is None}
+        return {**free, **dict(zip(self.joint_names, map(float, q_N), strict=True))}
+
+
+def _inward(limits: list[float], towards: float) -> Tensor:
+    """Limits as float32, rounded to the inside where float32 cannot hold them, so that no output exceeds the URDF's."""
+    exact = torch.tensor(limits, dtype=torch.float64)
+    rounded = exact.to(torch.float32)
+    outside = (rounded.double() < exact) if towards > 0 else (rounded.double() > exact)
+    return torch.where(outside, torch.nextafter(rounded, torch.full_like(rounded, towards)), rounded)
+
+
+def _drive(description: Description, joint: str) -> tuple[str, float, float]:
+    """The joint whose angle drives this one in the end, and the multiplier and offset on the way."""
+    multiplier, offset, seen = 1.0, 0.0, [joint]
+    while (mimic := description.joints[joint].mimic) is not None:
+        joint = mimic.joint
+        if joint in seen or joint not in description.joints:
+            reason = "mimics itself" if joint in seen else f"mimics '{joint}', which does not exist"
+            raise UserError(f"{description.path}: joint '{seen[0]}' {reason}")
+        offset, multiplier = offset + multiplier * mimic.offset, multiplier * mimic.multiplier
+        seen.append(joint)
+    return joint, multiplier, offset
+
+
+def _held_angle(description: Description, joint: str, hold: Mapping[str, float]) -> float:
+    """Angle at which a joint rests when it is not sampled; a joint that mimics follows its source elsewhere."""
+    info = description.joints[joint]
+    low = -np.inf if info.lower is None or info.kind == "continuous" else info.lower
+    high = np.inf if info.upper is None or info.kind == "continuous" else info.upper
+    if joint not in hold:
+        return float(np.clip(0.0, low, max(low, high)))
+    if not low <= hold[joint] <= high:
+        raise UserError(f"robot.hold.{joint}: {hold[joint]} leaves the URDF's limits {low} .. {high}")
+    return float(hold[joint])
+
+
+def _chain_xml(description: Description, needed: set[str]) -> bytes:
+    """A URDF of the needed joints alone: pytorch-kinematics trips over much that it does not need."""
+    robot = etree.Element("robot", name="chain")
+    etree.SubElement(robot, "link", name=description.root)
+    for joint in description.joints.values():
+        if joint.name not in needed:
+            continue
+        etree.SubElement(robot, "link", name=joint.child)
+        element = etree.SubElement(robot, "joint", name=joint.name, type=joint.kind)
+        rpy = Rotation.from_matrix(joint.origin_44[:3, :3]).as_euler("xyz")
+        etree.SubElement(element, "origin", xyz=_numbers(joint.origin_44[:3, 3]), rpy=_numbers(rpy))
+        etree.SubElement(element, "parent", link=joint.parent)
+        etree.SubElement(element, "child", link=joint.child)
+        etree.SubElement(element, "axis", xyz=_numbers(joint.axis_3))
+        etree.SubElement(element, "limit", lower="-1000", upper="1000", effort="1", velocity="1")
+    return etree.tostring(robot)
+
+
+def _numbers(values: np.ndarray) -> str:
+    return " ".join(repr(float(v)) for v in values)

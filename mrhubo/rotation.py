@@ -1,0 +1,87 @@
+"""Rotations: 6D <-> matrix <-> axis-angle <-> quaternion, and the geodesic distance.
+
+6D is the first two COLUMNS of the rotation matrix, flattened column after column: (r00, r10, r20, r01, r11, r21)
+(Zhou et al., "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019). Other code flattens rows.
+Axis-angle is in radians; quaternions are (x, y, z, w). Every function takes any number of leading batch axes, and its
+gradients are finite at angle 0 and at angle pi.
+"""
+
+from __future__ import annotations
+
+import roma
+import torch
+from torch import Tensor
+
+__all__ = [
+    "axis_angle_to_matrix",
+    "geodesic_distance",
+    "matrix_to_axis_angle",
+    "matrix_to_quaternion",
+    "matrix_to_sixd",
+    "quaternion_to_matrix",
+    "sixd_to_matrix",
+    "wrap_angle",
+]
+
+_TINY = 1e-12
+
+
+def matrix_to_sixd(matrix: Tensor) -> Tensor:
+    """(..., 3, 3) rotation matrices to (..., 6): first column, then second column."""
+    return matrix[..., :2].transpose(-1, -2).flatten(-2)
+
+
+def sixd_to_matrix(sixd: Tensor) -> Tensor:
+    """(..., 6) to (..., 3, 3) by Gram-Schmidt; any six numbers with independent halves give a rotation matrix."""
+    first, second = sixd[..., :3], sixd[..., 3:]
+    x = first * torch.rsqrt(first.square().sum(-1, keepdim=True) + _TINY)
+    second = second - (x * second).sum(-1, keepdim=True) * x
+    y = second * torch.rsqrt(second.square().sum(-1, keepdim=True) + _TINY)
+    return torch.stack((x, y, torch.linalg.cross(x, y)), dim=-1)
+
+
+def axis_angle_to_matrix(axis_angle: Tensor) -> Tensor:
+    """(..., 3) axis times angle [rad] to (..., 3, 3)."""
+    return roma.rotvec_to_rotmat(axis_angle)
+
+
+def matrix_to_axis_angle(matrix: Tensor) -> Tensor:
+    """(..., 3, 3) to (..., 3), angle in [0, pi] rad."""
+    return roma.rotmat_to_rotvec(matrix)
+
+
+def quaternion_to_matrix(quaternion_xyzw: Tensor) -> Tensor:
+    """(..., 4) quaternions (x, y, z, w), of any length but zero, to (..., 3, 3)."""
+    return roma.unitquat_to_rotmat(torch.nn.functional.normalize(quaternion_xyzw, dim=-1))
+
+
+def matrix_to_quaternion(matrix: Tensor) -> Tensor:
+    """(..., 3, 3) to (..., 4) unit quaternions (x, y, z, w)."""
+    return roma.rotmat_to_unitquat(matrix)
+
+
+def geodesic_distance(a: Tensor, b: Tensor) -> Tensor:
+    """Angle [rad], (...), in [0, pi] between rotation matrices (..., 3, 3).
+
+    atan2 of the sine (from the skew part) and the cosine (from the trace) is accurate where arccos is not, near 0 and pi;
+    the sine's square root is kept off zero, where its gradient would be infinite, and is zero there instead.
+    """
+    relative = a.transpose(-1, -2) @ b
+    skew = torch.stack(
+        (
+            relative[..., 2, 1] - relative[..., 1, 2],
+            relative[..., 0, 2] - relative[..., 2, 0],
+            relative[..., 1, 0] - relative[..., 0, 1],
+        ),
+        dim=-1,
+    )
+    squared = skew.square().sum(-1)
+    positive = squared > 0
+    sine = torch.where(positive, torch.where(positive, squared, torch.ones_like(squared)).sqrt(), squared) / 2
+    cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
+    return torch.atan2(sine, cosine)
+
+
+def wrap_angle(angle: Tensor) -> Tensor:
+    """The same angle in [-pi, pi) [rad]."""
+    return torch.remainder(angle + torch.pi, 2 * torch.pi) - torch.pi

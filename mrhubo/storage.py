@@ -1,0 +1,117 @@
+"""Tensors on disk that are either whole or absent: safetensors with a checksum, written aside, synced, renamed.
+
+safetensors notices a truncated file but not a flipped bit, so the header carries an xxh3 checksum over metadata and data.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import torch
+import xxhash
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor
+
+from mrhubo.errors import UserError
+
+_CHECKSUM = "xxh3"
+
+
+class DamagedFile(UserError):
+    """A file that is missing, truncated, altered, or not what its name says."""
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Yields a temporary path in the same folder; on success its content is synced and takes the place of `path`.
+
+    Raises:
+        UserError: the folder or the disk refuses the file (no space, no permission); nothing half-written stays.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        with open(temporary, "rb") as handle:
+            os.fsync(handle.fileno())
+        os.replace(temporary, path)
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def checksum_file(path: Path) -> str:
+    """xxh3 of a file's bytes, 16 hex digits."""
+    return xxhash.xxh3_64(path.read_bytes()).hexdigest()
+
+
+def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
+    digest = xxhash.xxh3_64(json.dumps(dict(metadata), sort_keys=True).encode())
+    for name in sorted(tensors):
+        tensor = tensors[name].contiguous()
+        digest.update(f"{name}{tuple(tensor.shape)}{tensor.dtype}".encode())
+        digest.update(tensor.flatten().view(torch.uint8).numpy() if tensor.numel() else b"")
+    return digest.hexdigest()
+
+
+def write_tensors(path: Path, tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> None:
+    """Writes named tensors and string metadata as one safetensors file, atomically; the same input gives the same bytes."""
+    whole = {name: tensor.detach().cpu().contiguous() for name, tensor in sorted(tensors.items())}
+    header = {**metadata, _CHECKSUM: _checksum(whole, metadata)}
+    content = save(whole, metadata=header)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(_sorted_header(content))
+
+
+def _sorted_header(content: bytes) -> bytes:
+    """safetensors writes its metadata in hash order, which changes from process to process; sort it."""
+    size = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + size])
+    metadata = header.pop("__metadata__", {})
+    text = json.dumps({"__metadata__": dict(sorted(metadata.items())), **header}, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    return len(text).to_bytes(8, "little") + text + content[8 + size :]
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """The metadata of a safetensors file, unchecked against the checksum.
+
+    Raises:
+        DamagedFile: the file is missing, truncated or no safetensors file.
+    """
+    try:
+        with safe_open(path, framework="pt") as handle:
+            return dict(handle.metadata() or {})
+    except (OSError, SafetensorError, ValueError) as error:
+        raise DamagedFile(f"{path}: cannot be read as safetensors: {error}") from error
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Tensors and metadata of a file that `write_tensors` wrote.
+
+    Raises:
+        DamagedFile: the file is missing, truncated, no safetensors file, or its checksum does not match.
+    """
+    try:
+        with safe_open(path, framework="pt") as handle:
+            metadata = dict(handle.metadata() or {})
+            tensors = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118 (not a mapping)
+    except (OSError, SafetensorError, ValueError) as error:
+        raise DamagedFile(f"{path}: cannot be read as safetensors: {error}") from error
+    expected = metadata.pop(_CHECKSUM, None)
+    if expected is None:
+        raise DamagedFile(f"{path}: carries no checksum, so it was not written by mrhubo")
+    if _checksum(tensors, metadata) != expected:
+        raise DamagedFile(f"{path}: the content does not match its checksum; the file is damaged")
+    return tensors, metadata

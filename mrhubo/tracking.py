@@ -1,0 +1,91 @@
+"""MLflow: where runs are kept, and the settings without which it misbehaves.
+
+SQLite for the tracking database (MLflow 3 dropped the plain file store), artifacts beside it, telemetry off. MLflow is
+imported only when a run starts: it costs two seconds.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mrhubo.errors import UserError
+
+if TYPE_CHECKING:
+    from lightning.pytorch.loggers import MLFlowLogger
+
+_LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yourdfpy", "roma", "safetensors", "scipy")
+
+
+def database_uri(folder: Path) -> str:
+    """SQLite tracking URI of `mlflow.db` in a folder."""
+    return f"sqlite:///{folder.resolve() / 'mlflow.db'}"
+
+
+def open_logger(folder: Path, experiment: str, run_name: str, tags: dict[str, str], uri: str | None = None,
+                run_id: str | None = None) -> MLFlowLogger:  # fmt: skip
+    """A Lightning logger whose database and experiment exist; artifacts go under `folder`/artifacts.
+
+    Raises:
+        UserError: the tracking server or database cannot be reached.
+    """
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    import mlflow
+    from lightning.pytorch.loggers import MLFlowLogger
+
+    folder.mkdir(parents=True, exist_ok=True)
+    uri = uri or database_uri(folder)
+    try:
+        client = mlflow.MlflowClient(tracking_uri=uri)
+        if client.get_experiment_by_name(experiment) is None:
+            location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
+            client.create_experiment(experiment, artifact_location=location)
+        logger = MLFlowLogger(
+            experiment_name=experiment, run_name=run_name, tracking_uri=uri, tags=tags, run_id=run_id, log_model=False
+        )
+        _ = logger.run_id
+    except Exception as error:
+        raise UserError(f"tracking.uri: MLflow cannot open {uri}: {str(error).splitlines()[0]}") from error
+    return logger
+
+
+def resumable_run(folder: Path, uri: str | None, run_id: str | None) -> str | None:
+    """The id itself if that run is still in the tracking database (a user may have deleted it), else None."""
+    if run_id is None:
+        return None
+    import mlflow
+
+    try:
+        run = mlflow.MlflowClient(tracking_uri=uri or database_uri(folder)).get_run(run_id)
+    except Exception:
+        return None
+    return run_id if run.info.lifecycle_stage == "active" else None
+
+
+def git_commit(folder: Path) -> str:
+    """Commit of the checkout that holds `folder`, with "+changes" if files differ from it; "unknown" outside git."""
+    try:
+        commit = subprocess.run(
+            ["git", "-C", str(folder), "rev-parse", "HEAD"], capture_output=True, text=True, check=True, timeout=10
+        ).stdout.strip()
+        dirty = subprocess.run(
+            ["git", "-C", str(folder), "status", "--porcelain", "--untracked-files=no"],
+            capture_output=True, text=True, check=True, timeout=10,
+        ).stdout.strip()  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return commit + ("+changes" if dirty else "")
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries that decide the result."""
+    versions = {}
+    for name in _LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "absent"
+    return versions

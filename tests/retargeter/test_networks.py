@@ -1,0 +1,113 @@
+"""Outputs stay inside the limits whatever comes in; features see what they should."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mrhubo import rotation
+from mrhubo.body import Skeleton
+from mrhubo.config import TrainerConfig
+from mrhubo.errors import UserError
+from mrhubo.retargeter import PoseFeatures, RetargetModule, RetargetNetwork
+
+LOWER, UPPER = torch.tensor([-2.08567, 0.0349066, -3.0]), torch.tensor([2.08567, 1.54462, -2.9])
+ARM = ("left_shoulder", "left_elbow", "left_wrist")
+
+
+def network(**settings: object) -> RetargetNetwork:
+    torch.manual_seed(0)
+    return RetargetNetwork(PoseFeatures(ARM, "chest"), LOWER, UPPER, hidden=32, **settings)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", ["tanh", "clamp"])
+@pytest.mark.parametrize("stages", [1, 2])
+@settings(max_examples=40, deadline=None)
+@given(scale=st.floats(0, 1e30), seed=st.integers(0, 1000), poison=st.sampled_from([0.0, float("nan"), float("inf")]))
+def test_limits_are_never_exceeded(kind: str, stages: int, scale: float, seed: int, poison: float) -> None:
+    net = network(bound_output=kind, stages=stages)
+    pose = scale * torch.randn(5, 21, 6, generator=torch.Generator().manual_seed(seed))
+    pose[0, 3] += poison
+    pose[1, 17] += poison
+    with torch.no_grad():
+        q = net(pose)
+        for raw in (torch.full((1, 3), 1e30), torch.full((1, 3), -1e30), torch.full((1, 3), float("nan"))):
+            q = torch.cat((q, net.limited(raw)))
+    assert bool(((q >= LOWER) & (q <= UPPER)).all())
+
+
+@pytest.mark.parametrize("kind", ["tanh", "clamp"])
+def test_both_ends_of_the_range_can_be_reached(kind: str) -> None:
+    limited = network(bound_output=kind).limited
+    torch.testing.assert_close(limited(torch.full((1, 3), 20.0))[0], UPPER)
+    torch.testing.assert_close(limited(torch.full((1, 3), -20.0))[0], LOWER)
+
+
+def test_chest_features_ignore_what_lies_below_the_chest() -> None:
+    features = PoseFeatures(ARM, "chest")
+    pose = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(4, 21, 3)))
+    bent = pose.clone()
+    bent[:, [2, 5, 8]] = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(4, 3, 3)))  # the spine
+    torch.testing.assert_close(features(bent), features(pose), atol=1e-5, rtol=0)
+    moved = pose.clone()
+    moved[:, 15] = bent[:, 2]  # left_shoulder
+    assert float((features(moved) - features(pose)).abs().max()) > 0.1
+
+
+def test_chest_features_hold_the_upper_arm_direction() -> None:
+    local = rotation.axis_angle_to_matrix(0.5 * torch.randn(6, 21, 3))
+    points, turns = Skeleton().keypoints_and_rotations(local)
+    direction = torch.nn.functional.normalize(points[:, 18] - points[:, 16], dim=-1)
+    seen = (turns[:, 9].mT @ direction[..., None])[..., 0]
+    features = PoseFeatures(("left_shoulder",), "chest")(rotation.matrix_to_sixd(local))
+    torch.testing.assert_close(features[:, :3], seen, atol=1e-5, rtol=0)
+
+
+def test_local_features_are_the_pose_itself() -> None:
+    pose = torch.randn(3, 21, 6)
+    torch.testing.assert_close(PoseFeatures(("left_hip", "head"), "local")(pose), pose[:, [0, 14]].flatten(1))
+
+
+@pytest.mark.parametrize("names", [(), ("pelvis",), ("left_wirst",)])
+def test_impossible_input_joints_are_refused(names: tuple[str, ...]) -> None:
+    with pytest.raises(UserError):
+        PoseFeatures(names, "chest")
+
+
+def test_losses_are_the_papers() -> None:
+    net = network()
+    module = RetargetModule(net, TrainerConfig(), detach_student=True)
+    features, links, q = torch.randn(8, 18), torch.randn(8, 3, 6), torch.rand(8, 3)
+    losses = module.losses(features, links, q)
+    assert net.pre is not None
+    predicted = net.pre(features)
+
+    def angles(given: torch.Tensor) -> torch.Tensor:
+        return (UPPER + LOWER) / 2 + (UPPER - LOWER) / 2 * torch.tanh(net.post(given))
+
+    pre = ((links.flatten(1) - predicted) ** 2).mean()
+    post = ((q - angles(links.flatten(1))) ** 2).mean() + ((q - angles(predicted)) ** 2).mean()
+    torch.testing.assert_close(losses["loss_pre"], pre)
+    torch.testing.assert_close(losses["loss_post"], post)
+    torch.testing.assert_close(losses["loss"], pre + post)
+
+
+@pytest.mark.parametrize("detach", [True, False])
+def test_the_students_gradient_stops_at_the_links_unless_asked(detach: bool) -> None:
+    net = network()
+    module = RetargetModule(net, TrainerConfig(), detach_student=detach)
+    module.losses(torch.randn(8, 18), torch.randn(8, 3, 6), torch.rand(8, 3))["loss_post"].backward()
+    assert net.pre is not None
+    reached = any(p.grad is not None and bool(p.grad.abs().sum() > 0) for p in net.pre.parameters())
+    assert reached is not detach
+
+
+def test_one_stage_has_one_loss_and_no_links() -> None:
+    net = network(stages=1)
+    assert set(RetargetModule(net, TrainerConfig()).losses(torch.randn(8, 18), torch.randn(8, 3, 6), torch.rand(8, 3))) == {
+        "loss"
+    }
+    with pytest.raises(RuntimeError):
+        net.links(torch.randn(8, 18))
