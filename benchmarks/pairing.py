@@ -33,7 +33,7 @@ def main(argv: list[str]) -> None:
         device = device_of(config)
         maker = PairGenerator(prepared.body_map.to(device), prepared.prior.to(device), config.pairs)
         start = time.perf_counter()
-        maker.prepare(PairStore.of(config), lambda step, cost: None)
+        maker.prepare(PairStore.of(config, prepared.body_map.robot), lambda step, cost: None)
         print(f"amortised solver: {config.pairs.amortiser_steps:,} steps in {time.perf_counter() - start:.1f} s\n")
     problem = maker.problem
     target = maker.draw_targets(int(options["--poses"]), torch.Generator().manual_seed(1234))

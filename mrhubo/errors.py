@@ -11,7 +11,9 @@ class UserError(Exception):
 
 
 def unknown_name(kind: str, name: str, available: Iterable[str]) -> str:
-    """One sentence that names the nearest available name, for instance ``link 'Hed' does not exist; nearest: 'Head'``."""
+    """One sentence that names the nearest available name, for instance ``link 'Hed' does not exist; nearest:
+    'Head'``.
+    """
     names = sorted(available)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     if near:

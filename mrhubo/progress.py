@@ -1,4 +1,6 @@
-"""One line that shows how a long step is getting on: in a terminal it is redrawn, in a log file it is printed now and then."""
+"""One line that shows how a long step is getting on: in a terminal it is redrawn, in a log file it is printed now
+and then.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ _LOG_SECONDS = 15.0
 class Progress:
     """Progress of one step: `with Progress("pairs", 50_000) as progress: progress.update(2_500, "residual 4.1 mm")`."""
 
-    def __init__(self, title: str, total: int, unit: str = "", quiet: bool = False, stream: TextIO | None = None) -> None:
+    def __init__(
+        self, title: str, total: int, unit: str = "", quiet: bool = False, stream: TextIO | None = None
+    ) -> None:
         self.title, self.total, self.unit, self.quiet = title, total, unit, quiet
         self.stream = stream or sys.stderr
         self.terminal = self.stream.isatty()
@@ -39,7 +43,9 @@ class Progress:
         parts = [f"{self.title}: {done:,} of {self.total:,}{' ' + self.unit if self.unit else ''}"]
         if rate:
             parts.append(f"{rate:,.0f}/s" if rate >= 10 else f"{rate:.2g}/s")
-            parts.append(f"{_clock((self.total - done) / rate)} left" if done < self.total else f"took {_clock(seconds)}")
+            parts.append(
+                f"{_clock((self.total - done) / rate)} left" if done < self.total else f"took {_clock(seconds)}"
+            )
         return ", ".join(parts + ([measure] if measure else []))
 
     def _show(self, line: str) -> None:
@@ -53,7 +59,9 @@ class Progress:
     def __enter__(self) -> Progress:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._last and not self.quiet:
             self._show(self._last)
             if self.terminal:

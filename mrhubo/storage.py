@@ -1,6 +1,7 @@
 """Tensors on disk that are either whole or absent: safetensors with a checksum, written aside, synced, renamed.
 
-safetensors notices a truncated file but not a flipped bit, so the header carries an xxh3 checksum over metadata and data.
+safetensors notices a truncated file but not a flipped bit, so the header carries an xxh3 checksum over metadata and
+data.
 """
 
 from __future__ import annotations
@@ -61,12 +62,15 @@ def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str
     for name in sorted(tensors):
         tensor = tensors[name].contiguous()
         digest.update(f"{name}{tuple(tensor.shape)}{tensor.dtype}".encode())
-        digest.update(tensor.flatten().view(torch.uint8).numpy() if tensor.numel() else b"")
+        if tensor.numel():
+            digest.update(memoryview(tensor.flatten().view(torch.uint8).numpy()))
     return digest.hexdigest()
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> None:
-    """Writes named tensors and string metadata as one safetensors file, atomically; the same input gives the same bytes."""
+    """Writes named tensors and string metadata as one safetensors file, atomically; the same input gives the same
+    bytes.
+    """
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in sorted(tensors.items())}
     header = {**metadata, _CHECKSUM: _checksum(whole, metadata)}
     content = save(whole, metadata=header)

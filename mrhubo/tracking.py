@@ -25,8 +25,14 @@ def database_uri(folder: Path) -> str:
     return f"sqlite:///{folder.resolve() / 'mlflow.db'}"
 
 
-def open_logger(folder: Path, experiment: str, run_name: str, tags: dict[str, str], uri: str | None = None,
-                run_id: str | None = None) -> MLFlowLogger:  # fmt: skip
+def open_logger(
+    folder: Path,
+    experiment: str,
+    run_name: str,
+    tags: dict[str, str],
+    uri: str | None = None,
+    run_id: str | None = None,
+) -> MLFlowLogger:
     """A Lightning logger whose database and experiment exist; artifacts go under `folder`/artifacts.
 
     Raises:
@@ -73,8 +79,11 @@ def git_commit(folder: Path) -> str:
         ).stdout.strip()
         dirty = subprocess.run(
             ["git", "-C", str(folder), "status", "--porcelain", "--untracked-files=no"],
-            capture_output=True, text=True, check=True, timeout=10,
-        ).stdout.strip()  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
+        ).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return "unknown"
     return commit + ("+changes" if dirty else "")

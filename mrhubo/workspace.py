@@ -1,6 +1,7 @@
 """The folder in which a fit keeps what it needs to resume: its MLflow run, its checkpoints.
 
-One folder per config (named after its fingerprint), so that the same command finds it again. A finished fit leaves a mark, and
+One folder per config (named after its fingerprint), so that the same command finds it again. A finished fit leaves a
+mark, and
 the same command then starts a new run. A lock keeps two processes out of one folder.
 """
 
@@ -32,12 +33,16 @@ class Workspace:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             self._lock.close()
-            raise UserError(f"{self.folder}: another process is running this very fit; wait for it or stop it") from error
+            raise UserError(
+                f"{self.folder}: another process is running this very fit; wait for it or stop it"
+            ) from error
         if self._read().get("finished"):
             self._clear()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._lock.close()
 
     @property

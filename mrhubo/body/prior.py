@@ -1,6 +1,7 @@
 """The human body prior: a variational autoencoder over the local rotations of SMPL's 21 body joints.
 
-It says what a human pose is: decoding any latent near the origin gives a plausible pose, and encoding, then decoding the
+It says what a human pose is: decoding any latent near the origin gives a plausible pose, and encoding, then decoding
+the
 mean, pulls an implausible pose back to a plausible one; how far it had to be pulled is the reconstruction error phi.
 After Pavlakos et al., "Expressive Body Capture" (CVPR 2019), VPoser; ours is trained on the CMU database, see
 `mrhubo.body.training`.
@@ -38,7 +39,11 @@ class BodyPrior(nn.Module):
         super().__init__()
         self.hidden, self.latent = hidden, latent
         self.encoder = nn.Sequential(
-            nn.Linear(_JOINTS * 6, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, 2 * latent)
+            nn.Linear(_JOINTS * 6, hidden),
+            nn.SiLU(),
+            nn.Linear(hidden, hidden),
+            nn.SiLU(),
+            nn.Linear(hidden, 2 * latent),
         )
         self.decoder = nn.Sequential(
             nn.Linear(latent, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, _JOINTS * 6)
@@ -57,7 +62,9 @@ class BodyPrior(nn.Module):
         path = Path(path) if path is not None else SHIPPED_WEIGHTS
         tensors, metadata = read_tensors(path)
         if metadata.get("schema") != _SCHEMA:
-            raise UserError(f"{path}: schema is '{metadata.get('schema')}', expected '{_SCHEMA}' (a body prior of mrhubo)")
+            raise UserError(
+                f"{path}: schema is '{metadata.get('schema')}', expected '{_SCHEMA}' (a body prior of mrhubo)"
+            )
         try:
             prior = cls(hidden=int(metadata["hidden"]), latent=int(metadata["latent"]))
             prior.load_state_dict(tensors)

@@ -1,10 +1,12 @@
 """The human body: SMPL's tree of 22 body joints, points fixed to them, batched forward kinematics, mirroring.
 
-Frame: x to the body's left, y up, z forward, metres. Rest pose: T-pose, arms along +-x, legs along -y, palms down. A pose is
+Frame: x to the body's left, y up, z forward, metres. Rest pose: T-pose, arms along +-x, legs along -y, palms down. A
+pose is
 the local rotation of joints 1..21 (the pelvis is the root and stays at the origin), in SMPL's order.
 
 Legend: B batch, J = 21 posed joints, K keypoints (22 joints and the points fixed to them).
-Source of the lengths: mean skeleton of the CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu); of the hand, eye and
+Source of the lengths: mean skeleton of the CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu); of the hand,
+eye and
 foot points: round numbers of an adult.
 """
 
@@ -102,9 +104,7 @@ def _levels() -> list[list[int]]:
 
 _LEVELS = _levels()
 _MIRROR = [
-    POSED_JOINT_NAMES.index(
-        n.replace("left", "~").replace("right", "left").replace("~", "right")
-    )
+    POSED_JOINT_NAMES.index(n.replace("left", "~").replace("right", "left").replace("~", "right"))
     for n in POSED_JOINT_NAMES
 ]
 

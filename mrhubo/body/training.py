@@ -42,7 +42,8 @@ class PriorConfig:
     """Training of the body prior."""
 
     data: Path
-    """File of training poses: `poses` (F, 66) axis-angle, root first; `clip_starts`, one more than clips; `clip_ids`."""
+    """File of training poses: `poses` (F, 66) axis-angle, root first; `clip_starts`, one more than clips;
+    `clip_ids`."""
     output: Path = SHIPPED_WEIGHTS
     """Where the weights go (.safetensors)."""
     steps: int = bounded(30_000, 1, 100_000_000)
@@ -145,8 +146,10 @@ class PriorTraining(lightning.LightningModule):
     def configure_optimizers(self) -> Any:
         """AdamW, linear warm-up over 2% of the steps, cosine decay to 0."""
         optimizer = torch.optim.AdamW(self.prior.parameters(), self.config.lr, weight_decay=self.config.weight_decay)
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": cosine_schedule(optimizer, self.config.steps),
-                                                         "interval": "step"}}  # fmt: skip
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": cosine_schedule(optimizer, self.config.steps), "interval": "step"},
+        }
 
 
 def cosine_schedule(optimizer: torch.optim.Optimizer, steps: int) -> torch.optim.lr_scheduler.LambdaLR:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from mrhubo.config.help import help_text
-from mrhubo.config.kinds import requires_anything, walk
+from mrhubo.config.kinds import example, requires_anything, walk
 from mrhubo.config.loading import load_config
 from mrhubo.config.schema import Config
 from mrhubo.errors import UserError, unknown_name
@@ -42,7 +42,7 @@ def parse_arguments(
         if name == "--config":
             file = value if equals else next(rest, "")
             if not file or file.startswith("-"):
-                raise UserError("command line: --config needs a file name, for instance --config conf/nao.yaml")
+                raise UserError("command line: --config needs a file name")
             files.append(file)
         elif argument.startswith("--") and argument[2:] in given:
             given[argument[2:]] = True
@@ -51,11 +51,11 @@ def parse_arguments(
         elif equals:
             overrides.append(argument)
         else:
-            raise UserError(_stray(argument))
+            raise UserError(_stray(argument, schema))
     if len(files) > 1:
         raise UserError(f"command line: --config is given {len(files)} times; one file is read")
     if not files and requires_anything(schema):
-        raise UserError(f"command line: --config FILE is missing, for instance {prog} --config conf/nao.yaml")
+        raise UserError(f"command line: --config FILE is missing; {prog} --help lists the keys of that file")
     return load_config(Path(files[0]) if files else None, overrides, schema), given
 
 
@@ -121,7 +121,7 @@ def _unknown_flag(argument: str, schema: type, flags: list[str]) -> str:
     return "command line: " + unknown_name("flag", name, ["--config", "--help", *(f"--{flag}" for flag in flags)])
 
 
-def _stray(argument: str) -> str:
+def _stray(argument: str, schema: type) -> str:
     if argument.endswith((".yaml", ".yml")):
         return f"command line: '{argument}' stands alone: write --config {argument}"
-    return f"command line: '{argument}' is neither a flag nor KEY=VALUE, for instance trainer.lr=0.001"
+    return f"command line: '{argument}' is neither a flag nor KEY=VALUE, for instance {example(schema)}"

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mrhubo.config.kinds import Key, allowed, fields_of, noun, requires_anything, walk
+from mrhubo.config.kinds import Key, allowed, example, fields_of, noun, requires_anything, walk
 
 WIDTH = 100
 
@@ -46,13 +46,13 @@ def help_text(schema: type, prog: str, description: str, flags: Mapping[str, str
     lines = [*textwrap.wrap(usage, WIDTH, subsequent_indent="       "), ""]
     lines += [*textwrap.wrap(" ".join(description.split()), WIDTH), "", "Options:"]
     lines += [line for name, text in options.items() for line in _row(name, [text], column)]
-    lines += ["", *textwrap.wrap(_KEYS_NOTE, WIDTH)]
+    lines += ["", *textwrap.wrap(_KEYS_NOTE.format(example=example(schema)), WIDTH)]
     lines += _section(schema, "", 4 + max((len(key.name) for key in walk(schema) if not key.is_section), default=0))
     return "\n".join(lines) + "\n"
 
 
 _KEYS_NOTE = (
-    "Keys, in the file or as KEY=VALUE on the command line, for instance trainer.lr=0.001, which replaces what the file"
+    "Keys, in the file or as KEY=VALUE on the command line, for instance {example}, which replaces what the file"
     " says. A value is taken literally unless it starts with a bracket or a quote, then it is YAML: a.b='[x, y]'. A"
     " relative path is relative to the file that holds it; on the command line, to the current directory."
 )

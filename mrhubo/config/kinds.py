@@ -71,6 +71,12 @@ def requires_anything(schema: type) -> bool:
     return any(key.required and not key.is_section for key in walk(schema))
 
 
+def example(schema: type) -> str:
+    """A KEY=VALUE that the schema knows, for messages."""
+    numbers = [key for key in walk(schema) if key.kind in (int, float) and isinstance(key.field.default, int | float)]
+    return f"{numbers[0].name}={numbers[0].field.default}" if numbers else "name=value"
+
+
 def noun(kind: Any) -> str:
     """The type in words: ``whole number``, ``list of text``."""
     if dataclasses.is_dataclass(kind):

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from mrhubo.config.kinds import example
 from mrhubo.config.schema import Config
 from mrhubo.config.tree import Node, command_line, describe, parse_typed, read_file
 from mrhubo.config.typed import build
@@ -23,16 +24,16 @@ def load_config(file: Path | str | None, overrides: Sequence[str] = (), schema: 
     """
     root = Node({}, command_line()) if file is None else read_file(Path(file))
     for override in overrides:
-        _replace(root, override)
+        _replace(root, override, schema)
     _interpolate(root)
     return build(schema, root)
 
 
-def _replace(root: Node, override: str) -> None:
+def _replace(root: Node, override: str, schema: type) -> None:
     name, equals, text = override.partition("=")
     parts = name.strip().split(".")
     if not equals or not all(parts):
-        raise UserError(f"command line: '{override}' is not KEY=VALUE, for instance trainer.lr=0.001")
+        raise UserError(f"command line: '{override}' is not KEY=VALUE, for instance {example(schema)}")
     value = parse_typed(text)
     node = root
     for depth, part in enumerate(parts[:-1], start=1):

@@ -28,8 +28,10 @@ class RobotConfig:
     joints: list[str]
     """Joints that are sampled and predicted, by URDF name; their order is the order of the output."""
     keypoints: dict[str, Any]
-    """Which link stands for which part of the human body. Points: `left_` and `right_` `shoulder`, `elbow`, `wrist`, each a
-    link name or {link: NAME, offset: [x, y, z]} (m, in that link's frame). `chest`: the link that carries the arms, with
+    """Which link stands for which part of the human body. Points: `left_` and `right_` `shoulder`, `elbow`, `wrist`,
+    each a
+    link name or {link: NAME, offset: [x, y, z]} (m, in that link's frame). `chest`: the link that carries the arms,
+    with
     optional `forward` and `up` (default [1, 0, 0] and [0, 0, 1]). Optional `left_hand` and `right_hand`: {link: NAME,
     fingers: [x, y, z], thumb: [x, y, z]}, where the fingers point and the thumb lies, in that link's frame. Optional
     `head`: a link name or {link: NAME, forward: ..., up: ...}."""
@@ -60,7 +62,8 @@ class PairsConfig:
     count: int = bounded(50_000, 100, 10_000_000_000)
     """Number of pairs."""
     dir: Path | None = None
-    """Folder for the pairs; default `data/pairs` beside `conf/`. Every pairing config gets a folder of its own in it."""
+    """Folder for the pairs; default `data/pairs` in the project. Every pairing config gets a folder of its own in
+    it."""
     seed: int = bounded(0, 0, 2**63 - 1)
     """Seed of the robot poses and of the amortised solver's training."""
     solver: str = choice("fine", "fine", "fast", "paper")
@@ -96,7 +99,8 @@ class ModelConfig:
     input_joints: list[str] | None = None
     """Human joints that are read; default: those between the chest and the keypoints that the robot has."""
     input_frame: str = choice("chest", "chest", "local")
-    """`chest` turns the joints' local rotations into rotations relative to the chest before the first layer; `local` feeds
+    """`chest` turns the joints' local rotations into rotations relative to the chest before the first layer; `local`
+    feeds
     them as they are (the paper)."""
     bound_output: str = choice("tanh", "tanh", "clamp")
     """How outputs are kept inside the joint limits: `tanh` squashes, `clamp` learns unbounded and cuts off."""
@@ -108,7 +112,7 @@ class ModelConfig:
 class TrainerConfig:
     """The training."""
 
-    max_steps: int = bounded(5_000, 1, 1_000_000_000)
+    max_steps: int = bounded(2_500, 1, 1_000_000_000)
     """Optimiser steps."""
     batch_size: int = bounded(2_048, 1, 10_000_000)
     """Pairs per step."""
@@ -143,8 +147,10 @@ class EvaluationConfig:
 class TrackingConfig:
     """MLflow."""
 
+    dir: Path | None = None
+    """Folder of the MLflow database, its artifacts, packages and unfinished runs; default `mlruns` in the project."""
     uri: str | None = None
-    """Tracking URI; default: `mlruns/mlflow.db` (SQLite) beside `conf/`."""
+    """URI of an MLflow tracking server; default: SQLite, `mlflow.db` in `dir`."""
     experiment: str = "mrhubo"
     """Experiment name."""
     run_name: str | None = None

@@ -1,6 +1,7 @@
 """The amortised solver: a small network from target keypoints to the latent, trained per robot on the IK cost itself.
 
-No labels: every step draws fresh robot poses and lowers the cost of the network's own answers. Training is resumed exactly
+No labels: every step draws fresh robot poses and lowers the cost of the network's own answers. Training is resumed
+exactly
 from its last checkpoint, because step s draws from (seed, s) alone.
 
 Legend: B batch, K used keypoints, Z latent numbers.
@@ -34,9 +35,14 @@ class Amortiser(nn.Module):
         self.register_buffer("center_F", torch.zeros(3 * keypoints))
         self.register_buffer("scale_F", torch.ones(3 * keypoints))
         self.layers = nn.Sequential(
-            nn.Linear(3 * keypoints, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, hidden),
-            nn.SiLU(), nn.Linear(hidden, latent),
-        )  # fmt: skip
+            nn.Linear(3 * keypoints, hidden),
+            nn.SiLU(),
+            nn.Linear(hidden, hidden),
+            nn.SiLU(),
+            nn.Linear(hidden, hidden),
+            nn.SiLU(),
+            nn.Linear(hidden, latent),
+        )
 
     def standardise(self, sample_BK3: Tensor) -> None:
         """Sets centre and scale; a coordinate that never varies (a pinned keypoint) is fed as zero."""
@@ -110,7 +116,9 @@ def _state(network: Amortiser, optimizer: torch.optim.Optimizer | None = None, s
     return tensors
 
 
-def _restore(path: Path, header: dict[str, str], network: Amortiser, optimizer: torch.optim.Optimizer | None = None) -> int:
+def _restore(
+    path: Path, header: dict[str, str], network: Amortiser, optimizer: torch.optim.Optimizer | None = None
+) -> int:
     """Loads what `_state` gave; the step reached (1 for a finished network), or 0 if there is nothing usable."""
     try:
         tensors, found = read_tensors(path)

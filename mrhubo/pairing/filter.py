@@ -35,7 +35,8 @@ def make_filter(phi_P: Tensor, rule: str, k: float) -> PairFilter:
 
     Args:
         phi_P: reconstruction errors.
-        rule: `linear` (1 at the smallest phi, falling linearly to 0 at the threshold), `hard` (1 up to the threshold) or
+        rule: `linear` (1 at the smallest phi, falling linearly to 0 at the threshold), `hard` (1 up to the
+        threshold) or
             `none` (1 everywhere).
         k: the threshold is mean + k * standard deviation.
     """

@@ -52,7 +52,13 @@ class PairGenerator:
             return
         settings, header = self.settings, {**store.header, "what": "amortiser"}
         self.amortiser = train_amortiser(
-            self.problem, self.draw_targets, settings.amortiser_steps, settings.seed, store.amortiser_path, header, progress
+            self.problem,
+            self.draw_targets,
+            settings.amortiser_steps,
+            settings.seed,
+            store.amortiser_path,
+            header,
+            progress,
         )
 
     def solve(self, target_BK3: Tensor) -> Tensor:

@@ -15,7 +15,8 @@ _ITERATIONS = 500
 
 
 def solve_lbfgs(problem: LatentProblem, target_BK3: Tensor) -> Tensor:
-    """Latents (B, Z) as the paper finds them: L-BFGS with strong Wolfe search on the summed cost of 500 poses at a time.
+    """Latents (B, Z) as the paper finds them: L-BFGS with strong Wolfe search on the summed cost of 500 poses at a
+    time.
 
     Up to 500 iterations from z = 0; one step length and one stop for all 500 poses.
     """
@@ -42,7 +43,8 @@ def solve_levenberg_marquardt(
     """Latents (B, Z) from the given start, each pose with its own damping and its own stop.
 
     A step is taken only if it lowers that pose's cost; a refused step raises the damping and solves again with the same
-    normal equations. A pose leaves the batch when an accepted step lowers its cost by less than `tolerance` of it, or when
+    normal equations. A pose leaves the batch when an accepted step lowers its cost by less than `tolerance` of it,
+    or when
     its damping shows that no step helps.
 
     Args:

@@ -24,7 +24,12 @@ class LatentProblem:
     """Cost, keypoints and Jacobian of latents for one prior, one skeleton and one set of used keypoints."""
 
     def __init__(
-        self, prior: BodyPrior, skeleton: Skeleton, keypoints: Sequence[int], w_data: float = 100.0, w_prior: float = 0.01
+        self,
+        prior: BodyPrior,
+        skeleton: Skeleton,
+        keypoints: Sequence[int],
+        w_data: float = 100.0,
+        w_prior: float = 0.01,
     ) -> None:
         self.prior, self.skeleton, self.keypoints = prior, skeleton, list(keypoints)
         self.w_data, self.w_prior, self.latent = w_data, w_prior, prior.latent
@@ -65,7 +70,8 @@ class LatentProblem:
     def linearise(self, z_BZ: Tensor) -> tuple[Tensor, Tensor]:
         """Used keypoints (B, K, 3) [m] and their Jacobian (B, 3K, Z), by the chain rule.
 
-        Forward through the decoder as matrix products over all Z columns at once; then each joint's angular velocity from
+        Forward through the decoder as matrix products over all Z columns at once; then each joint's angular velocity
+        from
         the derivative of Gram-Schmidt; then v_k = sum of omega_j x (p_k - p_j) over the joints that move keypoint k.
         """
         batch = len(z_BZ)
@@ -94,7 +100,9 @@ class LatentProblem:
 
 
 def _movers(keypoint: int) -> list[int]:
-    """Joints (indices in JOINT_NAMES, no pelvis) whose rotation moves a keypoint; a joint does not move its own centre."""
+    """Joints (indices in JOINT_NAMES, no pelvis) whose rotation moves a keypoint; a joint does not move its own
+    centre.
+    """
     joint = KEYPOINT_JOINT[keypoint]
     start = PARENTS[joint] if keypoint < len(JOINT_NAMES) else joint
     return [j for j in ancestors(start) if j > 0]

@@ -1,6 +1,8 @@
-"""Pairs on disk: a folder per pairing config, shards that are whole or absent, each dependent on (config, seed, index) only.
+"""Pairs on disk: a folder per pairing config, shards that are whole or absent, each dependent on (config, seed,
+index) only.
 
-The folder is named after the robot and the fingerprint of everything that decides the pairs, and each shard's header repeats
+The folder is named after the robot and the fingerprint of everything that decides the pairs, and each shard's header
+repeats
 it, so that pairs of two configs never mix. How many pairs are wanted is not part of it: more pairs reuse what is there.
 """
 
@@ -15,6 +17,7 @@ from torch import Tensor
 from mrhubo.body.prior import SHIPPED_WEIGHTS
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
+from mrhubo.robot import Robot
 from mrhubo.storage import DamagedFile, checksum_file, read_tensors, write_tensors
 
 SCHEMA = "mrhubo.pairs/1"
@@ -23,19 +26,19 @@ _NOT_IN_PAIRS = ("count", "dir", "filter", "filter_k")
 _NOT_IN_ROBOT = ("urdf", "key_links")
 
 
-def pairs_header(config: Config) -> dict[str, str]:
-    """What decides the pairs: settings, seed, and checksums of the URDF and the prior."""
+def pairs_header(config: Config, robot: Robot) -> dict[str, str]:
+    """What decides the pairs: settings, seed, the robot's kinematics and the prior's checksum."""
     plain = to_plain(config)
     pairs = {k: v for k, v in plain["pairs"].items() if k not in _NOT_IN_PAIRS}
-    robot = {k: v for k, v in plain["robot"].items() if k not in _NOT_IN_ROBOT}
-    urdf, prior = checksum_file(config.robot.urdf), checksum_file(config.body.prior_path or SHIPPED_WEIGHTS)
+    parts = {k: v for k, v in plain["robot"].items() if k not in _NOT_IN_ROBOT}
+    kinematics, prior = robot.description.kinematics, checksum_file(config.body.prior_path or SHIPPED_WEIGHTS)
     return {
         "schema": SCHEMA,
         "robot": config.robot.name,
-        "urdf_xxh3": urdf,
+        "kinematics": kinematics,
         "prior_xxh3": prior,
         "seed": str(config.pairs.seed),
-        "fingerprint": fingerprint({"schema": SCHEMA, "pairs": pairs, "robot": robot, "urdf": urdf, "prior": prior}),
+        "fingerprint": fingerprint({"schema": SCHEMA, "pairs": pairs, "robot": parts, "kinematics": kinematics, "prior": prior}),
     }
 
 
@@ -49,10 +52,10 @@ class PairStore:
         self.shards = -(-count // shard_size)
 
     @classmethod
-    def of(cls, config: Config) -> PairStore:
+    def of(cls, config: Config, robot: Robot) -> PairStore:
         """The store of a config's pairs; `pairs.dir` must be set."""
         assert config.pairs.dir is not None
-        header = pairs_header(config)
+        header = pairs_header(config, robot)
         return cls(config.pairs.dir, header, config.pairs.count, config.pairs.shard_size, len(config.robot.joints))
 
     @property
@@ -91,9 +94,14 @@ class PairStore:
             raise DamagedFile(f"{path}: was made for other settings than this config's")
         size = self.shard_size
         shapes = {
-            "q": (size, self.joints), "R": (size, self.joints, 6), "H": (size, len(POSED_JOINT_NAMES), 6),
-            "phi": (size,), "cost": (size,), "residual_m": (size,), "z_norm": (size,),
-        }  # fmt: skip
+            "q": (size, self.joints),
+            "R": (size, self.joints, 6),
+            "H": (size, len(POSED_JOINT_NAMES), 6),
+            "phi": (size,),
+            "cost": (size,),
+            "residual_m": (size,),
+            "z_norm": (size,),
+        }
         for name, shape in shapes.items():
             if name not in tensors or tuple(tensors[name].shape) != shape:
                 found = tuple(tensors[name].shape) if name in tensors else "nothing"

@@ -16,7 +16,9 @@ from mrhubo.errors import UserError
 
 
 class PoseFeatures(nn.Module):
-    """What the network sees of a human pose: rotations of the input joints, 6D columns, local or relative to the chest."""
+    """What the network sees of a human pose: rotations of the input joints, 6D columns, local or relative to the
+    chest.
+    """
 
     def __init__(self, input_joints: Sequence[str], frame: str) -> None:
         super().__init__()
@@ -52,7 +54,8 @@ def _mlp(size_in: int, hidden: int, layers: int, size_out: int) -> nn.Sequential
 class LimitedOutput(nn.Module):
     """Keeps joint angles inside the limits, whatever comes in.
 
-    `tanh` squashes the numbers that come in; `clamp` cuts off, and lets the training see the angles before the cut, so that
+    `tanh` squashes the numbers that come in; `clamp` cuts off, and lets the training see the angles before the cut,
+    so that
     an answer beyond the limit still feels a gradient.
     """
 
@@ -80,9 +83,15 @@ class RetargetNetwork(nn.Module):
     """Pre- and post-network (two stages), or one network from pose to joints (one stage)."""
 
     def __init__(
-        self, features: PoseFeatures, lower_N: Tensor, upper_N: Tensor, stages: int = 2, hidden: int = 512, layers: int = 2,
+        self,
+        features: PoseFeatures,
+        lower_N: Tensor,
+        upper_N: Tensor,
+        stages: int = 2,
+        hidden: int = 512,
+        layers: int = 2,
         bound_output: str = "tanh",
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__()
         self.features, self.stages, joints = features, stages, len(lower_N)
         links = 6 * joints

@@ -20,6 +20,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import open_prior
+from mrhubo.body.prior import SHIPPED_WEIGHTS
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
@@ -28,7 +29,7 @@ from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
 
 SCHEMA = "mrhubo.retargeter/1"
-_WEIGHTS, _URDF, _CONFIG = "retargeter.safetensors", "robot.urdf", "config.yaml"
+_WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _AGREEMENT_DEG = 20.0
 
 
@@ -103,6 +104,8 @@ class Retargeter:
         robot = self.body_map.robot
         with atomic_path(folder / _URDF) as temporary:
             shutil.copyfile(self.config.robot.urdf, temporary)
+        with atomic_path(folder / _PRIOR) as temporary:
+            shutil.copyfile(self.config.body.prior_path or SHIPPED_WEIGHTS, temporary)
         with atomic_path(folder / _CONFIG) as temporary:
             temporary.write_text(_portable(self.config))
         metadata = {
@@ -145,10 +148,11 @@ class Retargeter:
 
 
 def _portable(config: Config) -> str:
-    """The config as YAML whose only path is the URDF beside it."""
+    """The config as YAML whose only paths are the files beside it."""
     config = copy.deepcopy(config)
     config.robot.urdf = Path(_URDF)
+    config.body.prior_path = Path(_PRIOR)
     config.pairs.dir = None
     config.evaluation.motions = []
-    config.tracking.uri = None
+    config.tracking.dir = config.tracking.uri = None
     return to_yaml(config)

@@ -65,8 +65,10 @@ def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
     for word in words:
         given = value.get(word) if isinstance(value, Mapping) else None
         if given is None and word not in _DEFAULT_AXES:
-            raise UserError(f"robot.keypoints.{key}: '{word}' is missing; give {{link: NAME, {words[0]}: [x, y, z], "
-                            f"{words[1]}: [x, y, z]}} in the link's frame")  # fmt: skip
+            raise UserError(
+                f"robot.keypoints.{key}: '{word}' is missing; give {{link: NAME, {words[0]}: [x, y, z], "
+                f"{words[1]}: [x, y, z]}} in the link's frame"
+            )
         axes.append(torch.tensor(_DEFAULT_AXES[word] if given is None else _read_vector(f"{key}.{word}", given)))
     first, second = axes
     if first.norm() < 1e-6 or torch.linalg.cross(first, second).norm() < 1e-3 * first.norm() * max(second.norm(), 1e-6):

@@ -1,7 +1,9 @@
 """Robot links as human body parts: unit directions that robot and human share, and human keypoints built from them.
 
-A direction is seen from the chest, in human axes (x left, y up, z forward), so neither proportions nor the way a base faces
-matter. Limbs (upper arm, forearm) have one direction, oriented ends (hand, head) two: fingers and thumb, forward and up.
+A direction is seen from the chest, in human axes (x left, y up, z forward), so neither proportions nor the way a
+base faces
+matter. Limbs (upper arm, forearm) have one direction, oriented ends (hand, head) two: fingers and thumb, forward and
+up.
 
 `scale: auto` then gives each limb the human's length: keypoints are chained outwards from the shoulders of a human who
 stands upright, along the robot's directions. No number is tuned.
@@ -106,7 +108,7 @@ class BodyMap:
             if float(change) < 1e-4:
                 raise UserError(
                     f"robot.joints: '{joint}' turns no limb, hand or head of robot.keypoints relative to the chest "
-                    f"'{self.chest.link}', so no human pose could tell its angle; leave it out or name the part it moves"
+                    f"'{self.chest.link}', so no human pose could tell its angle; leave it out or name what it moves"
                 )
 
     def robot_directions(self, poses: LinkPoses) -> Tensor:
@@ -142,7 +144,7 @@ class BodyMap:
         return torch.stack(columns, dim=1) @ rotations[:, JOINT_NAMES.index("spine3")]
 
     def _list_keypoints(self) -> None:
-        names = list(_PINNED)
+        names: list[str] = list(_PINNED)
         for d in self.directions:
             if d.axis_3 is None:
                 names.append(d.name)
@@ -248,7 +250,9 @@ def build_body_map(config: RobotConfig) -> BodyMap:
         side, part = name.split("_")
         inner = dict((b, a) for a, b in _LIMBS).get(part)
         if inner and f"{side}_{inner}" not in points:
-            raise UserError(f"robot.keypoints: '{name}' needs '{side}_{inner}' too; a limb is a direction between the two")
+            raise UserError(
+                f"robot.keypoints: '{name}' needs '{side}_{inner}' too; a limb is a direction between the two"
+            )
     ends = {name: read_end(name, entries[name], _ENDS[name]) for name in _ENDS if name in entries}
     for name in ends:
         if name != "head" and name.replace("hand", "wrist") not in points:
@@ -271,5 +275,7 @@ def _check_lengths(body_map: BodyMap) -> None:
     names = [d.name for d in body_map.directions if d.axis_3 is None]
     for name, shortest in zip(names, length.tolist(), strict=True):
         if shortest < 1e-4:
-            raise UserError(f"robot.keypoints: '{_limb_of(name)[0]}' and '{name}' lie on one point, so the limb has no "
-                            "direction; choose another link or an offset")  # fmt: skip
+            raise UserError(
+                f"robot.keypoints: '{_limb_of(name)[0]}' and '{name}' lie on one point, so the limb has no "
+                "direction; choose another link or an offset"
+            )

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytorch_kinematics as pk
 import torch
-from lxml import etree
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
@@ -135,7 +135,9 @@ class Robot:
         return torch.zeros_like(self.lower_N).clamp(self.lower_N, self.upper_N)
 
     def configuration(self, q_N: np.ndarray) -> dict[str, float]:
-        """Angles [rad] of every joint of the URDF that is not fixed and mimics none, for tools that pose the whole robot."""
+        """Angles [rad] of every joint of the URDF that is not fixed and mimics none, for tools that pose the whole
+        robot.
+        """
         free = {n: a for n, a in self.held.items() if self.description.joints[n].mimic is None}
         return {**free, **dict(zip(self.joint_names, map(float, q_N), strict=True))}
 

@@ -13,9 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import yourdfpy
-from lxml import etree
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
+from mrhubo.config import fingerprint
 from mrhubo.errors import UserError, unknown_name
+
+# It warns at every pose about mimic joints whose source is fixed (NAO's fingers), which is no news to our users.
+logging.getLogger("yourdfpy.urdf").setLevel(logging.ERROR)
 
 _MAX_BYTES = 50_000_000
 _ROTARY = ("revolute", "continuous")
@@ -32,7 +36,9 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: from link `parent` to link `child`, placed by `origin_44`, turning about `axis_3` (unit, child frame)."""
+    """One joint: from link `parent` to link `child`, placed by `origin_44`, turning about `axis_3` (unit, child
+    frame).
+    """
 
     name: str
     kind: str
@@ -60,6 +66,16 @@ class Description:
     joints: dict[str, Joint]
     parent_joint: dict[str, Joint]
     """The joint above each link but the root."""
+
+    @property
+    def kinematics(self) -> str:
+        """Fingerprint of joints, limits and axes; looks and masses are not in it."""
+        joints = []
+        for j in self.joints.values():
+            mimic = None if j.mimic is None else [j.mimic.joint, j.mimic.multiplier, j.mimic.offset]
+            place = [j.origin_44.tolist(), j.axis_3.tolist()]
+            joints.append([j.name, j.kind, j.parent, j.child, place, repr(j.lower), repr(j.upper), mimic])
+        return fingerprint([self.root, joints])
 
     def joint(self, name: str) -> Joint:
         """UserError with the nearest name if there is no such joint."""
@@ -91,10 +107,9 @@ def load_urdf(path: Path) -> yourdfpy.URDF:
     if not path.is_file():
         raise UserError(f"robot.urdf: {path} does not exist; name a URDF file, relative to the YAML")
     if path.stat().st_size > _MAX_BYTES:
-        raise UserError(f"robot.urdf: {path} has {path.stat().st_size:,} bytes; the most that is read is {_MAX_BYTES:,}")
-    noisy = logging.getLogger("yourdfpy.urdf")
-    level = noisy.level
-    noisy.setLevel(logging.ERROR)
+        raise UserError(
+            f"robot.urdf: {path} has {path.stat().st_size:,} bytes; the most that is read is {_MAX_BYTES:,}"
+        )
     try:
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
         tree = etree.parse(str(path), parser)
@@ -104,16 +119,17 @@ def load_urdf(path: Path) -> yourdfpy.URDF:
         clean = _kinematic_part(tree.getroot())
         return yourdfpy.URDF.load(
             io.BytesIO(etree.tostring(clean)),
-            build_scene_graph=True, build_collision_scene_graph=False, load_meshes=False, load_collision_meshes=False,
-        )  # fmt: skip
+            build_scene_graph=True,
+            build_collision_scene_graph=False,
+            load_meshes=False,
+            load_collision_meshes=False,
+        )
     except (etree.XMLSyntaxError, OSError) as error:
         raise UserError(f"robot.urdf: {path} is no well-formed XML: {error}") from error
     except UserError:
         raise
     except Exception as error:
         raise UserError(f"robot.urdf: {path} cannot be read as a URDF: {type(error).__name__}: {error}") from error
-    finally:
-        noisy.setLevel(level)
 
 
 def _kinematic_part(robot: etree._Element) -> etree._Element:
@@ -142,11 +158,14 @@ def _check_structure(path: Path, robot: etree._Element) -> None:
             element = joint.find(end)
             link = element.get("link") if element is not None else None
             if link not in links:
-                raise UserError(f"robot.urdf: {path}: joint '{joint.get('name')}' has the {end} link '{link}', "
-                                "which does not exist")  # fmt: skip
+                raise UserError(
+                    f"robot.urdf: {path}: joint '{joint.get('name')}' has the {end} link '{link}', which does not exist"
+                )
             if end == "child" and link in children:
-                raise UserError(f"robot.urdf: {path}: link '{link}' hangs on two joints, '{children[link]}' and "
-                                f"'{joint.get('name')}'")  # fmt: skip
+                raise UserError(
+                    f"robot.urdf: {path}: link '{link}' hangs on two joints, '{children[link]}' and "
+                    f"'{joint.get('name')}'"
+                )
             if end == "child":
                 children[link] = joint.get("name")
                 below.setdefault(joint.find("parent").get("link"), []).append(link)
@@ -166,7 +185,8 @@ def describe(path: Path) -> Description:
     """Joints, links and the root of a URDF file.
 
     Raises:
-        UserError: the file is missing or no URDF; it has several roots, a loop, or a floating or planar joint anywhere but
+        UserError: the file is missing or no URDF; it has several roots, a loop, or a floating or planar joint
+        anywhere but
             directly under the root (where it only places the robot in the world, and is taken as fixed).
     """
     robot = load_urdf(path).robot
@@ -177,8 +197,10 @@ def describe(path: Path) -> Description:
         kind = joint.type
         if kind in ("floating", "planar"):
             if joint.parent != root:
-                raise UserError(f"{path}: joint '{joint.name}' is {kind}; only rotary, prismatic and fixed joints can be "
-                                "handled below the root")  # fmt: skip
+                raise UserError(
+                    f"{path}: joint '{joint.name}' is {kind}; only rotary, prismatic and fixed joints can be "
+                    "handled below the root"
+                )
             kind = "fixed"
         elif kind not in (*_ROTARY, "prismatic", "fixed"):
             raise UserError(f"{path}: joint '{joint.name}' has the unknown type '{kind}'")
@@ -190,17 +212,25 @@ def describe(path: Path) -> Description:
         limit = joint.limit if kind != "continuous" else None
         mimic = joint.mimic
         joints[joint.name] = Joint(
-            joint.name, kind, joint.parent, joint.child, origin, axis / max(length, 1e-9),
+            joint.name,
+            kind,
+            joint.parent,
+            joint.child,
+            origin,
+            axis / max(length, 1e-9),
             None if limit is None or limit.lower is None else float(limit.lower),
             None if limit is None or limit.upper is None else float(limit.upper),
-            None if mimic is None else Mimic(
+            None
+            if mimic is None
+            else Mimic(
                 mimic.joint,
                 1.0 if mimic.multiplier is None else float(mimic.multiplier),
                 0.0 if mimic.offset is None else float(mimic.offset),
             ),
-        )  # fmt: skip
-    return Description(path, root, tuple(link.name for link in robot.links), joints,
-                       {joint.child: joint for joint in joints.values()})  # fmt: skip
+        )
+    return Description(
+        path, root, tuple(link.name for link in robot.links), joints, {joint.child: joint for joint in joints.values()}
+    )
 
 
 def joint_range(path: Path, joint: Joint, narrower: list[float] | None) -> tuple[float, float]:
@@ -212,11 +242,14 @@ def joint_range(path: Path, joint: Joint, narrower: list[float] | None) -> tuple
     if not joint.rotary:
         raise UserError(f"{path}: joint '{joint.name}' is {joint.kind}; only rotary joints can be sampled")
     if joint.mimic is not None:
-        raise UserError(f"{path}: joint '{joint.name}' mimics '{joint.mimic.joint}'; name '{joint.mimic.joint}' instead")
+        raise UserError(
+            f"{path}: joint '{joint.name}' mimics '{joint.mimic.joint}'; name '{joint.mimic.joint}' instead"
+        )
     if narrower is not None:
         if len(narrower) != 2 or not all(map(math.isfinite, narrower)) or not narrower[0] < narrower[1]:
-            raise UserError(f"robot.ranges.{joint.name}: expected [lower, upper] in rad with lower < upper, "
-                            f"found {list(narrower)}")  # fmt: skip
+            raise UserError(
+                f"robot.ranges.{joint.name}: expected [lower, upper] in rad with lower < upper, found {list(narrower)}"
+            )
     if joint.lower is None or joint.upper is None:
         if narrower is None:
             raise UserError(f"{path}: joint '{joint.name}' has no limits; give it a range in robot.ranges")
@@ -226,6 +259,7 @@ def joint_range(path: Path, joint: Joint, narrower: list[float] | None) -> tuple
     if narrower is None:
         return joint.lower, joint.upper
     if narrower[0] < joint.lower - 1e-9 or narrower[1] > joint.upper + 1e-9:
-        raise UserError(f"robot.ranges.{joint.name}: {list(narrower)} leaves the URDF's limits "
-                        f"{joint.lower} .. {joint.upper}")  # fmt: skip
+        raise UserError(
+            f"robot.ranges.{joint.name}: {list(narrower)} leaves the URDF's limits {joint.lower} .. {joint.upper}"
+        )
     return narrower[0], narrower[1]

@@ -52,7 +52,9 @@ def test_the_mirrored_pose_puts_the_mirrored_points() -> None:
 
 
 def _other_side(name: str) -> str:
-    return {"left": "right", "right": "left"}.get(name.split("_")[0], name.split("_")[0]) + name[len(name.split("_")[0]) :]
+    return {"left": "right", "right": "left"}.get(name.split("_")[0], name.split("_")[0]) + name[
+        len(name.split("_")[0]) :
+    ]
 
 
 def test_turning_an_elbow_moves_only_what_hangs_on_it() -> None:

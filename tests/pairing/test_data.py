@@ -38,7 +38,9 @@ def test_an_epoch_depends_on_seed_and_epoch_alone() -> None:
 def test_rows_stay_together() -> None:
     count = 200
     number = torch.arange(count, dtype=torch.float32)
-    table = PairTable(number[:, None].expand(-1, 4), number[:, None, None].expand(-1, 2, 6), number[:, None].expand(-1, 2))
+    table = PairTable(
+        number[:, None].expand(-1, 4), number[:, None, None].expand(-1, 2, 6), number[:, None].expand(-1, 2)
+    )
     loader = PairData(table, make_filter(torch.rand(count), "none", 1.0), 32, 3, 0).train_dataloader()
     for features, links, joints in loader:
         assert features.shape == (32, 4) and links.shape == (32, 2, 6) and joints.shape == (32, 2)

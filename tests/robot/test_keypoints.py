@@ -26,7 +26,9 @@ def body_map_of(root: Path, name: str, **keypoints: Any) -> BodyMap:
 
 
 def directions(body_map: BodyMap, count: int = 50) -> torch.Tensor:
-    return body_map.robot_directions(body_map.robot.forward(body_map.robot.sample(count, torch.Generator().manual_seed(0))))
+    return body_map.robot_directions(
+        body_map.robot.forward(body_map.robot.sample(count, torch.Generator().manual_seed(0)))
+    )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -53,7 +55,9 @@ def test_keypoints_keep_the_directions(root: Path, name: str) -> None:
     for i, direction in enumerate(body_map.direction_names):
         if direction.endswith(("elbow", "wrist")):
             start = direction.replace("wrist", "_").replace("elbow", "shoulder").replace("_shoulder", "_shoulder")
-            start = direction.replace("elbow", "shoulder") if "elbow" in direction else direction.replace("wrist", "elbow")
+            start = (
+                direction.replace("elbow", "shoulder") if "elbow" in direction else direction.replace("wrist", "elbow")
+            )
             seen = torch.nn.functional.normalize(at[direction] - at[start], dim=-1)
             torch.testing.assert_close(seen, found[:, i], atol=1e-5, rtol=0)
 

@@ -1,0 +1,18 @@
+"""What happens around a training: metrics on clips, pictures, progress."""
+
+from mrhubo.callbacks.clips import Clip, Motions, load_motions, solve_references
+from mrhubo.callbacks.metrics import ClipMetrics, ClipScore, mean_score, predict_clips, score_clips
+from mrhubo.callbacks.progress import TrainingProgress
+
+__all__ = [
+    "Clip",
+    "ClipMetrics",
+    "ClipScore",
+    "Motions",
+    "TrainingProgress",
+    "load_motions",
+    "mean_score",
+    "predict_clips",
+    "score_clips",
+    "solve_references",
+]

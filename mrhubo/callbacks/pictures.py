@@ -1,0 +1,95 @@
+"""Pictures of pairs and of retargeted clips.
+
+Legend: T frames, J = 21 human joints, N robot joints.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from PIL.Image import Image
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body import KEYPOINT_NAMES, BodyPrior, Skeleton
+from mrhubo.callbacks.clips import Clip
+from mrhubo.pairing import PairFilter
+from mrhubo.robot import Robot, load_urdf
+from mrhubo.view import (
+    Solids,
+    common_cameras,
+    contact_sheet,
+    human_solids,
+    read_geometry,
+    render,
+    robot_solids,
+    stick_solids,
+)
+
+_SIZE = (220, 260)
+_REFERENCE_TINT = (0.55, 0.62, 0.72)
+_FIGURE_HEIGHT_M = 1.7
+
+
+class Artist:
+    """Draws one robot and the human, both at one height."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.urdf, self.skeleton = robot, load_urdf(robot.urdf), Skeleton()
+        self.geometry = read_geometry(self.urdf)
+        self.parents = {joint.child: joint.parent for joint in self.urdf.robot.joints}
+        height = float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2]))
+        self.scale = _FIGURE_HEIGHT_M / max(height, 1e-3)
+
+    def human(self, pose_J6: Tensor) -> Solids:
+        """A human in a pose (21, 6)."""
+        with torch.no_grad():
+            points = self.skeleton.keypoints(rotation.sixd_to_matrix(pose_J6[None].float()))[0]
+        return human_solids(points.numpy(), KEYPOINT_NAMES)
+
+    def robot_figure(self, q_N: Tensor, scaled: bool = True) -> Solids:
+        """The robot at joint angles (N,) [rad], scaled to the human's height."""
+        wanted = self.robot.configuration(q_N.numpy())
+        self.urdf.update_cfg({name: wanted[name] for name in self.urdf.actuated_joint_names if name in wanted})
+        root = self.robot.description.root
+        poses = {link: self.urdf.get_transform(link, root) for link in self.robot.description.links}
+        solids = robot_solids(self.geometry, poses) if self.geometry else stick_solids(poses, self.parents)
+        return solids.scaled(self.scale) if scaled else solids
+
+    def sheet(self, rows: list[list[Solids]], columns: list[str], titles: list[str], caption: str) -> Image:
+        """A table of figures, all at one scale."""
+        flat = [figure for row in rows for figure in row]
+        cameras = iter(common_cameras(flat, _SIZE))
+        pictures = [[render(figure, _SIZE, next(cameras)) for figure in row] for row in rows]
+        return contact_sheet(pictures, columns, titles, caption)
+
+    def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, prior: BodyPrior, count: int = 3) -> Image:
+        """Robot pose, human pose and denoised human pose, as in the paper's figure 1: feasible above, extreme below."""
+        order = pairs["phi"].argsort()
+        kept = int((pairs["phi"] <= pair_filter.threshold).sum())
+        feasible = [int(order[int(share * max(kept - 1, 0))]) for share in np.linspace(0.02, 0.6, count)]
+        extreme = [
+            int(order[-1 - int(share * max(len(order) - kept - 1, 0))]) for share in np.linspace(0.0, 0.5, count)
+        ]
+        rows, titles = [], []
+        with torch.no_grad():
+            for kind, chosen in (("feasible", feasible), ("extreme", extreme)):
+                for index in chosen:
+                    pose = pairs["H"][index]
+                    denoised = prior.denoise(pose[None])[0]
+                    rows.append([self.robot_figure(pairs["q"][index]), self.human(pose), self.human(denoised)])
+                    titles.append(f"{kind}\nphi {float(pairs['phi'][index]):.2g}")
+        columns = ["robot pose q", "human pose H", "denoised H~"]
+        return self.sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
+
+    def key_poses(self, clip: Clip, prediction_TN: Tensor, count: int = 6) -> Image:
+        """Human, reference and prediction at evenly spaced frames of a clip."""
+        frames = [round(f) for f in np.linspace(0.08, 0.92, count) * (len(prediction_TN) - 1)]
+        rows = [
+            [self.human(clip.motion.pose_TJ6[f]) for f in frames],
+            [self.robot_figure(clip.reference_TN[f]).recolored(_REFERENCE_TINT) for f in frames],
+            [self.robot_figure(prediction_TN[f]) for f in frames],
+        ]
+        columns = [f"{f / clip.motion.frame_rate:.1f} s" for f in frames]
+        name = f"{self.robot.name}: {clip.name}" + (f" ({clip.motion.description})" if clip.motion.description else "")
+        return self.sheet(rows, columns, ["human", "reference", "mrhubo"], name)

@@ -1,0 +1,71 @@
+"""`python -m mrhubo.fit --config conf/nao.yaml`: from a robot's URDF to a trained, measured, tracked retargeter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mrhubo.config import Config, parse_arguments, run_command
+
+DESCRIPTION = (
+    "Makes pairs of robot and human poses from a robot's URDF, trains the retargeter on them, measures it on human"
+    " motion, and keeps everything in MLflow. Interrupt it at any time: the same command goes on where it stopped."
+)
+FLAGS = {"quiet": "no progress lines"}
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What a fit leaves behind."""
+
+    package: Path
+    run_id: str
+    table: str
+    measures: dict[str, float]
+
+
+def fit(config: Config, quiet: bool = False) -> FitResult:
+    """Runs all steps; what an earlier, interrupted call finished is not done again.
+
+    Raises:
+        UserError: anything in the config or the files it names is wrong (before any work).
+        KeyboardInterrupt: the user stopped it; the same call resumes.
+    """
+    from mrhubo import pipeline
+    from mrhubo.recording import Recording
+    from mrhubo.retargeter import Retargeter
+    from mrhubo.workspace import Workspace
+
+    prepared = pipeline.prepare(config)
+    folder = Recording.folder(config)
+    with Workspace(folder / "fits", config.robot.name, prepared.fingerprint) as workspace:
+        with Recording.start(prepared, workspace) as recording:
+            report = pipeline.make_pairs(prepared, quiet)
+            validation, test = pipeline.make_references(prepared, quiet)
+            training = pipeline.train(
+                prepared, validation, recording.logger, workspace.checkpoints, workspace.last_checkpoint(), quiet
+            )
+            recording.resume_after_training()
+            recording.pairs(training.pairs, training.filter, report)
+            predictions, scores = pipeline.score_test(prepared, training.network, test)
+            retargeter = Retargeter(training.network, prepared.body_map, config, training.filter.threshold)
+            recording.scores(scores, training.best_link_cm)
+            recording.key_poses(test, predictions)
+            package = recording.package(retargeter, scores[-1], training.best_checkpoint)
+            workspace.finish()
+        measures = {"joint_rad": scores[-1].joint_rad, "link_cm": scores[-1].link_cm}
+        return FitResult(package, recording.run_id, recording.table(scores), measures)
+
+
+def main(argv: list[str]) -> None:
+    """The command."""
+    config, flags = parse_arguments(argv, "mrhubo.fit", DESCRIPTION, flags=FLAGS)
+    result = fit(config, flags["quiet"])
+    from mrhubo.recording import Recording, dashboard_command
+
+    print(f"\n{result.table}\n\npackage:   {result.package}")
+    print(f"dashboard: {dashboard_command(Recording.folder(config), config)}")
+
+
+if __name__ == "__main__":
+    run_command(main)

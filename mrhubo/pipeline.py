@@ -1,0 +1,241 @@
+"""The steps of a fit, one function each: check, pairs, training, test, package. `mrhubo.fit` strings them together.
+
+Everything a user can get wrong is checked by `prepare`, before any work.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import lightning
+import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
+from lightning.pytorch.loggers import Logger
+from torch import Tensor
+
+from mrhubo.body import BodyPrior
+from mrhubo.callbacks import (
+    Clip,
+    ClipMetrics,
+    ClipScore,
+    Motions,
+    TrainingProgress,
+    load_motions,
+    mean_score,
+    predict_clips,
+    score_clips,
+    solve_references,
+)
+from mrhubo.config import Config, fingerprint, to_plain
+from mrhubo.errors import UserError
+from mrhubo.locations import default_motions, default_pairs
+from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairStore, generate_pairs, make_filter
+from mrhubo.pairing.data import PairData, PairTable
+from mrhubo.progress import Progress
+from mrhubo.retargeter import RetargetModule, RetargetNetwork, build_network
+from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.storage import checksum_file
+
+
+@dataclass
+class Prepared:
+    """A config whose every part has been checked."""
+
+    config: Config
+    body_map: BodyMap
+    prior: BodyPrior
+    motions: Motions
+    store: PairStore
+
+    @property
+    def fingerprint(self) -> str:
+        """Of everything that decides the result of a fit."""
+        plain = to_plain(self.config)
+        for key in ("tracking", "evaluation"):
+            plain.pop(key)
+        plain["pairs"].pop("dir")
+        clips = {m.name: checksum_file(self.motions.folder / f"{m.name}.npz") for m in self._all_motions()}
+        evaluation = [sorted(m.name for m in self.motions.validation), self.config.evaluation.smoothness]
+        return fingerprint([plain, self.store.header, clips, evaluation])
+
+    def _all_motions(self) -> list:
+        return [*self.motions.validation, *self.motions.test]
+
+
+def prepare(config: Config) -> Prepared:
+    """Fills in default folders and opens everything that the run will need.
+
+    Raises:
+        UserError: anything in the config, the URDF, the prior or the motions is wrong.
+    """
+    config.pairs.dir = config.pairs.dir or default_pairs()
+    config.evaluation.motions = config.evaluation.motions or default_motions()
+    body_map = build_body_map(config.robot)
+    prior = BodyPrior.open(config.body.prior_path)
+    build_network(config, body_map)
+    if config.trainer.accelerator == "gpu" and not torch.cuda.is_available():
+        raise UserError("trainer.accelerator: 'gpu' is asked for, but torch finds no CUDA device; use 'auto' or 'cpu'")
+    return Prepared(config, body_map, prior, load_motions(config), PairStore.of(config, body_map.robot))
+
+
+def device_of(config: Config) -> torch.device:
+    """The device that `trainer.accelerator` stands for."""
+    return torch.device("cuda" if config.trainer.accelerator != "cpu" and torch.cuda.is_available() else "cpu")
+
+
+def make_pairs(prepared: Prepared, quiet: bool) -> PairingReport:
+    """Makes the pairs that are not there yet."""
+    device = device_of(prepared.config)
+    size, count = prepared.store.shard_size, prepared.store.count
+    generator = PairGenerator(prepared.body_map.to(device), prepared.prior.to(device), prepared.config.pairs)
+    steps = prepared.config.pairs.amortiser_steps
+    with Progress("amortised solver", steps, "steps", quiet) as first, Progress("pairs", count, quiet=quiet) as second:
+        report = generate_pairs(
+            generator,
+            prepared.store,
+            lambda step, cost: first.update(step, f"mean cost {cost:.3f}"),
+            lambda done, total: second.update(min(done * size, count)),
+        )
+    prepared.body_map.to("cpu")
+    prepared.prior.to("cpu")
+    return report
+
+
+def make_references(prepared: Prepared, quiet: bool) -> tuple[list[Clip], list[Clip]]:
+    """Validation and test clips with the reference retargeter's joint angles."""
+    folder = prepared.store.folder.parent / "reference"
+    count = len(prepared.motions.validation) + len(prepared.motions.test)
+    with Progress("reference", count, "clips", quiet) as progress:
+        return solve_references(
+            prepared.config,
+            prepared.body_map,
+            prepared.motions,
+            folder,
+            lambda done, total, name: progress.update(done, name),
+        )
+
+
+@dataclass
+class Training:
+    """A trained network and what it was trained on."""
+
+    network: RetargetNetwork
+    pairs: dict[str, Tensor]
+    filter: PairFilter
+    best_checkpoint: Path
+    best_link_cm: float
+
+
+def train(
+    prepared: Prepared,
+    validation: list[Clip],
+    logger: Logger | bool,
+    checkpoints: Path,
+    resume: Path | None,
+    quiet: bool,
+) -> Training:
+    """Trains on the pairs and returns the network of the best validation link error.
+
+    Args:
+        prepared: the checked config; its pairs are on disk.
+        validation: clips that choose the checkpoint.
+        logger: Lightning's logger, or False for none.
+        checkpoints: folder for `last.ckpt` and the best one, written at every validation.
+        resume: checkpoint to go on from, or None.
+        quiet: no progress line.
+
+    Raises:
+        KeyboardInterrupt: the user stopped it; the last checkpoint is there.
+    """
+    config, settings = prepared.config, prepared.config.trainer
+    pairs = prepared.store.read_all()
+    pair_filter = make_filter(pairs["phi"], config.pairs.filter, config.pairs.filter_k)
+    if not bool((pair_filter.probability_P > 0).any()):
+        raise UserError(f"pairs.filter_k: {config.pairs.filter_k} drops every pair; raise it")
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(settings.seed)
+        network = build_network(config, prepared.body_map)
+    with torch.no_grad():
+        features = torch.cat([network.features(part) for part in pairs["H"].split(16_384)])
+    data = PairData(
+        PairTable(features, pairs["R"], pairs["q"]),
+        pair_filter,
+        settings.batch_size,
+        min(settings.validate_every, settings.max_steps),
+        settings.seed,
+    )
+    module = RetargetModule(network, settings, config.model.detach_student)
+    saver = ModelCheckpoint(
+        dirpath=checkpoints,
+        filename="best",
+        monitor="val/link_cm",
+        mode="min",
+        save_last=True,
+        save_top_k=1,
+        save_on_train_epoch_end=True,
+        enable_version_counter=False,
+    )
+    with _quiet_lightning():
+        trainer = lightning.Trainer(
+            accelerator=settings.accelerator if settings.accelerator != "auto" else device_of(config).type,
+            devices=1,
+            precision="bf16-mixed" if settings.precision == "bf16" else "32-true",
+            max_steps=settings.max_steps,
+            logger=logger,
+            log_every_n_steps=50,
+            num_sanity_val_steps=0,
+            enable_progress_bar=False,
+            enable_model_summary=False,
+            callbacks=[
+                ClipMetrics(validation, prepared.body_map.robot, config.robot.key_links),
+                TrainingProgress(quiet),
+                saver,
+            ],
+        )
+        handler = signal.getsignal(signal.SIGINT)
+        try:
+            trainer.fit(module, datamodule=data, ckpt_path=resume, weights_only=True)
+        except SystemExit as stop:  # Lightning turns Ctrl-C into exit(1)
+            raise KeyboardInterrupt from stop
+        finally:
+            signal.signal(signal.SIGINT, handler)
+    best = torch.load(saver.best_model_path, map_location="cpu", weights_only=True)["state_dict"]
+    network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
+    network.requires_grad_(False).eval()
+    score = saver.best_model_score
+    return Training(
+        network, pairs, pair_filter, Path(saver.best_model_path), float("nan") if score is None else float(score)
+    )
+
+
+class _quiet_lightning:  # noqa: N801 (used like a function)
+    """Lightning's banners and hints about workers say nothing to our users."""
+
+    _LOGGERS = ("lightning.pytorch", "lightning.fabric", "lightning.pytorch.utilities.rank_zero")
+
+    def __enter__(self) -> None:
+        self._levels = {name: logging.getLogger(name).level for name in self._LOGGERS}
+        for name in self._LOGGERS:
+            logging.getLogger(name).setLevel(logging.ERROR)
+        self._warnings = warnings.catch_warnings()
+        self._warnings.__enter__()
+        warnings.filterwarnings("ignore", module=r"lightning\..*")
+        warnings.filterwarnings(
+            "ignore", message=r".*(num_workers|Checkpoint directory|lr_scheduler|isinstance\(treespec).*"
+        )
+
+    def __exit__(self, *error: object) -> None:
+        self._warnings.__exit__(None, None, None)
+        for name, level in self._levels.items():
+            logging.getLogger(name).setLevel(level)
+
+
+def score_test(prepared: Prepared, network: RetargetNetwork, clips: list[Clip]) -> tuple[list[Tensor], list[ClipScore]]:
+    """Predictions (T, N) and scores on the test clips, their mean last."""
+    predictions = predict_clips(network, clips)
+    scores = score_clips(predictions, clips, prepared.body_map.robot, prepared.config.robot.key_links)
+    return predictions, [*scores, mean_score(scores)]

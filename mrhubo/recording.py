@@ -1,0 +1,181 @@
+"""What a fit writes to MLflow: settings, provenance, metrics, tables, pictures, the package."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from torch import Tensor
+
+from mrhubo.callbacks import Clip, ClipScore
+from mrhubo.callbacks.pictures import Artist
+from mrhubo.config import Config, to_plain, to_yaml
+from mrhubo.locations import default_tracking, project_root
+from mrhubo.pairing import PairFilter, PairingReport
+from mrhubo.retargeter import Retargeter
+from mrhubo.storage import checksum_file
+from mrhubo.tracking import database_uri, git_commit, library_versions, open_logger, resumable_run
+from mrhubo.view import phi_histogram, save_png
+from mrhubo.workspace import Workspace
+
+if TYPE_CHECKING:
+    from lightning.pytorch.loggers import MLFlowLogger
+
+    from mrhubo.pipeline import Prepared
+
+
+class Recording:
+    """One MLflow run, open inside a `with` block: finished, failed or killed at its end."""
+
+    def __init__(self, prepared: Prepared, logger: MLFlowLogger) -> None:
+        self.prepared, self.logger, self.client = prepared, logger, logger.experiment
+        self.run_id = str(logger.run_id)
+        self.files = self.folder(prepared.config) / "packages" / f"{prepared.config.robot.name}-{self.run_id[:8]}"
+        self.artist = Artist(prepared.body_map.robot)
+
+    @staticmethod
+    def folder(config: Config) -> Path:
+        """Folder of the tracking database, the packages, and unfinished fits."""
+        return config.tracking.dir or default_tracking()
+
+    @classmethod
+    def start(cls, prepared: Prepared, workspace: Workspace) -> Recording:
+        """Opens a new run, or the unfinished one that the workspace remembers."""
+        config, folder = prepared.config, cls.folder(prepared.config)
+        for name in ("alembic", "mlflow.store.db.utils", "mlflow.tracking", "mlflow.system_metrics"):
+            logging.getLogger(name).setLevel(logging.ERROR)
+        run_id = resumable_run(folder, config.tracking.uri, workspace.run_id)
+        tags = {
+            "robot": config.robot.name,
+            "git_commit": git_commit(project_root()),
+            "prior_xxh3": prepared.store.header["prior_xxh3"],
+            "urdf_xxh3": checksum_file(config.robot.urdf),
+            "pairs_fingerprint": prepared.store.header["fingerprint"],
+            "config_fingerprint": prepared.fingerprint,
+            "motions": prepared.motions.folder.name,
+            **{f"version.{name}": number for name, number in library_versions().items()},
+        }
+        name = config.tracking.run_name or run_name(config)
+        logger = open_logger(folder, config.tracking.experiment, name, tags, config.tracking.uri, run_id)
+        recording = cls(prepared, logger)
+        workspace.start(recording.run_id)
+        if run_id is None:
+            logger.log_hyperparams(to_plain(config))
+            recording.client.log_text(recording.run_id, to_yaml(config), "config.yaml")
+        else:
+            recording.client.set_tag(recording.run_id, "resumed", time.strftime("%Y-%m-%d %H:%M:%S"))
+        return recording
+
+    def __enter__(self) -> Recording:
+        from mlflow.system_metrics.system_metrics_monitor import SystemMetricsMonitor
+
+        self.resume_after_training()
+        uri = self.prepared.config.tracking.uri or database_uri(self.folder(self.prepared.config))
+        self._monitor = SystemMetricsMonitor(self.run_id, resume_logging=True, tracking_uri=uri)
+        self._monitor.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._monitor.finish()
+        status = "FINISHED"
+        if error is not None:
+            status = "KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED"
+            self.client.set_tag(self.run_id, "ended_by", f"{type(error).__name__}: {error}"[:500])
+        self.client.set_terminated(self.run_id, status)
+
+    def resume_after_training(self) -> None:
+        """Lightning's logger closes the run when the training ends; the test is still to come."""
+        self.client.update_run(self.run_id, status="RUNNING")
+
+    def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, report: PairingReport) -> None:
+        """Metrics and pictures of the pairs."""
+        metrics = {
+            "pairs/count": float(len(pairs["phi"])),
+            "pairs/kept_share": pair_filter.kept_share,
+            "pairs/mean_probability": float(pair_filter.probability_P.mean()),
+            "pairs/ik_cost": float(pairs["cost"].mean()),
+            "pairs/ik_residual_mm": 1000 * float(pairs["residual_m"].mean()),
+            "pairs/phi_mean": float(pairs["phi"].mean()),
+            "pairs/phi_threshold": pair_filter.threshold if pair_filter.threshold < float("inf") else -1.0,
+        }
+        if report.made:
+            metrics["pairs/per_second"] = report.made / report.seconds
+        self.logger.log_metrics(metrics)
+        self._picture(phi_histogram(pairs["phi"].numpy(), pair_filter.threshold), "pairs/phi_histogram.png")
+        self._picture(self.artist.pairs(pairs, pair_filter, self.prepared.prior), "pairs/feasible_and_extreme.png")
+
+    def scores(self, scores: Sequence[ClipScore], best_link_cm: float) -> None:
+        """Errors on the test clips, their mean last: metrics and a table."""
+        metrics = {"val/best_link_cm": best_link_cm}
+        for score in scores:
+            name = "test" if score.name == "mean" else f"test/{score.name}"
+            metrics |= {f"{name}/joint_rad": score.joint_rad, f"{name}/link_cm": score.link_cm}
+        self.logger.log_metrics(metrics)
+        rows = [dataclasses.asdict(score) for score in scores]
+        self.client.log_table(self.run_id, {key: [row[key] for row in rows] for key in rows[0]}, "test/clips.json")
+        self.client.log_text(self.run_id, self.table(scores) + "\n", "test/clips.txt")
+
+    def key_poses(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
+        """A picture a test clip: human, reference and prediction side by side."""
+        for clip, prediction in zip(clips, predictions, strict=True):
+            self._picture(self.artist.key_poses(clip, prediction), f"test/key_poses_{clip.name}.png")
+
+    def package(self, retargeter: Retargeter, score: ClipScore, checkpoint: Path) -> Path:
+        """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""
+        header = self.prepared.store.header
+        provenance = {
+            "run_id": self.run_id,
+            "git_commit": git_commit(project_root()),
+            "urdf_xxh3": checksum_file(self.prepared.config.robot.urdf),
+            "prior_xxh3": header["prior_xxh3"],
+            "pairs_fingerprint": header["fingerprint"],
+            "test_joint_rad": f"{score.joint_rad:.6f}",
+            "test_link_cm": f"{score.link_cm:.6f}",
+        }
+        folder = retargeter.save(self.files, provenance)
+        self.client.log_artifacts(self.run_id, str(folder), "package")
+        self.client.log_artifact(self.run_id, str(checkpoint), "checkpoint")
+        return folder
+
+    def table(self, scores: Sequence[ClipScore]) -> str:
+        """The short table that a fit ends with."""
+        width = max(len(score.name) for score in scores)
+        lines = [f"{'clip':<{width}}  frames  joint [rad]  link [cm]"]
+        for score in scores:
+            if score.name == "mean":
+                lines.append("-" * len(lines[0]))
+            lines.append(f"{score.name:<{width}}  {score.frames:>6}  {score.joint_rad:>11.3f}  {score.link_cm:>9.2f}")
+        return "\n".join(lines)
+
+    def _picture(self, image: Any, name: str) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / Path(name).name
+            save_png(image, path)
+            self.client.log_artifact(self.run_id, str(path), str(Path(name).parent))
+
+
+def run_name(config: Config) -> str:
+    """The robot's name and the settings that differ from the defaults: `nao stages=1 filter=none`."""
+    words = [config.robot.name]
+    for section in ("pairs", "model", "trainer"):
+        given = getattr(config, section)
+        for field in dataclasses.fields(given):
+            default = field.default_factory() if callable(field.default_factory) else field.default
+            value = getattr(given, field.name)
+            if value != default and field.name != "dir":
+                words.append(f"{field.name}={value}")
+    return " ".join(words)
+
+
+def dashboard_command(folder: Path, config: Config) -> str:
+    """The command that opens the dashboard, on this machine only, light (one worker, no job runner)."""
+    uri = config.tracking.uri or database_uri(folder)
+    return f"MLFLOW_SERVER_ENABLE_JOB_EXECUTION=false mlflow ui --backend-store-uri {uri} --host 127.0.0.1 --workers 1"

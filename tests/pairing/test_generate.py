@@ -1,0 +1,178 @@
+"""Shards: what they hold, and that a killed run resumes to the same bytes."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import torch
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior
+from mrhubo.config import Config, load_config
+from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
+from mrhubo.robot import build_body_map
+from mrhubo.storage import DamagedFile
+
+SMALL = ["pairs.count=250", "pairs.shard_size=100", "pairs.amortiser_steps=30", "pairs.lm_steps=3"]
+
+
+def config_of(root: Path, folder: Path, *overrides: str) -> Config:
+    return load_config(root / "conf" / "nao.yaml", [*SMALL, f"pairs.dir={folder}", *overrides])
+
+
+def store_of(config: Config) -> PairStore:
+    return PairStore.of(config, build_body_map(config.robot).robot)
+
+
+def generate(config: Config) -> PairStore:
+    store = store_of(config)
+    generate_pairs(PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs), store)
+    return store
+
+
+def contents(store: PairStore) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(store.folder.iterdir())}
+
+
+@pytest.fixture(scope="module")
+def made(root: Path, tmp_path_factory: pytest.TempPathFactory) -> PairStore:
+    return generate(config_of(root, tmp_path_factory.mktemp("pairs")))
+
+
+def test_pairs_are_what_they_say(root: Path, made: PairStore) -> None:
+    pairs = made.read_all()
+    config = config_of(root, made.folder.parent)
+    body_map, prior = build_body_map(config.robot), BodyPrior.open()
+    robot = body_map.robot
+    assert len(pairs["q"]) == 250
+    assert bool(((pairs["q"] >= robot.lower_N) & (pairs["q"] <= robot.upper_N)).all())
+    torch.testing.assert_close(robot.moving_orientations(robot.forward(pairs["q"])), pairs["R"], atol=1e-5, rtol=0)
+    matrices = rotation.sixd_to_matrix(pairs["H"])
+    torch.testing.assert_close(rotation.matrix_to_sixd(matrices), pairs["H"], atol=1e-5, rtol=0)
+    torch.testing.assert_close(prior.reconstruction_error(pairs["H"]), pairs["phi"], atol=1e-6, rtol=1e-3)
+    target = body_map.targets(robot.forward(pairs["q"]))
+    reached = body_map.skeleton.keypoints(matrices)[:, body_map.keypoint_indices]
+    torch.testing.assert_close((reached - target).norm(dim=-1).mean(1), pairs["residual_m"], atol=1e-5, rtol=1e-3)
+    directions = body_map.human_directions(pairs["H"]) * body_map.robot_directions(robot.forward(pairs["q"]))
+    assert float(directions.sum(-1).mean()) > 0.8, "human and robot limbs point the same way"
+
+
+def test_joint_angles_are_uniform(made: PairStore) -> None:
+    q = made.read_all()["q"]
+    unit = (q - q.amin(0)) / (q.amax(0) - q.amin(0))
+    assert float((unit.mean(0) - 0.5).abs().max()) < 0.08
+    assert float(torch.corrcoef(q.T).fill_diagonal_(0).abs().max()) < 0.25
+
+
+def test_the_same_config_and_seed_give_the_same_bytes(root: Path, made: PairStore, tmp_path: Path) -> None:
+    assert contents(generate(config_of(root, tmp_path))) == contents(made)
+
+
+def test_more_pairs_keep_what_is_there(root: Path, tmp_path: Path) -> None:
+    few = generate(config_of(root, tmp_path, "pairs.count=150"))
+    before = {path.name: path.stat().st_mtime_ns for path in few.folder.iterdir()}
+    many = generate(config_of(root, tmp_path, "pairs.count=300"))
+    assert many.folder == few.folder and many.shards == 3
+    assert before.items() <= {path.name: path.stat().st_mtime_ns for path in many.folder.iterdir()}.items()
+
+
+def test_other_settings_have_another_folder(root: Path, tmp_path: Path) -> None:
+    base = store_of(config_of(root, tmp_path)).folder
+    for change in ("pairs.seed=1", "pairs.lm_steps=4", "pairs.solver=fast", "robot.keypoints.left_wrist=l_gripper"):
+        assert store_of(config_of(root, tmp_path, change)).folder != base, change
+    for same in ("pairs.filter=none", "pairs.count=9999", "robot.key_links=[l_wrist]"):
+        assert store_of(config_of(root, tmp_path, same)).folder == base, same
+
+
+@pytest.mark.parametrize("damage", ["truncated", "flipped", "foreign", "empty", "another index"])
+def test_a_bad_shard_is_noticed_and_remade(root: Path, made: PairStore, tmp_path: Path, damage: str) -> None:
+    config = config_of(root, tmp_path)
+    store = store_of(config)
+    store.folder.mkdir(parents=True)
+    for name, content in contents(made).items():
+        (store.folder / name).write_bytes(content)
+    victim = store.path(1)
+    content = bytearray(victim.read_bytes())
+    if damage == "truncated":
+        victim.write_bytes(content[: len(content) // 2])
+    elif damage == "flipped":
+        content[-5] ^= 4
+        victim.write_bytes(content)
+    elif damage == "foreign":
+        store_of_other = store_of(config_of(root, tmp_path, "pairs.seed=5"))
+        store_of_other.write(1, made.read(1))
+        victim.write_bytes(store_of_other.path(1).read_bytes())
+    elif damage == "empty":
+        victim.write_bytes(b"")
+    else:
+        victim.write_bytes(store.path(0).read_bytes())
+    with pytest.raises(DamagedFile):
+        store.read(1)
+    assert store.missing() == [1]
+    generate(config)
+    assert contents(store) == contents(made)
+
+
+def test_killed_at_random_moments_it_resumes_to_the_same_bytes(root: Path, made: PairStore, tmp_path: Path) -> None:
+    script = "import sys; sys.path.insert(0, sys.argv[3]); import test_generate as t; from pathlib import Path; " \
+             "t.generate(t.config_of(Path(sys.argv[1]), Path(sys.argv[2])))"  # fmt: skip
+    command = [sys.executable, "-c", script, str(root), str(tmp_path), str(Path(__file__).parent)]
+    folder = store_of(config_of(root, tmp_path)).folder
+    draw = random.Random(0)
+    for _ in range(3):
+        process = subprocess.Popen(command, start_new_session=True)
+        seen = len(list(folder.glob("*"))) if folder.exists() else 0
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline and process.poll() is None:
+            if folder.exists() and len(list(folder.glob("*"))) > seen:
+                break  # it has begun to write
+            time.sleep(0.005)
+        time.sleep(draw.uniform(0, 0.05))
+        os.killpg(process.pid, signal.SIGKILL) if process.poll() is None else None
+        process.wait()
+    subprocess.run(command, check=True)
+    store = store_of(config_of(root, tmp_path))
+    whole = {name: content for name, content in contents(store).items() if not name.startswith(".")}
+    assert whole == contents(made)
+    assert store.missing() == []
+
+
+def test_the_amortisers_training_resumes_exactly(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(amortiser, "_CHECKPOINT_EVERY", 7)
+    config = config_of(root, tmp_path)
+    maker = PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs)
+
+    def run(path: Path, stop_at: int | None = None) -> None:
+        def progress(step: int, cost: float) -> None:
+            assert cost > 0
+
+        draws = 0
+
+        def draw(count: int, generator: torch.Generator) -> torch.Tensor:
+            nonlocal draws
+            draws += 1
+            if stop_at is not None and draws > stop_at:
+                raise KeyboardInterrupt
+            return maker.draw_targets(count, generator)
+
+        amortiser.train_amortiser(maker.problem, draw, 20, 3, path, {"what": "test"}, progress)
+
+    run(tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path / "parts", stop_at=12)
+    assert (tmp_path / "parts.checkpoint").exists() and not (tmp_path / "parts").exists()
+    run(tmp_path / "parts")
+    assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()
+    assert not (tmp_path / "parts.checkpoint").exists()
+
+
+def test_the_papers_solver_needs_no_amortiser(root: Path, tmp_path: Path) -> None:
+    store = generate(config_of(root, tmp_path, "pairs.solver=paper", "pairs.count=100"))
+    assert not store.amortiser_path.exists() and float(store.read_all()["cost"].mean()) < 5

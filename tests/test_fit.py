@@ -1,0 +1,196 @@
+"""The command as a user runs it, small: result, tracking, resumption after kill -9 and Ctrl-C, mistakes."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import mlflow
+import numpy as np
+import pytest
+import torch
+
+from mrhubo.callbacks import load_motions
+from mrhubo.config import load_config
+from mrhubo.retargeter import Retargeter
+
+SMALL = [
+    "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=40", "pairs.lm_steps=3", "model.hidden=64",
+    "trainer.max_steps=120", "trainer.batch_size=128", "trainer.validate_every=30", "trainer.accelerator=cpu",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def motions(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three of the shipped motions."""
+    folder = tmp_path_factory.mktemp("motions")
+    for name in ("drinking", "wave", "punches"):
+        shutil.copy(root / "data" / "motions" / f"{name}.npz", folder)
+    return folder
+
+
+def command(root: Path, folder: Path, motions: Path, *overrides: str, config: str = "nao") -> list[str]:
+    return [
+        sys.executable, "-m", "mrhubo.fit", "--config", str(root / "conf" / f"{config}.yaml"), *SMALL,
+        f"evaluation.motions=[{motions}]", f"pairs.dir={folder / 'pairs'}", f"tracking.dir={folder / 'mlruns'}", *overrides,
+    ]  # fmt: skip
+
+
+def run(arguments: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(arguments, capture_output=True, text=True, timeout=300)
+
+
+def runs_of(folder: Path) -> list[Any]:
+    client = mlflow.MlflowClient(tracking_uri=f"sqlite:///{folder / 'mlruns' / 'mlflow.db'}")
+    experiment = client.get_experiment_by_name("mrhubo")
+    assert experiment is not None
+    return client.search_runs([experiment.experiment_id])
+
+
+@pytest.fixture(scope="module")
+def fitted(root: Path, motions: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    folder = tmp_path_factory.mktemp("fit")
+    done = run(command(root, folder, motions))
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+def test_it_ends_with_a_table_the_package_and_the_dashboard(fitted: tuple[Path, str]) -> None:
+    folder, output = fitted
+    lines = output.strip().splitlines()
+    assert lines[0].split() == ["clip", "frames", "joint", "[rad]", "link", "[cm]"]
+    assert {line.split()[0] for line in lines} >= {"punches", "wave", "mean", "package:", "dashboard:"}
+    package = Path(next(line.split(None, 1)[1] for line in lines if line.startswith("package:")))
+    assert package.parent == folder / "mlruns" / "packages"
+    assert "--host 127.0.0.1" in lines[-1]
+
+
+def test_the_run_holds_everything(fitted: tuple[Path, str]) -> None:
+    folder, _ = fitted
+    (found,) = runs_of(folder)
+    assert found.info.status == "FINISHED" and found.info.run_name.startswith("nao")
+    metrics = set(found.data.metrics)
+    assert metrics >= {
+        "train/loss", "train/loss_pre", "train/loss_post", "val/joint_rad", "val/link_cm", "test/joint_rad", "test/link_cm",
+        "test/wave/link_cm", "pairs/kept_share", "pairs/ik_residual_mm", "pairs/per_second",
+    }  # fmt: skip
+    assert set(found.data.tags) >= {"robot", "git_commit", "pairs_fingerprint", "prior_xxh3", "version.torch"}
+    assert found.data.params["trainer/max_steps"] == "120" and found.data.params["pairs/seed"] == "0"
+    artifacts = Path(found.info.artifact_uri.removeprefix("file://"))
+    names = {str(path.relative_to(artifacts)) for path in artifacts.rglob("*") if path.is_file()}
+    assert names >= {
+        "config.yaml", "pairs/phi_histogram.png", "pairs/feasible_and_extreme.png", "test/clips.json",
+        "test/key_poses_wave.png", "package/retargeter.safetensors", "package/robot.urdf", "checkpoint/best.ckpt",
+    }  # fmt: skip
+
+
+def test_the_package_retargets(root: Path, fitted: tuple[Path, str], motions: Path) -> None:
+    folder, output = fitted
+    (package,) = (folder / "mlruns" / "packages").iterdir()
+    retargeter = Retargeter.load(package)
+    assert retargeter.joint_names[0] == "LShoulderPitch"
+    config = load_config(root / "conf" / "nao.yaml", [f"evaluation.motions=[{motions}]"])
+    for motion in load_motions(config).test:
+        result = retargeter.retarget(motion.pose_TJ6)
+        robot = retargeter.body_map.robot
+        assert bool(((result.q_TN >= robot.lower_N) & (result.q_TN <= robot.upper_N)).all())
+        assert bool(((result.confidence_T >= 0) & (result.confidence_T <= 1)).all())
+        assert result.q_TN.shape == (len(motion.pose_TJ6), 8)
+        torch.testing.assert_close(retargeter.predict(motion.pose_TJ6), result.q_TN)
+
+
+def final_metrics(folder: Path) -> dict[str, float]:
+    (found,) = runs_of(folder)
+    assert found.info.status == "FINISHED"
+    return {k: v for k, v in found.data.metrics.items() if k.startswith(("test", "val", "train"))}
+
+
+@pytest.mark.parametrize(("stop", "status"), [(signal.SIGKILL, None), (signal.SIGINT, 130)])
+def test_stopped_in_training_it_resumes_to_the_same_metrics(
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, stop: signal.Signals, status: int | None
+) -> None:
+    shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
+    arguments = command(root, tmp_path, motions)
+    process = subprocess.Popen(arguments, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 200
+    while time.monotonic() < deadline and process.poll() is None:
+        if list((tmp_path / "mlruns").glob("fits/*/checkpoints/last.ckpt")):
+            break
+        time.sleep(0.005)
+    assert process.poll() is None, "it ended before it could be stopped"
+    os.killpg(process.pid, stop)
+    assert process.wait(timeout=60) == (status if status is not None else -stop)
+    (unfinished,) = runs_of(tmp_path)
+    assert unfinished.info.status == ("KILLED" if stop == signal.SIGINT else "RUNNING")
+    done = run(arguments)
+    assert done.returncode == 0, done.stderr
+    (found,) = runs_of(tmp_path)
+    assert found.info.run_id == unfinished.info.run_id and "resumed" in found.data.tags
+    expected, got = final_metrics(fitted[0]), final_metrics(tmp_path)
+    assert got.keys() == expected.keys()
+    for name, value in expected.items():
+        assert got[name] == pytest.approx(value, abs=1e-4), name
+
+
+def test_a_finished_fit_run_again_is_a_new_run_with_the_same_result(
+    root: Path, fitted: tuple[Path, str], motions: Path
+) -> None:
+    again = run(command(root, fitted[0], motions))
+    assert again.returncode == 0, again.stderr
+    assert again.stdout.split("package:")[0] == fitted[1].split("package:")[0]
+    latest, earlier = runs_of(fitted[0])
+    mlflow.MlflowClient(tracking_uri=f"sqlite:///{fitted[0] / 'mlruns' / 'mlflow.db'}").delete_run(latest.info.run_id)
+    assert latest.info.run_id != earlier.info.run_id
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["pairs.cuont=10"], "pairs.count"),
+        (["pairs.count=-5"], "pairs.count"),
+        (["robot.urdf=nowhere/nao.urdf"], "nowhere/nao.urdf does not exist"),
+        (["robot.key_links=[l_wirst]"], "nearest: 'l_wrist'"),
+        (["robot.joints=[LShoulderPich]"], "nearest: 'LShoulderPitch'"),
+        (["model.input_joints=[left_elbo]"], "nearest: 'left_elbow'"),
+        (["evaluation.motions=[nowhere]"], "nowhere"),
+        (["evaluation.validation=[]"], "evaluation.validation"),
+        (["body.prior_path=nowhere.safetensors"], "nowhere.safetensors"),
+    ],
+)
+def test_a_mistake_is_one_sentence_before_any_work(
+    root: Path, motions: Path, tmp_path: Path, overrides: list[str], message: str
+) -> None:
+    done = run(command(root, tmp_path, motions, *overrides))
+    assert done.returncode == 2
+    assert message in done.stderr and done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [], "nothing was begun"
+
+
+def test_nan_in_a_motion_is_refused_before_any_work(root: Path, motions: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "motions"
+    shutil.copytree(motions, folder)
+    arrays = dict(np.load(folder / "wave.npz"))
+    arrays["pose_body"][17, 3] = np.nan
+    np.savez(folder / "wave.npz", **arrays)
+    done = run(command(root, tmp_path, folder))
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert "wave.npz" in done.stderr and "17" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["motions"]
+
+
+@pytest.mark.parametrize("variant", ["model.stages=1", "pairs.filter=none", "trainer.precision=bf16"])
+def test_variants_are_settings(
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, variant: str
+) -> None:
+    shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
+    done = run(command(root, tmp_path, motions, variant))
+    assert done.returncode == 0, done.stderr
+    (found,) = runs_of(tmp_path)
+    assert variant.split(".")[1] in found.info.run_name
+    assert ("train/loss_pre" in found.data.metrics) is (variant != "model.stages=1")
