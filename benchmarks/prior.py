@@ -1,6 +1,6 @@
 """Encode, mean, decode: error of the shipped body prior on every motion of a folder.
 
-    python benchmarks/prior.py [FOLDER]          default: the evaluation motions
+python benchmarks/prior.py [FOLDER]          default: the evaluation motions
 """
 
 from __future__ import annotations

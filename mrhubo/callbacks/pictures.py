@@ -23,7 +23,6 @@ from mrhubo.view import (
     read_geometry,
     render,
     robot_solids,
-    stick_solids,
 )
 
 _SIZE = (220, 260)
@@ -53,7 +52,7 @@ class Artist:
         self.urdf.update_cfg({name: wanted[name] for name in self.urdf.actuated_joint_names if name in wanted})
         root = self.robot.description.root
         poses = {link: self.urdf.get_transform(link, root) for link in self.robot.description.links}
-        solids = robot_solids(self.geometry, poses) if self.geometry else stick_solids(poses, self.parents)
+        solids = robot_solids(self.geometry, poses, self.parents)
         return solids.scaled(self.scale) if scaled else solids
 
     def sheet(self, rows: list[list[Solids]], columns: list[str], titles: list[str], caption: str) -> Image:

@@ -1,0 +1,27 @@
+"""Pictures: figures made of capsules, a renderer without OpenGL, tables of pictures, charts."""
+
+from mrhubo.view.camera import Camera, common_cameras, front_camera
+from mrhubo.view.human import HUMAN_COLOR, SKIN_COLOR, human_solids
+from mrhubo.view.painter import render
+from mrhubo.view.robot import ROBOT_COLOR, LinkGeometry, read_geometry, robot_solids, stick_solids
+from mrhubo.view.sheets import contact_sheet, phi_histogram, save_png
+from mrhubo.view.solids import Solids
+
+__all__ = [
+    "HUMAN_COLOR",
+    "ROBOT_COLOR",
+    "SKIN_COLOR",
+    "Camera",
+    "LinkGeometry",
+    "Solids",
+    "common_cameras",
+    "contact_sheet",
+    "front_camera",
+    "human_solids",
+    "phi_histogram",
+    "read_geometry",
+    "render",
+    "robot_solids",
+    "save_png",
+    "stick_solids",
+]

@@ -1,0 +1,91 @@
+"""The shipped prior: what it must be able to do, and what its file is refused for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior, Skeleton, mirror_pose
+from mrhubo.body.prior import SHIPPED_WEIGHTS
+from mrhubo.body.training import random_wrists, reconstruction
+from mrhubo.errors import UserError
+from mrhubo.motion import read_folder
+from mrhubo.storage import read_tensors, write_tensors
+
+
+@pytest.fixture(scope="module")
+def prior() -> BodyPrior:
+    return BodyPrior.open()
+
+
+def test_decoded_poses_are_rotations(prior: BodyPrior) -> None:
+    matrices = prior.decode_matrices(torch.randn(50, prior.latent, generator=torch.Generator().manual_seed(0)))
+    torch.testing.assert_close(matrices @ matrices.mT, torch.eye(3).expand(50, 21, 3, 3), atol=1e-5, rtol=0)
+    assert bool((torch.linalg.det(matrices) > 0.99).all())
+
+
+def test_samples_are_plausible_and_random_rotations_are_not(prior: BodyPrior) -> None:
+    generator = torch.Generator().manual_seed(0)
+    sampled = prior.decode(torch.randn(500, prior.latent, generator=generator))
+    noise = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(2 * torch.randn(500, 21, 3, generator=generator)))
+    assert float(prior.reconstruction_error(sampled).quantile(0.99)) < float(prior.reconstruction_error(noise).min())
+
+
+def test_denoising_moves_towards_the_clean_pose(prior: BodyPrior) -> None:
+    generator = torch.Generator().manual_seed(0)
+    clean = prior.decode(0.7 * torch.randn(200, prior.latent, generator=generator))
+    tremble = rotation.axis_angle_to_matrix(0.25 * torch.randn(200, 21, 3, generator=generator))
+    noisy = rotation.matrix_to_sixd(rotation.sixd_to_matrix(clean) @ tremble)
+    before, after = ((x - clean).square().mean() for x in (noisy, prior.denoise(noisy)))
+    assert float(after) < 0.6 * float(before)
+
+
+def test_mirrored_poses_are_as_plausible(prior: BodyPrior, external_dir: Path) -> None:
+    pose = torch.cat([motion.pose_TJ6[::10] for motion in read_folder(external_dir / "cmu" / "evaluation")])
+    one, other = prior.reconstruction_error(pose).median(), prior.reconstruction_error(mirror_pose(pose)).median()
+    assert 0.5 < float(one / other) < 2
+
+
+def test_evaluation_clips_are_reconstructed_under_ten_millimetres(prior: BodyPrior, external_dir: Path) -> None:
+    for motion in read_folder(external_dir / "cmu" / "evaluation"):
+        error_mm, _ = reconstruction(prior, Skeleton(), motion.pose_TJ6)
+        assert float(error_mm.mean()) < 10, motion.name
+
+
+def test_the_card_says_data_licence_and_split(prior: BodyPrior) -> None:
+    card = json.loads(prior.metadata["card"])
+    assert (
+        "mocap.cs.cmu.edu" in card["data"] and card["licence"] == "Apache-2.0" and "NSF EIA-0196217" in card["credit"]
+    )
+    evaluation = {"13_28", "54_16", "02_05", "13_08", "13_15", "13_18", "13_21", "15_08", "26_02", "55_16", "56_02"}
+    assert not evaluation & set(card["held_out_clips"])
+
+
+def test_random_wrists_turn_wrists_alone_and_stay_human() -> None:
+    pose = rotation.matrix_to_sixd(torch.eye(3).expand(2000, 21, 3, 3))
+    turned = random_wrists(pose, 0.5)
+    changed = (turned - pose).abs().amax(-1) > 1e-6
+    assert not bool(changed[:, :19].any())
+    assert 0.4 < float(changed[:, 19:].float().mean()) < 0.6
+    angle = rotation.geodesic_distance(rotation.sixd_to_matrix(pose), rotation.sixd_to_matrix(turned))
+    assert float(torch.rad2deg(angle).max()) < 85
+
+
+def test_files_that_are_no_prior_are_refused(tmp_path: Path) -> None:
+    tensors, metadata = read_tensors(SHIPPED_WEIGHTS)
+    path = tmp_path / "prior.safetensors"
+    with pytest.raises(UserError, match="cannot be read"):
+        BodyPrior.open(path)
+    write_tensors(path, tensors, {**metadata, "schema": "other/1"})
+    with pytest.raises(UserError, match="schema is 'other/1'"):
+        BodyPrior.open(path)
+    write_tensors(path, tensors, {**metadata, "hidden": "64"})
+    with pytest.raises(UserError, match="no body prior that this version reads"):
+        BodyPrior.open(path)
+    write_tensors(path, {k: v for k, v in tensors.items() if "encoder.0" not in k}, metadata)
+    with pytest.raises(UserError, match="no body prior that this version reads"):
+        BodyPrior.open(path)
