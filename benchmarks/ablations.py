@@ -2,7 +2,8 @@
 
     python benchmarks/ablations.py [--config conf/nao.yaml] [--seeds 3] [key.sub=value ...]
 
-A variant and seed that a finished run already has (same settings, pairs, prior, motions) is read from MLflow, not redone.
+A variant and seed that a finished run already has (same settings, pairs, prior, motions) is read from MLflow,
+not redone.
 """
 
 from __future__ import annotations

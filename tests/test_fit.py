@@ -30,7 +30,7 @@ SMALL = [
 def motions(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three of the shipped motions."""
     folder = tmp_path_factory.mktemp("motions")
-    for name in ("drinking", "wave", "punches"):
+    for name in ("drinking", "wave", "boxing"):
         shutil.copy(root / "data" / "motions" / f"{name}.npz", folder)
     return folder
 
@@ -65,7 +65,7 @@ def test_it_ends_with_a_table_the_package_and_the_dashboard(fitted: tuple[Path, 
     folder, output = fitted
     lines = output.strip().splitlines()
     assert lines[0].split() == ["clip", "frames", "joint", "[rad]", "link", "[cm]"]
-    assert {line.split()[0] for line in lines} >= {"punches", "wave", "mean", "package:", "dashboard:"}
+    assert {line.split()[0] for line in lines} >= {"boxing", "wave", "mean", "package:", "dashboard:"}
     package = Path(next(line.split(None, 1)[1] for line in lines if line.startswith("package:")))
     assert package.parent == folder / "mlruns" / "packages"
     assert "--host 127.0.0.1" in lines[-1]

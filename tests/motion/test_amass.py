@@ -1,0 +1,328 @@
+"""Motion files: what is read, what is refused, and that a refusal is always a UserError."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
+
+from mrhubo.errors import UserError
+from mrhubo.motion import Motion, find_motions, read_folder, read_motion, write_motion
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+
+GENERATOR = np.random.default_rng(0)
+POSE_T63 = GENERATOR.normal(0, 0.5, (7, 63)).astype(np.float32)
+RATE = {"mocap_frame_rate": np.array(30.0)}
+
+
+def _save(path: Path, **arrays_: np.ndarray) -> Path:
+    np.savez(path, **arrays_)  # type: ignore[arg-type]
+    return path
+
+
+def _write(path: Path, description: str = "a test") -> Path:
+    write_motion(path, POSE_T63, np.zeros((7, 3)), np.zeros((7, 3)), 30.0, description)
+    return path
+
+
+def _member(header: dict | bytes, content: bytes = b"") -> bytes:
+    """An .npy member with any header."""
+    text = header if isinstance(header, bytes) else repr(header).encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + content
+
+
+def _archive(path: Path, members: dict[str, bytes]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return path
+
+
+def _npy(array: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
+
+
+def _expected(pose_T63: np.ndarray) -> torch.Tensor:
+    return matrix_to_sixd(axis_angle_to_matrix(torch.from_numpy(pose_T63).double().unflatten(-1, (21, 3)))).float()
+
+
+def _accepts_or_refuses(content: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "motion.npz"
+        path.write_bytes(content)
+        try:
+            motion = read_motion(path)
+        except UserError as error:
+            assert str(path) in str(error)
+        else:
+            assert motion.pose_TJ6.shape[1:] == (21, 6) and torch.isfinite(motion.pose_TJ6).all()
+            assert 1 <= motion.frame_rate <= 1000
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    motion = read_motion(_write(tmp_path / "wave.npz", "waves\n  twice"))
+    assert (motion.name, motion.frame_rate, motion.description) == ("wave", 30.0, "waves twice")
+    assert motion.pose_TJ6.dtype == torch.float32 and motion.duration == pytest.approx(7 / 30)
+    torch.testing.assert_close(motion.pose_TJ6, _expected(POSE_T63))
+
+
+def test_writing_is_deterministic_and_has_amass_keys(tmp_path: Path) -> None:
+    a, b = _write(tmp_path / "a.npz"), _write(tmp_path / "b.npz")
+    assert a.read_bytes() == b.read_bytes()
+    with zipfile.ZipFile(a) as archive:
+        assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+    with np.load(a, allow_pickle=False) as content:
+        assert set(content) == {
+            "pose_body", "root_orient", "trans", "mocap_frame_rate", "betas", "gender", "surface_model_type", "description",
+        }  # fmt: skip
+        assert content["pose_body"].dtype == np.float32 and str(content["gender"]) == "neutral"
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.npz", "b.npz"]
+
+
+@pytest.mark.parametrize(
+    ("shapes", "frame_rate"),
+    [(((6, 63), (7, 3), (7, 3)), 30.0), (((0, 63), (0, 3), (0, 3)), 30.0), (((7, 66), (7, 3), (7, 3)), 30.0)],
+)
+def test_writing_refuses_wrong_shapes(tmp_path: Path, shapes: tuple, frame_rate: float) -> None:
+    with pytest.raises(ValueError, match="expected shape"):
+        write_motion(tmp_path / "a.npz", *(np.zeros(shape) for shape in shapes), frame_rate=frame_rate, description="")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("width", [66, 72, 156, 165])
+@pytest.mark.parametrize("key", ["mocap_frame_rate", "mocap_framerate"])
+def test_poses_with_the_root_first(tmp_path: Path, width: int, key: str) -> None:
+    poses = GENERATOR.normal(0, 0.4, (5, width))
+    rate = np.array([120.0]) if width == 72 else np.array(120)
+    motion = read_motion(_save(tmp_path / "13_28_poses.npz", poses=poses, **{key: rate}, gender=np.array([b"male"])))
+    assert motion.name == "13_28" == motion.description
+    assert motion.frame_rate == 120.0
+    torch.testing.assert_close(motion.pose_TJ6, _expected(poses[:, 3:66]))
+
+
+def test_pose_body_goes_before_poses_and_unread_pickles_do_not_matter(tmp_path: Path) -> None:
+    """AMASS's stage II files carry object arrays (labels and the like) beside the numbers."""
+    path = _save(
+        tmp_path / "a_stageii.npz",
+        pose_body=POSE_T63,
+        poses=np.zeros((7, 165)),
+        labels=np.array([{}, {}], dtype=object),
+        **RATE,
+    )
+    motion = read_motion(path)
+    assert motion.name == "a"
+    torch.testing.assert_close(motion.pose_TJ6, _expected(POSE_T63))
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float64, np.longdouble, np.int8, ">f4"])
+def test_any_type_of_number(tmp_path: Path, dtype) -> None:
+    pose_T63 = np.round(POSE_T63).astype(dtype)
+    motion = read_motion(_save(tmp_path / "a.npz", pose_body=np.asfortranarray(pose_T63), **RATE))
+    torch.testing.assert_close(motion.pose_TJ6, _expected(np.round(POSE_T63)))
+
+
+def _with(row: int, column: int, value: float) -> np.ndarray:
+    pose_T63 = POSE_T63.copy()
+    pose_T63[row, column] = value
+    return pose_T63
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"pose_body": _with(3, 5, np.nan), **RATE}, "'pose_body' is not finite in frame 3, number 5: nan"),
+        ({"pose_body": _with(6, 0, -np.inf), **RATE}, "'pose_body' is not finite in frame 6, number 0: -inf"),
+        (
+            {"poses": np.pad(_with(2, 1, np.nan), ((0, 0), (3, 0))), **RATE},
+            "'poses' is not finite in frame 2, number 4",
+        ),
+        ({"pose_body": _with(1, 2, 90.0), **RATE}, r"degrees\?\) in frame 1, number 2: 90"),
+        ({"pose_body": POSE_T63[:, :60], **RATE}, r"'pose_body' has shape \(7, 60\); expected \(frames, 63\)"),
+        ({"pose_body": POSE_T63.reshape(7, 21, 3), **RATE}, r"'pose_body' has shape \(7, 21, 3\)"),
+        ({"poses": POSE_T63, **RATE}, r"'poses' has shape \(7, 63\); expected \(frames, 66\)"),
+        ({"pose_body": POSE_T63[:0], **RATE}, r"'pose_body' is empty: shape \(0, 63\)"),
+        ({"pose_body": POSE_T63.astype(complex), **RATE}, "'pose_body' has type complex128; expected numbers"),
+        ({"pose_body": POSE_T63.astype("U5"), **RATE}, "'pose_body' has type <U5; expected numbers"),
+        ({"pose_body": POSE_T63}, "holds no frame rate; expected the key 'mocap_frame_rate' or 'mocap_framerate'"),
+        ({"pose_body": POSE_T63, "mocap_frame_rate": np.array(0.0)}, "is 0 frames per second; expected 1 to 1000"),
+        ({"pose_body": POSE_T63, "mocap_framerate": np.array(1001)}, "'mocap_framerate' is 1001 frames per second"),
+        ({"pose_body": POSE_T63, "mocap_frame_rate": np.array(np.nan)}, "is nan frames per second"),
+        ({"pose_body": POSE_T63, "mocap_frame_rate": np.array([30.0, 30.0])}, r"has shape \(2,\); expected one number"),
+        ({"pose_body": POSE_T63, "description": np.zeros(1), **RATE}, "'description' has type float64; expected text"),
+        ({"betas": np.zeros(16), **RATE}, "holds neither 'pose_body' nor 'poses'.*betas, mocap_frame_rate"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, content: dict[str, np.ndarray], message: str) -> None:
+    path = _save(tmp_path / "bad.npz", **content)
+    with pytest.raises(UserError, match=message) as caught:
+        read_motion(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
+    witness = tmp_path / "executed"
+
+    class Attack:
+        def __reduce__(self):
+            return Path.touch, (witness,)
+
+    attack = np.array([Attack()], dtype=object)
+    pose = _npy(POSE_T63)
+    for key in ("pose_body", "poses", "mocap_frame_rate", "description"):
+        members = {"pose_body.npy": pose, "mocap_frame_rate.npy": _npy(np.array(30.0))} | {f"{key}.npy": _npy(attack)}
+        if key == "poses":
+            del members["pose_body.npy"]
+        with pytest.raises(UserError, match=f"'{key}' holds pickled Python objects"):
+            read_motion(_archive(tmp_path / f"{key}.npz", members))
+    raw = _archive(tmp_path / "raw.npz", {"pose_body.npy": pickle.dumps(Attack()), "mocap_frame_rate.npy": pose})
+    with pytest.raises(UserError, match="'pose_body' cannot be read"):
+        read_motion(raw)
+    bare = tmp_path / "bare.npz"
+    bare.write_bytes(pickle.dumps(Attack()))
+    with pytest.raises(UserError, match="is not an .npz file"):
+        read_motion(bare)
+    assert not witness.exists()
+
+
+@pytest.mark.parametrize(
+    ("shape", "descr", "message"),
+    [
+        ((10**12, 63), "<f4", "at most 5000000 frames and 4 GiB"),
+        ((2, 2**40), "<f8", "at most 5000000 frames and 4 GiB"),
+        ((4_000_000, 63), "<f4", r"claims shape \(4000000, 63\), 1008000000 bytes, but holds \d+; the file is damaged"),
+        ((-1, 63), "<f4", "'pose_body'"),
+        ((7, 63), "|V252", "'pose_body' has type"),
+        ((7, 63), "nonsense", "'pose_body' cannot be read"),
+    ],
+)
+def test_headers_that_lie(tmp_path: Path, shape: tuple, descr: str, message: str) -> None:
+    member = _member({"descr": descr, "fortran_order": False, "shape": shape}, bytes(7 * 63 * 4))
+    path = _archive(tmp_path / "lie.npz", {"pose_body.npy": member, "mocap_frame_rate.npy": _npy(np.array(30.0))})
+    with pytest.raises(UserError, match=message):
+        read_motion(path)
+
+
+@pytest.mark.filterwarnings("ignore:Reading `.npy`")  # numpy, of headers that Python 2 wrote
+@pytest.mark.parametrize(
+    "header", [b"(" * 9_000, b"{" * 60_000, b"\xff\xfe", b"", b"__import__('os')\n", b"{'descr': 1L}\n"]
+)
+def test_headers_that_are_none(tmp_path: Path, header: bytes) -> None:
+    with pytest.raises(UserError, match="'pose_body' cannot be read"):
+        read_motion(_archive(tmp_path / "bad.npz", {"pose_body.npy": _member(header)}))
+
+
+def test_missing_files_and_a_bare_array(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="there is no such file"):
+        read_motion(tmp_path / "none.npz")
+    bare = tmp_path / "bare.npz"
+    bare.write_bytes(_npy(POSE_T63))
+    with pytest.raises(UserError, match="is not an .npz file"):
+        read_motion(bare)
+    with pytest.raises(UserError, match="holds neither .* it holds: nothing"):
+        read_motion(_archive(tmp_path / "empty.npz", {}))
+
+
+@given(st.binary(max_size=300))
+@settings(max_examples=60, deadline=None)
+def test_random_bytes(content: bytes) -> None:
+    _accepts_or_refuses(content)
+    _accepts_or_refuses(b"PK\x03\x04" + content)
+
+
+def _whole(compressed: bool) -> bytes:
+    buffer = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(buffer, pose_body=POSE_T63, **RATE, description=np.array("x"))  # type: ignore
+    return buffer.getvalue()
+
+
+@given(st.booleans(), st.floats(0, 1, exclude_max=True))
+@settings(max_examples=60, deadline=None)
+def test_truncated_files(compressed: bool, share: float) -> None:
+    whole = _whole(compressed)
+    _accepts_or_refuses(whole[: int(share * len(whole))])
+
+
+@given(
+    st.booleans(),
+    st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.binary(min_size=1, max_size=6)), min_size=1, max_size=4),
+)
+@settings(max_examples=150, deadline=None)
+def test_altered_files(compressed: bool, changes: list[tuple[float, bytes]]) -> None:
+    altered = bytearray(_whole(compressed))
+    for share, new in changes:
+        start = int(share * (len(altered) - len(new)))
+        altered[start : start + len(new)] = new
+    _accepts_or_refuses(bytes(altered))
+
+
+ARRAYS = scalar_dtypes().flatmap(
+    lambda dtype: arrays(dtype, array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=3))
+)
+POSES = st.sampled_from(["<f2", "<f4", "<f8", "<i8", "<c8"]).flatmap(
+    lambda dtype: arrays(dtype, st.sampled_from([(1, 63), (2, 63), (1, 66), (1, 72)]))
+)
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from(["pose_body", "poses", "mocap_frame_rate", "mocap_framerate", "description"]), ARRAYS | POSES
+    )
+)
+@settings(max_examples=100, deadline=None)
+def test_random_arrays(content: dict[str, np.ndarray]) -> None:
+    buffer = io.BytesIO()
+    np.savez(buffer, **content)  # type: ignore[arg-type]
+    _accepts_or_refuses(buffer.getvalue())
+
+
+def test_read_folder_sorts_and_passes_over_what_is_no_motion(tmp_path: Path) -> None:
+    for name in ("b_poses", "a", "c_stageii"):
+        _write(tmp_path / f"{name}.npz")
+    for name in (".a.npz.123.tmp", ".hidden.npz", "notes.txt", "shape.npz", "neutral_stagei.npz"):
+        (tmp_path / name).write_bytes(b"x")
+    (tmp_path / "sub.npz").mkdir()
+    motions = read_folder(tmp_path)
+    assert [motion.name for motion in motions] == ["a", "b", "c"]
+    assert all(isinstance(motion, Motion) for motion in motions)
+
+
+def test_read_folder_refuses(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="holds no .npz motion file"):
+        read_folder(tmp_path)
+    with pytest.raises(UserError, match="there is no such folder"):
+        read_folder(tmp_path / "none")
+    _write(tmp_path / "a.npz")
+    _write(tmp_path / "a_poses.npz")
+    with pytest.raises(UserError, match="a.npz and a_poses.npz are both named 'a'"):
+        read_folder(tmp_path)
+
+
+def test_find_motions_takes_the_first_that_holds_any(tmp_path: Path) -> None:
+    empty, full, later = tmp_path / "empty", tmp_path / "full", tmp_path / "later"
+    for folder in (empty, full, later):
+        folder.mkdir()
+    _write(full / "a.npz")
+    _write(later / "a.npz")
+    assert find_motions([tmp_path / "none", empty, full, later]) == full
+    with pytest.raises(UserError, match="none, .*empty"):
+        find_motions([tmp_path / "none", empty])
+    with pytest.raises(UserError, match="no folder given"):
+        find_motions([])
+
+
+def test_evaluation_clips_are_read(external_dir: Path) -> None:
+    motions = {motion.name: motion for motion in read_folder(external_dir / "cmu" / "evaluation")}
+    assert len(motions) == 11
+    assert motions["13_28"].pose_TJ6.shape == (824, 21, 6) and motions["13_28"].frame_rate == 24.0
+    assert motions["13_28"].description == "direct traffic, wave, point"
