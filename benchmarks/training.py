@@ -66,8 +66,8 @@ def main(argv: list[str]) -> None:
         with tempfile.TemporaryDirectory() as folder:
             logger = open_logger(Path(folder), "benchmark", "run", {}) if tracked else False
             fit = lightning.Trainer(
-                max_steps=steps, accelerator="cpu", logger=logger, log_every_n_steps=50, enable_progress_bar=False,
-                enable_model_summary=False, enable_checkpointing=False, callbacks=[TrainingProgress(quiet=True)],
+                max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=50, enable_progress_bar=False,
+                enable_model_summary=False, enable_checkpointing=False, callbacks=[TrainingProgress(steps, quiet=True)],
             )  # fmt: skip
             net, pairs = module(), data()
             start = time.perf_counter()

@@ -184,7 +184,9 @@ def train(
             accelerator=settings.accelerator if settings.accelerator != "auto" else device_of(config).type,
             devices=1,
             precision="bf16-mixed" if settings.precision == "bf16" else "32-true",
-            max_steps=settings.max_steps,
+            # Not max_steps: with it Lightning takes a checkpoint of a finished epoch for one within the epoch, and a
+            # resumed run goes on with other batches. The module stops at its last step.
+            max_epochs=-(-settings.max_steps // settings.validate_every),
             logger=logger,
             log_every_n_steps=50,
             num_sanity_val_steps=0,
@@ -192,7 +194,7 @@ def train(
             enable_model_summary=False,
             callbacks=[
                 ClipMetrics(validation, prepared.body_map.robot, config.robot.key_links),
-                TrainingProgress(quiet),
+                TrainingProgress(settings.max_steps, quiet),
                 saver,
             ],
         )

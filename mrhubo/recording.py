@@ -104,7 +104,7 @@ class Recording:
             "pairs/ik_cost": float(pairs["cost"].mean()),
             "pairs/ik_residual_mm": 1000 * float(pairs["residual_m"].mean()),
             "pairs/phi_mean": float(pairs["phi"].mean()),
-            "pairs/phi_threshold": pair_filter.threshold if pair_filter.threshold < float("inf") else -1.0,
+            "pairs/phi_threshold": pair_filter.threshold,
         }
         if report.made:
             metrics["pairs/per_second"] = report.made / report.seconds

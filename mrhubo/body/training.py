@@ -137,6 +137,11 @@ class PriorTraining(lightning.LightningModule):
         self.log_dict({"train/loss": loss, "train/rotation": rotations, "train/position_m2": positions, "train/kl": kl})
         return loss
 
+    def on_train_batch_end(self, *_: Any) -> None:
+        """Stops at the last step, also within an epoch."""
+        if self.trainer.global_step >= self.config.steps:
+            self.trainer.should_stop = True
+
     def validation_step(self, pose_BJ6: Tensor, _: int) -> None:
         """Encode, take the mean, decode: distance of the 22 joints and angle of the 21 rotations."""
         error_mm, angle_deg = reconstruction(self.prior, self.skeleton, pose_BJ6)
@@ -218,7 +223,7 @@ def train(config: PriorConfig) -> BodyPrior:
         logger = open_logger(config.tracking_dir, "body-prior", name, tags, run_id=run_id)
         workspace.start(str(logger.run_id))
         trainer = lightning.Trainer(
-            max_steps=config.steps,
+            max_epochs=-(-config.steps // min(1_000, config.steps)),  # max_steps would break exact resumption
             logger=logger,
             log_every_n_steps=100,
             accelerator="auto",

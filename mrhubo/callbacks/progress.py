@@ -16,13 +16,14 @@ _EVERY = 10
 class TrainingProgress(lightning.Callback):
     """Steps, rate, time left and the last validation errors on one line."""
 
-    def __init__(self, quiet: bool = False) -> None:
-        self.quiet = quiet
+    def __init__(self, steps: int, quiet: bool = False) -> None:
+        """`steps` is the length of the whole training."""
+        self.steps, self.quiet = steps, quiet
         self._progress: Progress | None = None
 
     def on_train_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Opens the line."""
-        self._progress = Progress("training", int(trainer.max_steps), "steps", self.quiet)
+        self._progress = Progress("training", self.steps, "steps", self.quiet)
         self._progress.update(trainer.global_step)
 
     def on_train_batch_end(

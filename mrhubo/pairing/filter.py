@@ -37,13 +37,13 @@ def make_filter(phi_P: Tensor, rule: str, k: float) -> PairFilter:
         phi_P: reconstruction errors.
         rule: `linear` (1 at the smallest phi, falling linearly to 0 at the threshold), `hard` (1 up to the
         threshold) or
-            `none` (1 everywhere).
+            `none` (1 everywhere; the threshold is then only reported).
         k: the threshold is mean + k * standard deviation.
     """
     phi_P = phi_P.double().cpu()
     threshold = float(phi_P.mean() + k * phi_P.std()) if len(phi_P) > 1 else float(phi_P.max())
     if rule == "none":
-        return PairFilter(torch.ones(len(phi_P)), float("inf"))
+        return PairFilter(torch.ones(len(phi_P)), threshold)
     if rule == "hard":
         return PairFilter((phi_P <= threshold).float(), threshold)
     if rule != "linear":

@@ -38,7 +38,9 @@ def pairs_header(config: Config, robot: Robot) -> dict[str, str]:
         "kinematics": kinematics,
         "prior_xxh3": prior,
         "seed": str(config.pairs.seed),
-        "fingerprint": fingerprint({"schema": SCHEMA, "pairs": pairs, "robot": parts, "kinematics": kinematics, "prior": prior}),
+        "fingerprint": fingerprint(
+            {"schema": SCHEMA, "pairs": pairs, "robot": parts, "kinematics": kinematics, "prior": prior}
+        ),
     }
 
 

@@ -49,6 +49,11 @@ class RetargetModule(lightning.LightningModule):
         self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         return losses["loss"]
 
+    def on_train_batch_end(self, *_: Any) -> None:
+        """Stops at the last step, also within an epoch."""
+        if self.trainer.global_step >= self.settings.max_steps:
+            self.trainer.should_stop = True
+
     def configure_optimizers(self) -> Any:
         """AdamW with warm-up and cosine decay over `max_steps`."""
         settings = self.settings
