@@ -48,7 +48,9 @@ def open_logger(
         client = mlflow.MlflowClient(tracking_uri=uri)
         if client.get_experiment_by_name(experiment) is None:
             location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
-            client.create_experiment(experiment, artifact_location=location)
+            # The tag opens the experiment in the dashboard's view of trainings, not of language models.
+            kind = {"mlflow.experimentKind": "custom_model_development"}
+            client.create_experiment(experiment, artifact_location=location, tags=kind)
         logger = MLFlowLogger(
             experiment_name=experiment, run_name=run_name, tracking_uri=uri, tags=tags, run_id=run_id, log_model=False
         )

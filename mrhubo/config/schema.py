@@ -112,9 +112,9 @@ class ModelConfig:
 class TrainerConfig:
     """The training."""
 
-    max_steps: int = bounded(2_500, 1, 1_000_000_000)
+    max_steps: int = bounded(3_000, 1, 1_000_000_000)
     """Optimiser steps."""
-    batch_size: int = bounded(2_048, 1, 10_000_000)
+    batch_size: int = bounded(1_024, 1, 10_000_000)
     """Pairs per step."""
     lr: float = bounded(1e-3, 1e-9, 10.0)
     """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps."""

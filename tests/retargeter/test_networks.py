@@ -106,8 +106,8 @@ def test_the_students_gradient_stops_at_the_links_unless_asked(detach: bool) -> 
 
 def test_one_stage_has_one_loss_and_no_links() -> None:
     net = network(stages=1)
-    assert set(RetargetModule(net, TrainerConfig()).losses(torch.randn(8, 18), torch.randn(8, 3, 6), torch.rand(8, 3))) == {
-        "loss"
-    }
+    assert set(
+        RetargetModule(net, TrainerConfig()).losses(torch.randn(8, 18), torch.randn(8, 3, 6), torch.rand(8, 3))
+    ) == {"loss"}
     with pytest.raises(RuntimeError):
         net.links(torch.randn(8, 18))

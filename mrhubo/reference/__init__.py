@@ -1,0 +1,16 @@
+"""Optimisation-based human -> robot retargeting (the ground truth, and the peer to beat), and the metrics."""
+
+from mrhubo.reference.jacobian import DirectionJacobian
+from mrhubo.reference.metrics import direction_error, joint_error, link_error
+from mrhubo.reference.retarget import ReferenceResult, ReferenceRetargeter
+from mrhubo.reference.solve import DirectionProblem
+
+__all__ = [
+    "DirectionJacobian",
+    "DirectionProblem",
+    "ReferenceResult",
+    "ReferenceRetargeter",
+    "direction_error",
+    "joint_error",
+    "link_error",
+]

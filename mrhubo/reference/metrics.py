@@ -1,0 +1,47 @@
+"""How far two robot motions are apart, and how far a robot motion is from a human's.
+
+Legend: T frames (or any batch), N joints, D directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from mrhubo.errors import UserError, unknown_name
+from mrhubo.robot import BodyMap, Robot
+from mrhubo.rotation import wrap_angle
+
+
+def joint_error(q_TN: Tensor, q_ref_TN: Tensor) -> Tensor:
+    """Mean absolute difference of joint angles (T,) [rad], modulo 2 pi."""
+    return wrap_angle(q_TN - q_ref_TN).abs().mean(dim=-1)
+
+
+def link_error(robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence[str]) -> Tensor:
+    """Mean Euclidean distance (T,) [cm] of the key links in the robot's base frame.
+
+    Raises:
+        UserError: a key link is not among `robot.links`, or there is none.
+    """
+    if not key_links:
+        raise UserError("robot.key_links: is empty; name the links whose error is measured")
+    for link in key_links:
+        if link not in robot.links:
+            raise UserError(f"robot.key_links: {unknown_name('link', link, robot.links)}")
+    rows = [robot.link_index(link) for link in key_links]
+    position_TL3, reference_TL3 = (robot.forward(q).position_BL3[:, rows] for q in (q_TN, q_ref_TN))
+    return 100 * (position_TL3 - reference_TL3).norm(dim=-1).mean(dim=-1)
+
+
+def direction_error(body_map: BodyMap, q_TN: Tensor, pose_TJ6: Tensor) -> Tensor:
+    """Angle (T, D) [degrees] between the robot's directions and those of human poses (T, 21, 6), from the chest."""
+    robot_TD3 = body_map.robot_directions(body_map.robot.forward(q_TN))
+    return torch.rad2deg(angle_between(robot_TD3, body_map.human_directions(pose_TJ6)))
+
+
+def angle_between(a: Tensor, b: Tensor) -> Tensor:
+    """Angle (...) [rad] in [0, pi] between vectors (..., 3); exact near 0 and pi, where arccos is not."""
+    return torch.atan2(torch.linalg.cross(a, b).norm(dim=-1), (a * b).sum(-1))

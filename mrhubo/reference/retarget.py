@@ -1,0 +1,161 @@
+"""The reference retargeter: human motion -> robot motion by optimisation, the ground truth for the network.
+
+Every frame is solved from several starts; the best path through the solutions is chosen; then all frames are refined
+together, with a small cost on joint velocity that carries joints over frames which do not determine them (the twist of
+a straight arm).
+
+Legend: T frames (or B independent ones), S starts, D directions, N joints, J = 21 human joints, C blocks (see `solve`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.errors import UserError
+from mrhubo.reference.metrics import angle_between
+from mrhubo.reference.solve import DirectionProblem
+from mrhubo.reference.starts import StartPool
+from mrhubo.reference.trajectory import pick, smooth_motion
+from mrhubo.robot import BodyMap
+
+_REFERENCE_RATE = 24.0
+_AT_LIMIT = 1e-3
+
+
+@dataclass(frozen=True)
+class ReferenceResult:
+    """A robot motion and how good it is."""
+
+    q_TN: Tensor
+    """Joint angles [rad], inside the limits."""
+    residual_deg_TD: Tensor
+    """Angle between the robot's and the human's direction."""
+    at_limit_share: float
+    """Share of all joint angles that are at a limit (within 0.001 rad)."""
+    jumps: int
+    """Steps of an arm or the neck faster than 0.5 rad per 1/24 s while its human directions turn less than 0.25 rad."""
+
+
+class ReferenceRetargeter:
+    """Optimisation-based retargeter of one robot; works on the device of its body map. Deterministic for a seed."""
+
+    def __init__(self, body_map: BodyMap, smoothness: float = 0.02, starts: int = 12, seed: int = 0) -> None:
+        """Prepares the starts.
+
+        Args:
+            body_map: the robot and what it shares with a human body.
+            smoothness: weight of |q_t - q_(t-1)|^2 at 24 frames per second [1/rad^2]; at other rates the same for the
+                same velocity. 0: every frame on its own.
+            starts: starting points per frame.
+            seed: of the random robot poses that serve as starting points.
+        """
+        if not (math.isfinite(smoothness) and smoothness >= 0):
+            raise UserError(f"reference retargeter: smoothness must be 0 or more, found {smoothness}")
+        if starts < 2:
+            raise UserError(f"reference retargeter: needs at least 2 starts, found {starts}")
+        self.body_map, self.smoothness, self.starts, self.seed = body_map, smoothness, starts, seed
+        self._prepare()
+
+    def _prepare(self) -> None:
+        self.problem = DirectionProblem(self.body_map)
+        self._pool = StartPool(self.problem, self.starts, self.seed)
+
+    def to(self, device: torch.device | str) -> ReferenceRetargeter:
+        """Moves the body map, in place, and everything built on it."""
+        self.body_map.to(device)
+        self._prepare()
+        return self
+
+    @torch.no_grad()
+    def retarget(self, pose_TJ6: Tensor, frame_rate: float) -> ReferenceResult:
+        """The robot's motion for human poses (T, 21, 6) at `frame_rate` frames per second.
+
+        Raises:
+            UserError: the pose has the wrong shape or a frame that is no pose, or the frame rate is not positive.
+        """
+        if not (math.isfinite(frame_rate) and frame_rate > 0):
+            raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
+        target_TD3 = self._targets(pose_TJ6)
+        candidates_TSN, cost_TSC = self._candidates(target_TD3)
+        # sum_t |velocity_t|^2 with the reference rate as the unit of time
+        pull = self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2
+        if pull == 0 or len(target_TD3) == 1:
+            q_TN = self._polish(candidates_TSN, cost_TSC, target_TD3)[0]
+        else:
+            q_TN = smooth_motion(self.problem, candidates_TSN, cost_TSC, target_TD3, pull)
+        return self._result(q_TN, target_TD3, frame_rate)
+
+    @torch.no_grad()
+    def solve_frames(self, pose_BJ6: Tensor) -> tuple[Tensor, Tensor]:
+        """The best joint angles (B, N) [rad] of independent human poses (B, 21, 6), and their cost (B,).
+
+        Raises:
+            UserError: the pose has the wrong shape or a frame that is no pose.
+        """
+        target_BD3 = self._targets(pose_BJ6)
+        q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
+        return q_BN, cost_BC.sum(dim=1)
+
+    @torch.no_grad()
+    def solve_directions(self, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
+        """`solve_frames` for unit directions (B, D, 3), seen from the chest in human axes, in place of poses."""
+        q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
+        return q_BN, cost_BC.sum(dim=1)
+
+    def _targets(self, pose_BJ6: Tensor) -> Tensor:
+        joints = len(POSED_JOINT_NAMES)
+        if pose_BJ6.ndim != 3 or tuple(pose_BJ6.shape[1:]) != (joints, 6) or not len(pose_BJ6):
+            raise UserError(f"human motion: expected poses of shape (frames, {joints}, 6) with at least one frame, "
+                            f"found {tuple(pose_BJ6.shape)}")  # fmt: skip
+        pose_BJ6 = pose_BJ6.to(self.problem.device, torch.float32)
+        target_BD3 = self.body_map.human_directions(pose_BJ6)
+        for wrong_B, what in (
+            (~pose_BJ6.isfinite().flatten(1).all(dim=1), "has numbers that are NaN or infinite"),
+            (((target_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has six numbers that are no rotation"),
+        ):
+            if bool(wrong_B.any()):
+                frames = torch.nonzero(wrong_B)[:, 0]
+                more = f" (and {len(frames) - 1} more)" if len(frames) > 1 else ""
+                raise UserError(f"human motion: frame {int(frames[0])}{more}, counted from 0, {what}")
+        return target_BD3
+
+    def _candidates(self, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
+        """Nearly converged solutions (B, S, N) from the starts, and the cost of their blocks (B, S, C)."""
+        found = []
+        for part_BD3 in target_BD3.split(max(1, self.problem.chunk // self.starts)):
+            start_XN = self._pool.near(part_BD3).flatten(0, 1)
+            target_XD3 = part_BD3.repeat_interleave(self.starts, dim=0)
+            q_XN, cost_XC = self.problem.minimise(start_XN, target_XD3, steps=6, tolerance=1e-2)
+            found.append((q_XN.unflatten(0, (-1, self.starts)), cost_XC.unflatten(0, (-1, self.starts))))
+        return torch.cat([q for q, _ in found]), torch.cat([cost for _, cost in found])
+
+    def _polish(self, candidates_BSN: Tensor, cost_BSC: Tensor, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
+        """Each block's best candidate, converged: angles (B, N) and costs (B, C)."""
+        best_BN = pick(candidates_BSN, cost_BSC.argmin(dim=1), self.problem.joints_NC)
+        return self.problem.minimise(best_BN, target_BD3)
+
+    def _result(self, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> ReferenceResult:
+        problem = self.problem
+        robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
+        at_limit_TN = (q_TN - problem.lower_N < _AT_LIMIT) | (problem.upper_N - q_TN < _AT_LIMIT)
+        return ReferenceResult(
+            q_TN, torch.rad2deg(angle_between(robot_TD3, target_TD3)), float(at_limit_TN.float().mean()),
+            count_jumps(problem, q_TN, target_TD3, frame_rate),
+        )  # fmt: skip
+
+
+def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> int:
+    """Steps in which a joint turns by more than 0.5 rad, but the human directions of its block by less than 0.25 rad.
+
+    Both per 1/24 s, whatever the frame rate; a step is counted once per block.
+    """
+    scale = frame_rate / _REFERENCE_RATE
+    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.joints_NC).amax(dim=1) * scale
+    human_XD = angle_between(target_TD3[1:], target_TD3[:-1])
+    asked_XC = (human_XD[..., None] * problem.directions_DC).amax(dim=1) * scale
+    return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())

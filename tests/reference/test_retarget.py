@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo.errors import UserError
+from mrhubo.reference import ReferenceRetargeter, direction_error
+from mrhubo.reference.retarget import count_jumps
+
+
+@pytest.fixture(scope="module")
+def waving(make_pose: Callable[..., Tensor]) -> Callable[[float], Tensor]:
+    """Function of the frame rate: four seconds of both arms lowered half-way; the elbows stretch, then bend in a plane at
+    right angles to the first. While an elbow is straight, nothing tells the twist of the arm.
+    """
+
+    def make(frame_rate: float) -> Tensor:
+        time_T = torch.arange(int(4 * frame_rate) + 1) / frame_rate
+        bend_T = 1.2 * torch.cos(math.pi * time_T / 4)
+        bend_T = torch.where(bend_T.abs() < 0.6, 0.0, (bend_T.abs() - 0.6) * 2)
+        forward_T, down_T = bend_T * (time_T < 2), bend_T * (time_T >= 2)
+        zero_T, lowered_T = torch.zeros_like(time_T), torch.full_like(time_T, 0.7)
+        swing_T = 0.3 * torch.sin(time_T)
+        return make_pose(
+            left_shoulder=torch.stack((zero_T, swing_T, -lowered_T), 1),
+            left_elbow=torch.stack((zero_T, -forward_T, -down_T), 1),
+            right_shoulder=torch.stack((zero_T, -swing_T, lowered_T), 1),
+            right_elbow=torch.stack((zero_T, forward_T, down_T), 1),
+        )
+
+    return make
+
+
+@pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
+def test_straight_arm_does_not_flip(
+    name: str, retargeters: dict[str, ReferenceRetargeter], waving: Callable[[float], Tensor]
+) -> None:
+    retargeter = retargeters[name]
+    pose_TJ6 = waving(24.0)
+    result = retargeter.retarget(pose_TJ6, 24.0)
+    assert result.jumps == 0
+    assert float(result.q_TN.diff(dim=0).abs().max()) < 0.5
+    torch.testing.assert_close(result.residual_deg_TD, direction_error(retargeter.body_map, result.q_TN, pose_TJ6))
+    alone_TN, _ = retargeter.solve_frames(pose_TJ6)
+    assert float((alone_TN.diff(dim=0).abs()).max()) > 0.5  # frame by frame, the twist does flip
+    alone_TD = direction_error(retargeter.body_map, alone_TN, pose_TJ6)
+    assert float(result.residual_deg_TD.mean() - alone_TD.mean()) < 0.5  # smoothness costs next to no accuracy
+
+
+def test_frame_rate_changes_little(
+    retargeters: dict[str, ReferenceRetargeter], waving: Callable[[float], Tensor]
+) -> None:
+    slow = retargeters["nao"].retarget(waving(24.0), 24.0)
+    fast = retargeters["nao"].retarget(waving(48.0), 48.0)
+    assert float((fast.q_TN[::2] - slow.q_TN).abs().mean()) < 0.02
+    assert fast.jumps == 0
+
+
+def test_recorded_motion_stays_near_the_best_of_each_frame(
+    retargeters: dict[str, ReferenceRetargeter], cmu_poses: dict[str, Tensor]
+) -> None:
+    pose_TJ6 = cmu_poses["13_21"][:300]
+    for name, most_jumps in (("nao", 0), ("reachy", 0)):
+        retargeter = retargeters[name]
+        result = retargeter.retarget(pose_TJ6, 24.0)
+        alone_TN, _ = retargeter.solve_frames(pose_TJ6)
+        assert float((result.q_TN - alone_TN).abs().mean()) < 0.03
+        assert float(result.residual_deg_TD.mean()) < 2
+        assert result.jumps <= most_jumps
+        assert 0 <= result.at_limit_share < 0.2
+        problem = retargeter.problem
+        assert bool(((result.q_TN >= problem.lower_N) & (result.q_TN <= problem.upper_N)).all())
+
+
+def test_same_seed_same_result(
+    retargeters: dict[str, ReferenceRetargeter], random_pose: Callable[[int, int], Tensor]
+) -> None:
+    retargeter, pose_TJ6 = retargeters["coman"], random_pose(40, 8)
+    first = retargeter.retarget(pose_TJ6, 30.0)
+    again = ReferenceRetargeter(retargeter.body_map).retarget(pose_TJ6, 30.0)
+    assert torch.equal(first.q_TN, again.q_TN)
+    other = ReferenceRetargeter(retargeter.body_map, seed=1).retarget(pose_TJ6, 30.0)
+    assert not torch.equal(first.q_TN, other.q_TN)
+
+
+def test_one_frame_and_no_smoothness(
+    retargeters: dict[str, ReferenceRetargeter], random_pose: Callable[[int, int], Tensor]
+) -> None:
+    pose_TJ6 = random_pose(20, 9)
+    alone_TN, _ = retargeters["nao"].solve_frames(pose_TJ6)
+    one = retargeters["nao"].retarget(pose_TJ6[:1], 24.0)
+    assert one.q_TN.shape == (1, 8) and one.residual_deg_TD.shape == (1, 4) and one.jumps == 0
+    torch.testing.assert_close(one.q_TN, alone_TN[:1], atol=1e-3, rtol=0)
+    rough = ReferenceRetargeter(retargeters["nao"].body_map, smoothness=0.0).retarget(pose_TJ6, 24.0)
+    torch.testing.assert_close(rough.q_TN, alone_TN, atol=1e-3, rtol=0)
+
+
+def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, ReferenceRetargeter]) -> None:
+    problem = retargeters["nao"].problem
+    q_TN = torch.zeros(4, 8)
+    q_TN[2:, 0] = 0.6
+    still_TD3 = torch.tensor([1.0, 0, 0]).expand(4, 4, 3)
+    assert count_jumps(problem, q_TN, still_TD3, 24.0) == 1
+    assert count_jumps(problem, q_TN, still_TD3, 12.0) == 0  # the same step, at half the speed
+    turning_TD3 = still_TD3.clone()
+    turning_TD3[2:, 1] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])
+    assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 0
+    turning_TD3 = still_TD3.clone()
+    turning_TD3[2:, 3] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])  # but that is the other arm
+    assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 1
+
+
+def test_bad_input_is_named(retargeters: dict[str, ReferenceRetargeter]) -> None:
+    retargeter = retargeters["nao"]
+    good_TJ6 = torch.tensor([1.0, 0, 0, 0, 1, 0]).repeat(6, 21, 1)
+    for bad, message in ((math.nan, "frame 4 .*NaN"), (math.inf, "frame 4 .*infinite")):
+        pose_TJ6 = good_TJ6.clone()
+        pose_TJ6[4, 3, 2] = bad
+        with pytest.raises(UserError, match=message):
+            retargeter.retarget(pose_TJ6, 24.0)
+    pose_TJ6 = good_TJ6.clone()
+    pose_TJ6[[2, 5], 15] = 0.0
+    with pytest.raises(UserError, match=r"frame 2 \(and 1 more\) .*no rotation"):
+        retargeter.solve_frames(pose_TJ6)
+    for shape in ((6, 21, 3), (21, 6), (6, 22, 6), (0, 21, 6)):
+        with pytest.raises(UserError, match="21, 6"):
+            retargeter.retarget(torch.zeros(shape), 24.0)
+    for rate in (0.0, -1.0, math.nan):
+        with pytest.raises(UserError, match="frame rate"):
+            retargeter.retarget(good_TJ6, rate)
+    with pytest.raises(UserError, match="smoothness"):
+        ReferenceRetargeter(retargeter.body_map, smoothness=-1.0)
+    with pytest.raises(UserError, match="starts"):
+        ReferenceRetargeter(retargeter.body_map, starts=1)
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
+def test_cuda_gives_the_same(retargeters: dict[str, ReferenceRetargeter], waving: Callable[[float], Tensor]) -> None:
+    pose_TJ6 = waving(24.0)
+    here = retargeters["nao"].retarget(pose_TJ6, 24.0)
+    there = retargeters["nao"].to("cuda").retarget(pose_TJ6.cuda(), 24.0)
+    retargeters["nao"].to("cpu")
+    assert there.q_TN.is_cuda
+    torch.testing.assert_close(there.q_TN.cpu(), here.q_TN, atol=5e-3, rtol=0)

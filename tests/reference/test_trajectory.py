@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import itertools
+
+import torch
+
+from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference.trajectory import best_path, pick, refine
+
+
+def test_best_path_equals_trying_all() -> None:
+    generator = torch.Generator().manual_seed(0)
+    candidates_TSN, cost_TSC = torch.randn(5, 3, 4, generator=generator), torch.rand(5, 3, 2, generator=generator)
+    joints_NC = torch.tensor([[1.0, 0], [1, 0], [0, 1], [0, 1]])
+    path_TN, path_cost_TC = best_path(candidates_TSN, cost_TSC, joints_NC, 0.1)
+    for block in range(2):
+        joints_N = joints_NC[:, block].bool()
+
+        def total(states: tuple[int, ...], block: int = block, joints_N: torch.Tensor = joints_N) -> float:
+            q_TN = torch.stack([candidates_TSN[t, s, joints_N] for t, s in enumerate(states)])
+            costs = sum(float(cost_TSC[t, s, block]) for t, s in enumerate(states))
+            return costs + 0.1 * float(q_TN.diff(dim=0).square().sum())
+
+        best = min(itertools.product(range(3), repeat=5), key=total)
+        expected_TN = torch.stack([candidates_TSN[t, s, joints_N] for t, s in enumerate(best)])
+        torch.testing.assert_close(path_TN[:, joints_N], expected_TN)
+        torch.testing.assert_close(
+            path_cost_TC[:, block], torch.stack([cost_TSC[t, s, block] for t, s in enumerate(best)])
+        )
+
+
+def test_pick_takes_each_block_from_its_own_candidate() -> None:
+    candidates_TSN = torch.arange(12.0).reshape(1, 3, 4)
+    joints_NC = torch.tensor([[1.0, 0], [0, 1], [1, 0], [0, 1]])
+    assert pick(candidates_TSN, torch.tensor([[2, 0]]), joints_NC).tolist() == [[8.0, 1.0, 10.0, 3.0]]
+
+
+def test_refined_motion_is_a_minimum(retargeters: dict[str, ReferenceRetargeter]) -> None:
+    """Few frames, out of reach in part: no small change inside the limits lowers the motion's cost."""
+    problem = retargeters["nao"].problem
+    generator, pull = torch.Generator().manual_seed(2), 0.05
+    target_TD3 = torch.nn.functional.normalize(torch.randn(1, 4, 3, generator=generator), dim=-1)
+    target_TD3 = torch.nn.functional.normalize(target_TD3 + 0.3 * torch.randn(6, 4, 3, generator=generator), dim=-1)
+
+    def cost(q_TN: torch.Tensor) -> float:
+        each_TC = problem.quadratic(q_TN, target_TD3).cost_BC.double()
+        return float(each_TC.sum() + pull * q_TN.diff(dim=0).double().square().sum())
+
+    start_TN = problem.robot.sample(6, generator)
+    q_TN, cost_C = refine(problem, start_TN, target_TD3, pull, sweeps=200, tolerance=1e-9)
+    assert float(cost_C.sum()) < cost(start_TN)
+    assert abs(cost(q_TN) - float(cost_C.sum())) < 1e-4
+    for _ in range(100):
+        moved_TN = q_TN + 0.02 * torch.randn(q_TN.shape, generator=generator)
+        assert cost(torch.clamp(moved_TN, problem.lower_N, problem.upper_N)) > cost(q_TN) - 1e-5
