@@ -179,8 +179,6 @@ def run_name(config: Config) -> str:
 
 def dashboard_command(folder: Path, config: Config) -> str:
     """The command that opens the dashboard, on this machine only, light (one worker, no job runner)."""
-    uri = config.tracking.uri or database_uri(folder)
-    return (
-        "MLFLOW_SERVER_ENABLE_JOB_EXECUTION=false "
-        f"{shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {shlex.quote(uri)} --host 127.0.0.1 --workers 1"
-    )
+    uri = shlex.quote(config.tracking.uri or database_uri(folder))
+    command = f"{shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {uri} --host 127.0.0.1 --workers 1"
+    return f"MLFLOW_SERVER_ENABLE_JOB_EXECUTION=false {command}"

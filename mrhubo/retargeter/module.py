@@ -46,7 +46,8 @@ class RetargetModule(lightning.LightningModule):
     def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
         """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""
         losses = self.losses(*batch)
-        if (self.trainer.global_step + 1) % self.trainer.log_every_n_steps == 0:  # `log` costs milliseconds at each call
+        # Only when it is written anyway: each call costs milliseconds.
+        if (self.trainer.global_step + 1) % self.trainer.log_every_n_steps == 0:
             self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         return losses["loss"]
 

@@ -1,0 +1,102 @@
+"""A package gives back what was trained, and is refused when it is not whole."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import torch
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.errors import UserError
+from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.robot import build_body_map
+from mrhubo.storage import read_metadata, read_tensors, write_tensors
+
+
+@pytest.fixture(scope="module")
+def made(root: Path) -> Retargeter:
+    config = load_config(root / "conf" / "reachy.yaml", ["model.hidden=24"])
+    body_map = build_body_map(config.robot)
+    torch.manual_seed(0)
+    return Retargeter(build_network(config, body_map), body_map, config, phi_threshold=0.01)
+
+
+@pytest.fixture
+def folder(made: Retargeter, tmp_path: Path) -> Path:
+    return made.save(tmp_path / "package", {"run_id": "abc"})
+
+
+def human(count: int) -> torch.Tensor:
+    return BodyPrior.open().decode(torch.randn(count, 32, generator=torch.Generator().manual_seed(1)))
+
+
+def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: Path) -> None:
+    moved = tmp_path / "elsewhere"
+    shutil.move(folder, moved)
+    opened = Retargeter.load(moved)
+    assert opened.joint_names == made.joint_names
+    pose = human(20)
+    torch.testing.assert_close(opened.predict(pose), made.predict(pose))
+    torch.testing.assert_close(opened.retarget(pose).confidence_T, made.retarget(pose).confidence_T)
+
+
+def test_the_header_tells_joints_limits_and_conventions(made: Retargeter, folder: Path) -> None:
+    header = read_metadata(folder / "retargeter.safetensors")
+    assert header["robot"] == "reachy" and "l_elbow_pitch" in header["joint_names"] and header["run_id"] == "abc"
+    assert "rad" in header["output"] and "6D" in header["input"] and header["lower_rad"].count(",") == 16
+
+
+def test_no_path_of_this_machine_is_in_a_package(folder: Path, root: Path) -> None:
+    for file in folder.iterdir():
+        assert str(root).encode() not in file.read_bytes(), file.name
+
+
+def test_confidence_falls_for_implausible_poses(made: Retargeter) -> None:
+    noise = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(2 * torch.randn(50, 21, 3)))
+    good, bad = made.retarget(human(50)), made.retarget(noise)
+    assert float(bad.phi_T.min()) > float(good.phi_T.max())
+    for result in (good, bad):
+        assert bool(((result.confidence_T >= 0) & (result.confidence_T <= 1)).all())
+        plausible = (0.01 / result.phi_T).clamp(max=1)
+        assert bool((result.confidence_T <= plausible + 1e-6).all())
+    assert float(bad.confidence_T.max()) < 0.5
+
+
+@pytest.mark.parametrize("shape", [(5, 20, 6), (21, 6), (5, 21, 3)])
+def test_a_wrong_shape_is_refused(made: Retargeter, shape: tuple[int, ...]) -> None:
+    with pytest.raises(UserError, match="shape"):
+        made.predict(torch.zeros(shape))
+
+
+def test_nan_names_the_frame(made: Retargeter) -> None:
+    pose = human(9)
+    pose[4, 3, 2] = torch.nan
+    with pytest.raises(UserError, match="human pose 4 holds NaN"):
+        made.retarget(pose)
+
+
+def test_incomplete_or_foreign_packages_are_refused(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="is no package"):
+        Retargeter.load(tmp_path)
+    weights = folder / "retargeter.safetensors"
+    tensors, metadata = read_tensors(weights)
+    write_tensors(weights, tensors, {**metadata, "schema": "x/1"})
+    with pytest.raises(UserError, match="schema is 'x/1'"):
+        Retargeter.load(folder)
+    write_tensors(weights, {k: v for k, v in tensors.items() if "post.0" not in k}, metadata)
+    with pytest.raises(UserError, match="do not fit"):
+        Retargeter.load(folder)
+    weights.write_bytes(b"junk")
+    with pytest.raises(UserError, match="cannot be read"):
+        Retargeter.load(folder)
+    write_tensors(weights, tensors, metadata)
+    for name in ("robot.urdf", "config.yaml", "body_prior.safetensors"):
+        (folder / name).rename(folder / "away")
+        with pytest.raises(UserError):
+            Retargeter.load(folder)
+        (folder / "away").rename(folder / name)
+    Retargeter.load(folder)
