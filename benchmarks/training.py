@@ -22,7 +22,7 @@ from mrhubo.callbacks import TrainingProgress
 from mrhubo.config import load_config
 from mrhubo.pairing import make_filter
 from mrhubo.pairing.data import PairData, PairTable
-from mrhubo.retargeter import RetargetModule, build_network
+from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
 from mrhubo.robot import build_body_map
 from mrhubo.tracking import open_logger
 
@@ -66,7 +66,7 @@ def main(argv: list[str]) -> None:
         with tempfile.TemporaryDirectory() as folder:
             logger = open_logger(Path(folder), "benchmark", "run", {}) if tracked else False
             fit = lightning.Trainer(
-                max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=50, enable_progress_bar=False,
+                max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=LOG_EVERY, enable_progress_bar=False,
                 enable_model_summary=False, enable_checkpointing=False, callbacks=[TrainingProgress(steps, quiet=True)],
             )  # fmt: skip
             net, pairs = module(), data()

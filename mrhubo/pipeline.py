@@ -36,7 +36,7 @@ from mrhubo.locations import default_motions, default_pairs
 from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairStore, generate_pairs, make_filter
 from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.progress import Progress
-from mrhubo.retargeter import RetargetModule, RetargetNetwork, build_network
+from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
 from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.storage import checksum_file
 
@@ -188,7 +188,7 @@ def train(
             # resumed run goes on with other batches. The module stops at its last step.
             max_epochs=-(-settings.max_steps // settings.validate_every),
             logger=logger,
-            log_every_n_steps=50,
+            log_every_n_steps=LOG_EVERY,
             num_sanity_val_steps=0,
             enable_progress_bar=False,
             enable_model_summary=False,

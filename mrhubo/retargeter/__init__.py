@@ -1,7 +1,15 @@
 """The retargeter: networks, their training, and the package that a user takes away."""
 
-from mrhubo.retargeter.module import RetargetModule
+from mrhubo.retargeter.module import LOG_EVERY, RetargetModule
 from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
 from mrhubo.retargeter.package import Retargeter, RetargetResult, build_network
 
-__all__ = ["PoseFeatures", "RetargetModule", "RetargetNetwork", "RetargetResult", "Retargeter", "build_network"]
+__all__ = [
+    "LOG_EVERY",
+    "PoseFeatures",
+    "RetargetModule",
+    "RetargetNetwork",
+    "RetargetResult",
+    "Retargeter",
+    "build_network",
+]

@@ -19,7 +19,7 @@ from mrhubo.robot import BodyMap, build_body_map
 ROBOTS = ("nao", "coman", "reachy")
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def _one_thread():
     """Small batches: threads cost more than they give, much more when the machine is busy."""
     threads = torch.get_num_threads()

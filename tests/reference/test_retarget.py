@@ -63,7 +63,7 @@ def test_frame_rate_changes_little(
 def test_recorded_motion_stays_near_the_best_of_each_frame(
     retargeters: dict[str, ReferenceRetargeter], cmu_poses: dict[str, Tensor]
 ) -> None:
-    pose_TJ6 = cmu_poses["13_21"][:300]
+    pose_TJ6 = cmu_poses["13_21"][:200]
     for name, most_jumps in (("nao", 0), ("reachy", 0)):
         retargeter = retargeters[name]
         result = retargeter.retarget(pose_TJ6, 24.0)
@@ -79,7 +79,7 @@ def test_recorded_motion_stays_near_the_best_of_each_frame(
 def test_same_seed_same_result(
     retargeters: dict[str, ReferenceRetargeter], random_pose: Callable[[int, int], Tensor]
 ) -> None:
-    retargeter, pose_TJ6 = retargeters["coman"], random_pose(40, 8)
+    retargeter, pose_TJ6 = retargeters["nao"], random_pose(40, 8)
     first = retargeter.retarget(pose_TJ6, 30.0)
     again = ReferenceRetargeter(retargeter.body_map).retarget(pose_TJ6, 30.0)
     assert torch.equal(first.q_TN, again.q_TN)
