@@ -123,7 +123,11 @@ def test_stopped_in_training_it_resumes_to_the_same_metrics(
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
     given = arguments(root, tmp_path, motions)
     process = subprocess.Popen(
-        command(given), start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        command(given),
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored below a shell's background job
     )
     deadline = time.monotonic() + 200
     while time.monotonic() < deadline and process.poll() is None:

@@ -206,6 +206,7 @@ def test_ctrl_c(tmp_path: Path):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored below a shell's background job
     )
     assert process.stdout is not None and process.stdout.readline() == "go\n"
     process.send_signal(signal.SIGINT)
