@@ -38,7 +38,6 @@ from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.progress import Progress
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
 from mrhubo.robot import BodyMap, build_body_map
-from mrhubo.storage import checksum_file
 
 
 @dataclass
@@ -58,12 +57,9 @@ class Prepared:
         for key in ("tracking", "evaluation"):
             plain.pop(key)
         plain["pairs"].pop("dir")
-        clips = {m.name: checksum_file(self.motions.folder / f"{m.name}.npz") for m in self._all_motions()}
+        clips = {motion.name: motion.checksum for motion in self.motions.all}
         evaluation = [sorted(m.name for m in self.motions.validation), self.config.evaluation.smoothness]
         return fingerprint([plain, self.store.header, clips, evaluation])
-
-    def _all_motions(self) -> list:
-        return [*self.motions.validation, *self.motions.test]
 
 
 def prepare(config: Config) -> Prepared:
@@ -108,7 +104,7 @@ def make_pairs(prepared: Prepared, quiet: bool) -> PairingReport:
 def make_references(prepared: Prepared, quiet: bool) -> tuple[list[Clip], list[Clip]]:
     """Validation and test clips with the reference retargeter's joint angles."""
     folder = prepared.store.folder.parent / "reference"
-    count = len(prepared.motions.validation) + len(prepared.motions.test)
+    count = len(prepared.motions.all)
     with Progress("reference", count, "clips", quiet) as progress:
         return solve_references(
             prepared.config,

@@ -17,7 +17,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import BodyMap
-from mrhubo.storage import DamagedFile, checksum_file, read_tensors, write_tensors
+from mrhubo.storage import DamagedFile, read_tensors, write_tensors
 
 REFERENCE_SCHEMA = "mrhubo.reference/1"
 
@@ -42,6 +42,11 @@ class Motions:
     folder: Path
     validation: list[Motion]
     test: list[Motion]
+
+    @property
+    def all(self) -> list[Motion]:
+        """Those for validation, then those for the test."""
+        return [*self.validation, *self.test]
 
 
 def load_motions(config: Config) -> Motions:
@@ -86,11 +91,10 @@ def solve_references(
         "smoothness": repr(config.evaluation.smoothness),
     }
     retargeter = ReferenceRetargeter(body_map, smoothness=config.evaluation.smoothness)
-    everything = [*motions.validation, *motions.test]
-    clips = []
+    everything, clips = motions.all, []
     for done, motion in enumerate(everything):
         progress(done, len(everything), motion.name)
-        header = {**common, "motion_xxh3": checksum_file(motions.folder / f"{motion.name}.npz")}
+        header = {**common, "motion_xxh3": motion.checksum}
         path = folder / f"{config.robot.name}-{motion.name}-{fingerprint(header)}.safetensors"
         try:
             tensors, found = read_tensors(path)
