@@ -35,11 +35,12 @@ if TYPE_CHECKING:
 class Recording:
     """One MLflow run, open inside a `with` block: finished, failed or killed at its end."""
 
-    def __init__(self, prepared: Prepared, logger: MLFlowLogger) -> None:
+    def __init__(self, prepared: Prepared, logger: MLFlowLogger, provenance: dict[str, str]) -> None:
         self.prepared, self.logger, self.client = prepared, logger, logger.experiment
         self.run_id = str(logger.run_id)
         self.files = self.folder(prepared.config) / "packages" / f"{prepared.config.robot.name}-{self.run_id[:8]}"
         self.artist = Artist(prepared.body_map.robot)
+        self.provenance = provenance
 
     @staticmethod
     def folder(config: Config) -> Path:
@@ -53,19 +54,17 @@ class Recording:
         for name in ("alembic", "mlflow.store.db.utils", "mlflow.tracking", "mlflow.system_metrics"):
             logging.getLogger(name).setLevel(logging.ERROR)
         run_id = resumable_run(folder, config.tracking.uri, workspace.run_id)
+        provenance = _provenance(prepared)
         tags = {
             "robot": config.robot.name,
-            "git_commit": git_commit(project_root()),
-            "prior_xxh3": prepared.store.header["prior_xxh3"],
-            "urdf_xxh3": checksum_file(config.robot.urdf),
-            "pairs_fingerprint": prepared.store.header["fingerprint"],
+            **provenance,
             "config_fingerprint": prepared.fingerprint,
             "motions": prepared.motions.folder.name,
             **{f"version.{name}": number for name, number in library_versions().items()},
         }
         name = config.tracking.run_name or run_name(config)
         logger = open_logger(folder, config.tracking.experiment, name, tags, config.tracking.uri, run_id)
-        recording = cls(prepared, logger)
+        recording = cls(prepared, logger, provenance)
         workspace.start(recording.run_id)
         if run_id is None:
             logger.log_hyperparams(to_plain(config))
@@ -132,13 +131,9 @@ class Recording:
 
     def package(self, retargeter: Retargeter, score: ClipScore, checkpoint: Path) -> Path:
         """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""
-        header = self.prepared.store.header
         provenance = {
             "run_id": self.run_id,
-            "git_commit": git_commit(project_root()),
-            "urdf_xxh3": checksum_file(self.prepared.config.robot.urdf),
-            "prior_xxh3": header["prior_xxh3"],
-            "pairs_fingerprint": header["fingerprint"],
+            **self.provenance,
             "test_joint_rad": f"{score.joint_rad:.6f}",
             "test_link_cm": f"{score.link_cm:.6f}",
         }
@@ -162,6 +157,16 @@ class Recording:
             path = Path(folder) / Path(name).name
             save_png(image, path)
             self.client.log_artifact(self.run_id, str(path), str(Path(name).parent))
+
+
+def _provenance(prepared: Prepared) -> dict[str, str]:
+    """What a run was made from; the run's tags and the package's header say the same."""
+    return {
+        "git_commit": git_commit(project_root()),
+        "urdf_xxh3": checksum_file(prepared.config.robot.urdf),
+        "prior_xxh3": prepared.store.header["prior_xxh3"],
+        "pairs_fingerprint": prepared.store.header["fingerprint"],
+    }
 
 
 def run_name(config: Config) -> str:

@@ -12,9 +12,10 @@ from pathlib import Path
 
 from torch import Tensor
 
-from mrhubo.config import Config, fingerprint, to_plain
+from mrhubo.config import Config, fingerprint
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.pairing import pose_settings
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import BodyMap
 from mrhubo.storage import DamagedFile, read_tensors, write_tensors
@@ -83,10 +84,9 @@ def solve_references(
         folder: where answers are kept.
         progress: called with (clips done, all clips, name of the next).
     """
-    robot = {k: v for k, v in to_plain(config.robot).items() if k not in ("urdf", "key_links")}
     common = {
         "schema": REFERENCE_SCHEMA,
-        "robot": fingerprint(robot),
+        "robot": fingerprint(pose_settings(config)),
         "kinematics": body_map.robot.description.kinematics,
         "smoothness": repr(config.evaluation.smoothness),
     }

@@ -4,7 +4,7 @@ from mrhubo.pairing.filter import PairFilter, make_filter
 from mrhubo.pairing.generate import PairGenerator, PairingReport, generate_pairs
 from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
 from mrhubo.pairing.problem import LatentProblem
-from mrhubo.pairing.store import PairStore
+from mrhubo.pairing.store import PairStore, pose_settings
 
 __all__ = [
     "LatentProblem",
@@ -14,6 +14,7 @@ __all__ = [
     "PairingReport",
     "generate_pairs",
     "make_filter",
+    "pose_settings",
     "solve_lbfgs",
     "solve_levenberg_marquardt",
 ]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -26,11 +27,16 @@ _NOT_IN_PAIRS = ("count", "dir", "filter", "filter_k")
 _NOT_IN_ROBOT = ("urdf", "key_links")
 
 
+def pose_settings(config: Config) -> dict[str, Any]:
+    """The `robot` settings that decide how robot and human poses correspond: not where the URDF lies or what is measured."""
+    return {k: v for k, v in to_plain(config.robot).items() if k not in _NOT_IN_ROBOT}
+
+
 def pairs_header(config: Config, robot: Robot) -> dict[str, str]:
     """What decides the pairs: settings, seed, the robot's kinematics and the prior's checksum."""
     plain = to_plain(config)
     pairs = {k: v for k, v in plain["pairs"].items() if k not in _NOT_IN_PAIRS}
-    parts = {k: v for k, v in plain["robot"].items() if k not in _NOT_IN_ROBOT}
+    parts = pose_settings(config)
     kinematics, prior = robot.description.kinematics, checksum_file(config.body.prior_path or SHIPPED_WEIGHTS)
     return {
         "schema": SCHEMA,
