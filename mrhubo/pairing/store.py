@@ -28,7 +28,7 @@ _NOT_IN_ROBOT = ("urdf", "key_links")
 
 
 def pose_settings(config: Config) -> dict[str, Any]:
-    """The `robot` settings that decide how robot and human poses correspond: not where the URDF lies or what is measured."""
+    """`robot` settings that decide how robot and human poses correspond, not where files lie or what is measured."""
     return {k: v for k, v in to_plain(config.robot).items() if k not in _NOT_IN_ROBOT}
 
 
