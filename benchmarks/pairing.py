@@ -15,8 +15,9 @@ from pathlib import Path
 import torch
 from common import print_header, print_table
 
+from mrhubo.body.inverse import solve_levenberg_marquardt
 from mrhubo.config import load_config
-from mrhubo.pairing import PairGenerator, PairStore, make_filter, solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pairing import PairGenerator, PairStore, make_filter, solve_lbfgs
 from mrhubo.pipeline import device_of, prepare
 
 
@@ -33,7 +34,7 @@ def main(argv: list[str]) -> None:
         device = device_of(config)
         maker = PairGenerator(prepared.body_map.to(device), prepared.prior.to(device), config.pairs)
         start = time.perf_counter()
-        maker.prepare(PairStore.of(config, prepared.body_map.robot), lambda step, cost: None)
+        maker.prepare(PairStore.of(config, prepared.body_map, prepared.prior), lambda step, cost: None)
         print(f"amortised solver: {config.pairs.amortiser_steps:,} steps in {time.perf_counter() - start:.1f} s\n")
     problem = maker.problem
     target = maker.draw_targets(int(options["--poses"]), torch.Generator().manual_seed(1234))

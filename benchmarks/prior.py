@@ -12,7 +12,7 @@ import torch
 from common import print_header, print_table
 
 from mrhubo.body import BodyPrior, Skeleton
-from mrhubo.body.training import reconstruction
+from mrhubo.body.measures import reconstruction
 from mrhubo.locations import default_motions
 from mrhubo.motion import find_motions, read_folder
 

@@ -48,7 +48,9 @@ def fit(config: Config, quiet: bool = False) -> FitResult:
             recording.resume_after_training()
             recording.pairs(training.pairs, training.filter, report)
             predictions, scores = pipeline.score_test(prepared, training.network, test)
-            retargeter = Retargeter(training.network, prepared.body_map, config, training.filter.threshold)
+            retargeter = Retargeter(
+                training.network, prepared.body_map, prepared.prior, config, training.filter.threshold
+            )
             recording.scores(scores, training.best_link_cm)
             recording.key_poses(test, predictions)
             package = recording.package(retargeter, scores[-1], training.best_checkpoint)

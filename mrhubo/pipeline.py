@@ -19,7 +19,7 @@ from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import Logger
 from torch import Tensor
 
-from mrhubo.body import BodyPrior
+from mrhubo.body import BodyPrior, build_skeleton, open_prior
 from mrhubo.callbacks import (
     Clip,
     ClipMetrics,
@@ -72,12 +72,12 @@ def prepare(config: Config) -> Prepared:
     """
     config.pairs.dir = config.pairs.dir or default_pairs()
     config.evaluation.motions = config.evaluation.motions or default_motions()
-    body_map = build_body_map(config.robot)
-    prior = BodyPrior.open(config.body.prior_path)
+    prior = open_prior(config.body)
+    body_map = build_body_map(config.robot, build_skeleton(config.body))
     build_network(config, body_map)
     if config.trainer.accelerator == "gpu" and not torch.cuda.is_available():
         raise UserError("trainer.accelerator: 'gpu' is asked for, but torch finds no CUDA device; use 'auto' or 'cpu'")
-    return Prepared(config, body_map, prior, load_motions(config), PairStore.of(config, body_map.robot))
+    return Prepared(config, body_map, prior, load_motions(config), PairStore.of(config, body_map, prior))
 
 
 def device_of(config: Config) -> torch.device:

@@ -39,7 +39,7 @@ class Recording:
         self.prepared, self.logger, self.client = prepared, logger, logger.experiment
         self.run_id = str(logger.run_id)
         self.files = self.folder(prepared.config) / "packages" / f"{prepared.config.robot.name}-{self.run_id[:8]}"
-        self.artist = Artist(prepared.body_map.robot)
+        self.artist = Artist(prepared.body_map.robot, prepared.body_map.skeleton)
         self.provenance = provenance
 
     @staticmethod
@@ -172,12 +172,12 @@ def _provenance(prepared: Prepared) -> dict[str, str]:
 def run_name(config: Config) -> str:
     """The robot's name and the settings that differ from the defaults: `nao stages=1 filter=none`."""
     words = [config.robot.name]
-    for section in ("pairs", "model", "trainer"):
+    for section in ("body", "pairs", "model", "trainer"):
         given = getattr(config, section)
         for field in dataclasses.fields(given):
             default = field.default_factory() if callable(field.default_factory) else field.default
             value = getattr(given, field.name)
-            if value != default and field.name != "dir":
+            if value != default and field.name != "dir" and not isinstance(value, Path):
                 words.append(f"{field.name}={value}")
     return " ".join(words)
 

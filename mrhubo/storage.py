@@ -57,10 +57,11 @@ def checksum_file(path: Path) -> str:
     return xxhash.xxh3_64(path.read_bytes()).hexdigest()
 
 
-def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
+def checksum_tensors(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
+    """xxh3 of named tensors and metadata, 16 hex digits."""
     digest = xxhash.xxh3_64(json.dumps(dict(metadata), sort_keys=True).encode())
     for name in sorted(tensors):
-        tensor = tensors[name].contiguous()
+        tensor = tensors[name].detach().cpu().contiguous()
         digest.update(f"{name}{tuple(tensor.shape)}{tensor.dtype}".encode())
         if tensor.numel():
             digest.update(tensor.flatten().view(torch.uint8).numpy().data)
@@ -72,7 +73,7 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], metadata: Mapping[s
     bytes.
     """
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in sorted(tensors.items())}
-    header = {**metadata, _CHECKSUM: _checksum(whole, metadata)}
+    header = {**metadata, _CHECKSUM: checksum_tensors(whole, metadata)}
     content = save(whole, metadata=header)
     with atomic_path(path) as temporary:
         temporary.write_bytes(_sorted_header(content))
@@ -116,6 +117,6 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     expected = metadata.pop(_CHECKSUM, None)
     if expected is None:
         raise DamagedFile(f"{path}: carries no checksum, so it was not written by mrhubo")
-    if _checksum(tensors, metadata) != expected:
+    if checksum_tensors(tensors, metadata) != expected:
         raise DamagedFile(f"{path}: the content does not match its checksum; the file is damaged")
     return tensors, metadata

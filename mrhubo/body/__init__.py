@@ -1,6 +1,21 @@
-"""The human: skeleton, body prior, and how the prior is trained."""
+"""The human: skeleton, body prior, how the prior is trained and measured, and the official files."""
 
-from mrhubo.body.prior import BodyPrior, open_prior
+from mrhubo.body.human import build_skeleton, open_prior
+from mrhubo.body.official import open_skeleton, save_skeleton
+from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, mirror_pose
+from mrhubo.body.vposer import VPoser
 
-__all__ = ["JOINT_NAMES", "KEYPOINT_NAMES", "POSED_JOINT_NAMES", "BodyPrior", "Skeleton", "mirror_pose", "open_prior"]
+__all__ = [
+    "JOINT_NAMES",
+    "KEYPOINT_NAMES",
+    "POSED_JOINT_NAMES",
+    "BodyPrior",
+    "Skeleton",
+    "VPoser",
+    "build_skeleton",
+    "mirror_pose",
+    "open_prior",
+    "open_skeleton",
+    "save_skeleton",
+]

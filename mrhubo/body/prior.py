@@ -1,8 +1,7 @@
 """The human body prior: a variational autoencoder over the local rotations of SMPL's 21 body joints.
 
 It says what a human pose is: decoding any latent near the origin gives a plausible pose, and encoding, then decoding
-the
-mean, pulls an implausible pose back to a plausible one; how far it had to be pulled is the reconstruction error phi.
+the mean, pulls an implausible pose back to a plausible one; how far it was pulled is its reconstruction error phi.
 After Pavlakos et al., "Expressive Body Capture" (CVPR 2019), VPoser; ours is trained on the CMU database, see
 `mrhubo.body.training`.
 
@@ -12,7 +11,7 @@ Legend: B batch, J = 21 joints, Z = 32 latent numbers. Poses are 6D (two columns
 from __future__ import annotations
 
 import json
-from functools import lru_cache
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,34 +19,32 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.body.inverse import solve_levenberg_marquardt
+from mrhubo.body.latent import LatentProblem
+from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.errors import UserError
-from mrhubo.storage import read_tensors, write_tensors
+from mrhubo.storage import checksum_tensors, read_tensors, write_tensors
 
 SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "open_prior.safetensors"
-_SCHEMA = "mrhubo.body_prior/1"
 _JOINTS = len(POSED_JOINT_NAMES)
 
 
 class BodyPrior(nn.Module):
     """The VAE. Every layer is smooth (SiLU), which second-order latent inverse kinematics needs."""
 
+    schema = "mrhubo.body_prior/1"
+    """Of the files that `save` writes and `open` reads."""
     metadata: dict[str, str]
     identity_F: Tensor
 
-    def __init__(self, hidden: int = 512, latent: int = 32) -> None:
+    def __init__(
+        self, hidden: int = 512, latent: int = 32, activation: str = "silu", encoder_hidden: int | None = None
+    ) -> None:
         super().__init__()
-        self.hidden, self.latent = hidden, latent
-        self.encoder = nn.Sequential(
-            nn.Linear(_JOINTS * 6, hidden),
-            nn.SiLU(),
-            nn.Linear(hidden, hidden),
-            nn.SiLU(),
-            nn.Linear(hidden, 2 * latent),
-        )
-        self.decoder = nn.Sequential(
-            nn.Linear(latent, hidden), nn.SiLU(), nn.Linear(hidden, hidden), nn.SiLU(), nn.Linear(hidden, _JOINTS * 6)
-        )
+        self.hidden, self.latent, self.activation = hidden, latent, activation
+        self.encoder_hidden = encoder_hidden or hidden
+        self.encoder = _mlp(_JOINTS * 6, self.encoder_hidden, 2 * latent, activation)
+        self.decoder = _mlp(latent, hidden, _JOINTS * 6, activation)
         identity = torch.tensor([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]).repeat(_JOINTS)
         self.register_buffer("identity_F", identity, persistent=False)
         self.metadata = {}
@@ -61,22 +58,36 @@ class BodyPrior(nn.Module):
         """
         path = Path(path) if path is not None else SHIPPED_WEIGHTS
         tensors, metadata = read_tensors(path)
-        if metadata.get("schema") != _SCHEMA:
+        if metadata.get("schema") != cls.schema:
             raise UserError(
-                f"{path}: schema is '{metadata.get('schema')}', expected '{_SCHEMA}' (a body prior of mrhubo)"
+                f"{path}: schema is '{metadata.get('schema')}', expected '{cls.schema}' (a body prior of mrhubo)"
             )
         try:
-            prior = cls(hidden=int(metadata["hidden"]), latent=int(metadata["latent"]))
+            sizes = int(metadata["hidden"]), int(metadata["latent"])
+            encoder_hidden = int(metadata.get("encoder_hidden", sizes[0]))
+            prior = cls(*sizes, metadata.get("activation", "silu"), encoder_hidden)
             prior.load_state_dict(tensors)
         except (KeyError, ValueError, RuntimeError) as error:
             raise UserError(f"{path}: is no body prior that this version reads: {error}") from error
         prior.metadata = metadata
         return prior.requires_grad_(False).eval()
 
-    def save(self, path: Path, card: dict[str, Any]) -> None:
-        """Writes weights and model card (a JSON object in the header) atomically."""
-        metadata = {"schema": _SCHEMA, "hidden": str(self.hidden), "latent": str(self.latent), "card": json.dumps(card)}
+    def save(self, path: Path, card: dict[str, Any] | None = None) -> None:
+        """Writes weights and model card (a JSON object in the header; by default the one it was read with)."""
+        metadata = {
+            "schema": self.schema,
+            "hidden": str(self.hidden),
+            "latent": str(self.latent),
+            "activation": self.activation,
+            "encoder_hidden": str(self.encoder_hidden),
+            "card": self.metadata.get("card", "{}") if card is None else json.dumps(card),
+        }
         write_tensors(path, self.state_dict(), metadata)
+
+    @property
+    def checksum(self) -> str:
+        """xxh3 of kind and weights, 16 hex digits: the same prior, whatever file it came from."""
+        return checksum_tensors(self.state_dict(), {"schema": self.schema, "activation": self.activation})
 
     def posterior(self, pose_BJ6: Tensor) -> tuple[Tensor, Tensor]:
         """Mean (B, Z) and logarithm of the standard deviation (B, Z) of the latent, for poses (B, 21, 6)."""
@@ -87,9 +98,13 @@ class BodyPrior(nn.Module):
         """Mean latent (B, Z) of poses (B, 21, 6)."""
         return self.posterior(pose_BJ6)[0]
 
+    def decode_raw(self, z_BZ: Tensor) -> Tensor:
+        """What Gram-Schmidt makes orthonormal: six numbers per joint (B, 21, 6) of latents (B, Z)."""
+        return (self.decoder(z_BZ) + self.identity_F).unflatten(-1, (_JOINTS, 6))
+
     def decode_matrices(self, z_BZ: Tensor) -> Tensor:
         """Local rotation matrices (B, 21, 3, 3) of latents (B, Z)."""
-        return rotation.sixd_to_matrix((self.decoder(z_BZ) + self.identity_F).unflatten(-1, (_JOINTS, 6)))
+        return rotation.sixd_to_matrix(self.decode_raw(z_BZ))
 
     def decode(self, z_BZ: Tensor) -> Tensor:
         """Poses (B, 21, 6), proper rotations, of latents (B, Z)."""
@@ -103,8 +118,62 @@ class BodyPrior(nn.Module):
         """phi (B,): mean squared error of the 126 6D numbers between H and H~."""
         return (self.denoise(pose_BJ6) - pose_BJ6).square().mean(dim=(1, 2))
 
+    def inverse_kinematics(
+        self,
+        targets: Mapping[str, Tensor],
+        skeleton: Skeleton | None = None,
+        w_data: float = 100.0,
+        w_prior: float = 0.01,
+        steps: int = 60,
+    ) -> Tensor:
+        """The most plausible poses (B, 21, 6) whose keypoints lie where they should: VPoser's latent IK.
 
-@lru_cache(maxsize=4)
-def open_prior(path: Path | None = None) -> BodyPrior:
-    """`BodyPrior.open`, read once per process."""
-    return BodyPrior.open(path)
+            minimise over z   w_data * sum_k |P_k(z) - P_k|^2 + w_prior * |z|^2
+
+        Every pose is solved on its own by Levenberg-Marquardt from z = 0.
+
+        Args:
+            targets: positions (B, 3) [m] by name of keypoint (`KEYPOINT_NAMES`), in the pelvis's frame: x to the
+                body's left, y up, z forward, the pelvis at the origin.
+            skeleton: whose keypoints they are; default: the open skeleton.
+            w_data: weight of the squared distances, 1/m^2.
+            w_prior: weight of the squared norm of the latent.
+            steps: most iterations; a converged pose stops earlier.
+
+        Raises:
+            UserError: a name is unknown, no target is given, shapes differ, or a number is not finite.
+        """
+        return self.decode(self.solve_keypoints(targets, skeleton, w_data, w_prior, steps))
+
+    def solve_keypoints(
+        self,
+        targets: Mapping[str, Tensor],
+        skeleton: Skeleton | None = None,
+        w_data: float = 100.0,
+        w_prior: float = 0.01,
+        steps: int = 60,
+    ) -> Tensor:
+        """The latents (B, Z) of `inverse_kinematics`."""
+        if not targets:
+            raise UserError("inverse kinematics: no keypoint is given")
+        indices = keypoint_indices(list(targets))
+        shapes = {name: tuple(target.shape) for name, target in targets.items()}
+        if len(set(shapes.values())) > 1 or any(len(s) != 2 or s[1] != 3 for s in shapes.values()):
+            raise UserError(f"inverse kinematics: targets must all have one shape (poses, 3), found {shapes}")
+        target_BK3 = torch.stack([target.to(self.identity_F) for target in targets.values()], dim=1)
+        if not bool(torch.isfinite(target_BK3).all()):
+            raise UserError("inverse kinematics: a target holds NaN or infinite numbers")
+        skeleton = (skeleton or Skeleton()).to(self.identity_F.device)
+        problem = LatentProblem(self, skeleton, indices, w_data, w_prior)
+        start = target_BK3.new_zeros(len(target_BK3), self.latent)
+        return solve_levenberg_marquardt(problem, start, target_BK3, steps)
+
+
+ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "leaky_relu": nn.LeakyReLU, "tanh": nn.Tanh}
+
+
+def _mlp(inputs: int, hidden: int, outputs: int, activation: str) -> nn.Sequential:
+    layer = ACTIVATIONS[activation]
+    return nn.Sequential(
+        nn.Linear(inputs, hidden), layer(), nn.Linear(hidden, hidden), layer(), nn.Linear(hidden, outputs)
+    )

@@ -1,13 +1,11 @@
 """The human body: SMPL's tree of 22 body joints, points fixed to them, batched forward kinematics, mirroring.
 
 Frame: x to the body's left, y up, z forward, metres. Rest pose: T-pose, arms along +-x, legs along -y, palms down. A
-pose is
-the local rotation of joints 1..21 (the pelvis is the root and stays at the origin), in SMPL's order.
+pose is the local rotation of joints 1..21 (the pelvis is the root and stays at the origin), in SMPL's order.
 
 Legend: B batch, J = 21 posed joints, K keypoints (22 joints and the points fixed to them).
 Source of the lengths: mean skeleton of the CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu); of the hand,
-eye and
-foot points: round numbers of an adult.
+eye and foot points: round numbers of an adult.
 """
 
 from __future__ import annotations
@@ -18,7 +16,10 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.storage import checksum_tensors
 
+_LONGEST = 2.0
+"""No bone is that long [m]; other units than metres are."""
 _SIDES = {"left": 1.0, "right": -1.0}
 
 # name: (parent, offset from the parent at rest [m]); "side_" stands for both sides, x mirrored on the right.
@@ -73,7 +74,9 @@ def _fixed_points() -> dict[str, tuple[int, tuple[float, float, float]]]:
 
 
 _POINTS = _fixed_points()
-KEYPOINT_NAMES: tuple[str, ...] = JOINT_NAMES + tuple(_POINTS)
+POINT_NAMES: tuple[str, ...] = tuple(_POINTS)
+"""The points fixed to head, wrists, ankles and feet."""
+KEYPOINT_NAMES: tuple[str, ...] = JOINT_NAMES + POINT_NAMES
 """The 22 joints, then the points fixed to head, wrists, ankles and feet."""
 KEYPOINT_JOINT: tuple[int, ...] = tuple(range(22)) + tuple(joint for joint, _ in _POINTS.values())
 """Index in JOINT_NAMES of the joint that carries each keypoint (a joint's own keypoint is carried by itself)."""
@@ -116,19 +119,37 @@ def mirror_pose(pose_BJ6: Tensor) -> Tensor:
 
 
 class Skeleton(nn.Module):
-    """Rest offsets as buffers, so that they follow the module's device and precision."""
+    """Rest offsets as buffers, so that they follow the module's device and precision.
+
+    Args:
+        offsets_J3: offsets (21, 3) [m] of joints 1..21 from their parents at rest; default: the open skeleton's.
+        point_offsets_E3: offsets [m] of POINT_NAMES from the joints that carry them; default: the open skeleton's.
+
+    Raises:
+        UserError: an array has another shape, or holds NaN or a length that no human has.
+    """
 
     rest_K3: Tensor
     offsets_J3: Tensor
     point_offsets_E3: Tensor
 
-    def __init__(self) -> None:
+    def __init__(self, offsets_J3: Tensor | None = None, point_offsets_E3: Tensor | None = None) -> None:
         super().__init__()
-        offsets = torch.tensor([o for _, o in _JOINTS.values()])
-        self.register_buffer("offsets_J3", offsets[1:], persistent=False)
-        self.register_buffer("point_offsets_E3", torch.tensor([o for _, o in _POINTS.values()]), persistent=False)
+        ours = torch.tensor([o for _, o in _JOINTS.values()])[1:]
+        points = torch.tensor([o for _, o in _POINTS.values()])
+        for name, given, default in (("offsets_J3", offsets_J3, ours), ("point_offsets_E3", point_offsets_E3, points)):
+            if given is not None and given.shape != default.shape:
+                raise UserError(f"a skeleton's {name} must have the shape {tuple(default.shape)}, found {given.shape}")
+            if given is not None and not bool((given.abs() < _LONGEST).all()):
+                raise UserError(f"a skeleton's {name} must be finite and shorter than {_LONGEST:g} m")
+            self.register_buffer(name, (default if given is None else given).float().clone(), persistent=False)
         identity = torch.eye(3).expand(1, len(POSED_JOINT_NAMES), 3, 3)
         self.register_buffer("rest_K3", self.keypoints(identity)[0], persistent=False)
+
+    @property
+    def checksum(self) -> str:
+        """xxh3 of its lengths, 16 hex digits."""
+        return checksum_tensors({"offsets": self.offsets_J3, "points": self.point_offsets_E3}, {})
 
     def global_rotations(self, local_BJ33: Tensor) -> Tensor:
         """Local rotations (B, 21, 3, 3) of joints 1..21 to rotations relative to the pelvis (B, 22, 3, 3)."""

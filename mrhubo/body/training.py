@@ -25,14 +25,21 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, Sampler
 
 from mrhubo import rotation
-from mrhubo.body.prior import SHIPPED_WEIGHTS, BodyPrior
-from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, Skeleton, mirror_pose
-from mrhubo.config import bounded, fingerprint, parse_arguments, run_command, to_plain
+from mrhubo.body import anatomy
+from mrhubo.body.measures import measure, reconstruction, turn_joints
+from mrhubo.body.prior import ACTIVATIONS, SHIPPED_WEIGHTS, BodyPrior
+from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton, mirror_pose
+from mrhubo.config import bounded, choice, fingerprint, parse_arguments, run_command, to_plain
 from mrhubo.errors import UserError
 from mrhubo.tracking import git_commit, open_logger, resumable_run
 from mrhubo.workspace import Workspace
 
 _WRISTS = [POSED_JOINT_NAMES.index("left_wrist"), POSED_JOINT_NAMES.index("right_wrist")]
+_ROTATION_KNEE, _POSITION_KNEE = 0.02, 0.002
+_MARGIN = math.radians(3.0)
+"""Samples are kept this far inside the anatomical ranges [rad]."""
+_KNOWN, _UNSEEN = 50_000, 5_000
+"""Poses that the final measures take from the training clips and from those held out."""
 _WRIST_STD_DEG = (30.0, 12.0)
 _WRIST_LIMIT_DEG = (75.0, 28.0)
 
@@ -55,13 +62,27 @@ class PriorConfig:
     weight_decay: float = bounded(1e-4, 0.0, 1.0)
     """Weight decay of AdamW."""
     hidden: int = bounded(512, 8, 65_536)
-    """Width of the two hidden layers of encoder and decoder."""
+    """Width of the decoder's two hidden layers."""
+    encoder_hidden: int = bounded(512, 8, 65_536)
+    """Width of the encoder's two hidden layers."""
     latent: int = bounded(32, 1, 1_024)
     """Size of the latent."""
+    activation: str = choice("silu", *ACTIVATIONS)
+    """Activation of the hidden layers; second-order solvers need a smooth one."""
     w_position: float = bounded(50.0, 0.0)
     """Weight of the squared keypoint distances, 1/m^2."""
     w_kl: float = bounded(5e-4, 0.0)
     """Weight of the Kullback-Leibler divergence from N(0, I)."""
+    w_latent: float = bounded(0.0, 0.0)
+    """Weight of the sliced Wasserstein distance between the batch's latents and N(0, I)."""
+    w_anatomy: float = bounded(0.0, 0.0)
+    """Weight of the squared excess [rad^2] over anatomical ranges of poses decoded from N(0, I)."""
+    w_columns: float = bounded(0.0, 0.0)
+    """Weight that keeps the six raw numbers of every joint near two orthogonal unit vectors."""
+    noise_share: float = bounded(0.0, 0.0, 1.0)
+    """Share of the poses that the encoder sees with noise, and the decoder has to give clean."""
+    max_excess_deg: float = bounded(20.0, 0.0)
+    """Frames with a joint further outside its anatomical range than this are dropped."""
     wrist_share: float = bounded(0.5, 0.0, 1.0)
     """Share of the poses that get random wrist flexion and deviation."""
     held_out: float = bounded(0.05, 0.001, 0.5)
@@ -107,6 +128,50 @@ def random_wrists(pose_BJ6: Tensor, share: float) -> Tensor:
     return pose_BJ6.index_copy(1, torch.tensor(_WRISTS, device=pose_BJ6.device), wrists)
 
 
+def add_noise(pose_BJ6: Tensor, share: float) -> Tensor:
+    """Turns joints of a random share of the poses about random axes.
+
+    Half of them at every joint, by up to 40 degrees, the same angle for all joints; the others at one joint, by up to
+    120 degrees.
+    """
+    batch, device = len(pose_BJ6), pose_BJ6.device
+    everywhere = torch.rand(batch, 1, device=device) * 40.0
+    one = torch.nn.functional.one_hot(torch.randint(len(POSED_JOINT_NAMES), (batch,)), len(POSED_JOINT_NAMES))
+    single = torch.rand(batch, 1, device=device) * 120.0 * one.to(device)
+    angle = torch.where(torch.rand(batch, 1, device=device) < 0.5, everywhere, single)
+    noisy = torch.rand(batch, device=device) < share
+    turned = turn_joints(pose_BJ6[noisy], torch.deg2rad(angle[noisy]))
+    return pose_BJ6.index_put((noisy.nonzero()[:, 0],), turned)
+
+
+def _length(x: Tensor, knee: float) -> Tensor:
+    """Euclidean length of the last axis, quadratic below the knee: the mean error counts, not the mean square."""
+    return (x.square().sum(-1) + knee * knee).sqrt() - knee
+
+
+def sliced_wasserstein(z_BZ: Tensor, slices: int = 64) -> Tensor:
+    """Squared sliced Wasserstein-2 distance between the latents (B, Z) and N(0, I), over random directions.
+
+    Source: Kolouri et al., "Sliced Wasserstein Auto-Encoders" (ICLR 2019).
+    """
+    batch, latent = z_BZ.shape
+    direction = torch.nn.functional.normalize(torch.randn(latent, slices, device=z_BZ.device), dim=0)
+    level = (torch.arange(batch, device=z_BZ.device) + 0.5) / batch
+    expected = math.sqrt(2.0) * torch.erfinv(2 * level - 1)
+    return ((z_BZ @ direction).sort(dim=0).values - expected[:, None]).square().mean()
+
+
+def column_defect(raw_BJ6: Tensor) -> Tensor:
+    """How far the six raw numbers of each joint are from two orthogonal unit vectors: (B, 21), 0 if they are.
+
+    Where a raw vector shrinks to nothing or both become parallel, Gram-Schmidt has a singularity, and second-order
+    latent inverse kinematics gets stuck beside it.
+    """
+    first, second = raw_BJ6[..., :3], raw_BJ6[..., 3:]
+    a, b, ab = first.square().sum(-1), second.square().sum(-1), (first * second).sum(-1)
+    return (a - 1).square() + (b - 1).square() + 2 * ab.square()
+
+
 class PriorTraining(lightning.LightningModule):
     """Loss, validation and optimiser of the body prior."""
 
@@ -114,7 +179,7 @@ class PriorTraining(lightning.LightningModule):
         super().__init__()
         self.config = config
         self.save_hyperparameters(to_plain(config))
-        self.prior = BodyPrior(config.hidden, config.latent)
+        self.prior = BodyPrior(config.hidden, config.latent, config.activation, config.encoder_hidden)
         self.skeleton = Skeleton()
 
     def on_train_epoch_start(self) -> None:
@@ -126,15 +191,31 @@ class PriorTraining(lightning.LightningModule):
         flip = torch.rand(len(pose_BJ6), 1, 1, device=pose_BJ6.device) < 0.5
         pose_BJ6 = torch.where(flip, mirror_pose(pose_BJ6), pose_BJ6)
         pose_BJ6 = random_wrists(pose_BJ6, self.config.wrist_share)
-        mean, log_std = self.prior.posterior(pose_BJ6)
-        matrices = self.prior.decode_matrices(mean + log_std.exp() * torch.randn_like(mean))
+        seen_BJ6 = add_noise(pose_BJ6, self.config.noise_share)
+        mean, log_std = self.prior.posterior(seen_BJ6)
+        z_BZ = mean + log_std.exp() * torch.randn_like(mean)
+        raw_BJ6 = self.prior.decode_raw(torch.cat((z_BZ, torch.randn_like(z_BZ[: len(z_BZ) // 4]))))
+        decoded = rotation.sixd_to_matrix(raw_BJ6)
+        matrices, drawn = decoded[: len(z_BZ)], decoded[len(z_BZ) :]
+        anatomy_cost = anatomy.excess(drawn, margin=_MARGIN).square().sum(dim=(1, 2)).mean()
+        columns = column_defect(raw_BJ6).sum(dim=1).mean()
+        latent = sliced_wasserstein(z_BZ)
         target = rotation.sixd_to_matrix(pose_BJ6)
-        rotations = (matrices - target).square().sum(dim=(1, 2, 3)).mean()
+        rotations = _length((matrices - target).flatten(2), _ROTATION_KNEE).sum(dim=1).mean()
         distance = self.skeleton.keypoints(matrices) - self.skeleton.keypoints(target)
-        positions = distance.square().sum(dim=(1, 2)).mean()
+        positions = _length(distance, _POSITION_KNEE).sum(dim=1).mean()
         kl = 0.5 * (mean.square() + (2 * log_std).exp() - 1 - 2 * log_std).sum(-1).mean()
-        loss = rotations + self.config.w_position * positions + self.config.w_kl * kl
-        self.log_dict({"train/loss": loss, "train/rotation": rotations, "train/position_m2": positions, "train/kl": kl})
+        loss = (
+            rotations
+            + self.config.w_position * positions
+            + self.config.w_kl * kl
+            + self.config.w_latent * latent
+            + self.config.w_anatomy * anatomy_cost
+            + self.config.w_columns * columns
+        )
+        parts = {"rotation": rotations, "position_m": positions, "kl": kl, "latent": latent}
+        parts |= {"loss": loss, "anatomy_rad2": anatomy_cost, "columns": columns}
+        self.log_dict({f"train/{name}": value for name, value in parts.items()})
         return loss
 
     def on_train_batch_end(self, *_: Any) -> None:
@@ -165,12 +246,16 @@ def cosine_schedule(optimizer: torch.optim.Optimizer, steps: int) -> torch.optim
     )
 
 
-def reconstruction(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> tuple[Tensor, Tensor]:
-    """Encode-mean-decode error: joints (B, 22) [mm] and rotations (B, 21) [deg]."""
-    target, found = rotation.sixd_to_matrix(pose_BJ6), prior.decode_matrices(prior.encode(pose_BJ6))
-    joints = len(JOINT_NAMES)
-    distance = skeleton.keypoints(found)[:, :joints] - skeleton.keypoints(target)[:, :joints]
-    return 1000 * distance.norm(dim=-1), torch.rad2deg(rotation.geodesic_distance(found, target))
+def _sound(pose_FJ6: Tensor, limit: float) -> Tensor:
+    """Which frames (F,) have no joint further than `limit` [rad] outside its anatomical range."""
+    chunks = (anatomy.excess(rotation.sixd_to_matrix(chunk)) for chunk in pose_FJ6.split(32_768))
+    return torch.cat([(chunk <= limit).flatten(1).all(dim=1) for chunk in chunks])
+
+
+def _differing(config: PriorConfig) -> dict[str, Any]:
+    """Settings other than paths that differ from the defaults."""
+    defaults = to_plain(PriorConfig(data=config.data))
+    return {k: v for k, v in to_plain(config).items() if v != defaults[k] and not isinstance(getattr(config, k), Path)}
 
 
 class _Rows(Dataset[Tensor]):
@@ -211,6 +296,7 @@ def train(config: PriorConfig) -> BodyPrior:
     order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
     held = set(order[: max(1, round(config.held_out * len(clips)))])
     kept = torch.cat([poses[clips[i]] for i in range(len(clips)) if i not in held])
+    kept = kept[_sound(kept, math.radians(config.max_excess_deg))]
     held_out = torch.cat([poses[clips[i]][::4] for i in sorted(held)])
     del poses
     module = PriorTraining(config)
@@ -219,7 +305,7 @@ def train(config: PriorConfig) -> BodyPrior:
     with Workspace(config.tracking_dir / "fits", "prior", key) as workspace:
         tags = {"git_commit": git_commit(Path(__file__).parent)}
         run_id = resumable_run(config.tracking_dir, None, workspace.run_id)
-        name = f"prior {config.hidden}x{config.latent}"
+        name = ", ".join(f"{k}={v}" for k, v in _differing(config).items()) or "defaults"
         logger = open_logger(config.tracking_dir, "body-prior", name, tags, run_id=run_id)
         workspace.start(str(logger.run_id))
         trainer = lightning.Trainer(
@@ -244,8 +330,11 @@ def train(config: PriorConfig) -> BodyPrior:
             ckpt_path=workspace.last_checkpoint(),
             weights_only=True,
         )
+        prior = module.prior.cpu().requires_grad_(False).eval()
+        known = kept[torch.randperm(len(kept), generator=torch.Generator().manual_seed(config.seed))[:_KNOWN]]
+        measures = measure(prior, held_out[:: max(1, len(held_out) // _UNSEEN)], known, config.seed)
+        logger.log_metrics({f"held_out/{name}": value for name, value in measures.items()}, config.steps)
         workspace.finish()
-    measures = {k: round(float(v), 3) for k, v in trainer.callback_metrics.items() if k.startswith("val/")}
     card = {
         "name": "mrhubo open body prior",
         "data": "CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu), mirrored; free for all uses",
@@ -255,12 +344,11 @@ def train(config: PriorConfig) -> BodyPrior:
         "split": f"by clip: {len(clips) - len(held)} for training, {len(held)} held out; "
         "the evaluation clips are in neither",
         "held_out_clips": [names[i] for i in sorted(held)],
-        "measures_on_held_out_clips": measures,
+        "measures_on_held_out_clips": {name: round(value, 4) for name, value in measures.items()},
         "training": {k: v for k, v in settings.items() if not isinstance(getattr(config, k), Path)},
         "known_defects": "the data has no wrist flexion (random plausible wrist angles were added), no collar motion, "
         "and rigid feet",
     }
-    prior = module.prior.cpu().requires_grad_(False).eval()
     prior.save(config.output, card)
     return prior
 

@@ -87,6 +87,7 @@ def solve_references(
     common = {
         "schema": REFERENCE_SCHEMA,
         "robot": fingerprint(pose_settings(config)),
+        "skeleton": body_map.skeleton.checksum,
         "kinematics": body_map.robot.description.kinematics,
         "smoothness": repr(config.evaluation.smoothness),
     }

@@ -33,8 +33,8 @@ _FIGURE_HEIGHT_M = 1.7
 class Artist:
     """Draws one robot and the human, both at one height."""
 
-    def __init__(self, robot: Robot) -> None:
-        self.robot, self.urdf, self.skeleton = robot, load_urdf(robot.urdf), Skeleton()
+    def __init__(self, robot: Robot, skeleton: Skeleton | None = None) -> None:
+        self.robot, self.urdf, self.skeleton = robot, load_urdf(robot.urdf), skeleton or Skeleton()
         self.geometry = read_geometry(self.urdf)
         self.parents = {joint.child: joint.parent for joint in self.urdf.robot.joints}
         height = float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2]))

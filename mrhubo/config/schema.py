@@ -47,12 +47,17 @@ class RobotConfig:
 
 @dataclass
 class BodyConfig:
-    """The human body prior."""
+    """The human: body prior and skeleton. docs/official-files.md tells about VPoser, SMPL-X, SMPL and SMPL-H."""
 
-    prior: str = choice("open", "open")
-    """Which prior: `open` is the one that ships with mrhubo."""
+    prior: str = choice("open", "open", "vposer")
+    """Which prior: `open` ships with mrhubo; `vposer` is VPoser v2, for those who have it."""
     prior_path: Path | None = None
-    """Weights file (.safetensors) in place of the shipped one."""
+    """For `open`: weights file (.safetensors) in place of the shipped one. For `vposer`: its folder V02_05, or the
+    snapshot in it."""
+    model_path: Path | None = None
+    """Body model whose skeleton takes the place of ours: SMPL-X (.npz), SMPL or SMPL-H (.pkl, .npz)."""
+    betas: list[float] = field(default_factory=list)
+    """Shape of that body: its first coefficients; those left out are 0."""
 
 
 @dataclass

@@ -9,26 +9,23 @@ Legend: T frames, 63 = 21 joints x 3 axis-angle numbers [rad] of SMPL's joints 1
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import torch
 import xxhash
-from numpy.lib import format as npy
 from torch import Tensor
 
 from mrhubo.errors import UserError
+from mrhubo.npz import NpzFile, open_npz
 from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
 from mrhubo.storage import atomic_path
 
 MAX_FRAMES = 5_000_000
 """Longest motion that is read (eleven hours at 120 frames a second)."""
-MAX_BYTES = 4 * 2**30
-"""Largest array that is read."""
 _FRAME_RATES = (1.0, 1000.0)
 _MAX_TURN = 8 * math.pi
 """No axis-angle number is that large [rad]; degrees are."""
@@ -71,19 +68,10 @@ def read_motion(path: Path) -> Motion:
         UserError: the file is missing, damaged, hostile, too large, or not a motion.
     """
     path = Path(path)
-    if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
-    try:
-        archive = zipfile.ZipFile(path)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # whatever zipfile makes of a stranger's bytes
-        raise UserError(f"{path}: is not an .npz file (a zip archive of arrays): {error}") from error
-    with archive:
-        keys = {name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")}
-        pose_T63 = _read_pose(path, archive, keys)
-        frame_rate = _read_frame_rate(path, archive, keys)
-        description = _read_description(path, archive, keys)
+    with open_npz(path) as file:
+        pose_T63 = _read_pose(file)
+        frame_rate = _read_frame_rate(file)
+        description = _read_description(file)
     pose_TJ3 = torch.from_numpy(pose_T63).unflatten(-1, (21, 3))
     chunks = (matrix_to_sixd(axis_angle_to_matrix(chunk)).float() for chunk in pose_TJ3.split(65_536))
     pose_TJ6 = torch.cat(list(chunks))
@@ -168,13 +156,14 @@ def _motion_files(folder: Path) -> list[Path]:
     return sorted(file for file in found if not file.stem.endswith(_NO_MOTION) and file.is_file())
 
 
-def _read_pose(path: Path, archive: zipfile.ZipFile, keys: set[str]) -> np.ndarray:
+def _read_pose(file: NpzFile) -> np.ndarray:
     """Axis-angle (T, 63) [rad], finite, float64."""
+    path, keys = file.path, file.keys
     key = next((key for key in ("pose_body", "poses") if key in keys), None)
     if key is None:
         found = ", ".join(sorted(keys)[:12]) or "nothing"
         raise UserError(f"{path}: holds neither 'pose_body' nor 'poses', so it is no human motion; it holds: {found}")
-    array = _read_array(path, archive, key)
+    array = file.read(key, max_rows=MAX_FRAMES)
     widths = {63: "body without root"} if key == "pose_body" else _POSES_WIDTHS
     if array.ndim != 2 or array.shape[1] not in widths:
         expected = " or ".join(f"(frames, {width}) ({what})" for width, what in widths.items())
@@ -191,11 +180,12 @@ def _read_pose(path: Path, archive: zipfile.ZipFile, keys: set[str]) -> np.ndarr
     return pose_T63
 
 
-def _read_frame_rate(path: Path, archive: zipfile.ZipFile, keys: set[str]) -> float:
-    key = next((key for key in _RATE_KEYS if key in keys), None)
+def _read_frame_rate(file: NpzFile) -> float:
+    path = file.path
+    key = next((key for key in _RATE_KEYS if key in file.keys), None)
     if key is None:
         raise UserError(f"{path}: holds no frame rate; expected the key '{_RATE_KEYS[0]}' or '{_RATE_KEYS[1]}'")
-    array = _read_array(path, archive, key)
+    array = file.read(key)
     if array.size != 1:
         raise UserError(f"{path}: '{key}' has shape {array.shape}; expected one number")
     rate = float(array.reshape(()))
@@ -205,51 +195,10 @@ def _read_frame_rate(path: Path, archive: zipfile.ZipFile, keys: set[str]) -> fl
     return rate
 
 
-def _read_description(path: Path, archive: zipfile.ZipFile, keys: set[str]) -> str:
+def _read_description(file: NpzFile) -> str:
     """The description, or nothing where the file has none that is text."""
-    if "description" not in keys:
+    if "description" not in file.keys:
         return ""
-    array = _read_array(path, archive, "description", kinds="U")
+    array = file.read("description", kinds="U")
     text = str(array.reshape(())) if array.size == 1 else ""
     return " ".join("".join(c for c in text[:1000] if c.isprintable() or c.isspace()).split())
-
-
-def _read_array(path: Path, archive: zipfile.ZipFile, key: str, kinds: str = "fiu") -> np.ndarray:
-    """One array, whose header is found to be harmless before its content is read; `kinds`: numpy's letters of types."""
-    try:
-        with archive.open(f"{key}.npy") as handle:
-            shape, dtype = _read_header(handle)
-    except Exception as error:  # whatever zipfile, zlib and numpy make of a stranger's bytes
-        raise UserError(f"{path}: '{key}' cannot be read: {error or type(error).__name__}") from error
-    if dtype.hasobject:
-        raise UserError(f"{path}: '{key}' holds pickled Python objects, which are never opened; expected numbers")
-    if dtype.kind not in kinds:
-        raise UserError(f"{path}: '{key}' has type {dtype}; expected {'text' if kinds == 'U' else 'numbers'}")
-    size = math.prod(shape) * dtype.itemsize
-    if size == 0 and kinds != "U":
-        raise UserError(f"{path}: '{key}' is empty: shape {shape}")
-    if shape and shape[0] > MAX_FRAMES or size > MAX_BYTES:
-        raise UserError(
-            f"{path}: '{key}' claims shape {shape}, {size / 2**30:.3g} GiB; "
-            f"at most {MAX_FRAMES} frames and {MAX_BYTES / 2**30:g} GiB are read"
-        )
-    stored = archive.getinfo(f"{key}.npy").file_size
-    if size > stored:
-        raise UserError(f"{path}: '{key}' claims shape {shape}, {size} bytes, but holds {stored}; the file is damaged")
-    try:
-        with archive.open(f"{key}.npy") as handle:
-            return npy.read_array(handle, allow_pickle=False)
-    except Exception as error:  # as above: truncated or altered content
-        raise UserError(f"{path}: '{key}' cannot be read: {error or type(error).__name__}") from error
-
-
-def _read_header(handle: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and type that an .npy member claims to have."""
-    version = npy.read_magic(handle)
-    if version == (1, 0):
-        shape, _, dtype = npy.read_array_header_1_0(handle)
-    elif version == (2, 0):
-        shape, _, dtype = npy.read_array_header_2_0(handle)
-    else:
-        raise ValueError(f"version {version} of the .npy format is for records")
-    return shape, dtype

@@ -2,12 +2,10 @@
 
 from mrhubo.pairing.filter import PairFilter, make_filter
 from mrhubo.pairing.generate import PairGenerator, PairingReport, generate_pairs
-from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
-from mrhubo.pairing.problem import LatentProblem
+from mrhubo.pairing.inverse import solve_lbfgs
 from mrhubo.pairing.store import PairStore, pose_settings
 
 __all__ = [
-    "LatentProblem",
     "PairFilter",
     "PairGenerator",
     "PairStore",
@@ -16,5 +14,4 @@ __all__ = [
     "make_filter",
     "pose_settings",
     "solve_lbfgs",
-    "solve_levenberg_marquardt",
 ]

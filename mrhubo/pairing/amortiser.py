@@ -15,8 +15,8 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from mrhubo.body.latent import LatentProblem
 from mrhubo.body.training import cosine_schedule
-from mrhubo.pairing.problem import LatentProblem
 from mrhubo.storage import DamagedFile, read_tensors, write_tensors
 
 _BATCH = 512

@@ -13,10 +13,11 @@ import torch
 from torch import Tensor
 
 from mrhubo.body import BodyPrior
+from mrhubo.body.inverse import solve_levenberg_marquardt
+from mrhubo.body.latent import LatentProblem
 from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
-from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
-from mrhubo.pairing.problem import LatentProblem
+from mrhubo.pairing.inverse import solve_lbfgs
 from mrhubo.pairing.store import PairStore
 from mrhubo.robot import BodyMap
 

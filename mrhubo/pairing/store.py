@@ -2,8 +2,8 @@
 index) only.
 
 The folder is named after the robot and the fingerprint of everything that decides the pairs, and each shard's header
-repeats
-it, so that pairs of two configs never mix. How many pairs are wanted is not part of it: more pairs reuse what is there.
+repeats it, so that pairs of two configs never mix. How many pairs are wanted is not part of it: more pairs reuse what
+is there.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from mrhubo.body.prior import SHIPPED_WEIGHTS
+from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
-from mrhubo.robot import Robot
-from mrhubo.storage import DamagedFile, checksum_file, read_tensors, write_tensors
+from mrhubo.robot import BodyMap
+from mrhubo.storage import DamagedFile, read_tensors, write_tensors
 
 SCHEMA = "mrhubo.pairs/1"
 _NOT_IN_PAIRS = ("count", "dir", "filter", "filter_k")
@@ -32,22 +32,20 @@ def pose_settings(config: Config) -> dict[str, Any]:
     return {k: v for k, v in to_plain(config.robot).items() if k not in _NOT_IN_ROBOT}
 
 
-def pairs_header(config: Config, robot: Robot) -> dict[str, str]:
-    """What decides the pairs: settings, seed, the robot's kinematics and the prior's checksum."""
+def pairs_header(config: Config, body_map: BodyMap, prior: BodyPrior) -> dict[str, str]:
+    """What decides the pairs: settings, seed, the robot's kinematics, the checksums of prior and skeleton."""
     plain = to_plain(config)
     pairs = {k: v for k, v in plain["pairs"].items() if k not in _NOT_IN_PAIRS}
     parts = pose_settings(config)
-    kinematics, prior = robot.description.kinematics, checksum_file(config.body.prior_path or SHIPPED_WEIGHTS)
-    return {
+    header = {
         "schema": SCHEMA,
         "robot": config.robot.name,
-        "kinematics": kinematics,
-        "prior_xxh3": prior,
+        "kinematics": body_map.robot.description.kinematics,
+        "prior_xxh3": prior.checksum,
+        "skeleton_xxh3": body_map.skeleton.checksum,
         "seed": str(config.pairs.seed),
-        "fingerprint": fingerprint(
-            {"schema": SCHEMA, "pairs": pairs, "robot": parts, "kinematics": kinematics, "prior": prior}
-        ),
     }
+    return {**header, "fingerprint": fingerprint([header, pairs, parts])}
 
 
 class PairStore:
@@ -60,10 +58,10 @@ class PairStore:
         self.shards = -(-count // shard_size)
 
     @classmethod
-    def of(cls, config: Config, robot: Robot) -> PairStore:
+    def of(cls, config: Config, body_map: BodyMap, prior: BodyPrior) -> PairStore:
         """The store of a config's pairs; `pairs.dir` must be set."""
         assert config.pairs.dir is not None
-        header = pairs_header(config, robot)
+        header = pairs_header(config, body_map, prior)
         return cls(config.pairs.dir, header, config.pairs.count, config.pairs.shard_size, len(config.robot.joints))
 
     @property

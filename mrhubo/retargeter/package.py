@@ -19,8 +19,7 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body import open_prior
-from mrhubo.body.prior import SHIPPED_WEIGHTS
+from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
@@ -30,6 +29,7 @@ from mrhubo.storage import atomic_path, read_tensors, write_tensors
 
 SCHEMA = "mrhubo.retargeter/1"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
+_SKELETON = "skeleton.safetensors"
 _AGREEMENT_DEG = 20.0
 
 
@@ -60,10 +60,11 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
 class Retargeter:
     """A trained network with its robot; on the CPU unless `to` moves it."""
 
-    def __init__(self, network: RetargetNetwork, body_map: BodyMap, config: Config, phi_threshold: float) -> None:
+    def __init__(
+        self, network: RetargetNetwork, body_map: BodyMap, prior: BodyPrior, config: Config, phi_threshold: float
+    ) -> None:
         self.network = network.requires_grad_(False).eval()
-        self.body_map, self.config, self.phi_threshold = body_map, config, phi_threshold
-        self.prior = open_prior(config.body.prior_path)
+        self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -104,8 +105,8 @@ class Retargeter:
         robot = self.body_map.robot
         with atomic_path(folder / _URDF) as temporary:
             shutil.copyfile(self.config.robot.urdf, temporary)
-        with atomic_path(folder / _PRIOR) as temporary:
-            shutil.copyfile(self.config.body.prior_path or SHIPPED_WEIGHTS, temporary)
+        self.prior.save(folder / _PRIOR)
+        save_skeleton(folder / _SKELETON, self.body_map.skeleton)
         with atomic_path(folder / _CONFIG) as temporary:
             temporary.write_text(_portable(self.config))
         metadata = {
@@ -137,21 +138,21 @@ class Retargeter:
         if metadata.get("schema") != SCHEMA:
             raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
         config = load_config(folder / _CONFIG)
-        body_map = build_body_map(config.robot)
+        prior, body_map = open_prior(config.body), build_body_map(config.robot, build_skeleton(config.body))
         network = build_network(config, body_map)
         try:
             network.load_state_dict(tensors)
             threshold = float(metadata["phi_threshold"])
         except (RuntimeError, KeyError, ValueError) as error:
             raise UserError(f"{folder}: weights and settings do not fit: {error}") from error
-        return cls(network, body_map, config, threshold)
+        return cls(network, body_map, prior, config, threshold)
 
 
 def _portable(config: Config) -> str:
     """The config as YAML whose only paths are the files beside it."""
     config = copy.deepcopy(config)
     config.robot.urdf = Path(_URDF)
-    config.body.prior_path = Path(_PRIOR)
+    config.body.prior_path, config.body.model_path, config.body.betas = Path(_PRIOR), Path(_SKELETON), []
     config.pairs.dir = None
     config.evaluation.motions = []
     config.tracking.dir = config.tracking.uri = None

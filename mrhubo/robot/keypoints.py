@@ -1,9 +1,8 @@
 """Robot links as human body parts: unit directions that robot and human share, and human keypoints built from them.
 
 A direction is seen from the chest, in human axes (x left, y up, z forward), so neither proportions nor the way a
-base faces
-matter. Limbs (upper arm, forearm) have one direction, oriented ends (hand, head) two: fingers and thumb, forward and
-up.
+base faces matter. Limbs (upper arm, forearm) have one direction, oriented ends (hand, head) two: fingers and thumb,
+forward and up.
 
 `scale: auto` then gives each limb the human's length: keypoints are chained outwards from the shoulders of a human who
 stands upright, along the robot's directions. No number is tuned.
@@ -49,9 +48,10 @@ class Direction:
 class BodyMap:
     """What a robot shares with a human body, read from `robot.keypoints` of the config."""
 
-    def __init__(self, robot: Robot, points: Mapping[str, Point], ends: Mapping[str, End], chest: End) -> None:
-        self.robot, self.points, self.ends, self.chest = robot, points, ends, chest
-        self.skeleton = Skeleton()
+    def __init__(
+        self, robot: Robot, points: Mapping[str, Point], ends: Mapping[str, End], chest: End, skeleton: Skeleton
+    ) -> None:
+        self.robot, self.points, self.ends, self.chest, self.skeleton = robot, points, ends, chest, skeleton
         self.directions = self._list_directions()
         self.direction_names = tuple(d.name for d in self.directions)
         index = robot.link_index
@@ -232,8 +232,8 @@ def _frame(forward_up_23: Tensor) -> Tensor:
     return torch.stack((torch.linalg.cross(up, forward), up, forward), dim=-1)
 
 
-def build_body_map(config: RobotConfig) -> BodyMap:
-    """Robot and body map of a config's `robot` section, checked.
+def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> BodyMap:
+    """Robot and body map of a config's `robot` section, checked; `skeleton` is the human's, by default the open one.
 
     Raises:
         UserError: the URDF, a joint, a link or a keypoint entry is wrong; says which, and the nearest valid name.
@@ -262,7 +262,7 @@ def build_body_map(config: RobotConfig) -> BodyMap:
     if not config.key_links:
         raise UserError("robot.key_links: is empty; name the links whose error is measured")
     robot = Robot(config.urdf, config.joints, links, config.ranges, config.hold, config.name)
-    body_map = BodyMap(robot, points, ends, chest)
+    body_map = BodyMap(robot, points, ends, chest, skeleton or Skeleton())
     _check_lengths(body_map)
     body_map.check_moved()
     return body_map

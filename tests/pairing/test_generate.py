@@ -28,7 +28,7 @@ def config_of(root: Path, folder: Path, *overrides: str) -> Config:
 
 
 def store_of(config: Config) -> PairStore:
-    return PairStore.of(config, build_body_map(config.robot).robot)
+    return PairStore.of(config, build_body_map(config.robot), BodyPrior.open())
 
 
 def generate(config: Config) -> PairStore:

@@ -22,7 +22,7 @@ def made(root: Path) -> Retargeter:
     config = load_config(root / "conf" / "reachy.yaml", ["model.hidden=24"])
     body_map = build_body_map(config.robot)
     torch.manual_seed(0)
-    return Retargeter(build_network(config, body_map), body_map, config, phi_threshold=0.01)
+    return Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
 
 
 @pytest.fixture

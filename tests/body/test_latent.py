@@ -8,9 +8,11 @@ import pytest
 import torch
 
 from mrhubo.body import KEYPOINT_NAMES, BodyPrior
+from mrhubo.body.inverse import solve_levenberg_marquardt
+from mrhubo.body.latent import LatentProblem
 from mrhubo.body.skeleton import Skeleton, keypoint_indices
 from mrhubo.config import load_config
-from mrhubo.pairing import LatentProblem, solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pairing import solve_lbfgs
 from mrhubo.robot import build_body_map
 
 ROBOTS = ["nao", "coman", "reachy"]

@@ -7,14 +7,17 @@ Legend: B batch, K used keypoints, Z latent numbers, U human joints that move a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, PARENTS, Skeleton, ancestors
+
+if TYPE_CHECKING:
+    from mrhubo.body.prior import BodyPrior
 
 _CHUNK = 256
 """Poses whose Jacobians are made at once: larger ones leave the cache, smaller ones leave the cores idle."""
@@ -37,8 +40,8 @@ class LatentProblem:
         self._joints = sorted({j for movers in carriers for j in movers})
         device = prior.identity_F.device
         rows = torch.tensor([6 * (j - 1) + i for j in self._joints for i in range(6)], device=device)
-        layers = [m for m in prior.decoder if isinstance(m, nn.Linear)]
-        self._first, self._second, self._last = layers
+        self._first, self._second, self._last = [m for m in prior.decoder if isinstance(m, nn.Linear)]
+        self._activation = _ACTIVATIONS[prior.activation]
         self._last_rows = self._last.weight[rows].contiguous()
         self._moves_KU = torch.tensor(
             [[float(j in movers) for j in self._joints] for movers in carriers], device=device
@@ -71,16 +74,12 @@ class LatentProblem:
         """Used keypoints (B, K, 3) [m] and their Jacobian (B, 3K, Z), by the chain rule.
 
         Forward through the decoder as matrix products over all Z columns at once; then each joint's angular velocity
-        from
-        the derivative of Gram-Schmidt; then v_k = sum of omega_j x (p_k - p_j) over the joints that move keypoint k.
+        from the derivative of Gram-Schmidt; then v_k = sum of omega_j x (p_k - p_j) over the joints that move k.
         """
         batch = len(z_BZ)
-        x1 = self._first(z_BZ)
-        s1 = torch.sigmoid(x1)
-        x2 = self._second(x1 * s1)
-        s2 = torch.sigmoid(x2)
-        raw_BJ6 = (self._last(x2 * s2) + self.prior.identity_F).unflatten(-1, (-1, 6))
-        d1_BE, d2_BE = s1 * (1 + x1 * (1 - s1)), s2 * (1 + x2 * (1 - s2))
+        y1_BE, d1_BE = self._activation(self._first(z_BZ))
+        y2_BE, d2_BE = self._activation(self._second(y1_BE))
+        raw_BJ6 = (self._last(y2_BE) + self.prior.identity_F).unflatten(-1, (-1, 6))
         columns_BZE = d1_BE[:, None, :] * self._first.weight.T
         columns_BZE = (columns_BZE.flatten(0, 1) @ self._second.weight.T).unflatten(0, (batch, self.latent))
         columns_BZE = columns_BZE.mul_(d2_BE[:, None, :])
@@ -97,6 +96,29 @@ class LatentProblem:
         used_points = points[:, self.keypoints]
         velocity = torch.linalg.cross(omega_BK3Z, used_points[..., None].expand_as(omega_BK3Z), dim=2) - moment_BK3Z
         return used_points, velocity.flatten(1, 2)
+
+
+def _silu(x: Tensor) -> tuple[Tensor, Tensor]:
+    s = torch.sigmoid(x)
+    return x * s, s * (1 + x * (1 - s))
+
+
+def _leaky_relu(x: Tensor) -> tuple[Tensor, Tensor]:
+    slope = torch.where(x > 0, 1.0, 0.01)
+    return x * slope, slope
+
+
+def _tanh(x: Tensor) -> tuple[Tensor, Tensor]:
+    y = torch.tanh(x)
+    return y, 1 - y.square()
+
+
+_ACTIVATIONS: dict[str, Callable[[Tensor], tuple[Tensor, Tensor]]] = {
+    "silu": _silu,
+    "leaky_relu": _leaky_relu,
+    "tanh": _tanh,
+}
+"""Value and derivative of the activations a prior may have."""
 
 
 def _movers(keypoint: int) -> list[int]:

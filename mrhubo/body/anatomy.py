@@ -1,0 +1,96 @@
+"""Anatomical ranges of motion of the 21 posed joints, and by how much a pose leaves them.
+
+Every joint's rotation is split into a twist about the joint's own axis (a hinge's axis, or the bone) and a swing of the
+other two axes: R = twist . swing. Angles are those of a left joint; right ones are mirrored first.
+
+Sources: American Academy of Orthopaedic Surgeons, "Joint Motion: Method of Measuring and Recording" (1965), for the
+ranges; widened by 10 to 15 degrees, because one generic skeleton stands for all people and SMPL's rest pose is not the
+anatomical zero, and, for shoulder, hip and spine, which move together with collars and pelvis, by what athletes do.
+Elbow's oblique axis: the training data's, which is a pure hinge.
+
+Legend: B batch, J = 21 joints; the three angles are (twist, first swing, second swing).
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+
+_X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+ELBOW_AXIS = (0.0, -0.871, 0.491)
+"""Hinge of the left elbow: turning about it by a positive angle flexes."""
+KNEE_AXIS = _X
+"""Hinge of the knees: turning about it by a positive angle flexes."""
+
+# joint: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
+_Entry = tuple[tuple[float, float, float], tuple[float, float]]
+_RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
+    "hip": ((_Y, (-60, 60)), (_X, (-140, 45)), (_Z, (-40, 70))),
+    "knee": ((_X, (-10, 160)), (_Y, (-25, 25)), (_Z, (-25, 25))),
+    "ankle": ((_X, (-70, 50)), (_Y, (-45, 50)), (_Z, (-45, 45))),
+    "foot": ((_X, (-45, 45)), (_Y, (-15, 15)), (_Z, (-15, 15))),
+    "spine": ((_Y, (-25, 25)), (_X, (-30, 40)), (_Z, (-25, 25))),
+    "neck": ((_Y, (-50, 50)), (_X, (-45, 45)), (_Z, (-40, 40))),
+    "head": ((_Y, (-60, 60)), (_X, (-60, 80)), (_Z, (-60, 60))),
+    "collar": ((_X, (-30, 30)), (_Y, (-30, 30)), (_Z, (-20, 45))),
+    "shoulder": ((_X, (-110, 110)), (_Y, (-140, 65)), (_Z, (-115, 105))),
+    "elbow": ((ELBOW_AXIS, (-10, 160)), (_X, (-25, 25)), ((0.0, 0.491, 0.871), (-25, 25))),
+    "wrist": ((_X, (-110, 110)), (_Y, (-45, 45)), (_Z, (-90, 90))),
+}
+
+
+def _table() -> tuple[Tensor, Tensor]:
+    """Axes (21, 3, 3), one per row, and limits (21, 3, 2) [rad] of every joint as if it were on the left."""
+    axes, limits = [], []
+    for name in POSED_JOINT_NAMES:
+        entries = _RANGES[name.removeprefix("left_").removeprefix("right_").rstrip("123")]
+        axes.append([axis for axis, _ in entries])
+        limits.append([limit for _, limit in entries])
+    return torch.nn.functional.normalize(torch.tensor(axes), dim=-1), torch.deg2rad(torch.tensor(limits))
+
+
+_AXES_J33, _LIMITS_J32 = _table()
+_RIGHT = torch.tensor([name.startswith("right_") for name in POSED_JOINT_NAMES])
+
+
+def hinge_axis(name: str) -> tuple[float, float, float]:
+    """Axis about which a positive angle flexes the elbow or knee of this name."""
+    x, y, z = ELBOW_AXIS if name.endswith("elbow") else KNEE_AXIS
+    return (x, -y, -z) if name.startswith("right_") else (x, y, z)
+
+
+def joint_angles(matrix_BJ33: Tensor) -> Tensor:
+    """Twist and two swings (B, 21, 3) [rad] of local rotations (B, 21, 3, 3), as of left joints."""
+    axes = _AXES_J33.to(matrix_BJ33)
+    mirrored = matrix_BJ33.new_tensor([1.0, -1.0, -1.0])
+    sign = torch.where(_RIGHT.to(matrix_BJ33.device)[:, None], mirrored, torch.ones_like(mirrored))
+    quaternion = rotation.matrix_to_quaternion(matrix_BJ33)
+    quaternion = quaternion * torch.where(quaternion[..., 3:] < 0, -1.0, 1.0)
+    vector, scalar = quaternion[..., :3] * sign, quaternion[..., 3]
+    along = (vector * axes[:, 0]).sum(-1)
+    # A half turn about another axis leaves the twist open: 0 / 0, whose derivative would be NaN.
+    twist = torch.atan2(along, torch.where(scalar.abs() + along.abs() > 1e-6, scalar, torch.ones_like(scalar)))
+    half = axes[:, 0] * torch.sin(twist)[..., None]
+    cosine = torch.cos(twist)
+    swing_scalar = cosine * scalar + (half * vector).sum(-1)
+    swing = cosine[..., None] * vector - scalar[..., None] * half - torch.linalg.cross(half, vector)
+    sine = (swing.square().sum(-1) + 1e-12).sqrt()
+    swing = swing * (2 * torch.atan2(sine, swing_scalar) / sine)[..., None]
+    return torch.stack((2 * twist, (swing * axes[:, 1]).sum(-1), (swing * axes[:, 2]).sum(-1)), dim=-1)
+
+
+def excess(matrix_BJ33: Tensor, margin: float = 0.0) -> Tensor:
+    """By how much each angle (B, 21, 3) [rad] of local rotations (B, 21, 3, 3) leaves its range; 0 inside.
+
+    The ranges are `margin` [rad] narrower at both ends.
+    """
+    angles, limits = joint_angles(matrix_BJ33), _LIMITS_J32.to(matrix_BJ33)
+    return torch.relu(angles - limits[..., 1] + margin) + torch.relu(limits[..., 0] + margin - angles)
+
+
+def inside(pose_BJ6: Tensor) -> Tensor:
+    """Whether every joint of each pose (B, 21, 6) is inside its ranges: (B,) of bool."""
+    return (excess(rotation.sixd_to_matrix(pose_BJ6)) <= 0).flatten(1).all(dim=1)
