@@ -1,36 +1,130 @@
-"""Encode, mean, decode: error of the shipped body prior on every motion of a folder.
+"""The measures of the body prior: the shipped one, another of ours, or VPoser.
 
-python benchmarks/prior.py [FOLDER]          default: the evaluation motions
+    python benchmarks/prior.py [--motions FOLDER] [--prior FILE | --vposer V02_05] [--config conf/prior.yaml]
+
+The first table is on the clips held out of training (needs the training data that the config names), and on the motions
+of a folder, by default the evaluation clips; the second is by clip; the third is the speed of decoding.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import sys
+import time
 from pathlib import Path
 
 import torch
 from common import print_header, print_table
+from torch import Tensor
 
-from mrhubo.body import BodyPrior, Skeleton
-from mrhubo.body.measures import reconstruction
+from mrhubo.body import BodyPrior, Skeleton, VPoser
+from mrhubo.body.dataset import load_training_poses, sound_frames
+from mrhubo.body.measures import NOISE_DEG, measure, reconstruction
+from mrhubo.body.training import PriorConfig
+from mrhubo.config import parse_arguments
+from mrhubo.errors import UserError
 from mrhubo.locations import default_motions
-from mrhubo.motion import find_motions, read_folder
+from mrhubo.motion import Motion, find_motions, read_folder
+
+ROWS = {
+    "encode, mean, decode: mean joint error [mm]": "joint_mm",
+    "- worst 1% of the poses [mm]": "joint_mm_worst",
+    "encode, mean, decode: mean rotation error [deg]": "geodesic_deg",
+    "- worst 1% of the poses [deg]": "geodesic_deg_worst",
+    "latent IK, 13 keypoints: mean keypoint error [mm]": "ik_keypoint_mm",
+    "- all joints above the hips [mm]": "ik_upper_body_mm",
+    "- started from z = 0 [mm]": "ik_zero_keypoint_mm",
+    "ROC area (a): one elbow or knee backwards": "roc_bent",
+    "ROC area (b): random rotations": "roc_random",
+    "ROC area (c): others' limbs, an arm through the trunk": "roc_grafted",
+    "samples of N(0, I) inside anatomical ranges": "samples_inside",
+    "- mean joint distance to the nearest training pose [mm]": "samples_nearest_mm",
+    **{f"noise of {n:.0f} deg: rotation error after denoising [deg]": f"noise{n:.0f}_after_deg" for n in NOISE_DEG},
+    **{f"noise of {n:.0f} deg: joint error before [mm]": f"noise{n:.0f}_before_mm" for n in NOISE_DEG},
+    **{f"noise of {n:.0f} deg: joint error after [mm]": f"noise{n:.0f}_after_mm" for n in NOISE_DEG},
+}
+TARGETS = {"joint_mm": "<= 4", "ik_keypoint_mm": "<= 5", "roc_bent": ">= 0.97", "roc_random": ">= 0.999"}
+TARGETS |= {"samples_inside": ">= 0.99"}
 
 
-def main(argv: list[str]) -> None:
-    """Prints the table."""
-    print_header()
-    prior, skeleton = BodyPrior.open(), Skeleton()
+def training_poses(prior: BodyPrior, config: Path) -> tuple[Tensor, Tensor] | None:
+    """Held-out and training poses (5,000 and 50,000 of them) of the prior's card; None without the data or the card."""
+    try:
+        settings, _ = parse_arguments(["--config", str(config)], "benchmarks/prior.py", "", PriorConfig)
+        poses, clips, names = load_training_poses(settings.data)
+    except UserError:
+        return None
+    held_names = set(json.loads(prior.metadata["card"]).get("held_out_clips", []))
+    if not held_names:
+        return None
+    held = torch.zeros(len(poses), dtype=torch.bool)
+    for clip, name in zip(clips, names, strict=True):
+        held[clip] = name in held_names
+    sound = sound_frames(poses, settings.max_excess_deg)
+    unseen, known = poses[held & sound], poses[~held & sound]
+    generator = torch.Generator().manual_seed(0)
+    return unseen[:: max(1, len(unseen) // 5_000)], known[torch.randperm(len(known), generator=generator)[:50_000]]
+
+
+@torch.no_grad()
+def by_clip(prior: BodyPrior, motions: list[Motion]) -> tuple[list[list[str]], float]:
+    """Reconstruction of every clip, and the joint error's mean over clips."""
     rows, means = [], []
-    for motion in read_folder(find_motions([Path(argv[0])] if argv else default_motions())):
-        with torch.no_grad():
-            joints_mm, angles_deg = reconstruction(prior, skeleton, motion.pose_TJ6)
-            phi = prior.reconstruction_error(motion.pose_TJ6).mean()
+    for motion in motions:
+        joints_mm, angles_deg = reconstruction(prior, Skeleton(), motion.pose_TJ6)
+        phi = prior.reconstruction_error(motion.pose_TJ6).mean()
         means.append([float(joints_mm.mean()), float(angles_deg.mean())])
         rows.append([motion.name, str(len(joints_mm)), *[f"{m:.2f}" for m in means[-1]], f"{phi:.5f}"])
     mean = torch.tensor(means).mean(0)
-    rows.append(["mean over clips", "", f"{mean[0]:.2f}", f"{mean[1]:.2f}", ""])
-    print_table(["clip", "frames", "joints [mm]", "rotations [deg]", "phi"], rows)
+    return [*rows, ["mean over clips", "", f"{mean[0]:.2f}", f"{mean[1]:.2f}", ""]], float(mean[0])
+
+
+@torch.no_grad()
+def poses_per_second(prior: BodyPrior, batch: int = 2_000, seconds: float = 3.0) -> tuple[float, float]:
+    """Poses decoded, and decoded with all keypoints, per second on one thread: medians."""
+    skeleton, z = Skeleton(), torch.randn(batch, prior.latent)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    rates = []
+    for work in (lambda: prior.decode_matrices(z), lambda: skeleton.keypoints(prior.decode_matrices(z))):
+        work()
+        times, end = [], time.perf_counter() + seconds
+        while time.perf_counter() < end:
+            start = time.perf_counter()
+            work()
+            times.append(time.perf_counter() - start)
+        rates.append(batch / float(torch.tensor(times).median()))
+    torch.set_num_threads(threads)
+    return rates[0], rates[1]
+
+
+def main(argv: list[str]) -> None:
+    """Prints the tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--motions", type=Path)
+    parser.add_argument("--prior", type=Path)
+    parser.add_argument("--vposer", type=Path)
+    parser.add_argument("--config", type=Path, default=Path("conf/prior.yaml"))
+    given = parser.parse_args(argv)
+    print_header()
+    prior = VPoser.open(given.vposer) if given.vposer else BodyPrior.open(given.prior)
+    folder = find_motions([given.motions] if given.motions else default_motions())
+    motions = read_folder(folder)
+    clips, mean_mm = by_clip(prior, motions)
+    training = training_poses(prior, given.config)
+    evaluation = measure(prior, torch.cat([motion.pose_TJ6 for motion in motions]), training[1] if training else None)
+    held_out = measure(prior, *training) if training else {}
+    columns = {"held-out clips": held_out, f"{folder.name}, {len(motions)} clips": {**evaluation, "joint_mm": mean_mm}}
+    rows = [
+        [title, *(f"{values[key]:.4g}" if key in values else "" for values in columns.values()), TARGETS.get(key, "")]
+        for title, key in ROWS.items()
+    ]
+    print_table(["measure", *columns, "target"], rows)
+    print()
+    print_table(["clip", "frames", "joints [mm]", "rotations [deg]", "phi"], clips)
+    decoded, with_keypoints = poses_per_second(prior)
+    print(f"\none thread, batch 2000: {decoded:,.0f} poses/s decoded, {with_keypoints:,.0f} decoded with 36 keypoints")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.inverse import solve_levenberg_marquardt
+from mrhubo.body.inverse import nearest_samples, solve_levenberg_marquardt
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.errors import UserError
@@ -130,7 +130,7 @@ class BodyPrior(nn.Module):
 
             minimise over z   w_data * sum_k |P_k(z) - P_k|^2 + w_prior * |z|^2
 
-        Every pose is solved on its own by Levenberg-Marquardt from z = 0.
+        Every pose is solved on its own by Levenberg-Marquardt, from the nearest of 4,096 samples of the prior.
 
         Args:
             targets: positions (B, 3) [m] by name of keypoint (`KEYPOINT_NAMES`), in the pelvis's frame: x to the
@@ -165,8 +165,7 @@ class BodyPrior(nn.Module):
             raise UserError("inverse kinematics: a target holds NaN or infinite numbers")
         skeleton = (skeleton or Skeleton()).to(self.identity_F.device)
         problem = LatentProblem(self, skeleton, indices, w_data, w_prior)
-        start = target_BK3.new_zeros(len(target_BK3), self.latent)
-        return solve_levenberg_marquardt(problem, start, target_BK3, steps)
+        return solve_levenberg_marquardt(problem, nearest_samples(problem, target_BK3), target_BK3, steps)
 
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "leaky_relu": nn.LeakyReLU, "tanh": nn.Tanh}

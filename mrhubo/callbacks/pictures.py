@@ -10,22 +10,12 @@ import torch
 from PIL.Image import Image
 from torch import Tensor
 
-from mrhubo import rotation
-from mrhubo.body import KEYPOINT_NAMES, BodyPrior, Skeleton
+from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.callbacks.clips import Clip
 from mrhubo.pairing import PairFilter
 from mrhubo.robot import Robot, load_urdf
-from mrhubo.view import (
-    Solids,
-    common_cameras,
-    contact_sheet,
-    human_solids,
-    read_geometry,
-    render,
-    robot_solids,
-)
+from mrhubo.view import Solids, figure_sheet, human_figure, read_geometry, robot_solids
 
-_SIZE = (220, 260)
 _REFERENCE_TINT = (0.55, 0.62, 0.72)
 _FIGURE_HEIGHT_M = 1.7
 
@@ -42,9 +32,7 @@ class Artist:
 
     def human(self, pose_J6: Tensor) -> Solids:
         """A human in a pose (21, 6)."""
-        with torch.no_grad():
-            points = self.skeleton.keypoints(rotation.sixd_to_matrix(pose_J6[None].float()))[0]
-        return human_solids(points.numpy(), KEYPOINT_NAMES)
+        return human_figure(pose_J6, self.skeleton)
 
     def robot_figure(self, q_N: Tensor, scaled: bool = True) -> Solids:
         """The robot at joint angles (N,) [rad], scaled to the human's height."""
@@ -57,10 +45,7 @@ class Artist:
 
     def sheet(self, rows: list[list[Solids]], columns: list[str], titles: list[str], caption: str) -> Image:
         """A table of figures, all at one scale."""
-        flat = [figure for row in rows for figure in row]
-        cameras = iter(common_cameras(flat, _SIZE))
-        pictures = [[render(figure, _SIZE, next(cameras)) for figure in row] for row in rows]
-        return contact_sheet(pictures, columns, titles, caption)
+        return figure_sheet(rows, columns, titles, caption)
 
     def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, prior: BodyPrior, count: int = 3) -> Image:
         """Robot pose, human pose and denoised human pose, as in the paper's figure 1: feasible above, extreme below."""

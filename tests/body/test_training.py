@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mrhubo.body import BodyPrior
-from mrhubo.body.training import PriorConfig, load_training_poses, main, train
+from mrhubo.body.dataset import load_training_poses
+from mrhubo.body.training import PriorConfig, main, train
 from mrhubo.errors import UserError
 
 
@@ -42,8 +43,8 @@ def test_training_writes_a_prior_that_reconstructs(data: Path, tmp_path: Path) -
         ({"poses": np.zeros((10, 63), np.float32)}, "expected poses"),
         ({"poses": np.full((800, 66), np.nan, np.float32)}, "NaN"),
         ({"clip_starts": np.arange(3)}, "expected poses"),
-        ({"poses": np.array([{"a": 1}], dtype=object)}, "cannot be read"),
-        ({"poses": None}, "cannot be read"),
+        ({"poses": np.array([{"a": 1}], dtype=object)}, "pickled Python objects"),
+        ({"poses": None}, "'poses' cannot be read"),
     ],
 )
 def test_bad_data_is_refused(data: Path, change: dict, message: str) -> None:
@@ -58,5 +59,5 @@ def test_missing_and_truncated_files_are_refused(data: Path) -> None:
     with pytest.raises(UserError, match="none.npz does not exist"):
         main(["--config", str(data.parent / "prior.yaml")])
     data.write_bytes(data.read_bytes()[:500])
-    with pytest.raises(UserError, match="cannot be read"):
+    with pytest.raises(UserError, match="is not an .npz file"):
         load_training_poses(data)

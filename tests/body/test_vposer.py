@@ -77,7 +77,9 @@ def published(hidden: int = 512, latent: int = 32) -> Published:
     return network.requires_grad_(False)
 
 
-def write_snapshot(folder: Path, network: nn.Module, change: dict[str, Any] | None = None, ending: str = "ckpt") -> Path:
+def write_snapshot(
+    folder: Path, network: nn.Module, change: dict[str, Any] | None = None, ending: str = "ckpt"
+) -> Path:
     """The folder V02_05, as it is unpacked."""
     (folder / "snapshots").mkdir(parents=True)
     state = {f"vp_model.{k}": v for k, v in network.state_dict().items()}
@@ -154,7 +156,8 @@ def test_a_checkpoint_with_foreign_classes_is_read_without_importing_them(tmp_pa
     rewrite_pickle(
         path,
         lambda content: content.replace(
-            pickle.dumps("x", 2)[2:-1].rstrip(b"q\x00"), b"cpytorch_lightning.callbacks.model_checkpoint\nModelCheckpoint\n"
+            pickle.dumps("x", 2)[2:-1].rstrip(b"q\x00"),
+            b"cpytorch_lightning.callbacks.model_checkpoint\nModelCheckpoint\n",
         ),
     )
     with zipfile.ZipFile(path) as archive:

@@ -1,0 +1,85 @@
+"""The experiments that chose the body prior's settings: one change at a time, each a tracked training.
+
+    python benchmarks/prior_experiments.py [--config conf/prior.yaml] [--only NAME,NAME] [steps=2000 ...]
+
+Weights go to `prior_experiments` in the tracking folder; a variant whose weights are there is not trained again.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import torch
+from common import print_header, print_table
+
+from mrhubo.body import BodyPrior, Skeleton
+from mrhubo.body.measures import reconstruction
+from mrhubo.body.training import PriorConfig, train
+from mrhubo.config import fingerprint, parse_arguments, to_plain
+from mrhubo.errors import UserError
+from mrhubo.locations import default_motions
+from mrhubo.motion import find_motions, read_folder
+
+VARIANTS = {
+    "chosen": [],
+    "LeakyReLU in place of SiLU": ["activation=leaky_relu"],
+    "latent 24": ["latent=24"],
+    "latent 48": ["latent=48"],
+    "encoder 512 wide": ["encoder_hidden=512"],
+    "decoder 1024 wide": ["hidden=1024"],
+    "KL weight / 4": ["w_kl=0.0005"],
+    "KL weight x 4": ["w_kl=0.008"],
+    "no sliced Wasserstein": ["w_latent=0"],
+    "no anatomical ranges": ["w_anatomy=0"],
+    "no column penalty": ["w_columns=0"],
+    "no noise": ["noise_share=0"],
+    "none of these four": ["w_latent=0", "w_anatomy=0", "w_columns=0", "noise_share=0"],
+}
+COLUMNS = {
+    "joint_mm": "held-out [mm]",
+    "evaluation_mm": "evaluation [mm]",
+    "ik_keypoint_mm": "IK [mm]",
+    "ik_zero_keypoint_mm": "IK from z = 0 [mm]",
+    "samples_inside": "samples inside",
+    "samples_nearest_mm": "nearest [mm]",
+    "roc_bent": "ROC bent",
+    "roc_grafted": "ROC grafted",
+    "noise30_after_deg": "30° noise [deg]",
+}
+
+
+def measures(config: PriorConfig) -> dict[str, float]:
+    """A variant's measures: those in its card, and the reconstruction of the evaluation clips (mean over clips)."""
+    settings = {k: v for k, v in to_plain(config).items() if not isinstance(getattr(config, k), Path)}
+    config.output = config.tracking_dir / "prior_experiments" / f"{fingerprint(settings)}.safetensors"
+    try:
+        prior = BodyPrior.open(config.output)
+    except UserError:
+        prior = train(config)
+        prior = BodyPrior.open(config.output)
+    found = dict(json.loads(prior.metadata["card"])["measures_on_held_out_clips"])
+    with torch.no_grad():
+        clips = read_folder(find_motions(default_motions()))
+        means = [reconstruction(prior, Skeleton(), clip.pose_TJ6)[0].mean() for clip in clips]
+    return {**found, "evaluation_mm": float(torch.stack(means).mean())}
+
+
+def main(argv: list[str]) -> None:
+    """Prints the table."""
+    options = {"--config": "conf/prior.yaml", "--only": ",".join(VARIANTS)}
+    while argv and argv[0] in options:
+        options[argv[0]], argv = argv[1], argv[2:]
+    rows = []
+    for name in options["--only"].split(","):
+        given = ["--config", options["--config"], *argv, *VARIANTS[name]]
+        config, _ = parse_arguments(given, "benchmarks/prior_experiments.py", "Experiments.", PriorConfig)
+        found = measures(config)
+        rows.append([name, *(f"{found[key]:.3f}" for key in COLUMNS)])
+    print_header()
+    print_table(["variant", *COLUMNS.values()], rows)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
