@@ -63,9 +63,8 @@ def matrix_to_quaternion(matrix: Tensor) -> Tensor:
 def geodesic_distance(a: Tensor, b: Tensor) -> Tensor:
     """Angle [rad], (...), in [0, pi] between rotation matrices (..., 3, 3).
 
-    atan2 of the sine (from the skew part) and the cosine (from the trace) is accurate where arccos is not, near 0
-    and pi;
-    the sine's square root is kept off zero, where its gradient would be infinite, and is zero there instead.
+    atan2 of the sine (from the skew part) and the cosine (from the trace) is accurate where arccos is not, near 0 and
+    pi; the sine's square root is kept off zero, where its gradient would be infinite, and is zero there instead.
     """
     relative = a.transpose(-1, -2) @ b
     skew = torch.stack(

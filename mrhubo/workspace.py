@@ -1,8 +1,7 @@
 """The folder in which a fit keeps what it needs to resume: its MLflow run, its checkpoints.
 
 One folder per config (named after its fingerprint), so that the same command finds it again. A finished fit leaves a
-mark, and
-the same command then starts a new run. A lock keeps two processes out of one folder.
+mark, and the same command then starts a new run. A lock keeps two processes out of one folder.
 """
 
 from __future__ import annotations

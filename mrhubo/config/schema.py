@@ -29,12 +29,10 @@ class RobotConfig:
     """Joints that are sampled and predicted, by URDF name; their order is the order of the output."""
     keypoints: dict[str, Any]
     """Which link stands for which part of the human body. Points: `left_` and `right_` `shoulder`, `elbow`, `wrist`,
-    each a
-    link name or {link: NAME, offset: [x, y, z]} (m, in that link's frame). `chest`: the link that carries the arms,
-    with
-    optional `forward` and `up` (default [1, 0, 0] and [0, 0, 1]). Optional `left_hand` and `right_hand`: {link: NAME,
-    fingers: [x, y, z], thumb: [x, y, z]}, where the fingers point and the thumb lies, in that link's frame. Optional
-    `head`: a link name or {link: NAME, forward: ..., up: ...}."""
+    each a link name or {link: NAME, offset: [x, y, z]} (m, in that link's frame). `chest`: the link that carries the
+    arms, with optional `forward` and `up` (default [1, 0, 0] and [0, 0, 1]). Optional `left_hand` and `right_hand`:
+    {link: NAME, fingers: [x, y, z], thumb: [x, y, z]}, where the fingers point and the thumb lies, in that link's
+    frame. Optional `head`: a link name or {link: NAME, forward: ..., up: ...}."""
     key_links: list[str]
     """Links whose position error is the link error."""
     ranges: dict[str, list[float]] = field(default_factory=dict)
@@ -72,8 +70,8 @@ class PairsConfig:
     seed: int = bounded(0, 0, 2**63 - 1)
     """Seed of the robot poses and of the amortised solver's training."""
     solver: str = choice("fine", "fine", "fast", "paper")
-    """Latent inverse kinematics: `fine` = amortised start, then Levenberg-Marquardt; `fast` = amortised only;
-    `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
+    """Latent inverse kinematics: `fine` = amortised start, then Levenberg-Marquardt; `fast` = amortised only; `paper` =
+    L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
     shard_size: int = bounded(2_500, 100, 1_000_000)
     """Pairs per file."""
     amortiser_steps: int = bounded(2_000, 10, 1_000_000)
@@ -105,8 +103,7 @@ class ModelConfig:
     """Human joints that are read; default: those between the chest and the keypoints that the robot has."""
     input_frame: str = choice("chest", "chest", "local")
     """`chest` turns the joints' local rotations into rotations relative to the chest before the first layer; `local`
-    feeds
-    them as they are (the paper)."""
+    feeds them as they are (the paper)."""
     bound_output: str = choice("tanh", "tanh", "clamp")
     """How outputs are kept inside the joint limits: `tanh` squashes, `clamp` learns unbounded and cuts off."""
     detach_student: bool = True

@@ -1,8 +1,7 @@
 """The amortised solver: a small network from target keypoints to the latent, trained per robot on the IK cost itself.
 
 No labels: every step draws fresh robot poses and lowers the cost of the network's own answers. Training is resumed
-exactly
-from its last checkpoint, because step s draws from (seed, s) alone.
+exactly from its last checkpoint, because step s draws from (seed, s) alone.
 
 Legend: B batch, K used keypoints, Z latent numbers.
 """

@@ -1,8 +1,7 @@
 """Batches of pairs for the training, drawn by the filter; tensors stay in memory, no Python per sample.
 
-An epoch is a fixed number of optimiser steps. Its batches are cut from Bernoulli draws over the whole dataset, one
-draw after
-another, all from (seed, epoch): the batch size is exact, and a resumed run sees the same batches.
+An epoch is a fixed number of optimiser steps. Its batches are cut from Bernoulli draws over the whole dataset, one draw
+after another, all from (seed, epoch): the batch size is exact, and a resumed run sees the same batches.
 
 Legend: P pairs, B batch, F input features, M robot links, N robot joints.
 """

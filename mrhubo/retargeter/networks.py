@@ -54,9 +54,8 @@ def _mlp(size_in: int, hidden: int, layers: int, size_out: int) -> nn.Sequential
 class LimitedOutput(nn.Module):
     """Keeps joint angles inside the limits, whatever comes in.
 
-    `tanh` squashes the numbers that come in; `clamp` cuts off, and lets the training see the angles before the cut,
-    so that
-    an answer beyond the limit still feels a gradient.
+    `tanh` squashes the numbers that come in; `clamp` cuts off, and lets the training see the angles before the cut, so
+    that an answer beyond the limit still feels a gradient.
     """
 
     lower_N: Tensor

@@ -1,6 +1,6 @@
 """Pictures: figures made of capsules, a renderer without OpenGL, tables of pictures, charts."""
 
-from mrhubo.view.camera import Camera, common_cameras, front_camera
+from mrhubo.view.camera import Camera, common_cameras
 from mrhubo.view.figures import figure_sheet, human_figure
 from mrhubo.view.human import HUMAN_COLOR, SKIN_COLOR, human_solids
 from mrhubo.view.painter import render
@@ -18,7 +18,6 @@ __all__ = [
     "common_cameras",
     "contact_sheet",
     "figure_sheet",
-    "front_camera",
     "human_figure",
     "human_solids",
     "phi_histogram",

@@ -59,17 +59,6 @@ class Camera:
         return [solids.extent(axis) for axis in self.basis()]
 
 
-def front_camera(
-    solids: Solids | Sequence[Solids],
-    size: tuple[int, int] = (300, 300),
-    azimuth_deg: float = 30.0,
-    elevation_deg: float = 12.0,
-    margin: float = 0.07,
-) -> Camera:
-    """A three-quarter view from the front that shows all figures whole: one camera, so that a clip stays put."""
-    return Camera.framing(solids, size, azimuth_deg, elevation_deg, margin)
-
-
 def common_cameras(
     figures: Sequence[Solids],
     size: tuple[int, int] = (300, 300),

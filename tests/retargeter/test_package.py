@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from mrhubo import rotation
-from mrhubo.body import BodyPrior
+from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior, save_skeleton
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter, build_network
@@ -42,6 +42,24 @@ def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: 
     pose = human(20)
     torch.testing.assert_close(opened.predict(pose), made.predict(pose))
     torch.testing.assert_close(opened.retarget(pose).confidence_T, made.retarget(pose).confidence_T)
+
+
+def test_a_package_keeps_vposer_and_another_skeleton(root: Path, tmp_path: Path) -> None:
+    """As made with the official files, which the package must not need again."""
+    torch.manual_seed(0)
+    prior, longer = VPoser().requires_grad_(False).eval(), Skeleton(1.1 * Skeleton().offsets_J3)
+    prior.save(tmp_path / "vposer.safetensors")
+    save_skeleton(tmp_path / "longer.safetensors", longer)
+    overrides = [f"body.prior_path={tmp_path}/vposer.safetensors", f"body.model_path={tmp_path}/longer.safetensors"]
+    config = load_config(root / "conf" / "nao.yaml", ["model.hidden=24", "body.prior=vposer", *overrides])
+    body_map = build_body_map(config.robot, build_skeleton(config.body))
+    made = Retargeter(build_network(config, body_map), body_map, open_prior(config.body), config, phi_threshold=0.01)
+    folder = made.save(tmp_path / "package", {})
+    for name in ("vposer", "longer"):
+        (tmp_path / f"{name}.safetensors").unlink()
+    opened = Retargeter.load(folder)
+    assert opened.prior.checksum == prior.checksum and opened.body_map.skeleton.checksum == longer.checksum
+    torch.testing.assert_close(opened.retarget(human(5)).confidence_T, made.retarget(human(5)).confidence_T)
 
 
 def test_the_header_tells_joints_limits_and_conventions(made: Retargeter, folder: Path) -> None:
@@ -94,7 +112,7 @@ def test_incomplete_or_foreign_packages_are_refused(folder: Path, tmp_path: Path
     with pytest.raises(UserError, match="cannot be read"):
         Retargeter.load(folder)
     write_tensors(weights, tensors, metadata)
-    for name in ("robot.urdf", "config.yaml", "body_prior.safetensors"):
+    for name in ("robot.urdf", "config.yaml", "body_prior.safetensors", "skeleton.safetensors"):
         (folder / name).rename(folder / "away")
         with pytest.raises(UserError):
             Retargeter.load(folder)

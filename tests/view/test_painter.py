@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mrhubo.view import Camera, Solids, common_cameras, front_camera, human_solids, render
+from mrhubo.view import Camera, Solids, common_cameras, human_solids, render
 from mrhubo.view.painter import LIGHT
 
 RED, BLUE, GREY = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9), (0.6, 0.6, 0.6)
@@ -138,7 +138,7 @@ def test_light_from_above_left():
 @pytest.mark.parametrize("angles", [(30.0, 12.0), (180.0, 0.0), (0.0, 90.0)])
 def test_default_camera_shows_the_figure_whole(human, size, angles):
     for solids in (human_solids(*human), clutter(), solid((5, 5, 5), radius=1e-3), solid((0, 0, 0), radius=0.0)):
-        camera = front_camera(solids, size, *angles)
+        camera = Camera.framing(solids, size, *angles)
         covered = alpha(solids, camera, size) > 0
         if solids.radii_S.max() > 0.0:
             assert covered.any()
@@ -175,7 +175,7 @@ def test_background_shadow_and_transparency():
 def test_empty_and_bad_requests():
     assert np.all(pixels(render(Solids.empty(), (10, 10))) == 255)
     with pytest.raises(ValueError, match="empty"):
-        front_camera(Solids.empty())
+        Camera.framing(Solids.empty())
     with pytest.raises(ValueError, match="size"):
         render(solid((0, 0, 0)), (0, 10))
 
@@ -188,7 +188,7 @@ def test_solids_outside_the_picture_are_cut_off():
 def test_a_figure_is_drawn_fast(human):
     """60 ms on a free core; here with room for a busy machine, in CPU time."""
     solids = human_solids(*human)
-    camera = front_camera(solids)
+    camera = Camera.framing(solids)
     spent = []
     for _ in range(5):
         begin = time.process_time()
