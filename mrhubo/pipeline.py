@@ -5,11 +5,6 @@ Everything a user can get wrong is checked by `prepare`, before any work.
 
 from __future__ import annotations
 
-import logging
-import signal
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +35,7 @@ from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.progress import Progress
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
 from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.trainer import quiet_lightning, run_trainer
 
 
 @dataclass
@@ -177,7 +173,7 @@ def train(
         save_on_train_epoch_end=True,
         enable_version_counter=False,
     )
-    with _quiet_lightning():
+    with quiet_lightning():
         trainer = lightning.Trainer(
             accelerator=settings.accelerator if settings.accelerator != "auto" else device_of(config).type,
             devices=1,
@@ -196,13 +192,7 @@ def train(
                 saver,
             ],
         )
-        handler = signal.getsignal(signal.SIGINT)
-        try:
-            trainer.fit(module, datamodule=data, ckpt_path=resume, weights_only=True)
-        except SystemExit as stop:  # Lightning turns Ctrl-C into exit(1)
-            raise KeyboardInterrupt from stop
-        finally:
-            signal.signal(signal.SIGINT, handler)
+        run_trainer(trainer, module, resume, datamodule=data)
     best = torch.load(saver.best_model_path, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
     network.requires_grad_(False).eval()
@@ -210,27 +200,6 @@ def train(
     return Training(
         network, pairs, pair_filter, Path(saver.best_model_path), float("nan") if score is None else float(score)
     )
-
-
-_LIGHTNING_LOGGERS = ("lightning.pytorch", "lightning.fabric", "lightning.pytorch.utilities.rank_zero")
-
-
-@contextmanager
-def _quiet_lightning() -> Iterator[None]:
-    """Lightning's banners and hints about workers say nothing to our users."""
-    levels = {name: logging.getLogger(name).level for name in _LIGHTNING_LOGGERS}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", module=r"lightning\..*")
-        warnings.filterwarnings(
-            "ignore", message=r".*(num_workers|Checkpoint directory|lr_scheduler|isinstance\(treespec).*"
-        )
-        try:
-            for name in levels:
-                logging.getLogger(name).setLevel(logging.ERROR)
-            yield
-        finally:
-            for name, level in levels.items():
-                logging.getLogger(name).setLevel(level)
 
 
 def score_test(prepared: Prepared, network: RetargetNetwork, clips: list[Clip]) -> tuple[list[Tensor], list[ClipScore]]:

@@ -36,11 +36,14 @@ from mrhubo.body.skeleton import Skeleton, mirror_pose
 from mrhubo.config import bounded, choice, fingerprint, parse_arguments, run_command, to_plain
 from mrhubo.errors import UserError
 from mrhubo.tracking import git_commit, open_logger, resumable_run
+from mrhubo.trainer import quiet_lightning, run_trainer
 from mrhubo.workspace import Workspace
 
 _KNOWN, _UNSEEN = 50_000, 5_000
 """Poses that the final measures take from the training clips and from those held out."""
 
+_EPOCH = 1_000
+"""Steps between validations and checkpoints."""
 _ROTATION_KNEE, _POSITION_KNEE = 0.02, 0.002
 _MARGIN = math.radians(3.0)
 """Samples are kept this far inside the anatomical ranges [rad]."""
@@ -105,9 +108,9 @@ class PriorTraining(lightning.LightningModule):
         self.prior = BodyPrior(config.hidden, config.latent, config.activation, config.encoder_hidden)
         self.skeleton = Skeleton()
 
-    def on_train_epoch_start(self) -> None:
-        """Draws of an epoch depend on (seed, epoch) alone, so that a resumed training goes on exactly."""
-        torch.manual_seed(self.config.seed * 1_000_003 + self.current_epoch)
+    def on_train_batch_start(self, *_: Any) -> None:
+        """Draws of a step depend on (seed, step) alone, so that a resumed training goes on exactly."""
+        torch.manual_seed(self.config.seed * 1_000_003 + self.trainer.global_step)
 
     def training_step(self, pose_BJ6: Tensor, _: int) -> Tensor:
         """One batch of poses (B, 21, 6)."""
@@ -175,27 +178,53 @@ def _differing(config: PriorConfig) -> dict[str, Any]:
     return {k: v for k, v in to_plain(config).items() if v != defaults[k] and not isinstance(getattr(config, k), Path)}
 
 
+@dataclass(frozen=True)
+class Split:
+    """The sound frames of the training clips, (F, 21, 6), and of the clips held out, of which every fourth is used."""
+
+    kept: Tensor
+    held_out: Tensor
+    clips: int
+    held_out_clips: list[str]
+    dropped_share: float
+
+    @classmethod
+    def of(cls, config: PriorConfig) -> Split:
+        """Reads the data and draws the clips to hold out."""
+        poses, clips, names = load_training_poses(config.data)
+        order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
+        held = set(order[: max(1, round(config.held_out * len(clips)))])
+        parts = [[poses[clips[i]] for i in range(len(clips)) if (i in held) == wanted] for wanted in (False, True)]
+        kept, held_out = (pose[sound_frames(pose, config.max_excess_deg)] for pose in map(torch.cat, parts))
+        if not len(kept) or not len(held_out):
+            raise UserError(f"max_excess_deg: {config.max_excess_deg:g} leaves no frame to train or to validate on")
+        share = 1 - (len(kept) + len(held_out)) / len(poses)
+        return cls(kept, held_out[::4], len(clips), [names[i] for i in sorted(held)], share)
+
+    def known(self, seed: int) -> Tensor:
+        """Training poses to measure samples against."""
+        return self.kept[torch.randperm(len(self.kept), generator=torch.Generator().manual_seed(seed))[:_KNOWN]]
+
+    def unseen(self) -> Tensor:
+        """Held-out poses for the measures, evenly spaced."""
+        return self.held_out[:: max(1, len(self.held_out) // _UNSEEN)]
+
+
 def train(config: PriorConfig) -> BodyPrior:
-    """Trains, saves the weights with their card, and returns the prior."""
+    """Trains, measures, saves the weights with their card, and returns the prior."""
     lightning.seed_everything(config.seed, verbose=False)
-    poses, clips, names = load_training_poses(config.data)
-    order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
-    held = set(order[: max(1, round(config.held_out * len(clips)))])
-    parts = [[poses[clips[i]] for i in range(len(clips)) if (i in held) == wanted] for wanted in (False, True)]
-    kept, held_out = (pose[sound_frames(pose, config.max_excess_deg)] for pose in map(torch.cat, parts))
-    held_out, sound_share = held_out[::4], (len(kept) + len(held_out)) / len(poses)
-    del poses, parts
-    module = PriorTraining(config)
+    split, module = Split.of(config), PriorTraining(config)
     settings = to_plain(config)
     key = fingerprint({k: v for k, v in settings.items() if k not in ("output", "tracking_dir")})
-    with Workspace(config.tracking_dir / "fits", "prior", key) as workspace:
+    with Workspace(config.tracking_dir / "fits", "prior", key) as workspace, quiet_lightning():
         tags = {"git_commit": git_commit(Path(__file__).parent)}
         run_id = resumable_run(config.tracking_dir, None, workspace.run_id)
         name = ", ".join(f"{k}={v}" for k, v in _differing(config).items()) or "defaults"
         logger = open_logger(config.tracking_dir, "body-prior", name, tags, run_id=run_id)
         workspace.start(str(logger.run_id))
+        epoch = min(_EPOCH, config.steps)
         trainer = lightning.Trainer(
-            max_epochs=-(-config.steps // min(1_000, config.steps)),  # max_steps would break exact resumption
+            max_epochs=-(-config.steps // epoch),  # max_steps would break exact resumption
             logger=logger,
             log_every_n_steps=100,
             accelerator="auto",
@@ -207,38 +236,42 @@ def train(config: PriorConfig) -> BodyPrior:
                 ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True)
             ],
         )
-        batches = RandomBatches(len(kept), config.batch_size, min(1_000, config.steps), config.seed)
-        in_order = [torch.arange(a, min(a + 4_096, len(held_out))) for a in range(0, len(held_out), 4_096)]
-        trainer.fit(
+        batches = RandomBatches(len(split.kept), config.batch_size, epoch, config.seed)
+        in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
+        run_trainer(
+            trainer,
             module,
-            DataLoader(Rows(kept), sampler=batches, batch_size=None),
-            DataLoader(Rows(held_out), sampler=in_order, batch_size=None),
-            ckpt_path=workspace.last_checkpoint(),
-            weights_only=True,
+            workspace.last_checkpoint(),
+            DataLoader(Rows(split.kept), sampler=batches, batch_size=None),
+            DataLoader(Rows(split.held_out), sampler=in_order, batch_size=None),
         )
         prior = module.prior.cpu().requires_grad_(False).eval()
-        known = kept[torch.randperm(len(kept), generator=torch.Generator().manual_seed(config.seed))[:_KNOWN]]
-        measures = measure(prior, held_out[:: max(1, len(held_out) // _UNSEEN)], known, config.seed)
+        measures = measure(prior, split.unseen(), split.known(config.seed), config.seed)
         logger.log_metrics({f"held_out/{name}": value for name, value in measures.items()}, config.steps)
+        prior.save(config.output, _card(config, split, measures))
         workspace.finish()
-    card = {
+    return prior
+
+
+def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict[str, Any]:
+    """What the weights' header says of them."""
+    settings = {k: v for k, v in to_plain(config).items() if not isinstance(getattr(config, k), Path)}
+    held = len(split.held_out_clips)
+    return {
         "name": "mrhubo open body prior",
         "data": "CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu), mirrored; free for all uses",
         "credit": "The data used in this project was obtained from mocap.cs.cmu.edu. "
         "The database was created with funding from NSF EIA-0196217.",
         "licence": "Apache-2.0",
-        "split": f"by clip: {len(clips) - len(held)} for training, {len(held)} held out; "
-        "the evaluation clips are in neither",
-        "dropped": f"{100 * (1 - sound_share):.1f}% of the frames, as a joint was more than "
+        "split": f"by clip: {split.clips - held} for training, {held} held out; the evaluation clips are in neither",
+        "dropped": f"{100 * split.dropped_share:.1f}% of the frames, as a joint was more than "
         f"{config.max_excess_deg:g} degrees outside its anatomical range (defects of the recording)",
-        "held_out_clips": [names[i] for i in sorted(held)],
+        "held_out_clips": split.held_out_clips,
         "measures_on_held_out_clips": {name: round(value, 4) for name, value in measures.items()},
-        "training": {k: v for k, v in settings.items() if not isinstance(getattr(config, k), Path)},
+        "training": settings,
         "known_defects": "wrist flexion, collars and toes do not move in the data: plausible angles were added at "
         "random, so the prior allows them and knows nothing of how they go with the arm or the step",
     }
-    prior.save(config.output, card)
-    return prior
 
 
 def main(argv: list[str]) -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import mlflow
 import numpy as np
 import pytest
+import torch
 
-from mrhubo.body import BodyPrior
-from mrhubo.body.dataset import load_training_poses
-from mrhubo.body.training import PriorConfig, main, train
+from mrhubo.body import BodyPrior, training
+from mrhubo.body.dataset import load_training_poses, sound_frames
+from mrhubo.body.training import PriorConfig, PriorTraining, main, train
 from mrhubo.errors import UserError
+from mrhubo.storage import read_tensors
 
 
 @pytest.fixture
@@ -37,6 +41,40 @@ def test_training_writes_a_prior_that_reconstructs(data: Path, tmp_path: Path) -
     assert error < 0.8 * float(BodyPrior(64, 16).requires_grad_(False).reconstruction_error(poses).mean())
 
 
+def test_stopped_it_resumes_to_the_same_weights(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training, "_EPOCH", 10)
+
+    def config(folder: str) -> PriorConfig:
+        return PriorConfig(
+            data=data, output=tmp_path / f"{folder}.safetensors", steps=35, batch_size=32, hidden=16, encoder_hidden=16,
+            latent=8, tracking_dir=tmp_path / folder,
+        )  # fmt: skip
+
+    train(config("whole"))
+    step = PriorTraining.on_train_batch_end
+
+    def stop(self: PriorTraining, *given: Any) -> None:
+        step(self, *given)
+        if self.trainer.global_step == 17:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(PriorTraining, "on_train_batch_end", stop)
+    with pytest.raises(KeyboardInterrupt):
+        train(config("stopped"))
+    assert not (tmp_path / "stopped.safetensors").exists()
+    monkeypatch.setattr(PriorTraining, "on_train_batch_end", step)
+    train(config("stopped"))
+    (one, card), (other, other_card) = (read_tensors(tmp_path / f"{f}.safetensors") for f in ("whole", "stopped"))
+    for name in one:
+        torch.testing.assert_close(one[name], other[name], rtol=0, atol=0)
+    assert card == other_card
+    client = mlflow.MlflowClient(tracking_uri=f"sqlite:///{tmp_path / 'stopped' / 'mlflow.db'}")
+    found = client.get_experiment_by_name("body-prior")
+    assert found is not None
+    (run,) = client.search_runs([found.experiment_id])
+    assert {"held_out/joint_mm", "held_out/roc_bent", "train/loss", "val/joint_mm"} <= set(run.data.metrics)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -61,3 +99,10 @@ def test_missing_and_truncated_files_are_refused(data: Path) -> None:
     data.write_bytes(data.read_bytes()[:500])
     with pytest.raises(UserError, match="is not an .npz file"):
         load_training_poses(data)
+
+
+def test_defects_of_the_recording_are_dropped(data: Path) -> None:
+    poses, _, _ = load_training_poses(data)
+    assert 0 < float(sound_frames(poses, 20.0).float().mean()) <= float(sound_frames(poses, 40.0).float().mean())
+    with pytest.raises(UserError, match="max_excess_deg: 0 leaves no frame"):
+        training.Split.of(PriorConfig(data=data, max_excess_deg=0.0, held_out=0.001))
