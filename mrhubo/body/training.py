@@ -45,7 +45,7 @@ _KNOWN, _UNSEEN = 50_000, 5_000
 _EPOCH = 1_000
 """Steps between validations and checkpoints."""
 _ROTATION_KNEE, _POSITION_KNEE = 0.02, 0.002
-_MARGIN = math.radians(3.0)
+_MARGIN = math.radians(5.0)
 """Samples are kept this far inside the anatomical ranges [rad]."""
 
 
@@ -80,7 +80,7 @@ class PriorConfig:
     """Weight of the Kullback-Leibler divergence from N(0, I)."""
     w_latent: float = bounded(10.0, 0.0)
     """Weight of the sliced Wasserstein distance between the batch's latents and N(0, I)."""
-    w_anatomy: float = bounded(40.0, 0.0)
+    w_anatomy: float = bounded(60.0, 0.0)
     """Weight of the squared excess [rad^2] over anatomical ranges of poses decoded from N(0, I)."""
     w_columns: float = bounded(0.2, 0.0)
     """Weight that keeps the six raw numbers of every joint near two orthogonal unit vectors."""
