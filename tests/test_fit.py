@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import torch
 
+from mrhubo.body import Skeleton, VPoser, save_skeleton
 from mrhubo.callbacks import load_motions
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
@@ -171,6 +172,10 @@ def test_a_finished_fit_run_again_is_a_new_run_with_the_same_result(
         (["evaluation.motions=[nowhere]"], "nowhere"),
         (["evaluation.validation=[]"], "evaluation.validation"),
         (["body.prior_path=nowhere.safetensors"], "nowhere.safetensors"),
+        (["body.prior=vposer"], "body.prior_path: is missing"),
+        (["body.prior=vposer", "body.prior_path=V02_05"], "V02_05: there is no such file or folder"),
+        (["body.model_path=SMPLX_NEUTRAL.npz"], "SMPLX_NEUTRAL.npz: there is no such file"),
+        (["body.betas=[0.5]"], "body.betas: shape the body model of body.model_path, which is not given"),
     ],
 )
 def test_a_mistake_is_one_sentence_before_any_work(
@@ -193,6 +198,21 @@ def test_nan_in_a_motion_is_refused_before_any_work(root: Path, motions: Path, t
     assert done.returncode == 2 and done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
     assert "wave.npz" in done.stderr and "17" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["motions"]
+
+
+def test_vposer_and_an_official_skeleton_take_the_place_of_ours(root: Path, motions: Path, tmp_path: Path) -> None:
+    """Random weights and lengths: what counts here is that a fit goes through, and the package without the files."""
+    torch.manual_seed(0)
+    VPoser().save(tmp_path / "vposer.safetensors")
+    save_skeleton(tmp_path / "longer.safetensors", Skeleton(1.1 * Skeleton().offsets_J3))
+    paths = [f"body.prior_path={tmp_path}/vposer.safetensors", f"body.model_path={tmp_path}/longer.safetensors"]
+    main(arguments(root, tmp_path, motions, "body.prior=vposer", *paths, "trainer.max_steps=30"))
+    (found,) = runs_of(tmp_path)
+    assert found.info.status == "FINISHED" and "prior=vposer" in found.info.run_name
+    for name in ("vposer", "longer"):
+        (tmp_path / f"{name}.safetensors").unlink()
+    (package,) = (tmp_path / "mlruns" / "packages").iterdir()
+    assert isinstance(Retargeter.load(package).prior, VPoser)
 
 
 @pytest.mark.parametrize("variant", ["model.stages=1", "pairs.filter=none", "trainer.precision=bf16"])

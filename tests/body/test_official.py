@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import sys
 import types
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 import scipy.sparse
 import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from mrhubo.body import JOINT_NAMES, KEYPOINT_NAMES, Skeleton, build_skeleton, open_skeleton, save_skeleton
 from mrhubo.body.skeleton import PARENTS
@@ -213,6 +216,19 @@ def test_truncated_and_missing_files_are_refused(tmp_path: Path, chumpy: Any, en
         path.write_bytes(whole[: int(share * len(whole))])
         with pytest.raises(UserError, match="model"):
             open_skeleton(path)
+
+
+@given(data=st.data())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_altered_pickles_never_do_more_than_name_an_error(tmp_path: Path, chumpy: Any, data: st.DataObject) -> None:
+    path = tmp_path / "model.pkl"
+    write_smpl_pickle(path, model(24, 10), chumpy)
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content)
+    with contextlib.suppress(UserError):
+        open_skeleton(path)
 
 
 def test_other_endings_are_refused(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import zipfile
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Any
 
 import pytest
 import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -217,3 +220,27 @@ def test_missing_and_truncated_files_are_refused(tmp_path: Path) -> None:
     path.write_bytes(pickle.dumps({"state_dict": {}}))
     with pytest.raises(UserError, match="no PyTorch checkpoint"):
         VPoser.open(path)
+
+
+@given(data=st.data())
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_altered_snapshots_never_do_more_than_name_an_error(tmp_path: Path, data: st.DataObject) -> None:
+    folder = tmp_path / "V02_05"
+    if not folder.exists():
+        write_snapshot(folder, published(8, 4))
+        (folder / "V02_05.yaml").unlink()
+    path = next((folder / "snapshots").iterdir())
+    whole = path.read_bytes()
+
+    def alter(content: bytes) -> bytes:
+        altered = bytearray(content)
+        for _ in range(data.draw(st.integers(1, 4))):
+            altered[data.draw(st.integers(0, len(altered) - 1))] = data.draw(st.integers(0, 255))
+        return bytes(altered)
+
+    rewrite_pickle(path, alter)
+    try:
+        with contextlib.suppress(UserError):
+            VPoser.open(path)
+    finally:
+        path.write_bytes(whole)

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from mrhubo import rotation
-from mrhubo.body import BodyPrior
+from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.config import Config, load_config
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
 from mrhubo.robot import build_body_map
@@ -89,6 +89,17 @@ def test_other_settings_have_another_folder(root: Path, tmp_path: Path) -> None:
         assert store_of(config_of(root, tmp_path, change)).folder != base, change
     for same in ("pairs.filter=none", "pairs.count=9999", "robot.key_links=[l_wrist]"):
         assert store_of(config_of(root, tmp_path, same)).folder == base, same
+
+
+def test_another_prior_or_skeleton_has_another_folder(root: Path, tmp_path: Path) -> None:
+    config = config_of(root, tmp_path)
+    longer = build_body_map(config.robot, Skeleton(1.1 * Skeleton().offsets_J3))
+    folders = {
+        store_of(config).folder,
+        PairStore.of(config, longer, BodyPrior.open()).folder,
+        PairStore.of(config, build_body_map(config.robot), BodyPrior()).folder,
+    }
+    assert len(folders) == 3
 
 
 @pytest.mark.parametrize("damage", ["truncated", "flipped", "foreign", "empty", "another index"])
