@@ -109,7 +109,7 @@ def unpickle(file: io.BufferedIOBase, modules: Iterable[str]) -> Any:
 
 
 def to_array(value: Any) -> np.ndarray:
-    """The array that a pickled ndarray, scipy sparse matrix or chumpy object stands for; float64 where it is not whole.
+    """The array that a pickled ndarray, scipy sparse matrix (as a dense one) or chumpy object stands for.
 
     Raises:
         UserError: it stands for something else, or its parts do not fit together.
@@ -123,8 +123,6 @@ def to_array(value: Any) -> np.ndarray:
 
 
 def _to_array(value: Any) -> np.ndarray:
-    if isinstance(value, list):
-        return np.asarray(value, dtype=np.float64)
     if not isinstance(value, Inert):
         raise UserError(f"expected an array, found {type(value).__name__}")
     made, root = type(value).__name__, value.module.partition(".")[0]
@@ -240,7 +238,7 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
         last = offset + sum((n - 1) * s for n, s in zip(shape, stride, strict=True))
         if len(reference) != _STORAGE_PARTS or math.prod(shape) == 0 or min((*stride, offset, 0)) < 0:
             raise UserError(f"a tensor has shape {tuple(shape)} and stride {tuple(stride)}")
-        if last >= len(numbers):
+        if last >= len(numbers) or math.prod(shape) > len(numbers):
             raise UserError(f"a tensor of shape {tuple(shape)} reaches beyond its {len(numbers)} numbers")
         return torch.from_numpy(numbers.astype(np.float32)).as_strided(tuple(shape), tuple(stride), offset).clone()
     except UserError:

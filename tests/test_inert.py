@@ -79,7 +79,7 @@ def test_any_bytes_give_plain_objects_or_a_named_error(content: bytes) -> None:
         found = unpickle(io.BytesIO(content), MODULES)
     except UserError:
         return
-    with pytest.raises(UserError) if not isinstance(found, (list, Inert)) else _maybe():
+    with pytest.raises(UserError) if not isinstance(found, Inert) else _maybe():
         to_array(found)
 
 
@@ -115,8 +115,6 @@ def test_tensors_that_reach_beyond_their_storage_are_refused(tmp_path: Path) -> 
     torch.testing.assert_close(to_tensor(content["n"], content[""]), torch.ones(2))
     for args in ((0, (3, 3), (1, 3)), (5, (3, 2), (1, 3)), (0, (2, 3), (-3, 1)), (-1, (2,), (1,)), (0, (10**9,), (0,))):
         content["w"].args = (content["w"].args[0], *args)
-        if args[1] == (10**9,):
-            continue
         with pytest.raises(UserError):
             to_tensor(content["w"], content[""])
 

@@ -112,7 +112,7 @@ def roc_area(score_of_good: Tensor, score_of_bad: Tensor) -> float:
 
 
 def detection(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor, seed: int = 0) -> dict[str, float]:
-    """ROC areas of phi between real poses and broken ones; see the functions above."""
+    """ROC areas of phi between real poses and broken ones; see the functions above. No grafted one, no such area."""
     generator = torch.Generator().manual_seed(seed)
     real = prior.reconstruction_error(pose_BJ6)
     broken = {
@@ -120,10 +120,7 @@ def detection(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor, seed: int 
         "random": random_rotations(len(pose_BJ6), generator).to(pose_BJ6),
         "grafted": arms_through_body(skeleton, pose_BJ6, generator),
     }
-    return {
-        f"roc_{name}": roc_area(real, prior.reconstruction_error(bad)) if len(bad) else float("nan")
-        for name, bad in broken.items()
-    }
+    return {f"roc_{name}": roc_area(real, prior.reconstruction_error(bad)) for name, bad in broken.items() if len(bad)}
 
 
 def denoising(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor, seed: int = 0) -> dict[str, float]:
