@@ -1,6 +1,6 @@
 """The experiments that chose the body prior's settings: one change at a time, each a tracked training.
 
-    python benchmarks/prior_experiments.py [--config conf/prior.yaml] [--only NAME,NAME] [steps=2000 ...]
+    python benchmarks/prior_experiments.py [--config conf/prior.yaml] [--only NAME,NAME] [steps=3000 batch_size=256 ...]
 
 Weights go to `prior_experiments` in the tracking folder; a variant whose weights are there is not trained again.
 """
@@ -28,7 +28,6 @@ VARIANTS = {
     "latent 24": ["latent=24"],
     "latent 48": ["latent=48"],
     "encoder 512 wide": ["encoder_hidden=512"],
-    "decoder 1024 wide": ["hidden=1024"],
     "KL weight / 4": ["w_kl=0.0005"],
     "KL weight x 4": ["w_kl=0.008"],
     "no sliced Wasserstein": ["w_latent=0"],

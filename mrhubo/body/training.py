@@ -270,7 +270,9 @@ def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict
         "measures_on_held_out_clips": {name: round(value, 4) for name, value in measures.items()},
         "training": settings,
         "known_defects": "wrist flexion, collars and toes do not move in the data: plausible angles were added at "
-        "random, so the prior allows them and knows nothing of how they go with the arm or the step",
+        "random, so the prior allows them and knows nothing of how they go with the arm or the step; the elbows are "
+        "pure hinges and all twist of the forearm is in the wrists, so poses of other sources, which share these "
+        "turns out differently, have a larger phi",
     }
 
 

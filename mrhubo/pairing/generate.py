@@ -118,9 +118,9 @@ def generate_pairs(
     """
     start = time.perf_counter()
     missing = store.missing()
-    shard_progress(store.shards - len(missing), store.shards)
     if missing:
         generator.prepare(store, amortiser_progress)
+    shard_progress(store.shards - len(missing), store.shards)  # only now, so that the rate is that of the pairs
     for number, index in enumerate(missing):
         store.write(index, generator.shard(index))
         shard_progress(store.shards - len(missing) + number + 1, store.shards)
