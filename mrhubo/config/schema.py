@@ -80,8 +80,8 @@ class PairsConfig:
     """Most Levenberg-Marquardt steps per pose; a converged pose stops earlier."""
     w_data: float = bounded(100.0, 0.0)
     """Weight of the squared keypoint distance, 1/m^2."""
-    w_prior: float = bounded(0.01, 0.0)
-    """Weight of the squared norm of the latent."""
+    w_prior: float = bounded(0.001, 0.0)
+    """Weight of the squared norm of the latent (VPoser's inverse kinematics, and so the paper: 0.01)."""
     filter: str = choice("linear", "linear", "hard", "none")
     """Use of phi: `linear` = drop above the threshold, then draw with a probability that falls linearly with phi (the
     paper); `hard` = drop above the threshold only; `none` = use every pair."""
