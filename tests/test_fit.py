@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -109,6 +110,17 @@ def test_the_package_retargets(root: Path, fitted: tuple[Path, str], motions: Pa
         assert bool(((result.confidence_T >= 0) & (result.confidence_T <= 1)).all())
         assert result.q_TN.shape == (len(motion.pose_TJ6), 8)
         torch.testing.assert_close(retargeter.predict(motion.pose_TJ6), result.q_TN)
+
+
+def test_the_readmes_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    (package,) = (fitted[0] / "mlruns" / "packages").iterdir()
+    (code,) = [
+        b for b in re.findall(r"```python\n(.*?)```", (root / "README.md").read_text(), re.S) if "Retargeter" in b
+    ]
+    monkeypatch.chdir(root)
+    names: dict[str, Any] = {}
+    exec(re.sub(r"mlruns/packages/nao-\w+", str(package), code), names)
+    assert names["result"].q_TN.shape == (len(names["motion"].pose_TJ6), 8)
 
 
 def final_metrics(folder: Path) -> dict[str, float]:
