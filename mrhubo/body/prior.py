@@ -143,17 +143,6 @@ class BodyPrior(nn.Module):
         Raises:
             UserError: a name is unknown, no target is given, shapes differ, or a number is not finite.
         """
-        return self.decode(self.solve_keypoints(targets, skeleton, w_data, w_prior, steps))
-
-    def solve_keypoints(
-        self,
-        targets: Mapping[str, Tensor],
-        skeleton: Skeleton | None = None,
-        w_data: float = 100.0,
-        w_prior: float = 0.01,
-        steps: int = 60,
-    ) -> Tensor:
-        """The latents (B, Z) of `inverse_kinematics`."""
         if not targets:
             raise UserError("inverse kinematics: no keypoint is given")
         indices = keypoint_indices(list(targets))
@@ -165,7 +154,8 @@ class BodyPrior(nn.Module):
             raise UserError("inverse kinematics: a target holds NaN or infinite numbers")
         skeleton = (skeleton or Skeleton()).to(self.identity_F.device)
         problem = LatentProblem(self, skeleton, indices, w_data, w_prior)
-        return solve_levenberg_marquardt(problem, nearest_samples(problem, target_BK3), target_BK3, steps)
+        start = nearest_samples(problem, target_BK3)
+        return self.decode(solve_levenberg_marquardt(problem, start, target_BK3, steps))
 
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "leaky_relu": nn.LeakyReLU, "tanh": nn.Tanh}
