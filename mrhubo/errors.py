@@ -20,3 +20,14 @@ def unknown_name(kind: str, name: str, available: Iterable[str]) -> str:
         return f"{kind} '{name}' does not exist; nearest: '{near[0]}'"
     shown = ", ".join(names[:30]) + (", ..." if len(names) > 30 else "")
     return f"{kind} '{name}' does not exist; available: {shown or 'none'}"
+
+
+def was_interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is at the root of an error: libraries make errors of their own of an interrupt in their midst."""
+    seen: list[BaseException] = []
+    while error is not None and error not in seen:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        seen.append(error)
+        error = error.__cause__ or error.__context__
+    return False

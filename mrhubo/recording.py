@@ -18,6 +18,7 @@ from torch import Tensor
 from mrhubo.callbacks import Clip, ClipScore
 from mrhubo.callbacks.pictures import Artist
 from mrhubo.config import Config, to_plain, to_yaml
+from mrhubo.errors import was_interrupted
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
 from mrhubo.retargeter import Retargeter
@@ -88,7 +89,7 @@ class Recording:
         self._monitor.finish()
         status = "FINISHED"
         if error is not None:
-            status = "KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED"
+            status = "KILLED" if was_interrupted(error) else "FAILED"
             self.client.set_tag(self.run_id, "ended_by", f"{type(error).__name__}: {error}"[:500])
         self.client.set_terminated(self.run_id, status)
 

@@ -13,7 +13,7 @@ from mrhubo.config.help import help_text
 from mrhubo.config.kinds import example, requires_anything, walk
 from mrhubo.config.loading import load_config
 from mrhubo.config.schema import Config
-from mrhubo.errors import UserError, unknown_name
+from mrhubo.errors import UserError, unknown_name, was_interrupted
 
 T = TypeVar("T")
 
@@ -59,6 +59,9 @@ def parse_arguments(
     return load_config(Path(files[0]) if files else None, overrides, schema), given
 
 
+_INTERRUPTED = "interrupted; the same command resumes"
+
+
 def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     """Run a command's `main(arguments)` and leave with its exit status.
 
@@ -70,17 +73,23 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
         try:
             status = main(sys.argv[1:])
         except SystemExit as stop:
+            if was_interrupted(stop):
+                raise KeyboardInterrupt from stop
             status = stop.code
         _flush()
     except UserError as error:
         status = _end(f"error: {' '.join(str(error).split())}", 2)
     except KeyboardInterrupt:
-        status = _end("interrupted; the same command resumes", 130)
+        status = _end(_INTERRUPTED, 130)
     except BrokenPipeError:
         if not _reader_is_gone():
             raise
         _drop_output()
         status = 141
+    except Exception as error:
+        if not was_interrupted(error):
+            raise
+        status = _end(_INTERRUPTED, 130)
     sys.exit(status)
 
 

@@ -160,6 +160,18 @@ def script(body: str) -> str:
         ("sys.exit('why')", 1, "", "why\n"),
         ("print('part'); raise UserError('a\\n  b')", 2, "part\n", "error: a b\n"),
         ("raise KeyboardInterrupt", 130, "", "interrupted; the same command resumes\n"),
+        (
+            "try:\n    raise KeyboardInterrupt\nfinally:\n    raise RuntimeError('unexpected pos')",
+            130,
+            "",
+            "interrupted; the same command resumes\n",
+        ),
+        (
+            "try:\n    raise KeyboardInterrupt\nexcept KeyboardInterrupt:\n    sys.exit(1)",
+            130,
+            "",
+            "interrupted; the same command resumes\n",
+        ),
     ],
 )
 def test_ends(body, status, out, err):
