@@ -28,7 +28,7 @@ _ROWS_TO_COLUMNS = [6 * j + 2 * row + column for j in range(_JOINTS) for column 
 
 
 class VPoser(BodyPrior):
-    """VPoser v2. Its activation has a kink, so second-order latent inverse kinematics converges more slowly."""
+    """VPoser v2, with the open prior's interface."""
 
     schema = "mrhubo.vposer/1"
 
