@@ -3,7 +3,7 @@
     python benchmarks/prior.py [--motions FOLDER] [--prior FILE | --vposer V02_05] [--config conf/prior.yaml]
 
 The first table is on the clips held out of training (needs the training data that the config names), and on the motions
-of a folder, by default the evaluation clips; the second is by clip; the third is the speed of decoding.
+of a folder, by default the evaluation clips; the second is by clip, the third by joint; then the speed of decoding.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import torch
 from common import print_header, print_table
 from torch import Tensor
 
-from mrhubo.body import BodyPrior, Skeleton, VPoser
+from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
 from mrhubo.body.dataset import load_training_poses, sound_frames
 from mrhubo.body.measures import NOISE_DEG, measure, reconstruction
 from mrhubo.body.training import PriorConfig
@@ -81,6 +81,18 @@ def by_clip(prior: BodyPrior, motions: list[Motion]) -> tuple[list[list[str]], f
 
 
 @torch.no_grad()
+def by_joint(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
+    """Mean rotation error of every joint [deg], left and right together, for each set of poses."""
+    errors = [reconstruction(prior, Skeleton(), poses)[1].mean(dim=0) for poses in columns]
+    names = [name.removeprefix("left_") for name in POSED_JOINT_NAMES if not name.startswith("right_")]
+    rows = []
+    for name in names:
+        joints = [i for i, n in enumerate(POSED_JOINT_NAMES) if n in (name, f"left_{name}", f"right_{name}")]
+        rows.append([name, *(f"{float(error[joints].mean()):.2f}" for error in errors)])
+    return rows
+
+
+@torch.no_grad()
 def poses_per_second(prior: BodyPrior, batch: int = 2_000, seconds: float = 3.0) -> tuple[float, float]:
     """Poses decoded, and decoded with all keypoints, per second on one thread: medians."""
     skeleton, z = Skeleton(), torch.randn(batch, prior.latent)
@@ -123,6 +135,10 @@ def main(argv: list[str]) -> None:
     print_table(["measure", *columns, "target"], rows)
     print()
     print_table(["clip", "frames", "joints [mm]", "rotations [deg]", "phi"], clips)
+    print()
+    sets = [*([training[0]] if training else []), torch.cat([motion.pose_TJ6 for motion in motions])]
+    names = [*(["held-out clips [deg]"] if training else []), f"{folder.name} [deg]"]
+    print_table(["joint", *names], by_joint(prior, sets))
     decoded, with_keypoints = poses_per_second(prior)
     print(f"\none thread, batch 2000: {decoded:,.0f} poses/s decoded, {with_keypoints:,.0f} decoded with 36 keypoints")
 
