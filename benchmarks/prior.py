@@ -19,9 +19,8 @@ from common import print_header, print_table
 from torch import Tensor
 
 from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
-from mrhubo.body.dataset import load_training_poses, sound_frames
 from mrhubo.body.measures import NOISE_DEG, measure, reconstruction
-from mrhubo.body.training import PriorConfig
+from mrhubo.body.training import PriorConfig, Split
 from mrhubo.config import parse_arguments
 from mrhubo.errors import UserError
 from mrhubo.locations import default_motions
@@ -49,22 +48,14 @@ TARGETS |= {"samples_inside": ">= 0.99"}
 
 
 def training_poses(prior: BodyPrior, config: Path) -> tuple[Tensor, Tensor] | None:
-    """Held-out and training poses (5,000 and 50,000 of them) of the prior's card; None without the data or the card."""
+    """Held-out and training poses of the prior's card, those of its own measures; None without the data or the card."""
+    held_out_clips = json.loads(prior.metadata["card"]).get("held_out_clips", [])
     try:
         settings, _ = parse_arguments(["--config", str(config)], "benchmarks/prior.py", "", PriorConfig)
-        poses, clips, names = load_training_poses(settings.data)
+        split = Split.of(settings, held_out_clips)
     except UserError:
         return None
-    held_names = set(json.loads(prior.metadata["card"]).get("held_out_clips", []))
-    if not held_names:
-        return None
-    held = torch.zeros(len(poses), dtype=torch.bool)
-    for clip, name in zip(clips, names, strict=True):
-        held[clip] = name in held_names
-    sound = sound_frames(poses, settings.max_excess_deg)
-    unseen, known = poses[held & sound], poses[~held & sound]
-    generator = torch.Generator().manual_seed(0)
-    return unseen[:: max(1, len(unseen) // 5_000)], known[torch.randperm(len(known), generator=generator)[:50_000]]
+    return split.unseen(), split.known(settings.seed)
 
 
 @torch.no_grad()
@@ -125,7 +116,8 @@ def main(argv: list[str]) -> None:
     motions = read_folder(folder)
     clips, mean_mm = by_clip(prior, motions)
     training = training_poses(prior, given.config)
-    evaluation = measure(prior, torch.cat([motion.pose_TJ6 for motion in motions]), training[1] if training else None)
+    everything = torch.cat([motion.pose_TJ6 for motion in motions])
+    evaluation = measure(prior, everything, training[1] if training else None)
     held_out = measure(prior, *training) if training else {}
     columns = {"held-out clips": held_out, f"{folder.name}, {len(motions)} clips": {**evaluation, "joint_mm": mean_mm}}
     rows = [
@@ -136,7 +128,7 @@ def main(argv: list[str]) -> None:
     print()
     print_table(["clip", "frames", "joints [mm]", "rotations [deg]", "phi"], clips)
     print()
-    sets = [*([training[0]] if training else []), torch.cat([motion.pose_TJ6 for motion in motions])]
+    sets = [*([training[0]] if training else []), everything]
     names = [*(["held-out clips [deg]"] if training else []), f"{folder.name} [deg]"]
     print_table(["joint", *names], by_joint(prior, sets))
     decoded, with_keypoints = poses_per_second(prior)

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 
-import torch
 from common import print_header, print_table
+from prior import by_clip
 
-from mrhubo.body import BodyPrior, Skeleton
-from mrhubo.body.measures import reconstruction
+from mrhubo.body import BodyPrior
 from mrhubo.body.training import PriorConfig, train
-from mrhubo.config import fingerprint, parse_arguments, to_plain
+from mrhubo.config import fingerprint, parse_arguments, without_paths
 from mrhubo.errors import UserError
 from mrhubo.locations import default_motions
-from mrhubo.motion import find_motions, read_folder
+from mrhubo.motion import Motion, find_motions, read_folder
 
 VARIANTS = {
     "chosen": [],
@@ -49,20 +47,16 @@ COLUMNS = {
 }
 
 
-def measures(config: PriorConfig) -> dict[str, float]:
+def measures(config: PriorConfig, clips: list[Motion]) -> dict[str, float]:
     """A variant's measures: those in its card, and the reconstruction of the evaluation clips (mean over clips)."""
-    settings = {k: v for k, v in to_plain(config).items() if not isinstance(getattr(config, k), Path)}
-    config.output = config.tracking_dir / "prior_experiments" / f"{fingerprint(settings)}.safetensors"
+    config.output = config.tracking_dir / "prior_experiments" / f"{fingerprint(without_paths(config))}.safetensors"
     try:
         prior = BodyPrior.open(config.output)
     except UserError:
-        prior = train(config)
+        train(config)
         prior = BodyPrior.open(config.output)
     found = dict(json.loads(prior.metadata["card"])["measures_on_held_out_clips"])
-    with torch.no_grad():
-        clips = read_folder(find_motions(default_motions()))
-        means = [reconstruction(prior, Skeleton(), clip.pose_TJ6)[0].mean() for clip in clips]
-    return {**found, "evaluation_mm": float(torch.stack(means).mean())}
+    return {**found, "evaluation_mm": by_clip(prior, clips)[1]}
 
 
 def main(argv: list[str]) -> None:
@@ -70,11 +64,11 @@ def main(argv: list[str]) -> None:
     options = {"--config": "conf/prior.yaml", "--only": ",".join(VARIANTS)}
     while argv and argv[0] in options:
         options[argv[0]], argv = argv[1], argv[2:]
-    rows = []
+    rows, clips = [], read_folder(find_motions(default_motions()))
     for name in options["--only"].split(","):
         given = ["--config", options["--config"], *argv, *VARIANTS[name]]
         config, _ = parse_arguments(given, "benchmarks/prior_experiments.py", "Experiments.", PriorConfig)
-        found = measures(config)
+        found = measures(config, clips)
         rows.append([name, *(f"{found[key]:.3f}" for key in COLUMNS)])
     print_header()
     print_table(["variant", *COLUMNS.values()], rows)

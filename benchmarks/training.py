@@ -17,7 +17,6 @@ import lightning
 import torch
 from common import print_header, print_table
 
-from mrhubo.body.training import cosine_schedule
 from mrhubo.callbacks import TrainingProgress
 from mrhubo.config import load_config
 from mrhubo.pairing import make_filter
@@ -25,6 +24,7 @@ from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
 from mrhubo.robot import build_body_map
 from mrhubo.tracking import open_logger
+from mrhubo.trainer import cosine_schedule
 
 
 class Stopwatch(lightning.Callback):

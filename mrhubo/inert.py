@@ -188,11 +188,11 @@ _CHECKPOINT_MODULES = (
 _STORAGE_PARTS = 5
 
 
-def read_checkpoint(path: Path) -> dict[str, Any]:
-    """A PyTorch checkpoint (`torch.save`, since 1.6) as nested dictionaries, with tensors left inert: see `to_tensor`.
+def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """A PyTorch checkpoint (`torch.save`, since 1.6): nested dictionaries whose tensors are inert, and their storages.
 
     Unlike `torch.load(weights_only=True)` it reads files that hold other objects too, such as Lightning's callbacks,
-    since those are neither imported nor made. The key `""` holds the open archive's storages.
+    since those are neither imported nor made. `to_tensor` makes a tensor of both.
 
     Raises:
         UserError: the file is missing, too large, no such checkpoint, or names a module that it has no use for.
@@ -203,14 +203,14 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             names = archive.namelist()
             pickles = [name for name in names if name.endswith("data.pkl") and name.count("/") == 1]
             if len(pickles) != 1:
-                raise UserError(f"{path}: is no PyTorch checkpoint: it has no data.pkl")
+                raise UserError("is no PyTorch checkpoint: it has no data.pkl")
             folder = pickles[0].removesuffix("data.pkl") + "data/"
             if sum(info.file_size for info in archive.infolist()) > MAX_BYTES:
-                raise UserError(f"{path}: unpacks to more than {MAX_BYTES / 2**30:g} GiB")
+                raise UserError(f"unpacks to more than {MAX_BYTES / 2**30:g} GiB")
             storages = {n.removeprefix(folder): archive.read(n) for n in names if n.startswith(folder)}
             content = unpickle(io.BytesIO(archive.read(pickles[0])), _CHECKPOINT_MODULES)
     except UserError as error:
-        raise error if str(error).startswith(str(path)) else UserError(f"{path}: {error}") from error
+        raise UserError(f"{path}: {error}") from error
     except Exception as error:  # whatever zipfile makes of a stranger's bytes
         raise UserError(
             f"{path}: is truncated, damaged, or no PyTorch checkpoint (a zip archive, as torch.save writes since 1.6): "
@@ -218,7 +218,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         ) from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: expected a dictionary, found {type(content).__name__}")
-    return {**content, "": storages}
+    return content, storages
 
 
 def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from mrhubo.callbacks import Clip, ClipScore
 from mrhubo.callbacks.pictures import Artist
-from mrhubo.config import Config, to_plain, to_yaml
+from mrhubo.config import Config, changed_settings, to_plain, to_yaml
 from mrhubo.errors import was_interrupted
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
@@ -172,15 +172,9 @@ def _provenance(prepared: Prepared) -> dict[str, str]:
 
 def run_name(config: Config) -> str:
     """The robot's name and the settings that differ from the defaults: `nao stages=1 filter=none`."""
-    words = [config.robot.name]
-    for section in ("body", "pairs", "model", "trainer"):
-        given = getattr(config, section)
-        for field in dataclasses.fields(given):
-            default = field.default_factory() if callable(field.default_factory) else field.default
-            value = getattr(given, field.name)
-            if value != default and field.name != "dir" and not isinstance(value, Path):
-                words.append(f"{field.name}={value}")
-    return " ".join(words)
+    sections = (config.body, config.pairs, config.model, config.trainer)
+    changed = [f"{name}={value}" for section in sections for name, value in changed_settings(section).items()]
+    return " ".join([config.robot.name, *changed])
 
 
 def dashboard_command(folder: Path, config: Config) -> str:

@@ -1,8 +1,9 @@
-"""Lightning's Trainer, quiet and interruptible."""
+"""What every training shares: the learning rate's schedule, Lightning's Trainer, quiet and interruptible."""
 
 from __future__ import annotations
 
 import logging
+import math
 import signal
 import warnings
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import lightning
+import torch
 
 _LIGHTNING_LOGGERS = ("lightning.pytorch", "lightning.fabric", "lightning.pytorch.utilities.rank_zero")
 
@@ -48,3 +50,11 @@ def run_trainer(
         raise KeyboardInterrupt from stop
     finally:
         signal.signal(signal.SIGINT, handler)
+
+
+def cosine_schedule(optimizer: torch.optim.Optimizer, steps: int) -> torch.optim.lr_scheduler.LambdaLR:
+    """Learning-rate factor: linear warm-up over 2% of the steps, then cosine decay to 0 at the last."""
+    warm_up = max(1, steps // 50)
+    return torch.optim.lr_scheduler.LambdaLR(
+        optimizer, lambda s: min((s + 1) / warm_up, 0.5 + 0.5 * math.cos(math.pi * min(1.0, s / steps)))
+    )

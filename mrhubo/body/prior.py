@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor, nn
@@ -50,7 +50,7 @@ class BodyPrior(nn.Module):
         self.metadata = {}
 
     @classmethod
-    def open(cls, path: Path | str | None = None) -> BodyPrior:
+    def open(cls, path: Path | str | None = None) -> Self:
         """The shipped prior, or the one in `path`, in evaluation mode and without gradients of its weights.
 
         Raises:

@@ -15,6 +15,7 @@ with noise and asked for without. Clips are held out whole. Legend: B batch, Z l
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,10 +34,19 @@ from mrhubo.body.losses import column_defect, length, sliced_wasserstein
 from mrhubo.body.measures import measure, reconstruction
 from mrhubo.body.prior import ACTIVATIONS, SHIPPED_WEIGHTS, BodyPrior
 from mrhubo.body.skeleton import Skeleton, mirror_pose
-from mrhubo.config import bounded, choice, fingerprint, parse_arguments, run_command, to_plain
+from mrhubo.config import (
+    bounded,
+    changed_settings,
+    choice,
+    fingerprint,
+    parse_arguments,
+    run_command,
+    to_plain,
+    without_paths,
+)
 from mrhubo.errors import UserError
 from mrhubo.tracking import git_commit, open_logger, resumable_run
-from mrhubo.trainer import quiet_lightning, run_trainer
+from mrhubo.trainer import cosine_schedule, quiet_lightning, run_trainer
 from mrhubo.workspace import Workspace
 
 _KNOWN, _UNSEEN = 50_000, 5_000
@@ -164,20 +174,6 @@ class PriorTraining(lightning.LightningModule):
         }
 
 
-def cosine_schedule(optimizer: torch.optim.Optimizer, steps: int) -> torch.optim.lr_scheduler.LambdaLR:
-    """Learning-rate factor: linear warm-up over 2% of the steps, then cosine decay to 0 at the last."""
-    warm_up = max(1, steps // 50)
-    return torch.optim.lr_scheduler.LambdaLR(
-        optimizer, lambda s: min((s + 1) / warm_up, 0.5 + 0.5 * math.cos(math.pi * min(1.0, s / steps)))
-    )
-
-
-def _differing(config: PriorConfig) -> dict[str, Any]:
-    """Settings other than paths that differ from the defaults."""
-    defaults = to_plain(PriorConfig(data=config.data))
-    return {k: v for k, v in to_plain(config).items() if v != defaults[k] and not isinstance(getattr(config, k), Path)}
-
-
 @dataclass(frozen=True)
 class Split:
     """The sound frames of the training clips, (F, 21, 6), and of the clips held out, of which every fourth is used."""
@@ -189,11 +185,14 @@ class Split:
     dropped_share: float
 
     @classmethod
-    def of(cls, config: PriorConfig) -> Split:
-        """Reads the data and draws the clips to hold out."""
+    def of(cls, config: PriorConfig, held_out_clips: Collection[str] | None = None) -> Split:
+        """Reads the data and draws the clips to hold out, or holds out those of the given names."""
         poses, clips, names = load_training_poses(config.data)
-        order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
-        held = set(order[: max(1, round(config.held_out * len(clips)))])
+        if held_out_clips is None:
+            order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
+            held = set(order[: max(1, round(config.held_out * len(clips)))])
+        else:
+            held = {i for i, name in enumerate(names) if name in held_out_clips}
         parts = [[poses[clips[i]] for i in range(len(clips)) if (i in held) == wanted] for wanted in (False, True)]
         kept, held_out = (pose[sound_frames(pose, config.max_excess_deg)] for pose in map(torch.cat, parts))
         if not len(kept) or not len(held_out):
@@ -219,7 +218,7 @@ def train(config: PriorConfig) -> BodyPrior:
     with Workspace(config.tracking_dir / "fits", "prior", key) as workspace, quiet_lightning():
         tags = {"git_commit": git_commit(Path(__file__).parent)}
         run_id = resumable_run(config.tracking_dir, None, workspace.run_id)
-        name = ", ".join(f"{k}={v}" for k, v in _differing(config).items()) or "defaults"
+        name = ", ".join(f"{k}={v}" for k, v in changed_settings(config).items()) or "defaults"
         logger = open_logger(config.tracking_dir, "body-prior", name, tags, run_id=run_id)
         workspace.start(str(logger.run_id))
         epoch = min(_EPOCH, config.steps)
@@ -255,7 +254,6 @@ def train(config: PriorConfig) -> BodyPrior:
 
 def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict[str, Any]:
     """What the weights' header says of them."""
-    settings = {k: v for k, v in to_plain(config).items() if not isinstance(getattr(config, k), Path)}
     held = len(split.held_out_clips)
     return {
         "name": "mrhubo open body prior",
@@ -268,7 +266,7 @@ def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict
         f"{config.max_excess_deg:g} degrees outside its anatomical range (defects of the recording)",
         "held_out_clips": split.held_out_clips,
         "measures_on_held_out_clips": {name: round(value, 4) for name, value in measures.items()},
-        "training": settings,
+        "training": without_paths(config),
         "known_defects": "wrist flexion, collars and toes do not move in the data: plausible angles were added at "
         "random, so the prior allows them and knows nothing of how they go with the arm or the step; the elbows are "
         "pure hinges and all twist of the forearm is in the wrists, so poses of other sources, which share these "

@@ -60,11 +60,11 @@ class VPoser(BodyPrior):
             raise UserError("body.prior_path: is missing; name VPoser's folder V02_05 (docs/official-files.md)")
         path = Path(path)
         if path.suffix == ".safetensors":
-            return super().open(path)  # type: ignore[return-value]
+            return super().open(path)
         snapshot, settings = _find(path)
-        checkpoint = read_checkpoint(snapshot)
+        checkpoint, storages = read_checkpoint(snapshot)
         try:
-            prior = _convert(checkpoint, settings)
+            prior = _convert(checkpoint, storages, settings)
         except UserError as error:
             raise UserError(f"{snapshot}: {error}") from error
         prior.metadata = {"card": '{"name": "VPoser v2", "licence": "non-commercial, may not be passed on"}'}
@@ -100,9 +100,9 @@ def _find(path: Path) -> tuple[Path, dict[str, Any]]:
         ) from error
 
 
-def _convert(checkpoint: dict[str, Any], settings: dict[str, Any]) -> VPoser:
+def _convert(checkpoint: dict[str, Any], storages: dict[str, bytes], settings: dict[str, Any]) -> VPoser:
     """The network with a snapshot's weights."""
-    storages, state = checkpoint[""], checkpoint.get("state_dict", checkpoint)
+    state = checkpoint.get("state_dict", checkpoint)
     if not isinstance(state, dict):
         raise UserError(f"expected a dictionary 'state_dict', found {type(state).__name__}")
     names = {str(name).removeprefix(_PREFIX): value for name, value in state.items()}

@@ -43,10 +43,6 @@ class Artist:
         solids = robot_solids(self.geometry, poses, self.parents)
         return solids.scaled(self.scale) if scaled else solids
 
-    def sheet(self, rows: list[list[Solids]], columns: list[str], titles: list[str], caption: str) -> Image:
-        """A table of figures, all at one scale."""
-        return figure_sheet(rows, columns, titles, caption)
-
     def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, prior: BodyPrior, count: int = 3) -> Image:
         """Robot pose, human pose and denoised human pose, as in the paper's figure 1: feasible above, extreme below."""
         order = pairs["phi"].argsort()
@@ -64,7 +60,7 @@ class Artist:
                     rows.append([self.robot_figure(pairs["q"][index]), self.human(pose), self.human(denoised)])
                     titles.append(f"{kind}\nphi {float(pairs['phi'][index]):.2g}")
         columns = ["robot pose q", "human pose H", "denoised H~"]
-        return self.sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
+        return figure_sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
 
     def key_poses(self, clip: Clip, prediction_TN: Tensor, count: int = 6) -> Image:
         """Human, reference and prediction at evenly spaced frames of a clip."""
@@ -76,4 +72,4 @@ class Artist:
         ]
         columns = [f"{f / clip.motion.frame_rate:.1f} s" for f in frames]
         name = f"{self.robot.name}: {clip.name}" + (f" ({clip.motion.description})" if clip.motion.description else "")
-        return self.sheet(rows, columns, ["human", "reference", "mrhubo"], name)
+        return figure_sheet(rows, columns, ["human", "reference", "mrhubo"], name)

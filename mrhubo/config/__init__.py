@@ -3,7 +3,7 @@
 from mrhubo.config.command import parse_arguments, run_command
 from mrhubo.config.help import field_docs, help_text
 from mrhubo.config.loading import load_config
-from mrhubo.config.plain import fingerprint, to_plain, to_yaml
+from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
 from mrhubo.config.schema import (
     BodyConfig,
     Config,
@@ -27,6 +27,7 @@ __all__ = [
     "TrackingConfig",
     "TrainerConfig",
     "bounded",
+    "changed_settings",
     "choice",
     "field_docs",
     "fingerprint",
@@ -36,4 +37,5 @@ __all__ = [
     "run_command",
     "to_plain",
     "to_yaml",
+    "without_paths",
 ]

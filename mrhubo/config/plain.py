@@ -36,6 +36,21 @@ def to_plain(value: Any) -> Any:
     raise TypeError(f"not a plain value: {value!r}")
 
 
+def without_paths(config: Any) -> dict[str, Any]:
+    """Plain values of those fields of a dataclass that hold no path: what a result depends on, wherever files lie."""
+    plain = to_plain(config)
+    return {name: value for name, value in plain.items() if not isinstance(getattr(config, name), Path)}
+
+
+def changed_settings(config: Any) -> dict[str, Any]:
+    """Those of `without_paths` that differ from their field's default."""
+    defaults = {
+        field.name: field.default_factory() if callable(field.default_factory) else field.default
+        for field in dataclasses.fields(config)
+    }
+    return {name: value for name, value in without_paths(config).items() if getattr(config, name) != defaults[name]}
+
+
 def to_yaml(config: Any) -> str:
     """YAML that `load_config` reads back to an equal config."""
     return yaml.dump(_escaped(to_plain(config)), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)

@@ -15,8 +15,8 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.latent import LatentProblem
-from mrhubo.body.training import cosine_schedule
 from mrhubo.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.trainer import cosine_schedule
 
 _BATCH = 512
 _LR = 2e-3

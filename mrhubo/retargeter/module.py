@@ -16,9 +16,9 @@ import torch
 from torch import Tensor
 from torch.nn.functional import mse_loss
 
-from mrhubo.body.training import cosine_schedule
 from mrhubo.config import TrainerConfig
 from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.trainer import cosine_schedule
 
 LOG_EVERY = 50
 """Steps between two entries of the losses; MLflow takes about 20 ms for each."""
