@@ -54,7 +54,8 @@ class Prepared:
         plain = to_plain(self.config)
         for key in ("tracking", "evaluation"):
             plain.pop(key)
-        plain["pairs"].pop("dir")
+        for key in ("dir", "workers"):
+            plain["pairs"].pop(key)
         clips = {motion.name: motion.checksum for motion in self.motions.all}
         evaluation = [sorted(m.name for m in self.motions.validation), self.config.evaluation.smoothness]
         return fingerprint([plain, self.store.header, clips, evaluation])
@@ -89,14 +90,19 @@ def make_pairs(prepared: Prepared, quiet: bool) -> PairingReport:
     steps = prepared.config.pairs.amortiser_steps
     with Progress("amortised solver", steps, "steps", quiet) as first, Progress("pairs", count, quiet=quiet) as second:
         report = generate_pairs(
+            prepared.config,
             generator,
             prepared.store,
             lambda step, cost: first.update(step, f"mean cost {cost:.3f}"),
-            lambda done, total: second.update(min(done * size, count)),
+            lambda done, total, means: second.update(min(done * size, count), _quality(means)),
         )
     prepared.body_map.to("cpu")
     prepared.prior.to("cpu")
     return report
+
+
+def _quality(means: dict[str, float]) -> str:
+    return f"keypoints {1000 * means['residual_m']:.1f} mm off" if "residual_m" in means else ""
 
 
 def make_references(prepared: Prepared, quiet: bool) -> tuple[list[Clip], list[Clip]]:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 import torch
 import xxhash
 from safetensors import SafetensorError, safe_open
@@ -34,7 +36,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     Raises:
         UserError: the folder or the disk refuses the file (no space, no permission); nothing half-written stays.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
@@ -50,6 +52,14 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Removes the temporary files of `atomic_path` whose process has ended without removing them (kill -9)."""
+    for path in folder.glob(f".*.{platform.node()}.*.tmp"):
+        process = path.name.split(".")[-2]
+        if process.isdecimal() and (int(process) == os.getpid() or not psutil.pid_exists(int(process))):
+            path.unlink(missing_ok=True)
 
 
 def checksum_file(path: Path) -> str:

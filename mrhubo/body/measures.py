@@ -12,7 +12,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import anatomy
-from mrhubo.body.inverse import nearest_samples, solve_levenberg_marquardt
+from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton
@@ -143,7 +143,7 @@ def denoising(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor, seed: int 
 def latent_ik(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> dict[str, float]:
     """Mean distance [mm] of the 13 given keypoints, and of all joints above the hips, after latent IK.
 
-    `ik_zero_keypoint_mm` is what Levenberg-Marquardt gives from z = 0: the more it is above the other, the harder the
+    `ik_zero_keypoint_mm` is what the search gives from z = 0: the more it is above the other, the harder the
     prior is to search.
     """
     target = skeleton.keypoints(rotation.sixd_to_matrix(pose_BJ6))
@@ -152,7 +152,7 @@ def latent_ik(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> dict[st
     nothing = torch.zeros(len(pose_BJ6), prior.latent, device=pose_BJ6.device)
     found = []
     for start in (nearest_samples(problem, target[:, given]), nothing):
-        z = solve_levenberg_marquardt(problem, start, target[:, given], steps=60)
+        z = solve_quasi_newton(problem, start, target[:, given], steps=60)
         found.append(1000 * (skeleton.keypoints(prior.decode_matrices(z)) - target).norm(dim=-1))
     return {
         "ik_keypoint_mm": float(found[0][:, given].mean()),

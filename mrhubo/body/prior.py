@@ -19,7 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.inverse import nearest_samples, solve_levenberg_marquardt
+from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.errors import UserError
@@ -155,7 +155,7 @@ class BodyPrior(nn.Module):
         skeleton = (skeleton or Skeleton()).to(self.identity_F.device)
         problem = LatentProblem(self, skeleton, indices, w_data, w_prior)
         start = nearest_samples(problem, target_BK3)
-        return self.decode(solve_levenberg_marquardt(problem, start, target_BK3, steps))
+        return self.decode(solve_quasi_newton(problem, start, target_BK3, steps))
 
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "leaky_relu": nn.LeakyReLU, "tanh": nn.Tanh}

@@ -70,14 +70,16 @@ class PairsConfig:
     seed: int = bounded(0, 0, 2**63 - 1)
     """Seed of the robot poses and of the amortised solver's training."""
     solver: str = choice("fine", "fine", "fast", "paper")
-    """Latent inverse kinematics: `fine` = amortised start, then Levenberg-Marquardt; `fast` = amortised only; `paper` =
-    L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
+    """Latent inverse kinematics: `fine` = amortised start, then a quasi-Newton search of every pose; `fast` = amortised
+    only; `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
     shard_size: int = bounded(2_500, 100, 1_000_000)
     """Pairs per file."""
-    amortiser_steps: int = bounded(2_000, 10, 1_000_000)
+    amortiser_steps: int = bounded(4_000, 10, 1_000_000)
     """Training steps of the amortised solver, once per robot."""
-    lm_steps: int = bounded(12, 1, 1_000)
-    """Most Levenberg-Marquardt steps per pose; a converged pose stops earlier."""
+    fine_steps: int = bounded(100, 1, 10_000)
+    """Most quasi-Newton steps per pose; a converged pose stops earlier."""
+    workers: int = bounded(0, 0, 1_024)
+    """Processes that make pairs, on a CPU; 0 = one a core. The pairs do not depend on it."""
     w_data: float = bounded(100.0, 0.0)
     """Weight of the squared keypoint distance, 1/m^2."""
     w_prior: float = bounded(0.001, 0.0)

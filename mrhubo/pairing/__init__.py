@@ -1,9 +1,10 @@
 """Robot poses turned into human poses: latent inverse kinematics, Algorithm 1, shards on disk, the filter."""
 
 from mrhubo.pairing.filter import PairFilter, make_filter
-from mrhubo.pairing.generate import PairGenerator, PairingReport, generate_pairs
-from mrhubo.pairing.inverse import solve_lbfgs
+from mrhubo.pairing.generate import PairGenerator
+from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
 from mrhubo.pairing.store import PairStore, pose_settings
+from mrhubo.pairing.workers import PairingReport, generate_pairs
 
 __all__ = [
     "PairFilter",
@@ -14,4 +15,5 @@ __all__ = [
     "make_filter",
     "pose_settings",
     "solve_lbfgs",
+    "solve_levenberg_marquardt",
 ]

@@ -1,7 +1,8 @@
 """The amortised solver: a small network from target keypoints to the latent, trained per robot on the IK cost itself.
 
-No labels: every step draws fresh robot poses and lowers the cost of the network's own answers. Training is resumed
-exactly from its last checkpoint, because step s draws from (seed, s) alone.
+No labels: every step draws fresh robot poses and lowers the cost of the network's own answers, by the analytic gradient
+of `LatentProblem.cost_and_gradient`. Training is resumed exactly from its last checkpoint, because step s draws from
+(seed, s) alone.
 
 Legend: B batch, K used keypoints, Z latent numbers.
 """
@@ -18,21 +19,27 @@ from mrhubo.body.latent import LatentProblem
 from mrhubo.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.trainer import cosine_schedule
 
-_BATCH = 512
+_BATCH = 256
 _LR = 2e-3
 _CHECKPOINT_EVERY = 250
 
 
 class Amortiser(nn.Module):
-    """MLP from keypoints (B, K, 3) to latents (B, Z); inputs are standardised by a sample of targets."""
+    """MLP from keypoints (B, K, 3) to latents (B, Z).
+
+    Inputs are standardised by a sample of targets; outputs are coordinates along the eigenvectors of the cost's
+    `LatentProblem.metric`, longer where the cost is flatter, which evens out its curvature.
+    """
 
     center_F: Tensor
     scale_F: Tensor
+    axes_ZZ: Tensor
 
     def __init__(self, keypoints: int, latent: int, hidden: int = 512) -> None:
         super().__init__()
         self.register_buffer("center_F", torch.zeros(3 * keypoints))
         self.register_buffer("scale_F", torch.ones(3 * keypoints))
+        self.register_buffer("axes_ZZ", torch.eye(latent))
         self.layers = nn.Sequential(
             nn.Linear(3 * keypoints, hidden),
             nn.SiLU(),
@@ -43,16 +50,20 @@ class Amortiser(nn.Module):
             nn.Linear(hidden, latent),
         )
 
-    def standardise(self, sample_BK3: Tensor) -> None:
-        """Sets centre and scale; a coordinate that never varies (a pinned keypoint) is fed as zero."""
+    def condition(self, sample_BK3: Tensor, metric_ZZ: Tensor) -> None:
+        """Sets centre and scale of the inputs (a coordinate that never varies, as of a pinned keypoint, is fed as zero)
+        and the axes of the outputs.
+        """
         flat = sample_BK3.flatten(1)
         spread = flat.std(0)
         self.center_F.copy_(flat.mean(0))
         self.scale_F.copy_(torch.where(spread > 1e-4, 1 / spread.clamp_min(1e-4), torch.zeros_like(spread)))
+        variance, vectors = torch.linalg.eigh(metric_ZZ)
+        self.axes_ZZ.copy_((vectors * (variance / variance[0]) ** 0.25).T)
 
     def forward(self, target_BK3: Tensor) -> Tensor:
         """Latents (B, Z)."""
-        return self.layers((target_BK3.flatten(1) - self.center_F) * self.scale_F)
+        return self.layers((target_BK3.flatten(1) - self.center_F) * self.scale_F) @ self.axes_ZZ
 
 
 def train_amortiser(
@@ -79,7 +90,7 @@ def train_amortiser(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network = Amortiser(len(problem.keypoints), problem.latent)
-    network.standardise(draw(4096, torch.Generator().manual_seed(seed)).cpu())
+    network.condition(draw(4096, torch.Generator().manual_seed(seed)).cpu(), problem.metric.cpu())
     network = network.to(device)
     if _restore(path, header, network=network):
         return network.requires_grad_(False).eval()
@@ -92,13 +103,14 @@ def train_amortiser(
         for group, rate in zip(optimizer.param_groups, schedule.base_lrs, strict=True):
             group["lr"] = rate * schedule.lr_lambdas[0](step)
         target = draw(_BATCH, torch.Generator().manual_seed((seed + 1) * 1_000_003 + step))
-        cost = problem.cost(network(target), target).mean()
+        answer = network(target)
+        cost, gradient = problem.cost_and_gradient(answer.detach().T.contiguous(), target.permute(1, 2, 0).contiguous())
         optimizer.zero_grad()
-        cost.backward()
+        answer.backward(gradient.T / _BATCH)
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
         if step % 50 == 0 or step + 1 == steps:
-            progress(step + 1, float(cost.detach()))
+            progress(step + 1, float(cost.mean()))
         if (step + 1) % _CHECKPOINT_EVERY == 0 and step + 1 < steps:
             write_tensors(checkpoint, _state(network, optimizer, step + 1), header)
     write_tensors(path, _state(network), header)

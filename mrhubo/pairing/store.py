@@ -8,7 +8,7 @@ is there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,8 @@ from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.robot import BodyMap
 from mrhubo.storage import DamagedFile, read_tensors, write_tensors
 
-SCHEMA = "mrhubo.pairs/1"
-_NOT_IN_PAIRS = ("count", "dir", "filter", "filter_k")
+SCHEMA = "mrhubo.pairs/2"
+_NOT_IN_PAIRS = ("count", "dir", "workers", "filter", "filter_k")
 """Keys of `pairs` that do not change what a shard holds."""
 _NOT_IN_ROBOT = ("urdf", "key_links")
 
@@ -73,9 +73,9 @@ class PairStore:
         """File of one shard."""
         return self.folder / f"pairs-{index:06d}.safetensors"
 
-    def missing(self) -> list[int]:
-        """Indices of shards that are absent, damaged or foreign, and so have to be made."""
-        return [index for index in range(self.shards) if not self._whole(index)]
+    def missing(self, indices: Iterable[int] | None = None) -> list[int]:
+        """Indices (of the given ones, or of all) of shards to be made: absent, damaged or foreign ones."""
+        return [index for index in (range(self.shards) if indices is None else indices) if not self._whole(index)]
 
     def _whole(self, index: int) -> bool:
         try:

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import KEYPOINT_NAMES, BodyPrior, Skeleton
-from mrhubo.body.inverse import nearest_samples, solve_levenberg_marquardt
+from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.measures import IK_KEYPOINTS
 from mrhubo.errors import UserError
@@ -43,7 +43,7 @@ def test_the_first_guess_is_the_best_of_the_samples(prior: BodyPrior) -> None:
     for i in range(3):
         best = problem.cost(others, target[i : i + 1].expand(4_096, -1, -1)).min()
         assert float(problem.cost(start[i : i + 1], target[i : i + 1])) == pytest.approx(float(best), rel=1e-3)
-    solved = problem.cost(solve_levenberg_marquardt(problem, start, target, 40), target)
+    solved = problem.cost(solve_quasi_newton(problem, start, target, 40), target)
     assert bool((solved <= problem.cost(start, target)).all())
 
 

@@ -16,7 +16,7 @@ from torch.nn import functional as F
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton, VPoser, open_prior
-from mrhubo.body.inverse import solve_levenberg_marquardt
+from mrhubo.body.inverse import solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
 from mrhubo.config import BodyConfig
 from mrhubo.errors import UserError
@@ -148,7 +148,7 @@ def test_latent_inverse_kinematics_works_with_its_activation(tmp_path: Path) -> 
         expected = torch.autograd.functional.jacobian(lambda v: problem.keypoints_of(v[None])[0].flatten(), z[i])
         torch.testing.assert_close(jacobian[i], expected, atol=1e-5, rtol=1e-3)
     start = torch.zeros_like(z)
-    found = solve_levenberg_marquardt(problem, start, points, 60)
+    found = solve_quasi_newton(problem, start, points, 60)
     assert bool((problem.cost(found, points) < problem.cost(start, points)).all())
 
 

@@ -20,7 +20,7 @@ from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
 from mrhubo.robot import build_body_map
 from mrhubo.storage import DamagedFile
 
-SMALL = ["pairs.count=250", "pairs.shard_size=100", "pairs.amortiser_steps=30", "pairs.lm_steps=3"]
+SMALL = ["pairs.count=250", "pairs.shard_size=100", "pairs.amortiser_steps=30", "pairs.fine_steps=3"]
 
 
 def config_of(root: Path, folder: Path, *overrides: str) -> Config:
@@ -33,7 +33,7 @@ def store_of(config: Config) -> PairStore:
 
 def generate(config: Config) -> PairStore:
     store = store_of(config)
-    generate_pairs(PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs), store)
+    generate_pairs(config, PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs), store)
     return store
 
 
@@ -85,9 +85,9 @@ def test_more_pairs_keep_what_is_there(root: Path, tmp_path: Path) -> None:
 
 def test_other_settings_have_another_folder(root: Path, tmp_path: Path) -> None:
     base = store_of(config_of(root, tmp_path)).folder
-    for change in ("pairs.seed=1", "pairs.lm_steps=4", "pairs.solver=fast", "robot.keypoints.left_wrist=l_gripper"):
+    for change in ("pairs.seed=1", "pairs.fine_steps=4", "pairs.solver=fast", "robot.keypoints.left_wrist=l_gripper"):
         assert store_of(config_of(root, tmp_path, change)).folder != base, change
-    for same in ("pairs.filter=none", "pairs.count=9999", "robot.key_links=[l_wrist]"):
+    for same in ("pairs.filter=none", "pairs.count=9999", "pairs.workers=3", "robot.key_links=[l_wrist]"):
         assert store_of(config_of(root, tmp_path, same)).folder == base, same
 
 

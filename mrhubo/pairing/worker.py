@@ -1,0 +1,54 @@
+"""A process that makes the shards it is told to, started by `mrhubo.pairing.workers`.
+
+The first line on standard input is the config as JSON; every other line is the index of a shard to make and write. Each
+is answered by one line of JSON: {"shard": index, "cost": ..., "residual_m": ...} or {"error": sentence}.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import tempfile
+from pathlib import Path
+
+from mrhubo.body import build_skeleton, open_prior
+from mrhubo.config import load_config
+from mrhubo.errors import UserError
+from mrhubo.pairing.generate import PairGenerator
+from mrhubo.pairing.store import PairStore
+from mrhubo.robot import build_body_map
+
+
+def main() -> None:
+    """Answers lines until there are no more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; whoever started us ends us
+    lines = iter(sys.stdin)
+    answers, sys.stdout = sys.stdout, sys.stderr  # nothing else may come between the answers
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "config.yaml"
+            path.write_text(next(lines))  # JSON is YAML
+            config = load_config(path)
+        body_map, prior = build_body_map(config.robot, build_skeleton(config.body)), open_prior(config.body)
+        store = PairStore.of(config, body_map, prior)
+        generator = PairGenerator(body_map, prior, config.pairs)
+        generator.prepare(store)
+        for line in lines:
+            answer = make_shard(generator, store, int(line))
+            print(json.dumps(answer), file=answers, flush=True)
+    except UserError as error:
+        print(json.dumps({"error": str(error)}), file=answers, flush=True)
+
+
+def make_shard(generator: PairGenerator, store: PairStore, index: int) -> dict[str, float]:
+    """Makes and writes one shard, unless another process has done so; its index and mean quality.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    if store.path(index).exists():
+        return {"shard": index}
+    tensors = generator.shard(index)
+    store.write(index, tensors)
+    return {"shard": index, **{name: float(tensors[name].mean()) for name in ("cost", "residual_m")}}

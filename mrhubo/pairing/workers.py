@@ -1,0 +1,163 @@
+"""All missing shards of a store, by as many processes as there are cores, and by as many ranks as there are machines.
+
+One process with n threads makes far fewer pairs than n processes with one: the arrays are small. Workers are fresh
+interpreters that are told shard by shard what to make (`mrhubo.pairing.worker`), so nothing is forked, a script that
+calls `generate_pairs` needs no main guard, and a worker ends when whoever started it ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import mrhubo
+from mrhubo.config import Config, to_plain
+from mrhubo.errors import UserError
+from mrhubo.pairing.generate import PairGenerator
+from mrhubo.pairing.store import PairStore
+from mrhubo.pairing.worker import make_shard
+from mrhubo.ranks import Ranks
+from mrhubo.storage import remove_leftovers
+from mrhubo.threads import available_cores
+
+_WORTH_A_WORKER = 10_000
+"""Pairs; fewer are made before a new interpreter has started."""
+
+
+@dataclass(frozen=True)
+class PairingReport:
+    """How the pairs came about."""
+
+    made: int
+    """Pairs made now, by all ranks; the others were there already."""
+    seconds: float
+    """Time that took, the amortised solver's training included."""
+
+
+def generate_pairs(
+    config: Config,
+    generator: PairGenerator,
+    store: PairStore,
+    amortiser_progress: Callable[[int, float], None] = lambda step, cost: None,
+    shard_progress: Callable[[int, int, dict[str, float]], None] = lambda done, total, means: None,
+    ranks: Ranks | None = None,
+) -> PairingReport:
+    """Makes the shards that are missing, damaged or foreign; those that are whole stay.
+
+    Args:
+        config: what generator and store were built from; workers build the same.
+        generator: makes the pairs.
+        store: where they go.
+        amortiser_progress: called with (step, mean cost).
+        shard_progress: called with (shards done, all shards, means of what was made last: `cost`, `residual_m`)
+            before the first and after each shard. With several ranks: the shards of this rank.
+        ranks: the processes that share the work; default: this one alone.
+
+    Raises:
+        UserError: a shard cannot be written.
+    """
+    ranks = ranks or Ranks()
+    start = time.perf_counter()
+    remove_leftovers(store.folder)
+    mine = range(ranks.rank, store.shards, ranks.count)
+    missing = ranks.gather(store.missing(mine), store.shards)
+    for index in missing[ranks.rank :: ranks.count]:
+        store.path(index).unlink(missing_ok=True)
+    if missing:
+        if ranks.rank == 0:
+            generator.prepare(store, amortiser_progress)
+        ranks.wait()
+        if ranks.rank > 0:
+            generator.prepare(store)
+    indices = missing[ranks.rank :: ranks.count]
+    there = len(mine) - len(indices) if ranks.count == 1 else 0
+    total = there + len(indices)
+    shard_progress(there, total, {})  # only now, so that the rate is that of the pairs
+    for done, means in enumerate(_make(config, generator, store, indices, ranks), start=there + 1):
+        shard_progress(done, total, means)
+    ranks.wait()
+    return PairingReport(len(missing) * store.shard_size, time.perf_counter() - start)
+
+
+def _make(
+    config: Config, generator: PairGenerator, store: PairStore, indices: Sequence[int], ranks: Ranks
+) -> Iterator[dict[str, float]]:
+    count = config.pairs.workers or (available_cores() if ranks.count == 1 else 1)
+    count = min(count, len(indices) * store.shard_size // _WORTH_A_WORKER)
+    if count < 2 or generator.device.type != "cpu":
+        for index in indices:
+            yield make_shard(generator, store, index)
+        return
+    with _workers(config, count) as workers:
+        yield from _hand_out(workers, indices)
+
+
+def _hand_out(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) -> Iterator[dict[str, float]]:
+    """Every index goes to the next worker that is free; yields the answers."""
+    waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
+    answers: queue.SimpleQueue[dict[str, float] | str] = queue.SimpleQueue()
+    for index in indices:
+        waiting.put(index)
+
+    def serve(worker: subprocess.Popen[str]) -> None:
+        assert worker.stdin and worker.stdout
+        while not waiting.empty():
+            try:
+                index = waiting.get_nowait()
+            except queue.Empty:
+                return
+            try:
+                worker.stdin.write(f"{index}\n")
+                worker.stdin.flush()
+            except OSError:
+                pass  # it has ended; its last answer may say why
+            line = worker.stdout.readline()
+            answers.put(json.loads(line) if line else f"a worker ended with exit code {worker.wait()}")
+            if not line:
+                return
+
+    for worker in workers:
+        threading.Thread(target=serve, args=(worker,), daemon=True).start()
+    for _ in indices:
+        answer = answers.get()
+        if isinstance(answer, str):
+            raise RuntimeError(f"{answer}; what it wrote to standard error stands above")
+        if "error" in answer:
+            raise UserError(str(answer["error"]))
+        yield answer
+
+
+@contextmanager
+def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]]:
+    """Fresh interpreters that know the config; ended on leaving, whatever they are doing: files are whole or absent."""
+    package = str(Path(mrhubo.__file__).parent.parent)
+    path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
+    command = [sys.executable, "-c", "from mrhubo.pairing.worker import main; main()"]
+    workers: list[subprocess.Popen[str]] = []
+    try:
+        for _ in range(count):
+            workers.append(
+                subprocess.Popen(
+                    command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+                )
+            )
+        for worker in workers:
+            assert worker.stdin
+            worker.stdin.write(json.dumps(to_plain(config)) + "\n")
+            worker.stdin.flush()
+        yield workers
+    finally:
+        for worker in workers:
+            worker.kill()
+        for worker in workers:
+            worker.communicate()
