@@ -33,20 +33,27 @@ from mrhubo.locations import default_motions, default_pairs
 from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairStore, generate_pairs, make_filter
 from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.progress import Progress
+from mrhubo.ranks import Ranks
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
 from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.trainer import quiet_lightning, run_trainer
 
 
 @dataclass
-class Prepared:
-    """A config whose every part has been checked."""
+class PairSetup:
+    """What pairs are made from, checked."""
 
     config: Config
     body_map: BodyMap
     prior: BodyPrior
-    motions: Motions
     store: PairStore
+
+
+@dataclass
+class Prepared(PairSetup):
+    """A config whose every part has been checked."""
+
+    motions: Motions
 
     @property
     def fingerprint(self) -> str:
@@ -61,20 +68,30 @@ class Prepared:
         return fingerprint([plain, self.store.header, clips, evaluation])
 
 
+def prepare_pairs(config: Config) -> PairSetup:
+    """Fills in the default folder and opens everything that making pairs needs.
+
+    Raises:
+        UserError: anything in the config, the URDF or the prior is wrong.
+    """
+    config.pairs.dir = config.pairs.dir or default_pairs()
+    prior = open_prior(config.body)
+    body_map = build_body_map(config.robot, build_skeleton(config.body))
+    if config.trainer.accelerator == "gpu" and not torch.cuda.is_available():
+        raise UserError("trainer.accelerator: 'gpu' is asked for, but torch finds no CUDA device; use 'auto' or 'cpu'")
+    return PairSetup(config, body_map, prior, PairStore.of(config, body_map, prior))
+
+
 def prepare(config: Config) -> Prepared:
     """Fills in default folders and opens everything that the run will need.
 
     Raises:
         UserError: anything in the config, the URDF, the prior or the motions is wrong.
     """
-    config.pairs.dir = config.pairs.dir or default_pairs()
     config.evaluation.motions = config.evaluation.motions or default_motions()
-    prior = open_prior(config.body)
-    body_map = build_body_map(config.robot, build_skeleton(config.body))
-    build_network(config, body_map)
-    if config.trainer.accelerator == "gpu" and not torch.cuda.is_available():
-        raise UserError("trainer.accelerator: 'gpu' is asked for, but torch finds no CUDA device; use 'auto' or 'cpu'")
-    return Prepared(config, body_map, prior, load_motions(config), PairStore.of(config, body_map, prior))
+    setup = prepare_pairs(config)
+    build_network(config, setup.body_map)
+    return Prepared(config, setup.body_map, setup.prior, setup.store, load_motions(config))
 
 
 def device_of(config: Config) -> torch.device:
@@ -82,22 +99,29 @@ def device_of(config: Config) -> torch.device:
     return torch.device("cuda" if config.trainer.accelerator != "cpu" and torch.cuda.is_available() else "cpu")
 
 
-def make_pairs(prepared: Prepared, quiet: bool) -> PairingReport:
-    """Makes the pairs that are not there yet."""
-    device = device_of(prepared.config)
-    size, count = prepared.store.shard_size, prepared.store.count
-    generator = PairGenerator(prepared.body_map.to(device), prepared.prior.to(device), prepared.config.pairs)
-    steps = prepared.config.pairs.amortiser_steps
+def make_pairs(setup: PairSetup, quiet: bool, ranks: Ranks | None = None) -> PairingReport:
+    """Makes the pairs that are not there yet; several ranks share them out."""
+    ranks = ranks or Ranks()
+    device = ranks.device or device_of(setup.config)
+    size, count = setup.store.shard_size, setup.store.count
+    generator = PairGenerator(setup.body_map.to(device), setup.prior.to(device), setup.config.pairs)
+    steps = setup.config.pairs.amortiser_steps
     with Progress("amortised solver", steps, "steps", quiet) as first, Progress("pairs", count, quiet=quiet) as second:
+
+        def shards(done: int, total: int, means: dict[str, float]) -> None:
+            second.total = min(total * size, count)  # of this rank
+            second.update(min(done * size, count), _quality(means))
+
         report = generate_pairs(
-            prepared.config,
+            setup.config,
             generator,
-            prepared.store,
+            setup.store,
             lambda step, cost: first.update(step, f"mean cost {cost:.3f}"),
-            lambda done, total, means: second.update(min(done * size, count), _quality(means)),
+            shards,
+            ranks,
         )
-    prepared.body_map.to("cpu")
-    prepared.prior.to("cpu")
+    setup.body_map.to("cpu")
+    setup.prior.to("cpu")
     return report
 
 

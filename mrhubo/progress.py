@@ -25,6 +25,7 @@ class Progress:
         self.start = time.monotonic()
         self._first: int | None = None
         self._shown, self._width, self._last = -float("inf"), 0, ""
+        self._ended = False
 
     def update(self, done: int, measure: str = "") -> None:
         """Says that `done` of `total` are done. The rate counts from the first update, so resumed work is not in it."""
@@ -35,7 +36,10 @@ class Progress:
         pause = _TERMINAL_SECONDS if self.terminal else _LOG_SECONDS
         if now - self._shown >= pause and not self.quiet:
             self._shown = now
-            self._show(self._last)
+            if done < self.total and not self._ended:
+                self._show(self._last)
+        if done >= self.total:
+            self._end()
 
     def _line(self, done: int, measure: str, now: float) -> str:
         seconds, fresh = now - self.start, done - (self._first or 0)
@@ -62,11 +66,16 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._last and not self.quiet:
+        self._end()
+
+    def _end(self) -> None:
+        """The last line, once."""
+        if self._last and not self.quiet and not self._ended:
             self._show(self._last)
             if self.terminal:
                 self.stream.write("\n")
                 self.stream.flush()
+        self._ended = True
 
 
 def _clock(seconds: float) -> str:

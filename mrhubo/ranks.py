@@ -9,6 +9,8 @@ from typing import Any
 
 import torch
 
+from mrhubo.trainer import quiet_lightning
+
 
 @dataclass(frozen=True)
 class Ranks:
@@ -34,7 +36,8 @@ class Ranks:
         nodes, processes = shape
         on_gpu = accelerator != "cpu" and torch.cuda.is_available()
         fabric = Fabric(accelerator="cuda" if on_gpu else "cpu", strategy="ddp", devices=processes, num_nodes=nodes)
-        fabric.launch()
+        with quiet_lightning():
+            fabric.launch()
         return cls(fabric.global_rank, fabric.world_size, fabric.device, fabric)
 
     def wait(self) -> None:

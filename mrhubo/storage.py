@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import psutil
 import torch
@@ -105,9 +106,28 @@ def read_metadata(path: Path) -> dict[str, str]:
     Raises:
         DamagedFile: the file is missing, truncated or no safetensors file.
     """
+    with _reading(path) as handle:
+        return dict(handle.metadata() or {})
+
+
+def read_some_tensors(path: Path, names: Iterable[str]) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Named tensors and the metadata of a file that `write_tensors` wrote, unchecked against the checksum.
+
+    Raises:
+        DamagedFile: the file is missing, truncated, no safetensors file, or holds no tensor of a name.
+    """
+    with _reading(path) as handle:
+        metadata = dict(handle.metadata() or {})
+        tensors = {name: handle.get_tensor(name) for name in names}
+    metadata.pop(_CHECKSUM, None)
+    return tensors, metadata
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[Any]:
     try:
         with safe_open(path, framework="pt") as handle:
-            return dict(handle.metadata() or {})
+            yield handle
     except (OSError, SafetensorError, ValueError) as error:
         raise DamagedFile(f"{path}: cannot be read as safetensors: {error}") from error
 
@@ -118,12 +138,9 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     Raises:
         DamagedFile: the file is missing, truncated, no safetensors file, or its checksum does not match.
     """
-    try:
-        with safe_open(path, framework="pt") as handle:
-            metadata = dict(handle.metadata() or {})
-            tensors = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118 (not a mapping)
-    except (OSError, SafetensorError, ValueError) as error:
-        raise DamagedFile(f"{path}: cannot be read as safetensors: {error}") from error
+    with _reading(path) as handle:
+        metadata = dict(handle.metadata() or {})
+        tensors = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118 (not a mapping)
     expected = metadata.pop(_CHECKSUM, None)
     if expected is None:
         raise DamagedFile(f"{path}: carries no checksum, so it was not written by mrhubo")

@@ -60,3 +60,14 @@ def test_a_shorter_line_covers_a_longer_one(clock: list[float]) -> None:
         clock[0] = 1
         line.update(2)
     assert len(stream.getvalue().split("\r")[2]) >= len("x: 1 of 10, a very long measure indeed")
+
+
+def test_the_line_ends_when_the_step_is_done_not_when_the_program_leaves_it(clock: list[float]) -> None:
+    stream = Terminal()
+    with Progress("first", 10, stream=stream) as first, Progress("second", 10, stream=stream) as second:
+        first.update(0)
+        clock[0] = 1
+        first.update(10)
+        first.update(10)
+        second.update(10)
+    assert [line.split("\r")[-1][:10] for line in stream.getvalue().split("\n")[:-1]] == ["first: 10 ", "second: 10"]

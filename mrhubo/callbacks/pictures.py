@@ -5,6 +5,8 @@ Legend: T frames, J = 21 human joints, N robot joints.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import torch
 from PIL.Image import Image
@@ -14,8 +16,20 @@ from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.callbacks.clips import Clip
 from mrhubo.pairing import PairFilter
 from mrhubo.robot import Robot, load_urdf
-from mrhubo.view import Solids, figure_sheet, human_figure, read_geometry, robot_solids
+from mrhubo.view import (
+    Solids,
+    contact_sheet,
+    distributions,
+    figure_sheet,
+    human_figure,
+    read_geometry,
+    robot_solids,
+)
 
+PAIR_TITLES = {"phi": "phi", "residual_m": "keypoint distance [mm]", "z_norm": "|z|"}
+"""Measures of pairs that pictures show, and their titles."""
+PAIR_MEASURES = {"phi": 1.0, "residual_m": 1000.0, "z_norm": 1.0}
+"""Their units in pictures, per unit in the files."""
 _REFERENCE_TINT = (0.55, 0.62, 0.72)
 _FIGURE_HEIGHT_M = 1.7
 
@@ -61,6 +75,28 @@ class Artist:
                     titles.append(f"{kind}\nphi {float(pairs['phi'][index]):.2g}")
         columns = ["robot pose q", "human pose H", "denoised H~"]
         return figure_sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
+
+    def pair_sheet(self, pairs: Mapping[str, Tensor], measures: Mapping[str, Tensor]) -> Image:
+        """Best, median and worst pairs by the cost of their inverse kinematics, over the distributions of `measures`
+        (phi, residual_m and z_norm (P,), which may be of more pairs than are drawn from).
+        """
+        order = pairs["cost"].argsort()
+        last = len(order) - 1
+        places = {"best": (0, 1), "median": (last // 2, last // 2 + 1), "worst": (last - 1, last)}
+        chosen = [(word, int(order[min(place, last)])) for word, pair in places.items() for place in pair]
+        rows = [
+            [self.robot_figure(pairs["q"][index]) for _, index in chosen],
+            [self.human(pairs["H"][index]) for _, index in chosen],
+        ]
+        titles = [
+            f"{word}: {1000 * float(pairs['residual_m'][i]):.1f} mm, phi {float(pairs['phi'][i]):.2g}"
+            for word, i in chosen
+        ]
+        caption = f"{self.robot.name}: best, median and worst of {len(order):,} pairs, by the cost of their keypoints"
+        figures = figure_sheet(rows, titles, ["robot pose q", "human pose H"], caption, (170, 220))
+        shown = {name: unit * measures[name].numpy() for name, unit in PAIR_MEASURES.items()}
+        charts = distributions({"pairs": shown}, PAIR_TITLES, (figures.width, 300))
+        return contact_sheet([[figures], [charts]], gap=0)
 
     def key_poses(self, clip: Clip, prediction_TN: Tensor, count: int = 6) -> Image:
         """Human, reference and prediction at evenly spaced frames of a clip."""

@@ -19,8 +19,10 @@ from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.robot import BodyMap
-from mrhubo.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
 
+MEASURES = ("phi", "cost", "residual_m", "z_norm")
+"""One number a pair: reconstruction error, cost of the inverse kinematics, mean keypoint distance [m], norm of z."""
 SCHEMA = "mrhubo.pairs/2"
 _NOT_IN_PAIRS = ("count", "dir", "workers", "filter", "filter_k")
 """Keys of `pairs` that do not change what a shard holds."""
@@ -96,17 +98,13 @@ class PairStore:
         """
         path = self.path(index)
         tensors, header = read_tensors(path)
-        if header != {**self.header, "index": str(index)}:
-            raise DamagedFile(f"{path}: was made for other settings than this config's")
+        self._check_header(path, header, index)
         size = self.shard_size
         shapes = {
             "q": (size, self.joints),
             "R": (size, self.joints, 6),
             "H": (size, len(POSED_JOINT_NAMES), 6),
-            "phi": (size,),
-            "cost": (size,),
-            "residual_m": (size,),
-            "z_norm": (size,),
+            **dict.fromkeys(MEASURES, (size,)),
         }
         for name, shape in shapes.items():
             if name not in tensors or tuple(tensors[name].shape) != shape:
@@ -115,6 +113,21 @@ class PairStore:
             if not bool(torch.isfinite(tensors[name]).all()):
                 raise DamagedFile(f"{path}: '{name}' holds NaN or infinite numbers")
         return tensors
+
+    def read_measures(self, index: int) -> dict[str, Tensor]:
+        """MEASURES (P,) of one shard, without the rest of it and unchecked against its checksum.
+
+        Raises:
+            DamagedFile: it is missing, truncated, or was made for another config, seed or index.
+        """
+        path = self.path(index)
+        tensors, header = read_some_tensors(path, MEASURES)
+        self._check_header(path, header, index)
+        return tensors
+
+    def _check_header(self, path: Path, header: Mapping[str, str], index: int) -> None:
+        if header != {**self.header, "index": str(index)}:
+            raise DamagedFile(f"{path}: was made for other settings than this config's")
 
     def read_all(self) -> dict[str, Tensor]:
         """The first `count` pairs: q (P, N), R (P, N, 6), H (P, 21, 6), phi, cost, residual_m, z_norm (P,)."""

@@ -1,6 +1,7 @@
 """Pictures: figures made of capsules, a renderer without OpenGL, tables of pictures, charts."""
 
 from mrhubo.view.camera import Camera, common_cameras
+from mrhubo.view.distributions import distributions
 from mrhubo.view.figures import figure_sheet, human_figure
 from mrhubo.view.human import HUMAN_COLOR, SKIN_COLOR, human_solids
 from mrhubo.view.painter import render
@@ -17,6 +18,7 @@ __all__ = [
     "Solids",
     "common_cameras",
     "contact_sheet",
+    "distributions",
     "figure_sheet",
     "human_figure",
     "human_solids",
