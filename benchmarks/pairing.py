@@ -1,76 +1,247 @@
-"""Latent inverse kinematics: the paper's L-BFGS against our solvers, on the same robot poses, in one process.
+"""Pairs: our solvers against the paper's on the same robot poses, where the time of a pair goes, and how near the floor.
 
-    python benchmarks/pairing.py [--config conf/nao.yaml] [--poses 1000] [key.sub=value ...]
+    python benchmarks/pairing.py [--robots nao,coman,reachy] [--poses 1000] [key.sub=value ...]
 
-The amortised solver is trained (or read from the pairs' folder) first; its training time is printed on its own.
+The amortised solver is trained first, or read where a pairing with these settings has left it. Every method runs in
+this one process, with one thread and then with one a core; `mrhubo.pair` uses one process a core instead, which scales
+better, so its rate (last column of the last table: made and written, by all cores) is above the one here.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
 from common import print_header, print_table
+from torch import Tensor
 
-from mrhubo.body.inverse import solve_levenberg_marquardt
+from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
+from mrhubo.body.latent import LatentProblem
 from mrhubo.config import load_config
-from mrhubo.pairing import PairGenerator, PairStore, make_filter, solve_lbfgs
-from mrhubo.pipeline import device_of, prepare
+from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pipeline import PairSetup, prepare_pairs
+from mrhubo.threads import available_cores, use_threads
 
 
 def main(argv: list[str]) -> None:
-    """Prints the table."""
-    options = {"--config": "conf/nao.yaml", "--poses": "1000"}
+    """Prints the tables of every robot."""
+    options = {"--robots": "nao,coman,reachy", "--poses": "1000", "--pairs": "40000"}
     while argv and argv[0] in options:
         options[argv[0]], argv = argv[1], argv[2:]
     print_header()
-    config = load_config(Path(options["--config"]), [*argv, "pairs.solver=fine"])
-    with tempfile.TemporaryDirectory() as folder:
-        config.pairs.dir = Path(folder)
-        prepared = prepare(config)
-        device = device_of(config)
-        maker = PairGenerator(prepared.body_map.to(device), prepared.prior.to(device), config.pairs)
+    gemm = gemm_rate()
+    print(f"matrix products: {gemm / 1e9:.0f} GFLOP/s a core (float32, 512 x 512 by 512)\n")
+    for robot in options["--robots"].split(","):
+        config = load_config(Path(f"conf/{robot}.yaml"), [*argv, "pairs.solver=fine", "trainer.accelerator=cpu"])
+        setup = prepare_pairs(config)
+        maker = PairGenerator(setup.body_map, setup.prior, config.pairs)
         start = time.perf_counter()
-        maker.prepare(PairStore.of(config, prepared.body_map, prepared.prior), lambda step, cost: None)
-        print(f"amortised solver: {config.pairs.amortiser_steps:,} steps in {time.perf_counter() - start:.1f} s\n")
+        maker.prepare(setup.store)
+        seconds = time.perf_counter() - start
+        trained = f"{config.pairs.amortiser_steps:,} steps in {seconds:.1f} s" if seconds > 2 else "was there already"
+        print(f"## {robot}\n\namortised solver: {trained}\n")
+        compare(setup, maker, int(options["--poses"]))
+        parts(setup, maker, gemm)
+        whole(setup, int(options["--pairs"]))
+
+
+def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
+    """Rate, cost and accuracy of every method."""
     problem = maker.problem
-    target = maker.draw_targets(int(options["--poses"]), torch.Generator().manual_seed(1234))
-    zero = torch.zeros(len(target), problem.latent, device=device)
+    target = maker.draw_targets(count, torch.Generator().manual_seed(1234))
+    zero, random = torch.zeros(count, problem.latent), torch.randn(count, problem.latent)
+    assert maker.amortiser is not None
     with torch.no_grad():
-        guess = maker.amortiser(target) if maker.amortiser else zero
-    methods = {
-        "paper (L-BFGS, 500 poses)": lambda: solve_lbfgs(problem, target),
-        "LM from z = 0": lambda: solve_levenberg_marquardt(problem, zero, target, 100),
-        "fast (amortised)": lambda: maker.amortiser(target) if maker.amortiser else zero,
-        f"fine (amortised + LM, {config.pairs.lm_steps})": lambda: solve_levenberg_marquardt(
-            problem, guess, target, config.pairs.lm_steps
+        amortised, nearest = maker.amortiser(target), nearest_samples(problem, target)
+    steps = maker.settings.fine_steps
+
+    def best_of(solve: Callable[[Tensor], Tensor]) -> Tensor:
+        found = torch.stack([solve(start) for start in (amortised, nearest, random)])
+        costs = torch.stack([problem.cost(z, target) for z in found])
+        return found[costs.argmin(0), torch.arange(count)]
+
+    methods: dict[str, tuple[Callable[[], Tensor], bool]] = {
+        "paper: L-BFGS, 500 poses at a time": (lambda: solve_lbfgs(problem, target), True),
+        "LM from z = 0, 100 steps": (lambda: solve_levenberg_marquardt(problem, zero, target, 100), True),
+        "fast": (lambda: maker.amortiser(target) if maker.amortiser else zero, True),
+        f"fine (up to {steps} steps)": (lambda: solve_quasi_newton(problem, amortised, target, steps), True),
+        "LM, 200 steps, best of 3 starts": (
+            lambda: best_of(lambda z: solve_levenberg_marquardt(problem, z, target, 200, tolerance=1e-7)),
+            False,
         ),
-        "converged (200 LM steps)": lambda: solve_levenberg_marquardt(problem, guess, target, 200, tolerance=1e-7),
+        "quasi-Newton, 1,000 steps, best of 3": (
+            lambda: best_of(lambda z: solve_quasi_newton(problem, z, target, 1_000, tolerance=1e-6)),
+            False,
+        ),
     }
-    rows, paper_cost = [], 0.0
-    for name, solve in methods.items():
-        with torch.no_grad() if "paper" not in name else torch.enable_grad():
-            start = time.perf_counter()
-            z = solve()
-            if device.type == "cuda":
-                torch.cuda.synchronize()
-            seconds = time.perf_counter() - start
+    rows, paper = [], (0.0, 0.0, 0.0)
+    for name, (solve, timed) in methods.items():
+        rates = []
+        for threads in (1, available_cores()) if timed else (available_cores(),):
+            with use_threads(threads):
+                start = time.perf_counter()
+                z = solve().detach()
+                rates.append(count / (time.perf_counter() - start))
         with torch.no_grad():
             cost = problem.cost(z, target)
-            error = 1000 * (problem.keypoints_of(z) - target).norm(dim=-1)
-            phi = prepared.prior.reconstruction_error(prepared.prior.decode(z))
-        paper_cost = paper_cost or float(cost.mean())
+            error = 1000 * (problem.keypoints_of(z) - target).norm(dim=-1).flatten()[:4_000_000]
+            phi = setup.prior.reconstruction_error(setup.prior.decode(z))
+        mean = float(cost.mean())
+        paper = paper if paper[0] else (mean, rates[0], rates[1])
+        speed = [f"{rate:,.0f} ({rate / base:,.0f}x)" for rate, base in zip(rates, paper[1:], strict=False)]
         rows.append([
-            name, f"{len(target) / seconds:,.0f}", f"{cost.mean():.3f}", f"{cost.mean() / paper_cost:.0%}",
-            f"{cost.quantile(0.99):.2f}", f"{error.mean():.1f}", f"{error.flatten()[:4_000_000].quantile(0.99):.1f}",
-            f"{make_filter(phi, 'linear', 1.0).kept_share:.0%}",
+            name, *(speed if timed else ["", ""]), f"{mean:.3f} ({mean / paper[0]:.0%})", f"{cost.quantile(0.99):.2f}",
+            f"{error.mean():.2f}", f"{error.quantile(0.99):.1f}", f"{make_filter(phi, 'linear', 1.0).kept_share:.0%}",
         ])  # fmt: skip
-    print_table(
-        ["method", "poses/s", "mean cost", "of the paper's", "99% cost", "error [mm]", "99% error", "phi kept"], rows
+    columns = [
+        "method",
+        "poses/s, 1 thread",
+        f"{available_cores()} threads",
+        "mean cost",
+        "99%",
+        "keypoints [mm]",
+        "99%",
+    ]
+    print_table([*columns, "kept by the filter"], rows)
+    norm = float((problem.w_prior * z.square().sum(-1)).mean())
+    print(f"\nof the lowest costs found, {norm:.3f} is the prior's part, w_prior |z|^2\n")
+
+
+def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_500) -> None:
+    """Where the time of a `fast` pair goes on one core, a `fine` one's search beside it, and each part's floor."""
+    problem, prior, robot = maker.problem, setup.prior, setup.body_map.robot
+    assert maker.amortiser is not None
+    amortiser = maker.amortiser
+    q = robot.sample(count, torch.Generator().manual_seed(0))
+    poses = robot.forward(q)
+    target = setup.body_map.targets(poses)
+    z, pose = amortiser(target), prior.decode(amortiser(target))
+    shard = maker.shard(0)
+
+    def chunks(work: Callable[[Tensor], Tensor], values: Tensor) -> None:
+        for part in values.split(512):
+            work(part)
+
+    with tempfile.TemporaryDirectory(dir=setup.store.folder.parent) as folder, use_threads(1), torch.no_grad():
+        config = setup.config
+        config.pairs.dir, kept = Path(folder), config.pairs.dir
+        store = PairStore.of(config, setup.body_map, prior)
+        config.pairs.dir = kept
+        work: dict[str, tuple[Callable[[], object], float]] = {
+            "random poses, forward kinematics": (lambda: robot.forward(robot.sample(count, torch.Generator())), 0),
+            "directions, target keypoints": (lambda: setup.body_map.targets(poses), 0),
+            "amortised solver": (lambda: chunks(amortiser, target), macs(amortiser.layers)),
+            "decode": (lambda: chunks(prior.decode, z), macs(prior.decoder)),
+            "keypoints, cost": (lambda: chunks(problem.keypoints_of, z), macs(prior.decoder)),
+            "phi: encode and decode": (
+                lambda: chunks(prior.reconstruction_error, pose),
+                macs(prior.encoder) + macs(prior.decoder),
+            ),
+            "checksum, writing": (lambda: store.write(0, shard), 0),
+        }
+        times = {name: fastest(task) * 1e6 / count for name, (task, _) in work.items()}
+        evaluations = (
+            counted(problem, lambda: solve_quasi_newton(problem, z, target, maker.settings.fine_steps)) / count
+        )
+        seconds = fastest(lambda: solve_quasi_newton(problem, z, target, maker.settings.fine_steps), 2)
+    total = sum(times.values())
+    rows = []
+    for name, (_, products) in work.items():
+        floor = 2e6 * products / gemm
+        near = f"{times[name] / floor:.1f}" if floor else ""
+        rows.append([name, f"{times[name]:.1f}", f"{times[name] / total:.0%}", f"{floor:.1f}" if floor else "", near])
+    rows.append(["all of `fast`", f"{total:.1f}", "100%", "", ""])
+    one = macs(prior.decoder[:-1]) + problem.latent * 0 + prior.hidden * 6 * len(problem.tree.joints)
+    floor = 2e6 * 2 * one * evaluations / gemm
+    search = seconds * 1e6 / count
+    rows.append([
+        f"quasi-Newton search: {evaluations:.1f} evaluations", f"{search:.1f}", "", f"{floor:.1f}", f"{search / floor:.1f}"
+    ])  # fmt: skip
+    print_table(["part", "us a pair, one core", "share of fast", "floor [us]", "times the floor"], rows)
+    size = sum(tensor.nbytes for tensor in shard.values()) / count
+    print(f"\nfloor: the part's matrix products at the measured rate; {size:.0f} bytes a pair are written\n")
+
+
+def whole(setup: PairSetup, count: int) -> None:
+    """Pairs made and written by all cores, as `mrhubo.pair` does it."""
+    rows = []
+    for solver in ("fast", "fine"):
+        with tempfile.TemporaryDirectory(dir=setup.store.folder.parent) as folder:
+            config = load_config(setup.config.robot.urdf.parents[3] / "conf" / f"{setup.config.robot.name}.yaml", [
+                f"pairs.dir={folder}", f"pairs.solver={solver}", f"pairs.count={count}", "pairs.amortiser_steps=10",
+            ])  # fmt: skip
+            mine = prepare_pairs(config)
+            maker = PairGenerator(mine.body_map, mine.prior, config.pairs)
+            marks: list[tuple[int, float]] = []
+            # The amortised solver of the other store, under this one's name: its training is not what is timed here.
+            write_amortiser(setup, mine)
+            generate_pairs(
+                config, maker, mine.store, shard_progress=lambda done, *_: marks.append((done, time.perf_counter()))
+            )
+            # From the first shards on: until then workers are starting.
+            first = next(i for i, (done, _) in enumerate(marks) if done >= available_cores())
+            made = (marks[-1][0] - marks[first][0]) * mine.store.shard_size
+            rows.append(
+                [solver, f"{made / (marks[-1][1] - marks[first][1]):,.0f}", f"{marks[first][1] - marks[0][1]:.1f}"]
+            )
+    children, own = (
+        resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_CHILDREN, resource.RUSAGE_SELF)
     )
+    print_table([f"`mrhubo.pair` on {available_cores()} cores", "pairs/s", "start [s]"], rows)
+    print(f"\nmemory: {own:.2f} GB here at most (all methods), {children:.2f} GB a worker\n")
+
+
+def write_amortiser(source: PairSetup, target: PairSetup) -> None:
+    """The amortised solver of one store under another's name."""
+    from mrhubo.storage import read_tensors, write_tensors
+
+    tensors, _ = read_tensors(source.store.amortiser_path)
+    write_tensors(target.store.amortiser_path, tensors, {**target.store.header, "what": "amortiser"})
+
+
+def macs(layers: torch.nn.Module) -> float:
+    """Multiplications and additions of the matrix products of one sample."""
+    return float(sum(m.weight.numel() for m in layers.modules() if isinstance(m, torch.nn.Linear)))
+
+
+def counted(problem: LatentProblem, work: Callable[[], object]) -> int:
+    """How many poses `work` has evaluated cost and gradient of."""
+    count, evaluate = 0, problem.cost_and_gradient
+
+    def counting(z_ZB: Tensor, target_K3B: Tensor) -> tuple[Tensor, Tensor]:
+        nonlocal count
+        count += z_ZB.shape[1]
+        return evaluate(z_ZB, target_K3B)
+
+    problem.cost_and_gradient = counting  # type: ignore[method-assign]
+    try:
+        work()
+    finally:
+        del problem.__dict__["cost_and_gradient"]
+    return count
+
+
+def gemm_rate() -> float:
+    """Operations a second of one core in the size of product that the networks have."""
+    left, right = torch.randn(512, 512), torch.randn(512, 512)
+    with use_threads(1):
+        return 2 * 512**3 / fastest(lambda: left @ right, 50)
+
+
+def fastest(work: Callable[[], object], times: int = 5) -> float:
+    """Seconds of the fastest of some repetitions."""
+    work()
+    found = []
+    for _ in range(times):
+        start = time.perf_counter()
+        work()
+        found.append(time.perf_counter() - start)
+    return min(found)
 
 
 if __name__ == "__main__":

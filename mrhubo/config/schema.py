@@ -74,7 +74,7 @@ class PairsConfig:
     only; `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
     shard_size: int = bounded(2_500, 100, 1_000_000)
     """Pairs per file."""
-    amortiser_steps: int = bounded(4_000, 10, 1_000_000)
+    amortiser_steps: int = bounded(6_000, 10, 1_000_000)
     """Training steps of the amortised solver, once per robot."""
     fine_steps: int = bounded(100, 1, 10_000)
     """Most quasi-Newton steps per pose; a converged pose stops earlier."""

@@ -20,12 +20,16 @@ from mrhubo.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.trainer import cosine_schedule
 
 _BATCH = 256
+_BLOCK = 32
+"""Steps whose robot poses are drawn at once: kinematics of a few poses take nearly as long as those of many."""
 _LR = 2e-3
 _CHECKPOINT_EVERY = 250
 
 
 class Amortiser(nn.Module):
     """MLP from keypoints (B, K, 3) to latents (B, Z).
+
+    `metric_ZZ` is the mean inverse Hessian of the cost where its answers lie, for a search from there.
 
     Inputs are standardised by a sample of targets; outputs are coordinates along the eigenvectors of the cost's
     `LatentProblem.metric`, longer where the cost is flatter, which evens out its curvature.
@@ -34,12 +38,14 @@ class Amortiser(nn.Module):
     center_F: Tensor
     scale_F: Tensor
     axes_ZZ: Tensor
+    metric_ZZ: Tensor
 
     def __init__(self, keypoints: int, latent: int, hidden: int = 512) -> None:
         super().__init__()
         self.register_buffer("center_F", torch.zeros(3 * keypoints))
         self.register_buffer("scale_F", torch.ones(3 * keypoints))
         self.register_buffer("axes_ZZ", torch.eye(latent))
+        self.register_buffer("metric_ZZ", torch.eye(latent))
         self.layers = nn.Sequential(
             nn.Linear(3 * keypoints, hidden),
             nn.SiLU(),
@@ -94,15 +100,19 @@ def train_amortiser(
     network = network.to(device)
     if _restore(path, header, network=network):
         return network.requires_grad_(False).eval()
-    optimizer = torch.optim.Adam(network.parameters(), _LR)
+    optimizer = torch.optim.Adam(network.parameters(), _LR, fused=True)
     checkpoint = path.with_suffix(".checkpoint")
+    targets: tuple[Tensor, ...] = ()
     first = _restore(checkpoint, header, network=network, optimizer=optimizer)
     schedule = cosine_schedule(optimizer, steps)
     for step in range(first, steps):
         # The schedule is a function of the step alone, so it needs no state in the checkpoint.
         for group, rate in zip(optimizer.param_groups, schedule.base_lrs, strict=True):
             group["lr"] = rate * schedule.lr_lambdas[0](step)
-        target = draw(_BATCH, torch.Generator().manual_seed((seed + 1) * 1_000_003 + step))
+        if step % _BLOCK == 0 or step == first:
+            block = torch.Generator().manual_seed((seed + 1) * 1_000_003 + step // _BLOCK)
+            targets = draw(_BLOCK * _BATCH, block).split(_BATCH)
+        target = targets[step % _BLOCK]
         answer = network(target)
         cost, gradient = problem.cost_and_gradient(answer.detach().T.contiguous(), target.permute(1, 2, 0).contiguous())
         optimizer.zero_grad()
@@ -113,6 +123,8 @@ def train_amortiser(
             progress(step + 1, float(cost.mean()))
         if (step + 1) % _CHECKPOINT_EVERY == 0 and step + 1 < steps:
             write_tensors(checkpoint, _state(network, optimizer, step + 1), header)
+    with torch.no_grad():
+        network.metric_ZZ.copy_(problem.metric_of(network(draw(1024, torch.Generator().manual_seed(seed)))))
     write_tensors(path, _state(network), header)
     checkpoint.unlink(missing_ok=True)
     return network.requires_grad_(False).eval()

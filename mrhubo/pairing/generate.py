@@ -70,7 +70,8 @@ class PairGenerator:
             start = torch.cat([self.amortiser(part) for part in target_BK3.split(self._chunk)])
         if self.settings.solver == "fast":
             return start
-        return solve_quasi_newton(self.problem, start, target_BK3, self.settings.fine_steps)
+        steps, metric_ZZ = self.settings.fine_steps, self.amortiser.metric_ZZ
+        return solve_quasi_newton(self.problem, start, target_BK3, steps, metric_ZZ=metric_ZZ)
 
     @property
     def _chunk(self) -> int:
