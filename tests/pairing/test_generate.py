@@ -157,6 +157,7 @@ def test_killed_at_random_moments_it_resumes_to_the_same_bytes(root: Path, made:
 
 def test_the_amortisers_training_resumes_exactly(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(amortiser, "_CHECKPOINT_EVERY", 7)
+    monkeypatch.setattr(amortiser, "_BLOCK", 4)
     config = config_of(root, tmp_path)
     maker = PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs)
 
@@ -177,7 +178,7 @@ def test_the_amortisers_training_resumes_exactly(root: Path, tmp_path: Path, mon
 
     run(tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
-        run(tmp_path / "parts", stop_at=12)
+        run(tmp_path / "parts", stop_at=4)
     assert (tmp_path / "parts.checkpoint").exists() and not (tmp_path / "parts").exists()
     run(tmp_path / "parts")
     assert (tmp_path / "parts").read_bytes() == (tmp_path / "whole").read_bytes()
