@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mrhubo.config import Config, parse_arguments, run_command
+from mrhubo.errors import UserError
+
+if TYPE_CHECKING:
+    from mrhubo.pipeline import Prepared
+    from mrhubo.ranks import Ranks
+    from mrhubo.workspace import Workspace
 
 DESCRIPTION = (
     "Makes pairs of robot and human poses from a robot's URDF, trains the retargeter on them, measures it on human"
@@ -24,26 +31,37 @@ class FitResult:
     measures: dict[str, float]
 
 
-def fit(config: Config, quiet: bool = False) -> FitResult:
+def fit(config: Config, quiet: bool = False) -> FitResult | None:
     """Runs all steps; what an earlier, interrupted call finished is not done again.
+
+    Started by torchrun or SLURM, all ranks make pairs and train; the first does the rest, the others get None.
 
     Raises:
         UserError: anything in the config or the files it names is wrong (before any work).
         KeyboardInterrupt: the user stopped it; the same call resumes.
     """
     from mrhubo import pipeline
+    from mrhubo.ranks import Ranks
     from mrhubo.recording import Recording
     from mrhubo.retargeter import Retargeter
     from mrhubo.workspace import Workspace
 
     prepared = pipeline.prepare(config)
     folder = Recording.folder(config)
-    with Workspace(folder / "fits", config.robot.name, prepared.fingerprint) as workspace:
+    ranks = Ranks.join(config.trainer.accelerator)
+    if config.trainer.batch_size % ranks.count:
+        raise UserError(f"trainer.batch_size: must be a multiple of the {ranks.count} processes that share each batch")
+    workspace = Workspace(folder / "fits", config.robot.name, prepared.fingerprint)
+    if ranks.rank > 0:
+        _help(prepared, workspace, ranks)
+        return None
+    with workspace:
         with Recording.start(prepared, workspace) as recording:
-            report = pipeline.make_pairs(prepared, quiet)
+            report = pipeline.make_pairs(prepared, quiet, ranks)
             validation, test = pipeline.make_references(prepared, quiet)
+            ranks.wait()
             training = pipeline.train(
-                prepared, validation, recording.logger, workspace.checkpoints, workspace.last_checkpoint(), quiet
+                prepared, validation, recording.logger, workspace.checkpoints, workspace.last_checkpoint(), quiet, ranks
             )
             recording.resume_after_training()
             recording.pairs(training.pairs, training.filter, report)
@@ -59,10 +77,22 @@ def fit(config: Config, quiet: bool = False) -> FitResult:
         return FitResult(package, recording.run_id, recording.table(scores), measures)
 
 
+def _help(prepared: Prepared, workspace: Workspace, ranks: Ranks) -> None:
+    """What all ranks but the first do: pairs and training, in step with the first."""
+    from mrhubo import pipeline
+
+    pipeline.make_pairs(prepared, True, ranks)
+    ranks.wait()  # the first has solved the references and readied the workspace
+    validation, _ = pipeline.make_references(prepared, True)
+    pipeline.train(prepared, validation, False, workspace.checkpoints, workspace.last_checkpoint(), True, ranks)
+
+
 def main(argv: list[str]) -> None:
     """The command."""
     config, flags = parse_arguments(argv, "mrhubo.fit", DESCRIPTION, flags=FLAGS)
     result = fit(config, flags["quiet"])
+    if result is None:
+        return
     from mrhubo.recording import Recording, dashboard_command
 
     print(f"\n{result.table}\n\npackage:   {result.package}")

@@ -161,6 +161,7 @@ def train(
     checkpoints: Path,
     resume: Path | None,
     quiet: bool,
+    ranks: Ranks | None = None,
 ) -> Training:
     """Trains on the pairs and returns the network of the best validation link error.
 
@@ -171,11 +172,12 @@ def train(
         checkpoints: folder for `last.ckpt` and the best one, written at every validation.
         resume: checkpoint to go on from, or None.
         quiet: no progress line.
+        ranks: the processes that train together (DDP), each on its share of every batch; default: this one alone.
 
     Raises:
         KeyboardInterrupt: the user stopped it; the last checkpoint is there.
     """
-    config, settings = prepared.config, prepared.config.trainer
+    config, settings, ranks = prepared.config, prepared.config.trainer, ranks or Ranks()
     pairs = prepared.store.read_all()
     pair_filter = make_filter(pairs["phi"], config.pairs.filter, config.pairs.filter_k)
     if not bool((pair_filter.probability_P > 0).any()):
@@ -191,6 +193,7 @@ def train(
         settings.batch_size,
         min(settings.validate_every, settings.max_steps),
         settings.seed,
+        (ranks.rank, ranks.count),
     )
     module = RetargetModule(network, settings, config.model.detach_student)
     saver = ModelCheckpoint(
@@ -206,7 +209,10 @@ def train(
     with quiet_lightning():
         trainer = lightning.Trainer(
             accelerator=settings.accelerator if settings.accelerator != "auto" else device_of(config).type,
-            devices=1,
+            devices=ranks.count // ranks.nodes,
+            num_nodes=ranks.nodes,
+            strategy="ddp" if ranks.count > 1 else "auto",
+            use_distributed_sampler=False,
             precision="bf16-mixed" if settings.precision == "bf16" else "32-true",
             # Not max_steps: with it Lightning takes a checkpoint of a finished epoch for one within the epoch, and a
             # resumed run goes on with other batches. The module stops at its last step.

@@ -18,6 +18,8 @@ class Ranks:
 
     rank: int = 0
     count: int = 1
+    nodes: int = 1
+    """Machines that the processes run on, equally many on each."""
     device: torch.device | None = None
     """The device that this rank was given; None if it is alone."""
     fabric: Any = None
@@ -38,7 +40,7 @@ class Ranks:
         fabric = Fabric(accelerator="cuda" if on_gpu else "cpu", strategy="ddp", devices=processes, num_nodes=nodes)
         with quiet_lightning():
             fabric.launch()
-        return cls(fabric.global_rank, fabric.world_size, fabric.device, fabric)
+        return cls(fabric.global_rank, fabric.world_size, nodes, fabric.device, fabric)
 
     def wait(self) -> None:
         """Until every rank has come here."""

@@ -86,12 +86,13 @@ class Recording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._monitor.finish()
-        status = "FINISHED"
+        status = "FINISHED" if error is None else "KILLED" if was_interrupted(error) else "FAILED"
+        try:
+            self._monitor.finish()
+        finally:  # Lightning's logger has called an interrupted run failed; whatever else goes wrong, that is put right
+            self.client.set_terminated(self.run_id, status)
         if error is not None:
-            status = "KILLED" if was_interrupted(error) else "FAILED"
             self.client.set_tag(self.run_id, "ended_by", f"{type(error).__name__}: {error}"[:500])
-        self.client.set_terminated(self.run_id, status)
 
     def resume_after_training(self) -> None:
         """Lightning's logger closes the run when the training ends; the test is still to come."""

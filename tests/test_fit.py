@@ -236,3 +236,22 @@ def test_variants_are_settings(
     (found,) = runs_of(tmp_path)
     assert variant.split(".")[1] in found.info.run_name
     assert ("train/loss_pre" in found.data.metrics) is (variant != "model.stages=1")
+
+
+def test_two_ranks_fit_together_to_nearly_the_same_result(
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
+    launcher = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "-m", "mrhubo.fit"]
+    process = subprocess.run([*launcher, *arguments(root, tmp_path, motions)], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    assert process.stdout.count("package:") == 1, "one rank reports"
+    expected, got = final_metrics(fitted[0]), final_metrics(tmp_path)
+    assert got.keys() == expected.keys()
+    for name, value in expected.items():
+        if name.startswith("test"):
+            assert got[name] == pytest.approx(value, rel=0.02), name
+    uneven = subprocess.run(
+        [*launcher, *arguments(root, tmp_path, motions, "trainer.batch_size=127")], capture_output=True, text=True
+    )
+    assert uneven.returncode != 0 and "must be a multiple of the 2 processes" in uneven.stderr

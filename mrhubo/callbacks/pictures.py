@@ -77,9 +77,16 @@ class Artist:
         return figure_sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
 
     def pair_sheet(self, pairs: Mapping[str, Tensor], measures: Mapping[str, Tensor]) -> Image:
-        """Best, median and worst pairs by the cost of their inverse kinematics, over the distributions of `measures`
-        (phi, residual_m and z_norm (P,), which may be of more pairs than are drawn from).
+        """`ranked_pairs` over the distributions of `measures` (phi, residual_m and z_norm (P,), which may be of more
+        pairs than are drawn from).
         """
+        figures = self.ranked_pairs(pairs)
+        shown = {name: unit * measures[name].numpy() for name, unit in PAIR_MEASURES.items()}
+        charts = distributions({"pairs": shown}, PAIR_TITLES, (figures.width, 300))
+        return contact_sheet([[figures], [charts]], gap=0)
+
+    def ranked_pairs(self, pairs: Mapping[str, Tensor]) -> Image:
+        """Best, median and worst pairs by the cost of their inverse kinematics."""
         order = pairs["cost"].argsort()
         last = len(order) - 1
         places = {"best": (0, 1), "median": (last // 2, last // 2 + 1), "worst": (last - 1, last)}
@@ -93,10 +100,7 @@ class Artist:
             for word, i in chosen
         ]
         caption = f"{self.robot.name}: best, median and worst of {len(order):,} pairs, by the cost of their keypoints"
-        figures = figure_sheet(rows, titles, ["robot pose q", "human pose H"], caption, (170, 220))
-        shown = {name: unit * measures[name].numpy() for name, unit in PAIR_MEASURES.items()}
-        charts = distributions({"pairs": shown}, PAIR_TITLES, (figures.width, 300))
-        return contact_sheet([[figures], [charts]], gap=0)
+        return figure_sheet(rows, titles, ["robot pose q", "human pose H"], caption, (170, 220))
 
     def key_poses(self, clip: Clip, prediction_TN: Tensor, count: int = 6) -> Image:
         """Human, reference and prediction at evenly spaced frames of a clip."""

@@ -1,7 +1,9 @@
 """Batches of pairs for the training, drawn by the filter; tensors stay in memory, no Python per sample.
 
 An epoch is a fixed number of optimiser steps. Its batches are cut from Bernoulli draws over the whole dataset, one draw
-after another, all from (seed, epoch): the batch size is exact, and a resumed run sees the same batches.
+after another, all from (seed, epoch): the batch size is exact, and a resumed run sees the same batches. Several ranks
+make the same draws and share out every batch, so that their pairs are disjoint and the training is the one of a single
+process.
 
 Legend: P pairs, B batch, F input features, M robot links, N robot joints.
 """
@@ -40,10 +42,13 @@ class PairTable(Dataset[Batch]):
 
 
 class BernoulliBatches(Sampler[Tensor]):
-    """Index tensors of exactly `batch_size` pairs, `steps` of them an epoch."""
+    """Index tensors of exactly `batch_size` pairs, `steps` of them an epoch; with `share` (rank, ranks) its part."""
 
-    def __init__(self, pair_filter: PairFilter, batch_size: int, steps: int, seed: int) -> None:
+    def __init__(
+        self, pair_filter: PairFilter, batch_size: int, steps: int, seed: int, share: tuple[int, int] = (0, 1)
+    ) -> None:
         self.filter, self.batch_size, self.steps, self.seed, self.epoch = pair_filter, batch_size, steps, seed, 0
+        self.rank, self.ranks = share
         if not bool((pair_filter.probability_P > 0).any()):
             raise ValueError("the filter accepts no pair")
 
@@ -61,17 +66,25 @@ class BernoulliBatches(Sampler[Tensor]):
             while len(pool) < self.batch_size:
                 pool = torch.cat((pool, self.filter.draw(generator)))
             batch, pool = pool[: self.batch_size], pool[self.batch_size :]
-            yield batch
+            yield batch[self.rank :: self.ranks]
 
 
 class PairData(lightning.LightningDataModule):
     """The training loader over a table of pairs and its filter."""
 
-    def __init__(self, table: PairTable, pair_filter: PairFilter, batch_size: int, steps: int, seed: int) -> None:
-        """`steps` is the length of an epoch in batches."""
+    def __init__(
+        self,
+        table: PairTable,
+        pair_filter: PairFilter,
+        batch_size: int,
+        steps: int,
+        seed: int,
+        share: tuple[int, int] = (0, 1),
+    ) -> None:
+        """`steps` is the length of an epoch in batches, `share` this process's (rank, number of ranks)."""
         super().__init__()
         self.table, self.filter = table, pair_filter
-        self.sampler = BernoulliBatches(pair_filter, batch_size, steps, seed)
+        self.sampler = BernoulliBatches(pair_filter, batch_size, steps, seed, share)
 
     def setup(self, stage: str) -> None:
         """Moves the table to the training's device, so that no batch has to travel."""

@@ -118,8 +118,9 @@ def test_poses_are_solved_independently_of_their_batch(root: Path, monkeypatch: 
     together, alone = cost(200)[:40], cost(40)
     monkeypatch.setitem(inverse._WIDTH, "cpu", 32)  # poses take turns
     in_turns = cost(200)[:40]
-    for other in (alone, in_turns):  # rounding may lead a pose to another minimum, not more
-        assert float(((other - together).abs() < 0.02 * together + 1e-3).float().mean()) > 0.9
+    for other in (alone, in_turns):  # rounding leads a pose in ten to another minimum, of much the same cost
+        assert float((other - together).abs().median()) < 1e-3
+        assert float(other.mean()) == pytest.approx(float(together.mean()), rel=0.03)
 
 
 @pytest.mark.parametrize("count", [0, 1])

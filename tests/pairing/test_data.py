@@ -45,3 +45,13 @@ def test_rows_stay_together() -> None:
     for features, links, joints in loader:
         assert features.shape == (32, 4) and links.shape == (32, 2, 6) and joints.shape == (32, 2)
         assert torch.equal(features[:, 0], joints[:, 1]) and torch.equal(links[:, 1, 5], joints[:, 0])
+
+
+def test_ranks_share_out_the_batches_of_a_single_process() -> None:
+    pair_filter = make_filter(torch.rand(500, generator=torch.Generator().manual_seed(3)), "linear", 1.0)
+    alone = list(BernoulliBatches(pair_filter, 96, 7, seed=1))
+    shares = [list(BernoulliBatches(pair_filter, 96, 7, seed=1, share=(rank, 3))) for rank in range(3)]
+    for step, whole in enumerate(alone):
+        parts = [share[step] for share in shares]
+        assert [len(part) for part in parts] == [32, 32, 32]
+        assert torch.equal(torch.cat(parts).sort().values, whole.sort().values), "nothing twice, nothing lost"
