@@ -152,7 +152,7 @@ def latent_ik(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> dict[st
     nothing = torch.zeros(len(pose_BJ6), prior.latent, device=pose_BJ6.device)
     found = []
     for start in (nearest_samples(problem, target[:, given]), nothing):
-        z = solve_quasi_newton(problem, start, target[:, given], steps=60)
+        z = solve_quasi_newton(problem, start, target[:, given], steps=150, tolerance=1e-4)
         found.append(1000 * (skeleton.keypoints(prior.decode_matrices(z)) - target).norm(dim=-1))
     return {
         "ik_keypoint_mm": float(found[0][:, given].mean()),

@@ -124,13 +124,13 @@ class BodyPrior(nn.Module):
         skeleton: Skeleton | None = None,
         w_data: float = 100.0,
         w_prior: float = 0.01,
-        steps: int = 60,
+        steps: int = 150,
     ) -> Tensor:
         """The most plausible poses (B, 21, 6) whose keypoints lie where they should: VPoser's latent IK.
 
             minimise over z   w_data * sum_k |P_k(z) - P_k|^2 + w_prior * |z|^2
 
-        Every pose is solved on its own by Levenberg-Marquardt, from the nearest of 4,096 samples of the prior.
+        Every pose is solved on its own by a quasi-Newton search, from the nearest of 4,096 samples of the prior.
 
         Args:
             targets: positions (B, 3) [m] by name of keypoint (`KEYPOINT_NAMES`), in the pelvis's frame: x to the
@@ -155,7 +155,7 @@ class BodyPrior(nn.Module):
         skeleton = (skeleton or Skeleton()).to(self.identity_F.device)
         problem = LatentProblem(self, skeleton, indices, w_data, w_prior)
         start = nearest_samples(problem, target_BK3)
-        return self.decode(solve_quasi_newton(problem, start, target_BK3, steps))
+        return self.decode(solve_quasi_newton(problem, start, target_BK3, steps, tolerance=1e-4))
 
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "leaky_relu": nn.LeakyReLU, "tanh": nn.Tanh}
