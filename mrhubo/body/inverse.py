@@ -62,7 +62,7 @@ def solve_quasi_newton(
         problem: cost and gradient.
         start_BZ: first guess.
         target_BK3: keypoints to reach [m].
-        steps: most evaluations per pose after the first.
+        steps: evaluations after the first at which a pose is done, converged or not.
         tolerance: a pose is done when three steps in a row lower its cost by less than this share of it.
         metric_ZZ: first guess of the inverse Hessian; default: `LatentProblem.metric`.
     """
