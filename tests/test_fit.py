@@ -24,6 +24,7 @@ from mrhubo.callbacks import load_motions
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.fit import main
+from mrhubo.ranks import Ranks
 from mrhubo.retargeter import Retargeter
 
 SMALL = [
@@ -251,7 +252,11 @@ def test_two_ranks_fit_together_to_nearly_the_same_result(
     for name, value in expected.items():
         if name.startswith("test"):
             assert got[name] == pytest.approx(value, rel=0.02), name
-    uneven = subprocess.run(
-        [*launcher, *arguments(root, tmp_path, motions, "trainer.batch_size=127")], capture_output=True, text=True
-    )
-    assert uneven.returncode != 0 and "must be a multiple of the 2 processes" in uneven.stderr
+
+
+def test_ranks_that_cannot_share_a_batch_are_refused(
+    root: Path, motions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Ranks, "join", lambda accelerator: Ranks(0, 2))
+    with pytest.raises(UserError, match="batch_size: must be a multiple of the 2 processes"):
+        main(arguments(root, tmp_path, motions, "trainer.batch_size=127"))
