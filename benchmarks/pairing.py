@@ -127,6 +127,7 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
     poses = robot.forward(q)
     target = setup.body_map.targets(poses)
     z, pose = amortiser(target), prior.decode(amortiser(target))
+    matrices = prior.decode_matrices(z)
     shard = maker.shard(0)
 
     def chunks(work: Callable[[Tensor], Tensor], values: Tensor) -> None:
@@ -143,7 +144,7 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
             "directions, target keypoints": (lambda: setup.body_map.targets(poses), 0),
             "amortised solver": (lambda: chunks(amortiser, target), macs(amortiser.layers)),
             "decode": (lambda: chunks(prior.decode, z), macs(prior.decoder)),
-            "keypoints, cost": (lambda: chunks(problem.keypoints_of, z), macs(prior.decoder)),
+            "keypoints, cost": (lambda: chunks(setup.body_map.skeleton.keypoints, matrices), 0),
             "phi: encode and decode": (
                 lambda: chunks(prior.reconstruction_error, pose),
                 macs(prior.encoder) + macs(prior.decoder),

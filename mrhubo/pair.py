@@ -9,9 +9,8 @@ from mrhubo.errors import UserError
 
 DESCRIPTION = (
     "Makes pairs of robot and human poses from a robot's URDF, and nothing else; a fit with the same settings finds"
-    " them."
-    " Interrupt it at any time: the same command goes on where it stopped. Started by torchrun or SLURM, all processes"
-    " share the work (docs/scaling.md)."
+    " them. Interrupt it at any time: the same command goes on where it stopped. Started by torchrun or SLURM, all"
+    " processes share the work (docs/scaling.md)."
 )
 FLAGS = {
     "verify": "make nothing; read every file again: checksum, shapes, finite numbers, joint limits, kinematics",

@@ -14,7 +14,6 @@ from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import Logger
 from torch import Tensor
 
-from mrhubo.body import BodyPrior, build_skeleton, open_prior
 from mrhubo.callbacks import (
     Clip,
     ClipMetrics,
@@ -30,23 +29,12 @@ from mrhubo.callbacks import (
 from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.errors import UserError
 from mrhubo.locations import default_motions, default_pairs
-from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairStore, generate_pairs, make_filter
+from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairSetup, generate_pairs, make_filter
 from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.progress import Progress
 from mrhubo.ranks import Ranks
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
-from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.trainer import quiet_lightning, run_trainer
-
-
-@dataclass
-class PairSetup:
-    """What pairs are made from, checked."""
-
-    config: Config
-    body_map: BodyMap
-    prior: BodyPrior
-    store: PairStore
 
 
 @dataclass
@@ -75,11 +63,10 @@ def prepare_pairs(config: Config) -> PairSetup:
         UserError: anything in the config, the URDF or the prior is wrong.
     """
     config.pairs.dir = config.pairs.dir or default_pairs()
-    prior = open_prior(config.body)
-    body_map = build_body_map(config.robot, build_skeleton(config.body))
+    setup = PairSetup.open(config)
     if config.trainer.accelerator == "gpu" and not torch.cuda.is_available():
         raise UserError("trainer.accelerator: 'gpu' is asked for, but torch finds no CUDA device; use 'auto' or 'cpu'")
-    return PairSetup(config, body_map, prior, PairStore.of(config, body_map, prior))
+    return setup
 
 
 def prepare(config: Config) -> Prepared:

@@ -29,17 +29,18 @@ class Progress:
 
     def update(self, done: int, measure: str = "") -> None:
         """Says that `done` of `total` are done. The rate counts from the first update, so resumed work is not in it."""
+        if self._ended:
+            return
         now = time.monotonic()
         if self._first is None:
             self._first, self.start = done, now
         self._last = self._line(done, measure, now)
         pause = _TERMINAL_SECONDS if self.terminal else _LOG_SECONDS
-        if now - self._shown >= pause and not self.quiet:
-            self._shown = now
-            if done < self.total and not self._ended:
-                self._show(self._last)
         if done >= self.total:
             self._end()
+        elif now - self._shown >= pause and not self.quiet:
+            self._shown = now
+            self._show(self._last)
 
     def _line(self, done: int, measure: str, now: float) -> str:
         seconds, fresh = now - self.start, done - (self._first or 0)

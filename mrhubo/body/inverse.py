@@ -20,6 +20,11 @@ _RADIUS, _LONGEST = 0.3, 2.0
 """First and greatest trust radius, in units of the latent's standard deviation."""
 
 
+def poses_at_once(device: torch.device) -> int:
+    """How many poses to work on at once on a device."""
+    return _WIDTH.get(device.type, 512)
+
+
 @torch.no_grad()
 def nearest_samples(problem: LatentProblem, target_BK3: Tensor) -> Tensor:
     """First guesses (B, Z): of 4,096 latents drawn from N(0, I), always the same, the one with the smallest cost.
@@ -69,7 +74,7 @@ def solve_quasi_newton(
     count = len(start_BZ)
     found_BZ = start_BZ.clone()
     target_K3B = target_BK3.permute(1, 2, 0).contiguous()
-    width = min(count, _WIDTH.get(start_BZ.device.type, 512))
+    width = min(count, poses_at_once(start_BZ.device))
     work = _Work(problem, width, problem.metric if metric_ZZ is None else metric_ZZ)
     waiting = torch.arange(count, device=start_BZ.device)
     free = torch.arange(width, device=start_BZ.device)

@@ -3,12 +3,14 @@
 from mrhubo.pairing.filter import PairFilter, make_filter
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pairing.setup import PairSetup
 from mrhubo.pairing.store import PairStore, pose_settings
 from mrhubo.pairing.workers import PairingReport, generate_pairs
 
 __all__ = [
     "PairFilter",
     "PairGenerator",
+    "PairSetup",
     "PairStore",
     "PairingReport",
     "generate_pairs",

@@ -96,10 +96,10 @@ def train_amortiser(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network = Amortiser(len(problem.keypoints), problem.latent)
+    if _restore(path, header, network=network):
+        return network.to(device).requires_grad_(False).eval()
     network.condition(draw(4096, torch.Generator().manual_seed(seed)).cpu(), problem.metric.cpu())
     network = network.to(device)
-    if _restore(path, header, network=network):
-        return network.requires_grad_(False).eval()
     optimizer = torch.optim.Adam(network.parameters(), _LR, fused=True)
     checkpoint = path.with_suffix(".checkpoint")
     targets: tuple[Tensor, ...] = ()

@@ -10,8 +10,9 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from mrhubo import rotation
 from mrhubo.body import BodyPrior
-from mrhubo.body.inverse import solve_quasi_newton
+from mrhubo.body.inverse import poses_at_once, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
 from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
@@ -19,9 +20,6 @@ from mrhubo.pairing.inverse import solve_lbfgs
 from mrhubo.pairing.store import PairStore
 from mrhubo.robot import BodyMap
 from mrhubo.threads import use_threads
-
-_CHUNK = {"cpu": 512, "cuda": 65_536}
-"""Poses that are decoded and encoded at once: more leave a core's cache."""
 
 
 class PairGenerator:
@@ -67,15 +65,11 @@ class PairGenerator:
         if self.amortiser is None:
             raise RuntimeError("call prepare() before solve()")
         with torch.no_grad():
-            start = torch.cat([self.amortiser(part) for part in target_BK3.split(self._chunk)])
+            start = torch.cat([self.amortiser(part) for part in target_BK3.split(poses_at_once(self.device))])
         if self.settings.solver == "fast":
             return start
         steps, metric_ZZ = self.settings.fine_steps, self.amortiser.metric_ZZ
         return solve_quasi_newton(self.problem, start, target_BK3, steps, metric_ZZ=metric_ZZ)
-
-    @property
-    def _chunk(self) -> int:
-        return _CHUNK.get(self.device.type, 512)
 
     def shard(self, index: int) -> dict[str, Tensor]:
         """The pairs of one shard: what `PairStore.read` names, on the CPU.
@@ -91,16 +85,18 @@ class PairGenerator:
                 target_BK3 = self.body_map.targets(poses)
                 orientation_BM6 = self.robot.moving_orientations(poses)
             z_BZ = self.solve(target_BK3)
-            cut = zip(z_BZ.split(self._chunk), target_BK3.split(self._chunk), strict=True)
-            parts = [self._describe(*part) for part in cut]
+            chunk = poses_at_once(self.device)
+            parts = [self._describe(*part) for part in zip(z_BZ.split(chunk), target_BK3.split(chunk), strict=True)]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
     @torch.no_grad()
     def _describe(self, z_BZ: Tensor, target_BK3: Tensor) -> dict[str, Tensor]:
         """Human poses of latents, and how good they are."""
-        pose_BJ6 = self.prior.decode(z_BZ)
-        distance_BK = (self.problem.keypoints_of(z_BZ) - target_BK3).norm(dim=-1)
+        matrices = self.prior.decode_matrices(z_BZ)
+        pose_BJ6 = rotation.matrix_to_sixd(matrices)
+        points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
+        distance_BK = (points_BK3 - target_BK3).norm(dim=-1)
         prior_B = z_BZ.square().sum(-1)
         return {
             "H": pose_BJ6,

@@ -1,7 +1,8 @@
 """A process that makes the shards it is told to, started by `mrhubo.pairing.workers`.
 
-The first line on standard input is the config as JSON; every other line is the index of a shard to make and write. Each
-is answered by one line of JSON: {"shard": index, "cost": ..., "residual_m": ...} or {"error": sentence}.
+The first line on standard input is the config, YAML as a JSON string; every other line is the index of a shard to
+make and write. Each is answered by one line of JSON: {"shard": index, "cost": ..., "residual_m": ...} or
+{"error": sentence}.
 """
 
 from __future__ import annotations
@@ -12,12 +13,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from mrhubo.body import build_skeleton, open_prior
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.pairing.generate import PairGenerator
+from mrhubo.pairing.setup import PairSetup
 from mrhubo.pairing.store import PairStore
-from mrhubo.robot import build_body_map
 
 
 def main() -> None:
@@ -28,14 +28,13 @@ def main() -> None:
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "config.yaml"
-            path.write_text(next(lines))  # JSON is YAML
+            path.write_text(json.loads(next(lines)))
             config = load_config(path)
-        body_map, prior = build_body_map(config.robot, build_skeleton(config.body)), open_prior(config.body)
-        store = PairStore.of(config, body_map, prior)
-        generator = PairGenerator(body_map, prior, config.pairs)
-        generator.prepare(store)
+        setup = PairSetup.open(config)
+        generator = PairGenerator(setup.body_map, setup.prior, config.pairs)
+        generator.prepare(setup.store)
         for line in lines:
-            answer = make_shard(generator, store, int(line))
+            answer = make_shard(generator, setup.store, int(line))
             print(json.dumps(answer), file=answers, flush=True)
     except UserError as error:
         print(json.dumps({"error": str(error)}), file=answers, flush=True)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mrhubo
-from mrhubo.config import Config, to_plain
+from mrhubo.config import Config, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.store import PairStore
@@ -70,7 +70,8 @@ def generate_pairs(
     remove_leftovers(store.folder)
     mine = range(ranks.rank, store.shards, ranks.count)
     missing = ranks.gather(store.missing(mine), store.shards)
-    for index in missing[ranks.rank :: ranks.count]:
+    indices = missing[ranks.rank :: ranks.count]
+    for index in indices:
         store.path(index).unlink(missing_ok=True)
     if missing:
         if ranks.rank == 0:
@@ -78,7 +79,6 @@ def generate_pairs(
         ranks.wait()
         if ranks.rank > 0:
             generator.prepare(store)
-    indices = missing[ranks.rank :: ranks.count]
     there = len(mine) - len(indices) if ranks.count == 1 else 0
     total = there + len(indices)
     shard_progress(there, total, {})  # only now, so that the rate is that of the pairs
@@ -110,7 +110,7 @@ def _hand_out(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) 
 
     def serve(worker: subprocess.Popen[str]) -> None:
         assert worker.stdin and worker.stdout
-        while not waiting.empty():
+        while True:
             try:
                 index = waiting.get_nowait()
             except queue.Empty:
@@ -153,7 +153,7 @@ def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]
             )
         for worker in workers:
             assert worker.stdin
-            worker.stdin.write(json.dumps(to_plain(config)) + "\n")
+            worker.stdin.write(json.dumps(to_yaml(config)) + "\n")
             worker.stdin.flush()
         yield workers
     finally:

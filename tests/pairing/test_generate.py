@@ -1,13 +1,7 @@
-"""Shards: what they hold, and that a killed run resumes to the same bytes."""
+"""Shards: what they hold, and that other settings never mix."""
 
 from __future__ import annotations
 
-import os
-import random
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -129,30 +123,6 @@ def test_a_bad_shard_is_noticed_and_remade(root: Path, made: PairStore, tmp_path
     assert store.missing() == [1]
     generate(config)
     assert contents(store) == contents(made)
-
-
-def test_killed_at_random_moments_it_resumes_to_the_same_bytes(root: Path, made: PairStore, tmp_path: Path) -> None:
-    script = "import sys; sys.path.insert(0, sys.argv[3]); import test_generate as t; from pathlib import Path; " \
-             "t.generate(t.config_of(Path(sys.argv[1]), Path(sys.argv[2])))"  # fmt: skip
-    command = [sys.executable, "-c", script, str(root), str(tmp_path), str(Path(__file__).parent)]
-    folder = store_of(config_of(root, tmp_path)).folder
-    draw = random.Random(0)
-    for _ in range(3):
-        process = subprocess.Popen(command, start_new_session=True)
-        seen = len(list(folder.glob("*"))) if folder.exists() else 0
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline and process.poll() is None:
-            if folder.exists() and len(list(folder.glob("*"))) > seen:
-                break  # it has begun to write
-            time.sleep(0.005)
-        time.sleep(draw.uniform(0, 0.05))
-        os.killpg(process.pid, signal.SIGKILL) if process.poll() is None else None
-        process.wait()
-    subprocess.run(command, check=True)
-    store = store_of(config_of(root, tmp_path))
-    whole = {name: content for name, content in contents(store).items() if not name.startswith(".")}
-    assert whole == contents(made)
-    assert store.missing() == []
 
 
 def test_the_amortisers_training_resumes_exactly(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,31 @@
+"""What pairs are made from, opened from a config: by a command, and again by each of its workers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mrhubo.body import BodyPrior, build_skeleton, open_prior
+from mrhubo.config import Config
+from mrhubo.pairing.store import PairStore
+from mrhubo.robot import BodyMap, build_body_map
+
+
+@dataclass
+class PairSetup:
+    """Robot, prior and store of a config, checked."""
+
+    config: Config
+    body_map: BodyMap
+    prior: BodyPrior
+    store: PairStore
+
+    @classmethod
+    def open(cls, config: Config) -> PairSetup:
+        """Opens the files that the config names; `pairs.dir` must be set.
+
+        Raises:
+            UserError: anything in the config, the URDF or the prior is wrong.
+        """
+        prior = open_prior(config.body)
+        body_map = build_body_map(config.robot, build_skeleton(config.body))
+        return PairSetup(config, body_map, prior, PairStore.of(config, body_map, prior))
