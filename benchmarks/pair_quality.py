@@ -1,0 +1,87 @@
+"""How the link error on the validation clips depends on the pairs: number, solver, filter, weight of the prior.
+
+    python benchmarks/pair_quality.py [--robots nao,coman,reachy] [--seeds 1] [--results FILE] [key.sub=value ...]
+
+Trains a network for every row, with all other settings as shipped. Trainings whose result is in FILE (JSON lines) are
+not done again, so an interrupted table goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import torch
+from common import print_header, print_table
+
+from mrhubo.config import load_config
+from mrhubo.pipeline import make_pairs, make_references, prepare, train
+
+COUNTS = (12_500, 50_000, 200_000)
+FILTERS = {
+    "linear, k 0.5": ["pairs.filter_k=0.5"],
+    "linear, k 1": [],
+    "linear, k 2": ["pairs.filter_k=2"],
+    "hard, k 1": ["pairs.filter=hard"],
+    "none": ["pairs.filter=none"],
+}
+WEIGHTS = (0.003, 0.01)
+
+
+def rows() -> list[tuple[str, list[str]]]:
+    """Name and settings of every row: solver by count, solver by filter, weights of the prior."""
+    table = []
+    for solver in ("fine", "fast"):
+        for count in COUNTS:
+            for name, change in FILTERS.items() if count == 50_000 else [("linear, k 1", FILTERS["linear, k 1"])]:
+                settings = [f"pairs.solver={solver}", f"pairs.count={count}", *change]
+                table.append((f"{solver}, {count:,}, {name}", settings))
+    return table + [(f"fine, 50,000, linear, k 1, w_prior {w}", [f"pairs.w_prior={w}"]) for w in WEIGHTS]
+
+
+def link_error(robot: str, settings: list[str], results: Path) -> float:
+    """Best link error [cm] on the validation clips, read from the results or trained for."""
+    prepared = prepare(load_config(Path(f"conf/{robot}.yaml"), settings))
+    done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
+    for result in done:
+        if result["fingerprint"] == prepared.fingerprint:
+            return result["link_cm"]
+    make_pairs(prepared, quiet=True)
+    validation, _ = make_references(prepared, quiet=True)
+    with tempfile.TemporaryDirectory() as folder:
+        link = train(prepared, validation, False, Path(folder), None, quiet=True).best_link_cm
+    with results.open("a") as file:
+        file.write(json.dumps({"fingerprint": prepared.fingerprint, "link_cm": link}) + "\n")
+    print(f"{robot} {' '.join(settings)}: {link:.3f} cm", file=sys.stderr, flush=True)
+    return link
+
+
+def main(argv: list[str]) -> None:
+    """Prints the table."""
+    options = {"--robots": "nao,coman,reachy", "--seeds": "1", "--results": "mlruns/pair_quality.jsonl"}
+    while argv and argv[0] in options:
+        options[argv[0]], argv = argv[1], argv[2:]
+    robots, results = options["--robots"].split(","), Path(options["--results"])
+    results.parent.mkdir(parents=True, exist_ok=True)
+    table = []
+    for name, change in rows():
+        cells = []
+        for robot in robots:
+            found = torch.tensor(
+                [
+                    link_error(robot, [*argv, *change, f"trainer.seed={seed}"], results)
+                    for seed in range(int(options["--seeds"]))
+                ],
+                dtype=torch.float64,
+            )
+            spread = f" ± {found.std():.2f}" if len(found) > 1 else ""
+            cells.append(f"{found.mean():.2f}{spread}")
+        table.append([name, *cells])
+    print_header()
+    print_table(["pairs", *(f"{robot} [cm]" for robot in robots)], table)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
