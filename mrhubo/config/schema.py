@@ -116,17 +116,19 @@ class ModelConfig:
 class TrainerConfig:
     """The training."""
 
-    max_steps: int = bounded(3_000, 1, 1_000_000_000)
+    max_steps: int = bounded(6_000, 1, 1_000_000_000)
     """Optimiser steps."""
-    batch_size: int = bounded(1_024, 1, 10_000_000)
+    batch_size: int = bounded(256, 1, 10_000_000)
     """Pairs per step."""
-    lr: float = bounded(1e-3, 1e-9, 10.0)
+    loss: str = choice("l1", "l1", "mse")
+    """Distance of links and joint angles from the pair's: `l1` = mean absolute, `mse` = mean square (the paper)."""
+    lr: float = bounded(3e-3, 1e-9, 10.0)
     """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps."""
     weight_decay: float = bounded(1e-6, 0.0, 10.0)
     """Weight decay of AdamW."""
     precision: str = choice("32", "32", "bf16")
     """`32`, or `bf16` for bf16 autocast (faster, slightly less accurate)."""
-    validate_every: int = bounded(250, 1, 1_000_000_000)
+    validate_every: int = bounded(500, 1, 1_000_000_000)
     """Steps between validations; a checkpoint is written at each."""
     seed: int = bounded(0, 0, 2**32 - 1)
     """Seed of the initial weights and of the draws."""
