@@ -40,7 +40,7 @@ def main(argv: list[str]) -> None:
             settings.solver, settings.shard_size = solver, int(options["--poses"])
             maker = PairGenerator(setup.body_map, setup.prior, settings)
             maker.amortiser = first.amortiser
-            found[solver] = maker.shard(0)
+            found[solver] = maker.shard("forward", 0)
         series = {
             solver: {name: unit * pairs[name].numpy() for name, unit in PAIR_MEASURES.items()}
             for solver, pairs in found.items()

@@ -26,6 +26,7 @@ from mrhubo.body.latent import LatentProblem
 from mrhubo.config import load_config
 from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
 from mrhubo.pipeline import PairSetup, prepare_pairs
+from mrhubo.reference import ReferenceRetargeter
 from mrhubo.storage import read_tensors, write_tensors
 from mrhubo.threads import available_cores, use_threads
 
@@ -49,6 +50,7 @@ def main(argv: list[str]) -> None:
         print(f"## {robot}\n\namortised solver: {trained}\n")
         compare(setup, maker, int(options["--poses"]))
         parts(setup, maker, gemm)
+        reverse(setup, maker)
         whole(setup, int(options["--pairs"]))
 
 
@@ -128,7 +130,7 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
     target = setup.body_map.targets(poses)
     z, pose = amortiser(target), prior.decode(amortiser(target))
     matrices = prior.decode_matrices(z)
-    shard = maker.shard(0)
+    shard = maker.shard("forward", 0)
 
     def chunks(work: Callable[[Tensor], Tensor], values: Tensor) -> None:
         for part in values.split(512):
@@ -179,10 +181,12 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
 def whole(setup: PairSetup, count: int) -> None:
     """Pairs made and written by all cores, as `mrhubo.pair` does it, the amortised solver's training left out."""
     rows, cores = [], available_cores()
-    for solver in ("fast", "fine"):
+    for name in ("fast", "fine", "reverse"):
         with tempfile.TemporaryDirectory(dir=setup.store.folder.parent) as folder:
             config = copy.deepcopy(setup.config)
-            config.pairs.dir, config.pairs.solver, config.pairs.count = Path(folder), solver, count
+            config.pairs.dir, config.pairs.count = Path(folder), count
+            config.pairs.reverse_share = float(name == "reverse")
+            config.pairs.solver = "fast" if name == "fast" else "fine"
             mine = prepare_pairs(config)
             write_amortiser(setup, mine)
             marks: list[tuple[int, float]] = []
@@ -194,10 +198,38 @@ def whole(setup: PairSetup, count: int) -> None:
             generate_pairs(config, maker, mine.store, shard_progress=mark)
             first = next(mark for mark in marks if mark[0] >= cores)  # until then workers are starting
             rate = (marks[-1][0] - first[0]) * mine.store.shard_size / (marks[-1][1] - first[1])
-            rows.append([solver, f"{rate:,.0f}", f"{first[1] - marks[0][1]:.1f}"])
+            rows.append([name, f"{rate:,.0f}", f"{first[1] - marks[0][1]:.1f}"])
     worker, own = (resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_CHILDREN, resource.RUSAGE_SELF))
     print_table([f"`mrhubo.pair` on {cores} cores", "pairs/s", "first shards after [s]"], rows)
     print(f"\nmemory: {own:.2f} GB here at most (all methods), {worker:.2f} GB a worker\n")
+
+
+def reverse(setup: PairSetup, maker: PairGenerator, count: int = 5_000) -> None:
+    """Pairs from human poses: how fast and how well they are retargeted, and whether alike poses get alike angles."""
+    generator, device = torch.Generator().manual_seed(7), maker.device
+    z = maker.settings.reverse_spread * torch.randn(count, maker.prior.latent, generator=generator)
+    near = z + 0.05 * torch.randn(z.shape, generator=generator)
+    with torch.no_grad():
+        pose, near_pose = (maker.prior.decode(latent.to(device)) for latent in (z, near))
+    rows = []
+    for starts in (2, 4, 12):
+        reference = ReferenceRetargeter(setup.body_map, starts=starts)
+        with use_threads(1):
+            start = time.perf_counter()
+            q, cost = reference.solve_frames(pose)
+            seconds = time.perf_counter() - start
+        moved = (reference.solve_frames(near_pose)[0] - q).abs().amax(1)
+        used = " (used)" if starts == maker.reference.starts else ""
+        rows.append(
+            [
+                f"{starts} starts{used}", f"{count / seconds:,.0f}", f"{cost.mean():.5f}", f"{moved.median():.3f}",
+                f"{(moved > 0.5).float().mean():.2%}",
+            ]
+        )  # fmt: skip
+    print_table(
+        ["reverse pairs", "poses/s, 1 thread", "mean cost", "turn to a near pose: median [rad]", "over 0.5 rad"], rows
+    )
+    print("\nnear pose: every latent number 0.05 standard deviations away\n")
 
 
 def write_amortiser(source: PairSetup, target: PairSetup) -> None:

@@ -166,7 +166,7 @@ def train(
     """
     config, settings, ranks = prepared.config, prepared.config.trainer, ranks or Ranks()
     pairs = prepared.store.read_all()
-    pair_filter = make_filter(pairs["phi"], config.pairs.filter, config.pairs.filter_k)
+    pair_filter = make_filter(pairs["phi"], config.pairs.filter, config.pairs.filter_k, pairs["reverse"])
     if not bool((pair_filter.probability_P > 0).any()):
         raise UserError(f"pairs.filter_k: {config.pairs.filter_k} drops every pair; raise it")
     with torch.random.fork_rng(devices=[]):

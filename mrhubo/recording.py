@@ -100,8 +100,14 @@ class Recording:
 
     def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, report: PairingReport) -> None:
         """Metrics and pictures of the pairs."""
-        metrics = {
-            "pairs/count": float(len(pairs["phi"])),
+        count, reverse_P = len(pairs["phi"]), pairs["reverse"]
+        metrics = {"pairs/count": float(count), "pairs/reverse_share": float(reverse_P.float().mean())}
+        if bool(reverse_P.any()):
+            metrics["pairs/reverse_residual_mm"] = 1000 * float(pairs["residual_m"][reverse_P].mean())
+        if not bool(reverse_P.all()):  # phi and the filter are about the human poses that were made for robot poses
+            pairs = {name: tensor[~reverse_P] for name, tensor in pairs.items()}
+            pair_filter = PairFilter(pair_filter.probability_P[~reverse_P], pair_filter.threshold)
+        metrics |= {
             "pairs/kept_share": pair_filter.kept_share,
             "pairs/mean_probability": float(pair_filter.probability_P.mean()),
             "pairs/ik_cost": float(pairs["cost"].mean()),

@@ -24,7 +24,7 @@ from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
 from mrhubo.storage import remove_leftovers, write_tensors
 
-SMALL = ["pairs.count=750", "pairs.shard_size=150", "pairs.amortiser_steps=60", "pairs.fine_steps=4"]
+SMALL = ["pairs.count=900", "pairs.shard_size=150", "pairs.amortiser_steps=60", "pairs.fine_steps=4"]
 
 
 def arguments(root: Path, folder: Path, *more: str) -> list[str]:
@@ -74,14 +74,19 @@ def test_pairs_are_made_summed_up_and_found_again(
 ) -> None:
     main(arguments(root, tmp_path))
     first = capsys.readouterr().out
-    assert "of 750 pairs" in first and "the filter keeps" in first and "made 750 pairs" in first
+    assert (
+        "450 pairs from robot poses" in first
+        and "450 pairs from human poses" in first
+        and "the filter keeps" in first
+        and "made 900 pairs" in first
+    )
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.safetensors")}
     main(arguments(root, tmp_path))
     assert "made nothing: all were there" in capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.safetensors")} == before
     assert contents(tmp_path) == contents(undisturbed)
     main(arguments(root, tmp_path, "--verify"))
-    assert "all 5 shards are whole" in capsys.readouterr().out
+    assert "all 6 shards are whole" in capsys.readouterr().out
 
 
 def test_inspect_prints_a_summary_and_draws_a_picture(
@@ -90,7 +95,9 @@ def test_inspect_prints_a_summary_and_draws_a_picture(
     main(arguments(root, tmp_path, "--inspect"))
     output = capsys.readouterr().out
     pairs = spoilt.read_all()
-    assert f"{1000 * float(pairs['residual_m'].mean()):.3g}" in output and "picture:" in output
+    for reverse in (False, True):
+        assert f"{1000 * float(pairs['residual_m'][pairs['reverse'] == reverse].mean()):.3g}" in output
+    assert "picture:" in output
     picture = Image.open(spoilt.folder / "pairs.png")
     assert picture.width > 800 and len(picture.getcolors(1 << 24)) > 100
     main(arguments(root, tmp_path, "--verify"))  # the picture disturbs nothing
@@ -120,7 +127,7 @@ def alter(store: PairStore, damage: str) -> None:
         path.write_bytes(store.path(3).read_bytes())
     else:
         pairs = store.read(2)
-        header = {**store.header, "index": "2"}
+        header = store.header_of(2)
         if damage == "outside the limits":
             pairs["q"][7, 0] = 9.0
         elif damage == "wrong kinematics":
@@ -146,7 +153,7 @@ DAMAGES = {
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_verify_names_a_bad_shard(root: Path, spoilt: PairStore, tmp_path: Path, damage: str) -> None:
     alter(spoilt, damage)
-    with pytest.raises(UserError, match=f"pairs-000002.*{DAMAGES[damage]}.*without --verify"):
+    with pytest.raises(UserError, match=f"forward-000002.*{DAMAGES[damage]}.*without --verify"):
         main(arguments(root, tmp_path, "--verify"))
     robot = pipeline.prepare_pairs(load_config(root / "conf" / "nao.yaml", [f"pairs.dir={tmp_path}"])).body_map.robot
     assert check_shard(spoilt, robot, 1) is None
@@ -277,7 +284,7 @@ def test_ranks_share_the_work_and_a_dead_ranks_part(
     assert process.stdout.count("made 300 pairs") == 1, "one rank reports, for all"
     assert "pairs: 150 of 150" in process.stderr, "each rank made one of the two"
     assert contents(tmp_path) == contents(undisturbed)
-    assert sum(path.stat().st_mtime > before for path in spoilt.folder.glob("pairs-*")) == 2
+    assert sum(path.stat().st_mtime > before for path in spoilt.folder.glob("*-0*")) == 2
 
 
 def test_leftovers_of_the_dead_are_removed_and_no_others(tmp_path: Path) -> None:

@@ -76,13 +76,14 @@ class Artist:
         columns = ["robot pose q", "human pose H", "denoised H~"]
         return figure_sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
 
-    def pair_sheet(self, pairs: Mapping[str, Tensor], measures: Mapping[str, Tensor]) -> Image:
-        """`ranked_pairs` over the distributions of `measures` (phi, residual_m and z_norm (P,), which may be of more
-        pairs than are drawn from).
-        """
+    def pair_sheet(self, pairs: Mapping[str, Tensor], measures: Mapping[str, Mapping[str, Tensor]]) -> Image:
+        """`ranked_pairs` over the distributions of `measures`: phi, residual_m and z_norm (P,) by where pairs start."""
         figures = self.ranked_pairs(pairs)
-        shown = {name: unit * measures[name].numpy() for name, unit in PAIR_MEASURES.items()}
-        charts = distributions({"pairs": shown}, PAIR_TITLES, (figures.width, 300))
+        shown = {
+            f"from {source}": {name: unit * values[name].numpy() for name, unit in PAIR_MEASURES.items()}
+            for source, values in measures.items()
+        }
+        charts = distributions(shown, PAIR_TITLES, (figures.width, 300))
         return contact_sheet([[figures], [charts]], gap=0)
 
     def ranked_pairs(self, pairs: Mapping[str, Tensor]) -> Image:

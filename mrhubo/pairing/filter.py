@@ -30,16 +30,24 @@ class PairFilter:
         return accepted[torch.randperm(len(accepted), generator=generator)]
 
 
-def make_filter(phi_P: Tensor, rule: str, k: float) -> PairFilter:
+def make_filter(phi_P: Tensor, rule: str, k: float, reverse_P: Tensor | None = None) -> PairFilter:
     """The filter of a dataset.
 
     Args:
         phi_P: reconstruction errors.
         rule: `linear` (1 at the smallest phi, falling linearly to 0 at the threshold), `hard` (1 up to the
-        threshold) or
-            `none` (1 everywhere; the threshold is then only reported).
+            threshold) or `none` (1 everywhere; the threshold is then only reported).
         k: the threshold is mean + k * standard deviation.
+        reverse_P: pairs whose human pose was drawn from the prior and needs no judgement: they take part in every draw,
+            and the filter is that of the others, if there are others.
     """
+    if reverse_P is not None and bool(reverse_P.any()) and not bool(reverse_P.all()):
+        forward = make_filter(phi_P[~reverse_P], rule, k)
+        probability_P = torch.ones(len(phi_P))
+        probability_P[~reverse_P] = forward.probability_P
+        return PairFilter(probability_P, forward.threshold)
+    if reverse_P is not None and bool(reverse_P.any()):
+        rule = "none"
     phi_P = phi_P.double().cpu()
     threshold = float(phi_P.mean() + k * phi_P.std()) if len(phi_P) > 1 else float(phi_P.max())
     if rule == "none":

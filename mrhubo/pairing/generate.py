@@ -1,4 +1,8 @@
-"""Algorithm 1 of MR.HuBo: random robot poses to pairs of robot and human pose, shard by shard.
+"""Pairs of robot and human pose, shard by shard: forward, from random robot poses (algorithm 1 of MR.HuBo), and
+reverse, from human poses of the prior.
+
+Forward pairs never hold a human pose that the robot cannot reach. Reverse pairs do, as the reference retargeter answers
+any pose; no human motion is needed for them either.
 
 Legend: B pairs of a shard, N robot joints, K keypoints, J = 21 human joints, Z latent numbers.
 """
@@ -6,6 +10,7 @@ Legend: B pairs of a shard, N robot joints, K keypoints, J = 21 human joints, Z 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import torch
 from torch import Tensor
@@ -18,8 +23,12 @@ from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.inverse import solve_lbfgs
 from mrhubo.pairing.store import PairStore
+from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import BodyMap
 from mrhubo.threads import use_threads
+
+_STARTS = 4
+"""Starts of the reference retargeter for a reverse pair: 12 take twice as long, for a cost that is 0.3% lower."""
 
 
 class PairGenerator:
@@ -44,7 +53,7 @@ class PairGenerator:
 
     def prepare(self, store: PairStore, progress: Callable[[int, float], None] = lambda step, cost: None) -> None:
         """Reads or trains the amortised solver, if the config's solver uses one; `progress` gets (step, mean cost)."""
-        if self.settings.solver == "paper":
+        if self.settings.solver == "paper" or not store.counts["forward"]:
             return
         settings, header = self.settings, {**store.header, "what": "amortiser"}
         with use_threads():
@@ -71,31 +80,54 @@ class PairGenerator:
         steps, metric_ZZ = self.settings.fine_steps, self.amortiser.metric_ZZ
         return solve_quasi_newton(self.problem, start, target_BK3, steps, metric_ZZ=metric_ZZ)
 
-    def shard(self, index: int) -> dict[str, Tensor]:
-        """The pairs of one shard: what `PairStore.read` names, on the CPU.
+    @cached_property
+    def reference(self) -> ReferenceRetargeter:
+        """Answers the human poses of reverse pairs."""
+        return ReferenceRetargeter(self.body_map, starts=_STARTS)
+
+    def shard(self, direction: str, index: int) -> dict[str, Tensor]:
+        """The pairs of one shard, `forward` or `reverse`: what `PairStore.read` names, on the CPU.
 
         On a CPU always with one thread, so that the bytes do not depend on how many cores or processes there are; more
         cores are used by more processes (`mrhubo.pairing.workers`).
         """
         with use_threads(1):
-            generator = torch.Generator().manual_seed(_shard_seed(self.settings.seed, index))
-            q_BN = self.robot.sample(self.settings.shard_size, generator)
+            # Forward shards count upwards from 0, reverse ones downwards from -1.
+            seed = _shard_seed(self.settings.seed, index if direction == "forward" else -1 - index)
+            generator = torch.Generator().manual_seed(seed)
+            z_BZ, q_BN = self._draw(direction, generator)
             with torch.no_grad():
                 poses = self.robot.forward(q_BN)
                 target_BK3 = self.body_map.targets(poses)
                 orientation_BM6 = self.robot.moving_orientations(poses)
-            z_BZ = self.solve(target_BK3)
+            if z_BZ is None:
+                z_BZ = self.solve(target_BK3)
             chunk = poses_at_once(self.device)
-            parts = [self._describe(*part) for part in zip(z_BZ.split(chunk), target_BK3.split(chunk), strict=True)]
+            cut = zip(z_BZ.split(chunk), target_BK3.split(chunk), strict=True)
+            parts = [self._describe(*part, direction) for part in cut]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
     @torch.no_grad()
-    def _describe(self, z_BZ: Tensor, target_BK3: Tensor) -> dict[str, Tensor]:
+    def _draw(self, direction: str, generator: torch.Generator) -> tuple[Tensor | None, Tensor]:
+        """Latents (B, Z), which forward pairs have yet to be given, and joint angles (B, N)."""
+        count = self.settings.shard_size
+        if direction == "forward":
+            return None, self.robot.sample(count, generator)
+        z_BZ = self.settings.reverse_spread * torch.randn(count, self.prior.latent, generator=generator)
+        z_BZ = z_BZ.to(self.device)
+        poses = [self.prior.decode(part) for part in z_BZ.split(poses_at_once(self.device))]
+        return z_BZ, self.reference.solve_frames(torch.cat(poses))[0]
+
+    @torch.no_grad()
+    def _describe(self, z_BZ: Tensor, target_BK3: Tensor, direction: str) -> dict[str, Tensor]:
         """Human poses of latents, and how good they are."""
         matrices = self.prior.decode_matrices(z_BZ)
         pose_BJ6 = rotation.matrix_to_sixd(matrices)
-        points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
+        if direction == "forward":
+            points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
+        else:  # the prior's humans bend their backs; only what the robot has is compared, on an upright human
+            points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(pose_BJ6))
         distance_BK = (points_BK3 - target_BK3).norm(dim=-1)
         prior_B = z_BZ.square().sum(-1)
         return {

@@ -1,14 +1,17 @@
 """Pairs on disk: a folder per pairing config, shards that are whole or absent, each dependent on (config, seed,
-index) only.
+direction, index) only.
+
+A forward pair starts from a random robot pose (MR.HuBo), a reverse pair from a human pose drawn from the prior; a shard
+holds pairs of one direction.
 
 The folder is named after the robot and the fingerprint of everything that decides the pairs, and each shard's header
-repeats it, so that pairs of two configs never mix. How many pairs are wanted is not part of it: more pairs reuse what
-is there.
+repeats it, so that pairs of two configs never mix. How many pairs are wanted, and how many of them reverse, is not part
+of it: more pairs reuse what is there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +26,8 @@ from mrhubo.storage import DamagedFile, read_some_tensors, read_tensors, write_t
 
 MEASURES = ("phi", "cost", "residual_m", "z_norm")
 """One number a pair: reconstruction error, cost of the inverse kinematics, mean keypoint distance [m], norm of z."""
-SCHEMA = "mrhubo.pairs/2"
-_NOT_IN_PAIRS = ("count", "dir", "workers", "filter", "filter_k")
+SCHEMA = "mrhubo.pairs/3"
+_NOT_IN_PAIRS = ("count", "reverse_share", "dir", "workers", "filter", "filter_k")
 """Keys of `pairs` that do not change what a shard holds."""
 _NOT_IN_ROBOT = ("urdf", "key_links")
 
@@ -53,52 +56,71 @@ def pairs_header(config: Config, body_map: BodyMap, prior: BodyPrior) -> dict[st
 class PairStore:
     """The shards of one pairing config."""
 
-    def __init__(self, folder: Path, header: Mapping[str, str], count: int, shard_size: int, joints: int) -> None:
+    def __init__(
+        self, folder: Path, header: Mapping[str, str], count: int, reverse_share: float, shard_size: int, joints: int
+    ) -> None:
         """`joints` is the number N of robot joints; every shard holds `shard_size` pairs, `count` of all are used."""
         self.folder = folder / f"{header['robot']}-{header['fingerprint']}"
         self.header, self.count, self.shard_size, self.joints = dict(header), count, shard_size, joints
-        self.shards = -(-count // shard_size)
+        self.counts = {"forward": count - round(count * reverse_share), "reverse": round(count * reverse_share)}
+        """Pairs of each direction that are used."""
+        self._places = [
+            (direction, index) for direction, used in self.counts.items() for index in range(-(-used // shard_size))
+        ]
+        self.shards = len(self._places)
 
     @classmethod
     def of(cls, config: Config, body_map: BodyMap, prior: BodyPrior) -> PairStore:
         """The store of a config's pairs; `pairs.dir` must be set."""
         assert config.pairs.dir is not None
-        header = pairs_header(config, body_map, prior)
-        return cls(config.pairs.dir, header, config.pairs.count, config.pairs.shard_size, len(config.robot.joints))
+        pairs, header = config.pairs, pairs_header(config, body_map, prior)
+        return cls(
+            config.pairs.dir, header, pairs.count, pairs.reverse_share, pairs.shard_size, len(config.robot.joints)
+        )
 
     @property
     def amortiser_path(self) -> Path:
         """File of the amortised solver of this config."""
         return self.folder / "amortiser.safetensors"
 
-    def path(self, index: int) -> Path:
+    def place(self, number: int) -> tuple[str, int]:
+        """Direction and index of one shard, of those numbered 0 to `shards` - 1."""
+        return self._places[number]
+
+    def path(self, number: int) -> Path:
         """File of one shard."""
-        return self.folder / f"pairs-{index:06d}.safetensors"
+        direction, index = self.place(number)
+        return self.folder / f"{direction}-{index:06d}.safetensors"
 
-    def missing(self, indices: Iterable[int] | None = None) -> list[int]:
-        """Indices (of the given ones, or of all) of shards to be made: absent, damaged or foreign ones."""
-        return [index for index in (range(self.shards) if indices is None else indices) if not self._whole(index)]
+    def missing(self, numbers: Iterable[int] | None = None) -> list[int]:
+        """Numbers (of the given ones, or of all) of shards to be made: absent, damaged or foreign ones."""
+        return [number for number in (range(self.shards) if numbers is None else numbers) if not self._whole(number)]
 
-    def _whole(self, index: int) -> bool:
+    def _whole(self, number: int) -> bool:
         try:
-            self.read(index)
+            self.read(number)
         except DamagedFile:
             return False
         return True
 
-    def write(self, index: int, tensors: Mapping[str, Tensor]) -> None:
-        """Writes one shard atomically."""
-        write_tensors(self.path(index), tensors, {**self.header, "index": str(index)})
+    def header_of(self, number: int) -> dict[str, str]:
+        """What one shard's header must say."""
+        direction, index = self.place(number)
+        return {**self.header, "direction": direction, "index": str(index)}
 
-    def read(self, index: int) -> dict[str, Tensor]:
+    def write(self, number: int, tensors: Mapping[str, Tensor]) -> None:
+        """Writes one shard atomically."""
+        write_tensors(self.path(number), tensors, self.header_of(number))
+
+    def read(self, number: int) -> dict[str, Tensor]:
         """One shard, checked.
 
         Raises:
-            DamagedFile: it is missing, damaged, or was made for another config, seed or index.
+            DamagedFile: it is missing, damaged, or was made for another config, seed, direction or index.
         """
-        path = self.path(index)
+        path = self.path(number)
         tensors, header = read_tensors(path)
-        self._check_header(path, header, index)
+        self._check_header(path, header, number)
         size = self.shard_size
         shapes = {
             "q": (size, self.joints),
@@ -114,22 +136,41 @@ class PairStore:
                 raise DamagedFile(f"{path}: '{name}' holds NaN or infinite numbers")
         return tensors
 
-    def read_measures(self, index: int) -> dict[str, Tensor]:
+    def read_measures(self, number: int) -> dict[str, Tensor]:
         """MEASURES (P,) of one shard, without the rest of it and unchecked against its checksum.
 
         Raises:
-            DamagedFile: it is missing, truncated, or was made for another config, seed or index.
+            DamagedFile: it is missing, truncated, or was made for another config, seed, direction or index.
         """
-        path = self.path(index)
+        path = self.path(number)
         tensors, header = read_some_tensors(path, MEASURES)
-        self._check_header(path, header, index)
+        self._check_header(path, header, number)
         return tensors
 
-    def _check_header(self, path: Path, header: Mapping[str, str], index: int) -> None:
-        if header != {**self.header, "index": str(index)}:
+    def _check_header(self, path: Path, header: Mapping[str, str], number: int) -> None:
+        if header != self.header_of(number):
             raise DamagedFile(f"{path}: was made for other settings than this config's")
 
     def read_all(self) -> dict[str, Tensor]:
-        """The first `count` pairs: q (P, N), R (P, N, 6), H (P, 21, 6), phi, cost, residual_m, z_norm (P,)."""
-        parts = [self.read(index) for index in range(self.shards)]
-        return {name: torch.cat([part[name] for part in parts])[: self.count] for name in parts[0]}
+        """The first `counts` pairs of each direction: q (P, N), R (P, N, 6), H (P, 21, 6), phi, cost, residual_m,
+        z_norm (P,) and reverse (P,), true where a pair starts from the human.
+        """
+        return self._join(self.read)
+
+    def read_all_measures(self, most_shards: int) -> dict[str, Tensor]:
+        """MEASURES and reverse (P,); of more shards than `most_shards`, of that many, evenly spread.
+
+        Raises:
+            DamagedFile: a shard is missing, truncated, or was made for another config, seed, direction or index.
+        """
+        return self._join(self.read_measures, max(1, -(-self.shards // most_shards)))
+
+    def _join(self, read: Callable[[int], dict[str, Tensor]], step: int = 1) -> dict[str, Tensor]:
+        left, parts = dict(self.counts), []
+        for number in range(0, self.shards, step):
+            direction, _ = self.place(number)
+            used = min(self.shard_size, left[direction])
+            left[direction] -= used
+            tensors = {name: tensor[:used] for name, tensor in read(number).items()}
+            parts.append({**tensors, "reverse": torch.full((used,), direction == "reverse")})
+        return {name: torch.cat([part[name] for part in parts]) for name in parts[0]}

@@ -19,6 +19,8 @@ from mrhubo.robot import Robot
 from mrhubo.storage import DamagedFile
 
 _TOLERANCE = 1e-4
+SOURCES = {"robot poses": False, "human poses": True}
+"""Where pairs start, in words, and whether those are the reverse ones."""
 _MOST_SHARDS = 1_000
 """A summary of more shards reads that many, evenly spread."""
 
@@ -68,9 +70,10 @@ class PairSummary:
 
     count: int
     """Pairs that were read."""
-    measures: dict[str, Tensor]
-    """phi, cost, residual_m and z_norm (P,) of those pairs."""
+    measures: dict[str, dict[str, Tensor]]
+    """phi, cost, residual_m and z_norm (P,) of those pairs, by where they start: SOURCES."""
     kept_share: float
+    """Share of the pairs from robot poses that the filter lets through; of all pairs if there are none."""
     threshold: float
 
     def table(self) -> str:
@@ -81,12 +84,16 @@ class PairSummary:
             "residual_m": ("keypoint distance [mm]", 1000.0),
             "z_norm": ("|z|", 1.0),
         }
-        lines = [f"{'of ' + format(self.count, ',') + ' pairs':<32}{'mean':>10}{'median':>10}{'99%':>10}"]
-        for name, (title, unit) in names.items():
-            values = unit * self.measures[name].double().numpy()
-            numbers = values.mean(), np.median(values), np.quantile(values, 0.99)
-            lines.append(f"{title:<32}" + "".join(f"{number:>10.3g}" for number in numbers))
-        lines.append(f"the filter keeps {self.kept_share:.1%}: phi up to {self.threshold:.3g}")
+        lines = []
+        for source, measures in self.measures.items():
+            count = f"{len(measures['phi']):,}"
+            lines.append(f"{count + ' pairs from ' + source:<36}{'mean':>10}{'median':>10}{'99%':>10}")
+            for name, (title, unit) in names.items():
+                values = unit * measures[name].double().numpy()
+                numbers = values.mean(), np.median(values), np.quantile(values, 0.99)
+                lines.append(f"  {title:<34}" + "".join(f"{number:>10.3g}" for number in numbers))
+        if "robot poses" in self.measures:
+            lines.append(f"the filter keeps {self.kept_share:.1%}: phi up to {self.threshold:.3g}")
         return "\n".join(lines)
 
 
@@ -96,8 +103,8 @@ def summarise(store: PairStore, rule: str, k: float) -> PairSummary:
     Raises:
         DamagedFile: a shard is missing, or not of this store.
     """
-    step = max(1, -(-store.shards // _MOST_SHARDS))
-    parts = [store.read_measures(index) for index in range(0, store.shards, step)]
-    measures = {name: torch.cat([part[name] for part in parts])[: store.count] for name in MEASURES}
-    pair_filter = make_filter(measures["phi"], rule, k)
-    return PairSummary(len(measures["phi"]), measures, pair_filter.kept_share, pair_filter.threshold)
+    found = store.read_all_measures(_MOST_SHARDS)
+    rows = {source: found["reverse"] == reverse for source, reverse in SOURCES.items()}
+    measures = {s: {name: found[name][rows_P] for name in MEASURES} for s, rows_P in rows.items() if bool(rows_P.any())}
+    pair_filter = make_filter(next(iter(measures.values()))["phi"], rule, k)
+    return PairSummary(len(found["phi"]), measures, pair_filter.kept_share, pair_filter.threshold)

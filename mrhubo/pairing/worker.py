@@ -48,6 +48,6 @@ def make_shard(generator: PairGenerator, store: PairStore, index: int) -> dict[s
     """
     if store.path(index).exists():
         return {"shard": index}
-    tensors = generator.shard(index)
+    tensors = generator.shard(*store.place(index))
     store.write(index, tensors)
     return {"shard": index, **{name: float(tensors[name].mean()) for name in ("cost", "residual_m")}}

@@ -11,10 +11,17 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.config import Config, load_config
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
+from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import build_body_map
 from mrhubo.storage import DamagedFile
 
-SMALL = ["pairs.count=250", "pairs.shard_size=100", "pairs.amortiser_steps=30", "pairs.fine_steps=3"]
+SMALL = [
+    "pairs.count=250",
+    "pairs.reverse_share=0.4",
+    "pairs.shard_size=100",
+    "pairs.amortiser_steps=30",
+    "pairs.fine_steps=3",
+]
 
 
 def config_of(root: Path, folder: Path, *overrides: str) -> Config:
@@ -53,13 +60,45 @@ def test_pairs_are_what_they_say(root: Path, made: PairStore) -> None:
     torch.testing.assert_close(prior.reconstruction_error(pairs["H"]), pairs["phi"], atol=1e-6, rtol=1e-3)
     target = body_map.targets(robot.forward(pairs["q"]))
     reached = body_map.skeleton.keypoints(matrices)[:, body_map.keypoint_indices]
+    reached[150:] = body_map.human_keypoints(body_map.human_directions(pairs["H"][150:]))
     torch.testing.assert_close((reached - target).norm(dim=-1).mean(1), pairs["residual_m"], atol=1e-5, rtol=1e-3)
+    assert pairs["reverse"].tolist() == 150 * [False] + 100 * [True]
     directions = body_map.human_directions(pairs["H"]) * body_map.robot_directions(robot.forward(pairs["q"]))
-    assert float(directions.sum(-1).mean()) > 0.8, "human and robot limbs point the same way"
+    for reverse in (False, True):
+        same = directions.sum(-1)[pairs["reverse"] == reverse].mean()
+        assert float(same) > 0.8, "human and robot limbs point the same way"
+
+
+def test_reverse_pairs_are_the_references_answer_to_the_priors_poses(root: Path, made: PairStore) -> None:
+    pairs = {name: tensor[made.read_all()["reverse"]] for name, tensor in made.read_all().items()}
+    reference = ReferenceRetargeter(build_body_map(config_of(root, made.folder.parent).robot))
+    target = reference.body_map.human_directions(pairs["H"])
+    cost_B = reference.problem.quadratic(pairs["q"], target).cost_BC.sum(1)
+    assert float((cost_B - reference.problem.minimise(pairs["q"], target)[1].sum(1)).max()) < 1e-3, "converged"
+    assert float(cost_B.mean()) < 1.02 * float(reference.solve_frames(pairs["H"])[1].mean()), (
+        "no better with more starts"
+    )
+    assert abs(float(pairs["z_norm"].mean()) / BodyPrior.open().latent ** 0.5 - 1.1) < 0.1
+
+
+def test_another_share_of_reverse_pairs_keeps_what_is_there(root: Path, made: PairStore, tmp_path: Path) -> None:
+    found = {}
+    for share in (0.0, 1.0, 0.4):
+        store = generate(config_of(root, tmp_path, f"pairs.reverse_share={share}"))
+        assert float(store.read_all()["reverse"].float().mean()) == pytest.approx(share)
+        again = {path.name: path.stat().st_mtime_ns for path in store.folder.iterdir()}
+        assert again.items() >= found.items()
+        found = again
+    assert contents(store).items() >= contents(made).items()
+
+
+def test_reverse_pairs_alone_need_no_amortised_solver(root: Path, tmp_path: Path) -> None:
+    store = generate(config_of(root, tmp_path, "pairs.reverse_share=1", "pairs.count=100"))
+    assert [path.name for path in store.folder.iterdir()] == ["reverse-000000.safetensors"]
 
 
 def test_joint_angles_are_uniform(made: PairStore) -> None:
-    q = made.read_all()["q"]
+    q = made.read_all()["q"][:150]  # the others follow human poses
     unit = (q - q.amin(0)) / (q.amax(0) - q.amin(0))
     assert float((unit.mean(0) - 0.5).abs().max()) < 0.08
     assert float(torch.corrcoef(q.T).fill_diagonal_(0).abs().max()) < 0.25
@@ -73,7 +112,7 @@ def test_more_pairs_keep_what_is_there(root: Path, tmp_path: Path) -> None:
     few = generate(config_of(root, tmp_path, "pairs.count=150"))
     before = {path.name: path.stat().st_mtime_ns for path in few.folder.iterdir()}
     many = generate(config_of(root, tmp_path, "pairs.count=300"))
-    assert many.folder == few.folder and many.shards == 3
+    assert many.folder == few.folder and many.shards == 4
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in many.folder.iterdir()}.items()
 
 
@@ -157,4 +196,5 @@ def test_the_amortisers_training_resumes_exactly(root: Path, tmp_path: Path, mon
 
 def test_the_papers_solver_needs_no_amortiser(root: Path, tmp_path: Path) -> None:
     store = generate(config_of(root, tmp_path, "pairs.solver=paper", "pairs.count=100"))
-    assert not store.amortiser_path.exists() and float(store.read_all()["cost"].mean()) < 5
+    pairs = store.read_all()
+    assert not store.amortiser_path.exists() and float(pairs["cost"][~pairs["reverse"]].mean()) < 5

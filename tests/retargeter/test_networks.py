@@ -76,9 +76,10 @@ def test_impossible_input_joints_are_refused(names: tuple[str, ...]) -> None:
         PoseFeatures(names, "chest")
 
 
-def test_losses_are_the_papers() -> None:
+@pytest.mark.parametrize(("loss", "power"), [("l1", 1), ("mse", 2)])
+def test_losses_are_the_papers(loss: str, power: int) -> None:
     net = network()
-    module = RetargetModule(net, TrainerConfig(), detach_student=True)
+    module = RetargetModule(net, TrainerConfig(loss=loss), detach_student=True)
     features, links, q = torch.randn(8, 18), torch.randn(8, 3, 6), torch.rand(8, 3)
     losses = module.losses(features, links, q)
     assert net.pre is not None
@@ -87,8 +88,8 @@ def test_losses_are_the_papers() -> None:
     def angles(given: torch.Tensor) -> torch.Tensor:
         return (UPPER + LOWER) / 2 + (UPPER - LOWER) / 2 * torch.tanh(net.post(given))
 
-    pre = ((links.flatten(1) - predicted) ** 2).mean()
-    post = ((q - angles(links.flatten(1))) ** 2).mean() + ((q - angles(predicted)) ** 2).mean()
+    pre = ((links.flatten(1) - predicted).abs() ** power).mean()
+    post = sum(((q - angles(given)).abs() ** power).mean() for given in (links.flatten(1), predicted))
     torch.testing.assert_close(losses["loss_pre"], pre)
     torch.testing.assert_close(losses["loss_post"], post)
     torch.testing.assert_close(losses["loss"], pre + post)
