@@ -7,7 +7,7 @@ import select
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from mrhubo.config.help import help_text
 from mrhubo.config.kinds import example, requires_anything, walk
@@ -24,16 +24,18 @@ def parse_arguments(
     description: str,
     schema: type[T] = Config,
     flags: Mapping[str, str] | None = None,
-) -> tuple[T, dict[str, bool]]:
+) -> tuple[T, dict[str, Any]]:
     """``--config FILE``, ``--help``, the given flags and ``key.sub=value`` -> (config, {flag: given?}).
 
-    `flags` maps a name (``quiet`` for ``--quiet``) to its meaning. ``--help`` prints `help_text` and exits with 0.
+    `flags` maps a name (``quiet`` for ``--quiet``) to its meaning. One with a word for its value (``out FILE`` for
+    ``--out FILE``) gives that value, or None if it is not given. ``--help`` prints `help_text` and exits with 0.
     """
     meanings = {name.lstrip("-"): text for name, text in (flags or {}).items()}
     if "--help" in argv or "-h" in argv:
         print(help_text(schema, prog, description, meanings), end="")
         raise SystemExit(0)
-    given = dict.fromkeys(meanings, False)
+    with_value = {name.split()[0]: name.split()[1] for name in meanings if " " in name}
+    given: dict[str, Any] = {name.split()[0]: None if " " in name else False for name in meanings}
     files: list[str] = []
     overrides: list[str] = []
     rest = iter(argv)
@@ -44,6 +46,13 @@ def parse_arguments(
             if not file or file.startswith("-"):
                 raise UserError("command line: --config needs a file name")
             files.append(file)
+        elif name[2:] in with_value and name.startswith("--"):
+            text = value if equals else next(rest, "")
+            if not text or text.startswith("-"):
+                raise UserError(f"command line: {name} needs a value: {name} {with_value[name[2:]]}")
+            if given[name[2:]] is not None:
+                raise UserError(f"command line: {name} is given twice")
+            given[name[2:]] = text
         elif argument.startswith("--") and argument[2:] in given:
             given[argument[2:]] = True
         elif argument.startswith("-"):

@@ -1,7 +1,7 @@
 """Optimisation-based human -> robot retargeting (the ground truth, and the peer to beat), and the metrics."""
 
 from mrhubo.reference.jacobian import DirectionJacobian
-from mrhubo.reference.metrics import direction_error, joint_error, link_error
+from mrhubo.reference.metrics import at_limit_share, direction_error, direction_jerk, joint_error, link_error
 from mrhubo.reference.retarget import ReferenceResult, ReferenceRetargeter
 from mrhubo.reference.solve import DirectionProblem
 
@@ -10,7 +10,9 @@ __all__ = [
     "DirectionProblem",
     "ReferenceResult",
     "ReferenceRetargeter",
+    "at_limit_share",
     "direction_error",
+    "direction_jerk",
     "joint_error",
     "link_error",
 ]

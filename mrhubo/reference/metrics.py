@@ -14,6 +14,8 @@ from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.rotation import wrap_angle
 
+_AT_LIMIT = 1e-3
+
 
 def joint_error(q_TN: Tensor, q_ref_TN: Tensor) -> Tensor:
     """Mean absolute difference of joint angles (T,) [rad], modulo 2 pi."""
@@ -40,6 +42,16 @@ def direction_error(body_map: BodyMap, q_TN: Tensor, pose_TJ6: Tensor) -> Tensor
     """Angle (T, D) [degrees] between the robot's directions and those of human poses (T, 21, 6), from the chest."""
     robot_TD3 = body_map.robot_directions(body_map.robot.forward(q_TN))
     return torch.rad2deg(angle_between(robot_TD3, body_map.human_directions(pose_TJ6)))
+
+
+def at_limit_share(robot: Robot, q_TN: Tensor) -> Tensor:
+    """Share of the joints (T,) that are at a limit, within 0.001 rad."""
+    return ((q_TN - robot.lower_N < _AT_LIMIT) | (robot.upper_N - q_TN < _AT_LIMIT)).float().mean(dim=-1)
+
+
+def direction_jerk(directions_TD3: Tensor, frame_rate: float) -> Tensor:
+    """Mean jerk (T - 3,) [1/s^3] of unit directions (T, D, 3): the length of their third difference in time."""
+    return directions_TD3.diff(n=3, dim=0).norm(dim=-1).mean(dim=-1) * frame_rate**3
 
 
 def angle_between(a: Tensor, b: Tensor) -> Tensor:

@@ -17,14 +17,13 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
-from mrhubo.reference.metrics import angle_between
+from mrhubo.reference.metrics import angle_between, at_limit_share
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.trajectory import pick, smooth_motion
 from mrhubo.robot import BodyMap
 
 _REFERENCE_RATE = 24.0
-_AT_LIMIT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -141,10 +140,10 @@ class ReferenceRetargeter:
 
     def _result(self, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> ReferenceResult:
         problem = self.problem
-        robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
-        at_limit_TN = (q_TN - problem.lower_N < _AT_LIMIT) | (problem.upper_N - q_TN < _AT_LIMIT)
+        robot = self.body_map.robot
+        robot_TD3 = self.body_map.robot_directions(robot.forward(q_TN))
         return ReferenceResult(
-            q_TN, torch.rad2deg(angle_between(robot_TD3, target_TD3)), float(at_limit_TN.float().mean()),
+            q_TN, torch.rad2deg(angle_between(robot_TD3, target_TD3)), float(at_limit_share(robot, q_TN).mean()),
             count_jumps(problem, q_TN, target_TD3, frame_rate),
         )  # fmt: skip
 

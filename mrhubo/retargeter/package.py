@@ -149,11 +149,11 @@ class Retargeter:
 
 
 def _portable(config: Config) -> str:
-    """The config as YAML whose only paths are the files beside it."""
+    """What loading needs of the config, as YAML whose only paths are the files beside it.
+
+    How pairs were made and the network was trained is in the run (`run_id`); a package outlives changes of those keys.
+    """
     config = copy.deepcopy(config)
     config.robot.urdf = Path(_URDF)
     config.body.prior_path, config.body.model_path, config.body.betas = Path(_PRIOR), Path(_SKELETON), []
-    config.pairs.dir = None
-    config.evaluation.motions = []
-    config.tracking.dir = config.tracking.uri = None
-    return to_yaml(config)
+    return to_yaml({"robot": config.robot, "body": config.body, "model": config.model})

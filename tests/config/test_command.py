@@ -28,7 +28,7 @@ class Small:
     """A name."""
 
 
-FLAGS = {"quiet": "Print only the result.", "dry-run": "Do nothing."}
+FLAGS = {"quiet": "Print only the result.", "dry-run": "Do nothing.", "out FILE": "Where to."}
 
 
 def parse(*argv: str, schema: type = Small):
@@ -38,11 +38,13 @@ def parse(*argv: str, schema: type = Small):
 def test_arguments(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("steps: 5")
-    assert parse() == (Small(), {"quiet": False, "dry-run": False})
-    assert parse("--config", str(file), "--quiet") == (Small(5), {"quiet": True, "dry-run": False})
+    assert parse() == (Small(), {"quiet": False, "dry-run": False, "out": None})
+    assert parse("--config", str(file), "--quiet") == (Small(5), {"quiet": True, "dry-run": False, "out": None})
+    for argv in (["--out", "a b"], ["--out=a b"]):
+        assert parse(*argv)[1]["out"] == "a b"
     assert parse(f"--config={file}", "steps=7", "--dry-run", "name=--x") == (
         Small(7, "--x"),
-        {"quiet": False, "dry-run": True},
+        {"quiet": False, "dry-run": True, "out": None},
     )
     assert parse("steps=7", "--config", str(file))[0] == Small(7)
 
@@ -53,6 +55,9 @@ def test_arguments(tmp_path):
         (["--quite"], "command line: flag '--quite' does not exist; nearest: '--quiet'"),
         (["--confg", "x"], "command line: flag '--confg' does not exist; nearest: '--config'"),
         (["--confg=x"], "command line: flag '--confg' does not exist; nearest: '--config'"),
+        (["--out"], "command line: --out needs a value: --out FILE"),
+        (["--out", "--quiet"], "command line: --out needs a value: --out FILE"),
+        (["--out=a", "--out=b"], "command line: --out is given twice"),
         (["-q"], "command line: flag '-q' does not exist; "),
         (["--quiet=1"], "command line: flag '--quiet=1' takes no value"),
         (["--steps=3"], "command line: '--steps=3' is a key, not a flag: write steps=VALUE"),

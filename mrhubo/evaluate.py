@@ -1,0 +1,63 @@
+"""`python -m mrhubo.evaluate --config conf/nao.yaml --retargeter FOLDER`: how good a trained retargeter is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mrhubo.config import Config, parse_arguments, run_command
+from mrhubo.errors import UserError
+
+DESCRIPTION = (
+    "Measures a trained retargeter on human motion: against the reference retargeter (joints, links), against the"
+    " human (directions of limbs, hands, head, jerk), and in time. The motions, and what is a key link, are those of"
+    " the config; the robot is the retargeter's own and must be the config's."
+)
+FLAGS = {
+    "retargeter FOLDER": "the package that a fit ended with",
+    "validation": "the validation clips, for choosing between retargeters; else the test clips",
+    "quiet": "no progress line",
+}
+
+
+def evaluate(config: Config, package: Path, validation: bool = False, quiet: bool = False) -> str:
+    """Returns the table of clips and their means, and the latency.
+
+    Raises:
+        UserError: the config, the package or the motions cannot be used, or the package is of another robot.
+    """
+    from mrhubo import pipeline
+    from mrhubo.callbacks import predict_clips
+    from mrhubo.evaluation import evaluate_clip, latency_us, means, table
+    from mrhubo.retargeter import Retargeter
+
+    retargeter = Retargeter.load(package)
+    prepared = pipeline.prepare(config)
+    body_map, own = prepared.body_map, retargeter.body_map.robot
+    same = own.description.kinematics == body_map.robot.description.kinematics
+    if not same or own.joint_names != body_map.robot.joint_names:
+        raise UserError(
+            f"{package}: was made for another robot or other joints ('{own.name}': {', '.join(own.joint_names)}) than"
+            f" the config's ('{config.robot.name}': {', '.join(config.robot.joints)})"
+        )
+    clips = pipeline.make_references(prepared, quiet)[0 if validation else 1]
+    predictions = predict_clips(retargeter.network, clips)
+    found = [
+        evaluate_clip(clip, q_TN, body_map, config.robot.key_links)
+        for clip, q_TN in zip(clips, predictions, strict=True)
+    ]
+    pose_TJ6 = clips[0].motion.pose_TJ6
+    one, many = (latency_us(retargeter.predict, pose_TJ6, batch) for batch in (1, 1_000))
+    latency = f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once"
+    return f"{table([*found, *means(found)])}\n\n{latency}"
+
+
+def main(argv: list[str]) -> None:
+    """The command."""
+    config, flags = parse_arguments(argv, "mrhubo.evaluate", DESCRIPTION, flags=FLAGS)
+    if flags["retargeter"] is None:
+        raise UserError("command line: --retargeter FOLDER is missing; a fit ends with the folder's name")
+    print(evaluate(config, Path(flags["retargeter"]), flags["validation"], flags["quiet"]))
+
+
+if __name__ == "__main__":
+    run_command(main)
