@@ -1,6 +1,10 @@
-"""How the link error on the validation clips depends on the pairs: number, solver, filter, weight of the prior.
+"""How the link error on the validation clips depends on the pairs: number, solver, filter, weight of the prior,
+and how many of them start from a human pose.
 
-    python benchmarks/pair_quality.py [--robots nao,coman,reachy] [--seeds 1] [--results FILE] [key.sub=value ...]
+    python benchmarks/pair_quality.py [--robots nao,coman,reachy] [--only WORD] [--seeds 1] [--results FILE]
+        [key.sub=value ...]
+
+`--only reverse` makes the rows whose name holds that word.
 
 Trains a network for every row, with all other settings as shipped. Trainings whose result is in FILE (JSON lines) are
 not done again, so an interrupted table goes on where it stopped.
@@ -28,17 +32,22 @@ FILTERS = {
     "none": ["pairs.filter=none"],
 }
 WEIGHTS = (0.003, 0.01)
+REVERSE_SHARES = (0.25, 0.5, 0.75, 1.0)
 
 
 def rows() -> list[tuple[str, list[str]]]:
-    """Name and settings of every row: solver by count, solver by filter, weights of the prior."""
+    """Name and settings of every row: solver by count, solver by filter, weights of the prior, reverse pairs."""
     table = []
     for solver in ("fine", "fast"):
         for count in COUNTS:
             for name, change in FILTERS.items() if count == 50_000 else [("linear, k 1", FILTERS["linear, k 1"])]:
-                settings = [f"pairs.solver={solver}", f"pairs.count={count}", *change]
+                settings = [f"pairs.solver={solver}", f"pairs.count={count}", "pairs.reverse_share=0", *change]
                 table.append((f"{solver}, {count:,}, {name}", settings))
-    return table + [(f"fine, 50,000, linear, k 1, w_prior {w}", [f"pairs.w_prior={w}"]) for w in WEIGHTS]
+    base = "fine, 50,000, linear, k 1"
+    table += [(f"{base}, w_prior {w}", [f"pairs.w_prior={w}", "pairs.reverse_share=0"]) for w in WEIGHTS]
+    return table + [
+        (f"{base}, {share:.0%} of them reverse", [f"pairs.reverse_share={share}"]) for share in REVERSE_SHARES
+    ]
 
 
 def link_error(robot: str, settings: list[str], results: Path) -> float:
@@ -60,13 +69,15 @@ def link_error(robot: str, settings: list[str], results: Path) -> float:
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options = {"--robots": "nao,coman,reachy", "--seeds": "1", "--results": "mlruns/pair_quality.jsonl"}
+    options = {"--robots": "nao,coman,reachy", "--only": "", "--seeds": "1", "--results": "mlruns/pair_quality.jsonl"}
     while argv and argv[0] in options:
         options[argv[0]], argv = argv[1], argv[2:]
     robots, results = options["--robots"].split(","), Path(options["--results"])
     results.parent.mkdir(parents=True, exist_ok=True)
     table = []
     for name, change in rows():
+        if options["--only"] not in name:
+            continue
         cells = []
         for robot in robots:
             found = torch.tensor(
