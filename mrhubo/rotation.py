@@ -35,7 +35,8 @@ def sixd_to_matrix(sixd: Tensor) -> Tensor:
     """(..., 6) to (..., 3, 3) by Gram-Schmidt; any six numbers with independent halves give a rotation matrix."""
     first, second = sixd[..., :3], sixd[..., 3:]
     x = first * torch.rsqrt(first.square().sum(-1, keepdim=True) + _TINY)
-    second = second - (x * second).sum(-1, keepdim=True) * x
+    for _ in range(2):  # once leaves halves that are nearly parallel visibly oblique, in float32
+        second = second - (x * second).sum(-1, keepdim=True) * x
     y = second * torch.rsqrt(second.square().sum(-1, keepdim=True) + _TINY)
     return torch.stack((x, y, torch.linalg.cross(x, y)), dim=-1)
 

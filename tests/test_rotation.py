@@ -44,6 +44,14 @@ def test_sixd_round_trip_and_projection() -> None:
     torch.testing.assert_close(torch.linalg.det(projected), torch.ones(100, dtype=torch.float64))
 
 
+@pytest.mark.parametrize("apart", [1e-1, 1e-2, 1e-3])
+def test_nearly_parallel_halves_still_give_a_rotation_in_float32(apart: float) -> None:
+    first, other = torch.randn(2, 500, 3, generator=torch.Generator().manual_seed(0))
+    matrix = rotation.sixd_to_matrix(torch.cat((first, -2 * first + apart * other), dim=-1))
+    oblique = (matrix[..., 0] * matrix[..., 1]).sum(-1).abs()
+    assert float(oblique.max()) < 2e-6
+
+
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.5, 3.0, math.pi - 1e-7, math.pi])
 def test_geodesic_distance_is_the_angle(angle: float) -> None:
     turn = rotation.axis_angle_to_matrix(random_axis_angle(50, angle))
