@@ -1,4 +1,5 @@
-"""Two stages against one, filter against none: several seeds each, on the same pairs, every training a tracked fit.
+"""Two stages against one, filter against none, with reverse pairs and without: several seeds each, on the same pairs,
+every training a tracked fit.
 
     python benchmarks/ablations.py [--config conf/nao.yaml] [--seeds 3] [key.sub=value ...]
 
@@ -22,9 +23,10 @@ from mrhubo.recording import Recording
 from mrhubo.tracking import database_uri
 
 VARIANTS = {
-    "proposed (two stages, linear filter)": [],
-    "one stage": ["model.stages=1"],
-    "without filter": ["pairs.filter=none"],
+    "forward pairs alone: two stages, linear filter": ["pairs.reverse_share=0"],
+    "forward pairs alone: one stage": ["pairs.reverse_share=0", "model.stages=1"],
+    "forward pairs alone: without filter": ["pairs.reverse_share=0", "pairs.filter=none"],
+    "shipped settings: half of the pairs reverse": [],
 }
 
 

@@ -54,3 +54,15 @@ def test_equal_errors_all_stay() -> None:
 def test_unknown_rule() -> None:
     with pytest.raises(ValueError, match="soft"):
         make_filter(torch.rand(3), "soft", 1.0)
+
+
+def test_reverse_pairs_always_take_part_and_leave_the_filter_of_the_others_alone() -> None:
+    phi = torch.rand(400, generator=torch.Generator().manual_seed(0))
+    reverse = torch.arange(400) % 3 == 0
+    phi[reverse] *= 100
+    both, forward = make_filter(phi, "linear", 1.0, reverse), make_filter(phi[~reverse], "linear", 1.0)
+    assert bool((both.probability_P[reverse] == 1).all()) and both.threshold == forward.threshold
+    torch.testing.assert_close(both.probability_P[~reverse], forward.probability_P)
+    assert make_filter(phi, "linear", 1.0, torch.ones(400, dtype=torch.bool)).kept_share == 1
+    nothing = make_filter(phi, "linear", 1.0, torch.zeros(400, dtype=torch.bool))
+    torch.testing.assert_close(nothing.probability_P, make_filter(phi, "linear", 1.0).probability_P)

@@ -198,3 +198,10 @@ def test_the_papers_solver_needs_no_amortiser(root: Path, tmp_path: Path) -> Non
     store = generate(config_of(root, tmp_path, "pairs.solver=paper", "pairs.count=100"))
     pairs = store.read_all()
     assert not store.amortiser_path.exists() and float(pairs["cost"][~pairs["reverse"]].mean()) < 5
+
+
+def test_a_summary_of_many_shards_reads_some_of_each_direction(root: Path, made: PairStore) -> None:
+    whole, some = made.read_all_measures(100), made.read_all_measures(2)
+    assert len(whole["phi"]) == 250 and len(some["phi"]) == 200
+    assert sorted(some["reverse"].unique().tolist()) == [False, True]
+    torch.testing.assert_close(whole["cost"], made.read_all()["cost"])
