@@ -95,7 +95,7 @@ def test_it_improves_on_lbfgs(root: Path, solve: Solver) -> None:
     start = solve_lbfgs(problem, target[:100])
     found = solve(problem, start, target[:100], 100)
     assert bool((problem.cost(found, target[:100]) <= problem.cost(start, target[:100])).all())
-    assert float(problem.cost(found, target[:100]).mean()) < 0.99 * float(problem.cost(start, target[:100]).mean())
+    assert float(problem.cost(found, target[:100]).mean()) < 0.995 * float(problem.cost(start, target[:100]).mean())
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
