@@ -13,8 +13,7 @@ import os
 import sys
 from pathlib import Path
 
-import torch
-from common import print_header, print_table
+from common import mean_and_spread, print_header, print_table, read_options
 
 from mrhubo.config import load_config
 from mrhubo.fit import fit
@@ -50,19 +49,16 @@ def measures(file: Path, overrides: list[str]) -> tuple[float, float]:
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options = {"--config": "conf/nao.yaml", "--seeds": "3"}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
+    options, argv = read_options(argv, config="conf/nao.yaml", seeds="3")
     rows = []
     for name, change in VARIANTS.items():
         found = [
-            measures(Path(options["--config"]), [*argv, *change, f"trainer.seed={seed}"])
-            for seed in range(int(options["--seeds"]))
+            measures(Path(options["config"]), [*argv, *change, f"trainer.seed={seed}"])
+            for seed in range(int(options["seeds"]))
         ]
-        joint, link = torch.tensor(found, dtype=torch.float64).T
-        spread = [f" ± {x.std():.3f}" if len(x) > 1 else "" for x in (joint, link)]
+        joint, link = zip(*found, strict=True)
         each = "; ".join(f"{j:.3f} / {c:.2f}" for j, c in found)
-        rows.append([name, f"{joint.mean():.3f}{spread[0]}", f"{link.mean():.2f}{spread[1]}", each])
+        rows.append([name, mean_and_spread(joint, 3), mean_and_spread(link, 2), each])
     print_header()
     print_table(["variant", "joint [rad]", "link [cm]", "each seed"], rows)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import shlex
+import statistics
 import sys
 from collections.abc import Sequence
 
@@ -11,6 +12,22 @@ import torch
 
 from mrhubo.locations import project_root
 from mrhubo.tracking import git_commit
+
+
+def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list[str]]:
+    """Values of the leading `--name VALUE` arguments (in `defaults`, without the dashes), and the arguments left."""
+    while argv and argv[0].startswith("--"):
+        name = argv[0].removeprefix("--")
+        if name not in defaults or len(argv) == 1:
+            sys.exit(f"{argv[0]}: is unknown or lacks its value; there are --{', --'.join(defaults)}")
+        defaults[name], argv = argv[1], argv[2:]
+    return defaults, argv
+
+
+def mean_and_spread(values: Sequence[float], digits: int) -> str:
+    """Mean and standard deviation of several seeds, or the value of one."""
+    spread = f" ± {statistics.stdev(values):.{digits}f}" if len(values) > 1 else ""
+    return f"{statistics.fmean(values):.{digits}f}{spread}"
 
 
 def print_header() -> None:

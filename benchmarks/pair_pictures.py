@@ -11,7 +11,7 @@ import copy
 import sys
 from pathlib import Path
 
-from common import print_header, print_table
+from common import print_header, print_table, read_options
 
 from mrhubo.callbacks.pictures import PAIR_MEASURES, PAIR_TITLES, Artist
 from mrhubo.config import load_config
@@ -24,12 +24,10 @@ SOLVERS = ("fine", "fast", "paper")
 
 def main(argv: list[str]) -> None:
     """Draws a picture a robot and prints the means."""
-    options = {"--robots": "nao,coman,reachy", "--poses": "2000", "--out": "docs/images"}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
+    options, argv = read_options(argv, robots="nao,coman,reachy", poses="2000", out="docs/images")
     print_header()
     rows = []
-    for robot in options["--robots"].split(","):
+    for robot in options["robots"].split(","):
         config = load_config(Path(f"conf/{robot}.yaml"), [*argv, "pairs.solver=fine", "trainer.accelerator=cpu"])
         setup = prepare_pairs(config)
         first = PairGenerator(setup.body_map, setup.prior, config.pairs)
@@ -37,7 +35,7 @@ def main(argv: list[str]) -> None:
         found = {}
         for solver in SOLVERS:
             settings = copy.deepcopy(config.pairs)
-            settings.solver, settings.shard_size = solver, int(options["--poses"])
+            settings.solver, settings.shard_size = solver, int(options["poses"])
             maker = PairGenerator(setup.body_map, setup.prior, settings)
             maker.amortiser = first.amortiser
             found[solver] = maker.shard("forward", 0)
@@ -49,7 +47,7 @@ def main(argv: list[str]) -> None:
             rows.append([robot, solver, *(f"{values.mean():.3g}" for values in measures.values())])
         figures = Artist(setup.body_map.robot, setup.body_map.skeleton).ranked_pairs(found["fine"])
         charts = distributions(series, PAIR_TITLES, (figures.width, 300))
-        path = save_png(contact_sheet([[figures], [charts]], gap=0), Path(options["--out"]) / f"pairs_{robot}.png")
+        path = save_png(contact_sheet([[figures], [charts]], gap=0), Path(options["out"]) / f"pairs_{robot}.png")
         print(path)
     print()
     print_table(["robot", "solver", *(f"mean {title}" for title in PAIR_TITLES.values())], rows)

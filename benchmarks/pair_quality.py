@@ -17,8 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-import torch
-from common import print_header, print_table
+from common import mean_and_spread, print_header, print_table, read_options
 
 from mrhubo.config import load_config
 from mrhubo.pipeline import make_pairs, make_references, prepare, train
@@ -69,26 +68,22 @@ def link_error(robot: str, settings: list[str], results: Path) -> float:
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options = {"--robots": "nao,coman,reachy", "--only": "", "--seeds": "1", "--results": "mlruns/pair_quality.jsonl"}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
-    robots, results = options["--robots"].split(","), Path(options["--results"])
+    options, argv = read_options(
+        argv, robots="nao,coman,reachy", only="", seeds="1", results="mlruns/pair_quality.jsonl"
+    )
+    robots, results = options["robots"].split(","), Path(options["results"])
     results.parent.mkdir(parents=True, exist_ok=True)
     table = []
     for name, change in rows():
-        if options["--only"] not in name:
+        if options["only"] not in name:
             continue
         cells = []
         for robot in robots:
-            found = torch.tensor(
-                [
-                    link_error(robot, [*argv, *change, f"trainer.seed={seed}"], results)
-                    for seed in range(int(options["--seeds"]))
-                ],
-                dtype=torch.float64,
-            )
-            spread = f" ± {found.std():.2f}" if len(found) > 1 else ""
-            cells.append(f"{found.mean():.2f}{spread}")
+            found = [
+                link_error(robot, [*argv, *change, f"trainer.seed={seed}"], results)
+                for seed in range(int(options["seeds"]))
+            ]
+            cells.append(mean_and_spread(found, 2))
         table.append([name, *cells])
     print_header()
     print_table(["pairs", *(f"{robot} [cm]" for robot in robots)], table)

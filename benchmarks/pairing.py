@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import torch
-from common import print_header, print_table
+from common import print_header, print_table, read_options
 from torch import Tensor
 
 from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
@@ -33,13 +33,11 @@ from mrhubo.threads import available_cores, use_threads
 
 def main(argv: list[str]) -> None:
     """Prints the tables of every robot."""
-    options = {"--robots": "nao,coman,reachy", "--poses": "1000", "--pairs": "40000"}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
+    options, argv = read_options(argv, robots="nao,coman,reachy", poses="1000", pairs="40000")
     print_header()
     gemm = gemm_rate()
     print(f"matrix products: {gemm / 1e9:.0f} GFLOP/s a core (float32, 512 x 512 by 512)\n")
-    for robot in options["--robots"].split(","):
+    for robot in options["robots"].split(","):
         config = load_config(Path(f"conf/{robot}.yaml"), [*argv, "pairs.solver=fine", "trainer.accelerator=cpu"])
         setup = prepare_pairs(config)
         maker = PairGenerator(setup.body_map, setup.prior, config.pairs)
@@ -48,10 +46,10 @@ def main(argv: list[str]) -> None:
         seconds = time.perf_counter() - start
         trained = f"{config.pairs.amortiser_steps:,} steps in {seconds:.1f} s" if seconds > 2 else "was there already"
         print(f"## {robot}\n\namortised solver: {trained}\n")
-        compare(setup, maker, int(options["--poses"]))
+        compare(setup, maker, int(options["poses"]))
         parts(setup, maker, gemm)
         reverse(setup, maker)
-        whole(setup, int(options["--pairs"]))
+        whole(setup, int(options["pairs"]))
 
 
 def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:

@@ -17,7 +17,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from common import print_header, print_table
+from common import print_header, print_table, read_options
 
 from mrhubo.config import load_config
 from mrhubo.pipeline import prepare_pairs
@@ -29,14 +29,12 @@ TORCHRUN = ["-m", "torch.distributed.run", "--nproc-per-node"]
 
 def main(argv: list[str]) -> None:
     """Prints both tables."""
-    options = {"--config": "conf/nao.yaml", "--pairs": "100000", "--steps": "1000"}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
+    options, argv = read_options(argv, config="conf/nao.yaml", pairs="100000", steps="1000")
     print_header()
     cores = available_cores()
     with tempfile.TemporaryDirectory() as folder:
         first = Path(folder) / "amortiser"
-        given = ["--config", options["--config"], "--quiet", "trainer.accelerator=cpu", *argv]
+        given = ["--config", options["config"], "--quiet", "trainer.accelerator=cpu", *argv]
         run(["-m", "mrhubo.pair", *given, "pairs.count=100", f"pairs.dir={first}"])
         ways = {
             "one process": ["-m", "mrhubo.pair", "pairs.workers=1"],
@@ -46,15 +44,15 @@ def main(argv: list[str]) -> None:
         rows, made = [], set()
         for index, (name, command) in enumerate(ways.items()):
             place = Path(folder) / str(index)
-            more = [f"pairs.count={options['--pairs']}", f"pairs.dir={place}"]
-            copy_amortiser(options["--config"], argv, first, place)
+            more = [f"pairs.count={options['pairs']}", f"pairs.dir={place}"]
+            copy_amortiser(options["config"], argv, first, place)
             seconds = run([*command, *given, *more])
-            rows.append([name, seconds, int(options["--pairs"]) / seconds])
+            rows.append([name, seconds, int(options["pairs"]) / seconds])
             made.add(digest(place))
         show("pairs", "pairs/s", rows)
         print(f"\nthe same bytes: {'yes' if len(made) == 1 else 'NO'}\n")
-        rows, steps = [], int(options["--steps"])
-        fit = ["-m", "mrhubo.fit", *given, f"pairs.count={options['--pairs']}", f"pairs.dir={Path(folder) / '1'}"]
+        rows, steps = [], int(options["steps"])
+        fit = ["-m", "mrhubo.fit", *given, f"pairs.count={options['pairs']}", f"pairs.dir={Path(folder) / '1'}"]
         run([*fit, "trainer.max_steps=1", f"tracking.dir={Path(folder) / 'references'}"])  # makes the clips' references
         for name, command in {"one process": [], "torchrun, 2 processes": [*TORCHRUN, "2"]}.items():
             place = f"tracking.dir={Path(folder) / name.replace(' ', '-')}"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import lightning
 import torch
-from common import print_header, print_table
+from common import print_header, print_table, read_options
 
 from mrhubo.callbacks import TrainingProgress
 from mrhubo.config import load_config
@@ -43,13 +43,11 @@ class Stopwatch(lightning.Callback):
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options = {"--config": "conf/nao.yaml", "--steps": "300", "--pairs": "50000"}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
+    options, argv = read_options(argv, config="conf/nao.yaml", steps="300", pairs="50000")
     print_header()
     logging.getLogger("lightning.pytorch").setLevel(logging.ERROR)
-    config = load_config(Path(options["--config"]), argv)
-    steps, count = int(options["--steps"]), int(options["--pairs"])
+    config = load_config(Path(options["config"]), argv)
+    steps, count = int(options["steps"]), int(options["pairs"])
     config.trainer.max_steps = steps
     body_map = build_body_map(config.robot)
     joints = len(body_map.robot.joint_names)

@@ -27,7 +27,7 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
     """
     from mrhubo import pipeline
     from mrhubo.callbacks import predict_clips
-    from mrhubo.evaluation import evaluate_clip, latency_us, means, table
+    from mrhubo.evaluation import evaluate_clips, latency_us, table
     from mrhubo.retargeter import Retargeter
 
     retargeter = Retargeter.load(package)
@@ -40,15 +40,11 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
             f" the config's ('{config.robot.name}': {', '.join(config.robot.joints)})"
         )
     clips = pipeline.make_references(prepared, quiet)[0 if validation else 1]
-    predictions = predict_clips(retargeter.network, clips)
-    found = [
-        evaluate_clip(clip, q_TN, body_map, config.robot.key_links)
-        for clip, q_TN in zip(clips, predictions, strict=True)
-    ]
+    found = evaluate_clips(predict_clips(retargeter.network, clips), clips, body_map, config.robot.key_links)
     pose_TJ6 = clips[0].motion.pose_TJ6
     one, many = (latency_us(retargeter.predict, pose_TJ6, batch) for batch in (1, 1_000))
     latency = f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once"
-    return f"{table([*found, *means(found)])}\n\n{latency}"
+    return f"{table(found)}\n\n{latency}"
 
 
 def main(argv: list[str]) -> None:

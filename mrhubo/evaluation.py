@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
-from mrhubo.callbacks import Clip
-from mrhubo.reference import at_limit_share, direction_error, direction_jerk, joint_error, link_error
+from mrhubo.callbacks import Clip, ClipScore, mean_score, score_clip
+from mrhubo.reference import angle_between, at_limit_share, direction_jerk
 from mrhubo.robot import BodyMap
 from mrhubo.threads import use_threads
 
@@ -21,15 +21,9 @@ _ENDS = ("left_hand", "right_hand", "head")
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class Evaluation(ClipScore):
     """One clip, or a mean over clips or over frames. NaN: the robot has no such part, or the clip is too short."""
 
-    name: str
-    frames: int
-    joint_rad: float
-    """Mean absolute difference of joint angles to the reference, modulo 2 pi."""
-    link_cm: float
-    """Mean distance of the key links to the reference's."""
     limb_deg: float
     """Mean angle between the robot's and the human's upper arms and forearms, seen from the chest."""
     reference_limb_deg: float
@@ -46,8 +40,9 @@ class Evaluation:
 
 def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str]) -> Evaluation:
     """Measures of predicted joint angles (T, N) [rad]."""
-    robot, pose_TJ6 = body_map.robot, clip.motion.pose_TJ6
-    error_TD, reference_TD = (direction_error(body_map, q, pose_TJ6) for q in (q_TN, clip.reference_TN))
+    robot, human_TD3 = body_map.robot, body_map.human_directions(clip.motion.pose_TJ6)
+    robot_TD3, reference_TD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_TN, clip.reference_TN))
+    error_TD, reference_TD = (torch.rad2deg(angle_between(d, human_TD3)) for d in (robot_TD3, reference_TD3))
     names = body_map.direction_names
     part = {name: next((end for end in _ENDS if name.startswith(f"{end}_")), "limb") for name in names}
 
@@ -55,36 +50,34 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         columns = [i for i, name in enumerate(names) if part[name] in parts]
         return float(angles_TD[:, columns].mean())  # NaN where there are none
 
-    directions = (body_map.robot_directions(robot.forward(q_TN)), body_map.human_directions(pose_TJ6))
-    jerk, human_jerk = (float(direction_jerk(d, clip.motion.frame_rate).mean()) for d in directions)
+    jerk, human_jerk = (float(direction_jerk(d, clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3))
     return Evaluation(
-        clip.name,
-        len(q_TN),
-        float(joint_error(q_TN, clip.reference_TN).mean()),
-        float(link_error(robot, q_TN, clip.reference_TN, key_links).mean()),
-        mean(error_TD, "limb"),
-        mean(reference_TD, "limb"),
-        mean(error_TD, "left_hand", "right_hand"),
-        mean(error_TD, "head"),
-        jerk / human_jerk if human_jerk else float("nan"),
-        float(at_limit_share(robot, q_TN).mean()),
+        **vars(score_clip(clip, q_TN, robot, key_links)),
+        limb_deg=mean(error_TD, "limb"),
+        reference_limb_deg=mean(reference_TD, "limb"),
+        hand_deg=mean(error_TD, "left_hand", "right_hand"),
+        head_deg=mean(error_TD, "head"),
+        jerk_ratio=jerk / human_jerk if human_jerk else float("nan"),
+        at_limit=float(at_limit_share(robot, q_TN).mean()),
     )
 
 
-def means(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
-    """The mean over clips, each counted once, and the mean over frames."""
-    frames = torch.tensor([e.frames for e in evaluations], dtype=torch.float64)
-    names = [field.name for field in fields(Evaluation)[2:]]
-    table = torch.tensor([[getattr(e, name) for name in names] for e in evaluations], dtype=torch.float64)
-    total = int(frames.sum())
-    return [
-        Evaluation("mean over clips", total, *table.mean(0).tolist()),
-        Evaluation("mean over frames", total, *((frames / total) @ table).tolist()),
-    ]
+def evaluate_clips(
+    predictions: Sequence[Tensor], clips: Sequence[Clip], body_map: BodyMap, key_links: Sequence[str]
+) -> list[Evaluation]:
+    """Measures clip by clip, then their means over clips and over frames."""
+    found = [evaluate_clip(clip, q_TN, body_map, key_links) for clip, q_TN in zip(clips, predictions, strict=True)]
+    return [*found, mean_score(found), mean_score(found, over_frames=True)]
+
+
+def measures(evaluation: Evaluation) -> dict[str, float]:
+    """The measures by name; those that the robot does not have are left out."""
+    found = {field.name: getattr(evaluation, field.name) for field in fields(Evaluation)[2:]}
+    return {name: value for name, value in found.items() if value == value}
 
 
 def table(evaluations: Sequence[Evaluation]) -> str:
-    """All measures, a row each; parts that the robot does not have are left out."""
+    """What `evaluate_clips` gave, a row each; parts that the robot does not have are left out."""
     heads = {
         "frames": ("frames", "{:,}"),
         "joint_rad": ("joint [rad]", "{:.3f}"),

@@ -41,6 +41,7 @@ def fit(config: Config, quiet: bool = False) -> FitResult | None:
         KeyboardInterrupt: the user stopped it; the same call resumes.
     """
     from mrhubo import pipeline
+    from mrhubo.evaluation import measures, table
     from mrhubo.ranks import Ranks
     from mrhubo.recording import Recording
     from mrhubo.retargeter import Retargeter
@@ -71,10 +72,10 @@ def fit(config: Config, quiet: bool = False) -> FitResult | None:
             )
             recording.scores(scores, training.best_link_cm)
             recording.key_poses(test, predictions)
-            package = recording.package(retargeter, scores[-1], training.best_checkpoint)
+            over_clips = scores[-2]
+            package = recording.package(retargeter, over_clips, training.best_checkpoint)
             workspace.finish()
-        measures = {"joint_rad": scores[-1].joint_rad, "link_cm": scores[-1].link_cm}
-        return FitResult(package, recording.run_id, recording.table(scores), measures)
+        return FitResult(package, recording.run_id, table(scores), measures(over_clips))
 
 
 def _help(prepared: Prepared, workspace: Workspace, ranks: Ranks) -> None:

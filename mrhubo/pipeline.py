@@ -17,17 +17,15 @@ from torch import Tensor
 from mrhubo.callbacks import (
     Clip,
     ClipMetrics,
-    ClipScore,
     Motions,
     TrainingProgress,
     load_motions,
-    mean_score,
     predict_clips,
-    score_clips,
     solve_references,
 )
 from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.errors import UserError
+from mrhubo.evaluation import Evaluation, evaluate_clips
 from mrhubo.locations import default_motions, default_pairs
 from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairSetup, generate_pairs, make_filter
 from mrhubo.pairing.data import PairData, PairTable
@@ -164,25 +162,14 @@ def train(
     Raises:
         KeyboardInterrupt: the user stopped it; the last checkpoint is there.
     """
-    config, settings, ranks = prepared.config, prepared.config.trainer, ranks or Ranks()
+    ranks = ranks or Ranks()
     pairs = prepared.store.read_all()
-    pair_filter = make_filter(pairs["phi"], config.pairs.filter, config.pairs.filter_k, pairs["reverse"])
-    if not bool((pair_filter.probability_P > 0).any()):
-        raise UserError(f"pairs.filter_k: {config.pairs.filter_k} drops every pair; raise it")
+    pair_filter = _filter(prepared.config, pairs)
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(settings.seed)
-        network = build_network(config, prepared.body_map)
-    with torch.no_grad():
-        features = torch.cat([network.features(part) for part in pairs["H"].split(16_384)])
-    data = PairData(
-        PairTable(features, pairs["R"], pairs["q"]),
-        pair_filter,
-        settings.batch_size,
-        min(settings.validate_every, settings.max_steps),
-        settings.seed,
-        (ranks.rank, ranks.count),
-    )
-    module = RetargetModule(network, settings, config.model.detach_student)
+        torch.manual_seed(prepared.config.trainer.seed)
+        network = build_network(prepared.config, prepared.body_map)
+    data = _data(prepared.config, network, pairs, pair_filter, ranks)
+    module = RetargetModule(network, prepared.config.trainer, prepared.config.model.detach_student)
     saver = ModelCheckpoint(
         dirpath=checkpoints,
         filename="best",
@@ -193,28 +180,10 @@ def train(
         save_on_train_epoch_end=True,
         enable_version_counter=False,
     )
+    metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
+    progress = TrainingProgress(prepared.config.trainer.max_steps, quiet)
     with quiet_lightning():
-        trainer = lightning.Trainer(
-            accelerator=settings.accelerator if settings.accelerator != "auto" else device_of(config).type,
-            devices=ranks.count // ranks.nodes,
-            num_nodes=ranks.nodes,
-            strategy="ddp" if ranks.count > 1 else "auto",
-            use_distributed_sampler=False,
-            precision="bf16-mixed" if settings.precision == "bf16" else "32-true",
-            # Not max_steps: with it Lightning takes a checkpoint of a finished epoch for one within the epoch, and a
-            # resumed run goes on with other batches. The module stops at its last step.
-            max_epochs=-(-settings.max_steps // settings.validate_every),
-            logger=logger,
-            log_every_n_steps=LOG_EVERY,
-            num_sanity_val_steps=0,
-            enable_progress_bar=False,
-            enable_model_summary=False,
-            callbacks=[
-                ClipMetrics(validation, prepared.body_map.robot, config.robot.key_links),
-                TrainingProgress(settings.max_steps, quiet),
-                saver,
-            ],
-        )
+        trainer = _trainer(prepared.config, logger, [metrics, progress, saver], ranks)
         run_trainer(trainer, module, resume, datamodule=data)
     best = torch.load(saver.best_model_path, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
@@ -225,8 +194,55 @@ def train(
     )
 
 
-def score_test(prepared: Prepared, network: RetargetNetwork, clips: list[Clip]) -> tuple[list[Tensor], list[ClipScore]]:
-    """Predictions (T, N) and scores on the test clips, their mean last."""
+def _filter(config: Config, pairs: dict[str, Tensor]) -> PairFilter:
+    pair_filter = make_filter(pairs["phi"], config.pairs.filter, config.pairs.filter_k, pairs["reverse"])
+    if not bool((pair_filter.probability_P > 0).any()):
+        raise UserError(f"pairs.filter_k: {config.pairs.filter_k} drops every pair; raise it")
+    return pair_filter
+
+
+@torch.no_grad()
+def _data(
+    config: Config, network: RetargetNetwork, pairs: dict[str, Tensor], pair_filter: PairFilter, ranks: Ranks
+) -> PairData:
+    settings = config.trainer
+    features = torch.cat([network.features(part) for part in pairs["H"].split(16_384)])
+    return PairData(
+        PairTable(features, pairs["R"], pairs["q"]),
+        pair_filter,
+        settings.batch_size,
+        min(settings.validate_every, settings.max_steps),
+        settings.seed,
+        (ranks.rank, ranks.count),
+    )
+
+
+def _trainer(
+    config: Config, logger: Logger | bool, callbacks: list[lightning.Callback], ranks: Ranks
+) -> lightning.Trainer:
+    settings = config.trainer
+    return lightning.Trainer(
+        accelerator=settings.accelerator if settings.accelerator != "auto" else device_of(config).type,
+        devices=ranks.count // ranks.nodes,
+        num_nodes=ranks.nodes,
+        strategy="ddp" if ranks.count > 1 else "auto",
+        use_distributed_sampler=False,
+        precision="bf16-mixed" if settings.precision == "bf16" else "32-true",
+        # Not max_steps: with it Lightning takes a checkpoint of a finished epoch for one within the epoch, and a
+        # resumed run goes on with other batches. The module stops at its last step.
+        max_epochs=-(-settings.max_steps // settings.validate_every),
+        logger=logger,
+        log_every_n_steps=LOG_EVERY,
+        num_sanity_val_steps=0,
+        enable_progress_bar=False,
+        enable_model_summary=False,
+        callbacks=callbacks,
+    )
+
+
+def score_test(
+    prepared: Prepared, network: RetargetNetwork, clips: list[Clip]
+) -> tuple[list[Tensor], list[Evaluation]]:
+    """Predictions (T, N) and measures on the test clips, their means over clips and over frames last."""
     predictions = predict_clips(network, clips)
-    scores = score_clips(predictions, clips, prepared.body_map.robot, prepared.config.robot.key_links)
-    return predictions, [*scores, mean_score(scores)]
+    return predictions, evaluate_clips(predictions, clips, prepared.body_map, prepared.config.robot.key_links)

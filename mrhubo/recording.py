@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from torch import Tensor
 
-from mrhubo.callbacks import Clip, ClipScore
+from mrhubo.callbacks import Clip
 from mrhubo.callbacks.pictures import Artist
 from mrhubo.config import Config, changed_settings, to_plain, to_yaml
 from mrhubo.errors import was_interrupted
+from mrhubo.evaluation import Evaluation, measures, table
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
 from mrhubo.retargeter import Retargeter
@@ -121,23 +122,24 @@ class Recording:
         self._picture(phi_histogram(pairs["phi"].numpy(), pair_filter.threshold), "pairs/phi_histogram.png")
         self._picture(self.artist.pairs(pairs, pair_filter, self.prepared.prior), "pairs/feasible_and_extreme.png")
 
-    def scores(self, scores: Sequence[ClipScore], best_link_cm: float) -> None:
-        """Errors on the test clips, their mean last: metrics and a table."""
+    def scores(self, scores: Sequence[Evaluation], best_link_cm: float) -> None:
+        """What `evaluate_clips` gave for the test clips: metrics and a table."""
+        *clips, over_clips, _ = scores
         metrics = {"val/best_link_cm": best_link_cm}
-        for score in scores:
-            name = "test" if score.name == "mean" else f"test/{score.name}"
-            metrics |= {f"{name}/joint_rad": score.joint_rad, f"{name}/link_cm": score.link_cm}
+        metrics |= {f"test/{name}": value for name, value in measures(over_clips).items()}
+        for clip in clips:
+            metrics |= {f"test/{clip.name}/joint_rad": clip.joint_rad, f"test/{clip.name}/link_cm": clip.link_cm}
         self.logger.log_metrics(metrics)
         rows = [dataclasses.asdict(score) for score in scores]
         self.client.log_table(self.run_id, {key: [row[key] for row in rows] for key in rows[0]}, "test/clips.json")
-        self.client.log_text(self.run_id, self.table(scores) + "\n", "test/clips.txt")
+        self.client.log_text(self.run_id, table(scores) + "\n", "test/clips.txt")
 
     def key_poses(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
         """A picture a test clip: human, reference and prediction side by side."""
         for clip, prediction in zip(clips, predictions, strict=True):
             self._picture(self.artist.key_poses(clip, prediction), f"test/key_poses_{clip.name}.png")
 
-    def package(self, retargeter: Retargeter, score: ClipScore, checkpoint: Path) -> Path:
+    def package(self, retargeter: Retargeter, score: Evaluation, checkpoint: Path) -> Path:
         """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""
         provenance = {
             "run_id": self.run_id,
@@ -149,16 +151,6 @@ class Recording:
         self.client.log_artifacts(self.run_id, str(folder), "package")
         self.client.log_artifact(self.run_id, str(checkpoint), "checkpoint")
         return folder
-
-    def table(self, scores: Sequence[ClipScore]) -> str:
-        """The short table that a fit ends with."""
-        width = max(len(score.name) for score in scores)
-        lines = [f"{'clip':<{width}}  frames  joint [rad]  link [cm]"]
-        for score in scores:
-            if score.name == "mean":
-                lines.append("-" * len(lines[0]))
-            lines.append(f"{score.name:<{width}}  {score.frames:>6}  {score.joint_rad:>11.3f}  {score.link_cm:>9.2f}")
-        return "\n".join(lines)
 
     def _picture(self, image: Any, name: str) -> None:
         with tempfile.TemporaryDirectory() as folder:

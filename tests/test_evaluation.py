@@ -11,11 +11,11 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
-from mrhubo.callbacks import Clip
+from mrhubo.callbacks import Clip, mean_score
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.evaluate import main
-from mrhubo.evaluation import Evaluation, evaluate_clip, latency_us, means, table
+from mrhubo.evaluation import Evaluation, evaluate_clip, latency_us, measures, table
 from mrhubo.motion import Motion
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.retargeter import Retargeter, build_network
@@ -84,8 +84,9 @@ def test_at_a_limit(root: Path) -> None:
 def test_means_count_clips_or_frames() -> None:
     nan = float("nan")
     clips = [Evaluation(n, f, v, v, v, v, v, nan, v, v) for n, f, v in (("a", 30, 1.0), ("b", 10, 3.0))]
-    over_clips, over_frames = means(clips)
+    over_clips, over_frames = mean_score(clips), mean_score(clips, over_frames=True)
     assert over_clips.link_cm == 2 and over_frames.link_cm == 1.5 and over_clips.frames == over_frames.frames == 40
+    assert "head_deg" not in measures(over_clips) and measures(over_clips)["at_limit"] == 2
     text = table([*clips, over_clips, over_frames])
     assert "head" not in text and len({len(line) for line in text.splitlines()}) == 1
 

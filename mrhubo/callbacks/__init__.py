@@ -1,7 +1,7 @@
 """What happens around a training: metrics on clips, pictures, progress."""
 
 from mrhubo.callbacks.clips import Clip, Motions, load_motions, solve_references
-from mrhubo.callbacks.metrics import ClipMetrics, ClipScore, mean_score, predict_clips, score_clips
+from mrhubo.callbacks.metrics import ClipMetrics, ClipScore, mean_score, predict_clips, score_clip
 from mrhubo.callbacks.progress import TrainingProgress
 
 __all__ = [
@@ -13,6 +13,6 @@ __all__ = [
     "load_motions",
     "mean_score",
     "predict_clips",
-    "score_clips",
+    "score_clip",
     "solve_references",
 ]

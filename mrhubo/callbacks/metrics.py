@@ -6,7 +6,8 @@ Legend: T frames, J = 21 human joints, N robot joints.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import lightning
 import torch
@@ -30,15 +31,17 @@ class ClipScore:
     """Mean Euclidean distance of the key links."""
 
 
-def mean_score(scores: Sequence[ClipScore]) -> ClipScore:
-    """Means over clips, each clip counted once."""
-    count = len(scores)
-    return ClipScore(
-        "mean",
-        sum(s.frames for s in scores),
-        sum(s.joint_rad for s in scores) / count,
-        sum(s.link_cm for s in scores) / count,
-    )
+Score = TypeVar("Score", bound=ClipScore)
+
+
+def mean_score(scores: Sequence[Score], over_frames: bool = False) -> Score:
+    """Means of every measure over clips, each counted once, or over all their frames."""
+    names = [field.name for field in fields(scores[0])[2:]]
+    frames = [score.frames for score in scores]
+    share = torch.tensor(frames if over_frames else [1] * len(scores), dtype=torch.float64)
+    table = torch.tensor([[getattr(score, name) for name in names] for score in scores], dtype=torch.float64)
+    name = "mean over frames" if over_frames else "mean over clips"
+    return type(scores[0])(name, sum(frames), *((share / share.sum()) @ table).tolist())
 
 
 @torch.no_grad()
@@ -53,16 +56,11 @@ def predict_clips(network: RetargetNetwork, clips: Sequence[Clip]) -> list[Tenso
     return list(joints.split([len(clip.motion.pose_TJ6) for clip in clips]))
 
 
-def score_clips(
-    predictions: Sequence[Tensor], clips: Sequence[Clip], robot: Robot, key_links: Sequence[str]
-) -> list[ClipScore]:
-    """Errors of predicted joint angles against the reference, clip by clip."""
-    scores = []
-    for q_TN, clip in zip(predictions, clips, strict=True):
-        joints = joint_error(q_TN, clip.reference_TN)
-        links = link_error(robot, q_TN, clip.reference_TN, key_links)
-        scores.append(ClipScore(clip.name, len(q_TN), float(joints.mean()), float(links.mean())))
-    return scores
+def score_clip(clip: Clip, q_TN: Tensor, robot: Robot, key_links: Sequence[str]) -> ClipScore:
+    """Errors of predicted joint angles (T, N) [rad] against the reference."""
+    joints = joint_error(q_TN, clip.reference_TN)
+    links = link_error(robot, q_TN, clip.reference_TN, key_links)
+    return ClipScore(clip.name, len(q_TN), float(joints.mean()), float(links.mean()))
 
 
 class ClipMetrics(lightning.Callback):
@@ -74,6 +72,8 @@ class ClipMetrics(lightning.Callback):
     def on_train_epoch_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Scores the network as it is now."""
         assert isinstance(pl_module, RetargetModule)
-        scores = score_clips(predict_clips(pl_module.network, self.clips), self.clips, self.robot, self.key_links)
-        mean = mean_score(scores)
+        predictions = predict_clips(pl_module.network, self.clips)
+        mean = mean_score(
+            [score_clip(c, q, self.robot, self.key_links) for c, q in zip(self.clips, predictions, strict=True)]
+        )
         pl_module.log_dict({"val/joint_rad": mean.joint_rad, "val/link_cm": mean.link_cm})

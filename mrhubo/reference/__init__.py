@@ -1,7 +1,14 @@
 """Optimisation-based human -> robot retargeting (the ground truth, and the peer to beat), and the metrics."""
 
 from mrhubo.reference.jacobian import DirectionJacobian
-from mrhubo.reference.metrics import at_limit_share, direction_error, direction_jerk, joint_error, link_error
+from mrhubo.reference.metrics import (
+    angle_between,
+    at_limit_share,
+    direction_error,
+    direction_jerk,
+    joint_error,
+    link_error,
+)
 from mrhubo.reference.retarget import ReferenceResult, ReferenceRetargeter
 from mrhubo.reference.solve import DirectionProblem
 
@@ -10,6 +17,7 @@ __all__ = [
     "DirectionProblem",
     "ReferenceResult",
     "ReferenceRetargeter",
+    "angle_between",
     "at_limit_share",
     "direction_error",
     "direction_jerk",

@@ -23,6 +23,7 @@ from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
+from mrhubo.reference import direction_error
 from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
 from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
@@ -90,10 +91,7 @@ class Retargeter:
         """Joint angles with a confidence for each frame; poses as for `predict`."""
         q_TN = self.predict(pose_TJ6)
         pose_TJ6 = pose_TJ6.float()
-        robot = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
-        human = self.body_map.human_directions(pose_TJ6)
-        sine, cosine = torch.linalg.cross(robot, human).norm(dim=-1), (robot * human).sum(-1)
-        error_TD = torch.rad2deg(torch.atan2(sine, cosine))
+        error_TD = direction_error(self.body_map, q_TN, pose_TJ6)
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
         plausible = (self.phi_threshold / phi_T.clamp_min(1e-12)).clamp(max=1.0)
         agreement = torch.exp(-(error_TD.mean(dim=1) / _AGREEMENT_DEG).square())

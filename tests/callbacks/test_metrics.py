@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from mrhubo.callbacks import Clip, load_motions, mean_score, predict_clips, score_clips, solve_references
+from mrhubo.callbacks import Clip, load_motions, mean_score, predict_clips, score_clip, solve_references
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion
@@ -33,11 +33,11 @@ def test_a_perfect_prediction_scores_zero_and_a_turned_joint_scores_its_angle(ro
     robot = body_map.robot
     q = robot.sample(40, torch.Generator().manual_seed(0))
     clip = Clip(Motion("a", torch.zeros(40, 21, 6), 24.0, ""), q)
-    (score,) = score_clips([q + 2 * torch.pi], [clip], robot, config.robot.key_links)
+    score = score_clip(clip, q + 2 * torch.pi, robot, config.robot.key_links)
     assert score.joint_rad == pytest.approx(0, abs=1e-5) and score.link_cm == pytest.approx(0, abs=1e-3)
     off = q.clone()
     off[:, robot.joint_names.index("LElbowRoll")] -= 0.4
-    (score,) = score_clips([off], [clip], robot, config.robot.key_links)
+    score = score_clip(clip, off, robot, config.robot.key_links)
     assert score.joint_rad == pytest.approx(0.4 / 8, rel=1e-4)
     # l_wrist and l_gripper lie 5.6 and 11.4 cm below the elbow: a chord of 2 r sin(0.2), two of eight links
     assert score.link_cm == pytest.approx((5.595 + 11.437) * 2 * 0.19867 / 8, rel=0.02)
@@ -48,8 +48,10 @@ def test_the_mean_counts_each_clip_once(root: Path) -> None:
     robot = body_map.robot
     q = robot.sample(30, torch.Generator().manual_seed(0))
     clips = [Clip(Motion(n, torch.zeros(c, 21, 6), 24.0, ""), q[:c]) for n, c in (("a", 30), ("b", 10))]
-    scores = score_clips([q + 0.1, q[:10] + 0.3], clips, robot, config.robot.key_links)
+    found = zip(clips, (q + 0.1, q[:10] + 0.3), strict=True)
+    scores = [score_clip(clip, moved, robot, config.robot.key_links) for clip, moved in found]
     assert mean_score(scores).joint_rad == pytest.approx(0.2, rel=1e-4) and mean_score(scores).frames == 40
+    assert mean_score(scores, over_frames=True).joint_rad == pytest.approx(0.15, rel=1e-4)
 
 
 def test_predictions_come_back_clip_by_clip(root: Path) -> None:
