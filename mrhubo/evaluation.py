@@ -14,7 +14,7 @@ from torch import Tensor
 
 from mrhubo.callbacks import Clip, ClipScore, mean_score, score_clip
 from mrhubo.reference import angle_between, at_limit_share, direction_jerk
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, SelfCollision
 from mrhubo.threads import use_threads
 
 _ENDS = ("left_hand", "right_hand", "head")
@@ -36,9 +36,15 @@ class Evaluation(ClipScore):
     """Jerk of the robot's directions over that of the human's."""
     at_limit: float
     """Share of joint angles at a limit."""
+    collision: float
+    """Share of frames in which the robot's collision shapes overlap."""
+    reference_collision: float
+    """The same for the reference, which is not told to avoid it."""
 
 
-def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str]) -> Evaluation:
+def evaluate_clip(
+    clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str], shapes: SelfCollision
+) -> Evaluation:
     """Measures of predicted joint angles (T, N) [rad]."""
     robot, human_TD3 = body_map.robot, body_map.human_directions(clip.motion.pose_TJ6)
     robot_TD3, reference_TD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_TN, clip.reference_TN))
@@ -59,6 +65,8 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         head_deg=mean(error_TD, "head"),
         jerk_ratio=jerk / human_jerk if human_jerk else float("nan"),
         at_limit=float(at_limit_share(robot, q_TN).mean()),
+        collision=float(shapes.collides(q_TN).float().mean()),
+        reference_collision=float(shapes.collides(clip.reference_TN).float().mean()),
     )
 
 
@@ -66,7 +74,8 @@ def evaluate_clips(
     predictions: Sequence[Tensor], clips: Sequence[Clip], body_map: BodyMap, key_links: Sequence[str]
 ) -> list[Evaluation]:
     """Measures clip by clip, then their means over clips and over frames."""
-    found = [evaluate_clip(clip, q_TN, body_map, key_links) for clip, q_TN in zip(clips, predictions, strict=True)]
+    shapes = SelfCollision(body_map.robot)
+    found = [evaluate_clip(c, q_TN, body_map, key_links, shapes) for c, q_TN in zip(clips, predictions, strict=True)]
     return [*found, mean_score(found), mean_score(found, over_frames=True)]
 
 
@@ -88,6 +97,8 @@ def table(evaluations: Sequence[Evaluation]) -> str:
         "head_deg": ("head [deg]", "{:.1f}"),
         "jerk_ratio": ("jerk ratio", "{:.2f}"),
         "at_limit": ("at a limit", "{:.1%}"),
+        "collision": ("collision", "{:.1%}"),
+        "reference_collision": ("reference's ", "{:.1%}"),
     }
     shown = {n: h for n, h in heads.items() if any(getattr(e, n) == getattr(e, n) for e in evaluations)}
     rows = [["clip", *(head for head, _ in shown.values())]]

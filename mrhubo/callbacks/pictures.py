@@ -15,14 +15,13 @@ from torch import Tensor
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.callbacks.clips import Clip
 from mrhubo.pairing import PairFilter
-from mrhubo.robot import Robot, load_urdf
+from mrhubo.robot import Robot, link_poses, load_urdf, read_geometry
 from mrhubo.view import (
     Solids,
     contact_sheet,
     distributions,
     figure_sheet,
     human_figure,
-    read_geometry,
     robot_solids,
 )
 
@@ -50,10 +49,7 @@ class Artist:
 
     def robot_figure(self, q_N: Tensor, scaled: bool = True) -> Solids:
         """The robot at joint angles (N,) [rad], scaled to the human's height."""
-        wanted = self.robot.configuration(q_N.numpy())
-        self.urdf.update_cfg({name: wanted[name] for name in self.urdf.actuated_joint_names if name in wanted})
-        root = self.robot.description.root
-        poses = {link: self.urdf.get_transform(link, root) for link in self.robot.description.links}
+        poses = link_poses(self.urdf, self.robot.configuration(q_N.numpy()))
         solids = robot_solids(self.geometry, poses, self.parents)
         return solids.scaled(self.scale) if scaled else solids
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from mrhubo.robot import BodyMap, LinkPoses, Robot
+from mrhubo.robot import BodyMap, LinkPoses
 
 
 class DirectionJacobian:
@@ -24,7 +24,7 @@ class DirectionJacobian:
         self.body_map, robot = body_map, body_map.robot
         device = robot.lower_N.device
         joints = [robot.description.joints[name] for name in robot.driven_joints]
-        self.robot = _with_links(robot, [joint.child for joint in joints])
+        self.robot = robot.with_links([joint.child for joint in joints])
         self._children = [self.robot.link_index(joint.child) for joint in joints]
         self._axes_A3 = torch.tensor([joint.axis_3.tolist() for joint in joints], device=device)
         self._limbs = [i for i, d in enumerate(body_map.directions) if d.axis_3 is None]
@@ -100,17 +100,3 @@ class DirectionJacobian:
         jacobian_BX = sum((entries_BX.index_select(1, x) for x in self._layers_KX[1:]),
                           start=entries_BX.index_select(1, self._layers_KX[0]))  # fmt: skip
         return jacobian_BX.unflatten(1, (directions_BD3.shape[1], 3, -1))
-
-
-def _with_links(robot: Robot, links: list[str]) -> Robot:
-    """The robot itself if it computes the poses of these links, else its twin that does, with the same links first.
-
-    Only links of joints that mimic another can be missing.
-    """
-    if set(links) <= set(robot.links):
-        return robot
-    hold = {name: angle for name, angle in robot.held.items() if name not in robot.joint_names}
-    limits = zip(robot.joint_names, robot.lower_N.tolist(), robot.upper_N.tolist(), strict=True)
-    ranges = {name: [lower, upper] for name, lower, upper in limits}
-    twin = Robot(robot.urdf, robot.joint_names, (*robot.links, *links), ranges, hold, robot.name)
-    return twin.to(robot.lower_N.device)

@@ -2,13 +2,14 @@
 
 Every frame is solved from several starts; the best path through the solutions is chosen; then all frames are refined
 together, with a small cost on joint velocity that carries joints over frames which do not determine them (the twist of
-a straight arm).
+a straight arm). `collision_free` then makes a second motion of it in which the robot does not touch itself.
 
 Legend: T frames (or B independent ones), S starts, D directions, N joints, J = 21 human joints, C blocks (see `solve`).
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
@@ -38,6 +40,8 @@ class ReferenceResult:
     """Share of all joint angles that are at a limit (within 0.001 rad)."""
     jumps: int
     """Steps of an arm or the neck faster than 0.5 rad per 1/24 s while its human directions turn less than 0.25 rad."""
+    rests_T: Tensor
+    """Frames (T,) that `retarget_collision_free` could not free, which hold the nearest free pose."""
 
 
 class ReferenceRetargeter:
@@ -63,6 +67,7 @@ class ReferenceRetargeter:
     def _prepare(self) -> None:
         self.problem = DirectionProblem(self.body_map)
         self._pool = StartPool(self.problem, self.starts, self.seed)
+        self.__dict__.pop("_free_problem", None)
 
     def to(self, device: torch.device | str) -> ReferenceRetargeter:
         """Moves the body map, in place, and everything built on it."""
@@ -81,13 +86,41 @@ class ReferenceRetargeter:
             raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
         target_TD3 = self._targets(pose_TJ6)
         candidates_TSN, cost_TSC = self._candidates(target_TD3)
-        # sum_t |velocity_t|^2 with the reference rate as the unit of time
-        pull = self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2
+        pull = self._pull(frame_rate)
         if pull == 0 or len(target_TD3) == 1:
             q_TN = self._polish(candidates_TSN, cost_TSC, target_TD3)[0]
         else:
             q_TN = smooth_motion(self.problem, candidates_TSN, cost_TSC, target_TD3, pull)
         return self._result(q_TN, target_TD3, frame_rate)
+
+    @torch.no_grad()
+    def retarget_collision_free(
+        self, pose_TJ6: Tensor, frame_rate: float, q_TN: Tensor | None = None
+    ) -> ReferenceResult:
+        """A motion in which the robot never touches itself, as near to the human's as that allows.
+
+        Args:
+            pose_TJ6: human poses.
+            frame_rate: frames per second.
+            q_TN: what `retarget` gave for the same poses, if it is there already.
+
+        Raises:
+            UserError: as for `retarget`; or no pose that was tried, nor the robot's home pose, is free of collision.
+        """
+        if q_TN is None:
+            q_TN = self.retarget(pose_TJ6, frame_rate).q_TN
+        target_TD3 = self._targets(pose_TJ6)
+        pull = self._pull(frame_rate)
+        q_TN, rests_T = avoid_collisions(self._free_problem, self._pool, q_TN.to(target_TD3), target_TD3, pull)
+        return self._result(q_TN, target_TD3, frame_rate, rests_T)
+
+    @functools.cached_property
+    def _free_problem(self) -> CollisionFreeProblem:
+        return CollisionFreeProblem(self.body_map)
+
+    def _pull(self, frame_rate: float) -> float:
+        """Weight of |q_t - q_(t-1)|^2: that of the squared velocity, with the reference rate as the unit of time."""
+        return self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2
 
     @torch.no_grad()
     def solve_frames(self, pose_BJ6: Tensor) -> tuple[Tensor, Tensor]:
@@ -138,13 +171,16 @@ class ReferenceRetargeter:
         best_BN = pick(candidates_BSN, cost_BSC.argmin(dim=1), self.problem.joints_NC)
         return self.problem.minimise(best_BN, target_BD3)
 
-    def _result(self, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> ReferenceResult:
+    def _result(
+        self, q_TN: Tensor, target_TD3: Tensor, frame_rate: float, rests_T: Tensor | None = None
+    ) -> ReferenceResult:
         problem = self.problem
         robot = self.body_map.robot
         robot_TD3 = self.body_map.robot_directions(robot.forward(q_TN))
         return ReferenceResult(
             q_TN, torch.rad2deg(angle_between(robot_TD3, target_TD3)), float(at_limit_share(robot, q_TN).mean()),
             count_jumps(problem, q_TN, target_TD3, frame_rate),
+            torch.zeros(len(q_TN), dtype=torch.bool) if rests_T is None else rests_T.cpu(),
         )  # fmt: skip
 
 

@@ -89,14 +89,20 @@ def _bridge(
 
 
 def refine(
-    problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, pull: float, sweeps: int = 30, tolerance: float = 3e-5
+    problem: DirectionProblem,
+    q_TN: Tensor,
+    target_TD3: Tensor,
+    pull: float,
+    sweeps: int = 30,
+    tolerance: float = 3e-5,
+    fixed_T: Tensor | None = None,
 ) -> tuple[Tensor, Tensor]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
 
     Gauss-Newton on all frames at once: the system is block-tridiagonal, solved as a banded one. Joints at a limit that
     the descent would push beyond it are frozen for the step. A block's step counts only if the block's cost falls;
     damping is raised in the frames whose own share of the cost rose. Ends when no block's cost falls by more than the
-    share `tolerance`, or five steps in a row were of no use.
+    share `tolerance`, or five steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
     """
     model = _motion_quadratic(problem, q_TN, target_TD3, pull)
     cost_C = model.cost_BC.double().sum(0)
@@ -104,7 +110,7 @@ def refine(
     failures_C = torch.zeros_like(cost_C)
     for _ in range(sweeps):
         running_N = (failures_C < _PATIENCE)[problem.block_N]
-        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC[:, problem.block_N], pull)
+        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC[:, problem.block_N], pull, fixed_T)
         trial_TN = torch.where(running_N, torch.clamp(trial_TN, problem.lower_N, problem.upper_N), q_TN)
         trial = _motion_quadratic(problem, trial_TN, target_TD3, pull)
         trial_cost_C = trial.cost_BC.double().sum(0)
@@ -133,10 +139,14 @@ def _motion_quadratic(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tenso
     )
 
 
-def _motion_step(problem: DirectionProblem, q_TN: Tensor, model: Quadratic, damping_TN: Tensor, pull: float) -> Tensor:
+def _motion_step(
+    problem: DirectionProblem, q_TN: Tensor, model: Quadratic, damping_TN: Tensor, pull: float, fixed_T: Tensor | None
+) -> Tensor:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints."""
     frames, joints = q_TN.shape
     free_TN = ~problem.frozen(q_TN, model.gradient_BN)
+    if fixed_T is not None:
+        free_TN &= ~fixed_T[:, None]
     both_TNN = free_TN[:, :, None] & free_TN[:, None, :]
     system_TNN = (model.hessian_BNN * both_TNN).double().cpu().numpy()
     diagonal_TN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1)

@@ -1,7 +1,21 @@
 """The robot: its URDF, batched kinematics, and which link stands for which part of the human body."""
 
+from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.keypoints import BodyMap, build_body_map
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.urdf import load_urdf
+from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
+from mrhubo.robot.urdf import link_poses, load_urdf
 
-__all__ = ["BodyMap", "LinkPoses", "Robot", "build_body_map", "load_urdf"]
+__all__ = [
+    "ROBOT_COLOR",
+    "BodyMap",
+    "LinkGeometry",
+    "LinkPoses",
+    "Robot",
+    "SelfCollision",
+    "build_body_map",
+    "link_poses",
+    "load_urdf",
+    "read_collision_geometry",
+    "read_geometry",
+]

@@ -111,6 +111,16 @@ class Robot:
         self.drive_DN, self._frames = self.drive_DN.to(device), self._frames.to(device)
         return self
 
+    def with_links(self, links: Sequence[str]) -> Robot:
+        """The robot itself if it computes the poses of these links, else its twin that does, its own links first."""
+        if set(links) <= set(self.links):
+            return self
+        hold = {name: angle for name, angle in self.held.items() if name not in self.joint_names}
+        limits = zip(self.joint_names, self.lower_N.tolist(), self.upper_N.tolist(), strict=True)
+        ranges = {name: [lower, upper] for name, lower, upper in limits}
+        twin = Robot(self.urdf, self.joint_names, (*self.links, *links), ranges, hold, self.name)
+        return twin.to(self.lower_N.device)
+
     def link_index(self, link: str) -> int:
         """Position of a link in `links`."""
         return self.links.index(link)

@@ -132,6 +132,12 @@ def load_urdf(path: Path) -> yourdfpy.URDF:
         raise UserError(f"robot.urdf: {path} cannot be read as a URDF: {type(error).__name__}: {error}") from error
 
 
+def link_poses(urdf: yourdfpy.URDF, configuration: dict[str, float]) -> dict[str, np.ndarray]:
+    """Pose (4, 4) of every link in the root's frame, at angles [rad] by joint (`Robot.configuration`)."""
+    urdf.update_cfg({name: configuration[name] for name in urdf.actuated_joint_names if name in configuration})
+    return {link.name: urdf.get_transform(link.name, urdf.base_link) for link in urdf.robot.links}
+
+
 def _kinematic_part(robot: etree._Element) -> etree._Element:
     """Links, joints and colours alone: simulators' and sensors' tags, and textures, only trip the parser."""
     for element in list(robot):

@@ -5,16 +5,14 @@ from mrhubo.view.distributions import distributions
 from mrhubo.view.figures import figure_sheet, human_figure
 from mrhubo.view.human import HUMAN_COLOR, SKIN_COLOR, human_solids
 from mrhubo.view.painter import render
-from mrhubo.view.robot import ROBOT_COLOR, LinkGeometry, read_geometry, robot_solids, stick_solids
+from mrhubo.view.robot import robot_solids, stick_solids
 from mrhubo.view.sheets import contact_sheet, phi_histogram, save_png
 from mrhubo.view.solids import Solids
 
 __all__ = [
     "HUMAN_COLOR",
-    "ROBOT_COLOR",
     "SKIN_COLOR",
     "Camera",
-    "LinkGeometry",
     "Solids",
     "common_cameras",
     "contact_sheet",
@@ -23,7 +21,6 @@ __all__ = [
     "human_figure",
     "human_solids",
     "phi_histogram",
-    "read_geometry",
     "render",
     "robot_solids",
     "save_png",

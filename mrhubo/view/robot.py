@@ -3,104 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
-import yourdfpy
 
 from mrhubo.errors import unknown_name
+from mrhubo.robot import ROBOT_COLOR, LinkGeometry
 from mrhubo.view.solids import Color, Solids
-
-ROBOT_COLOR: Color = (0.80, 0.83, 0.87)
-"""Colour of shapes whose URDF names none."""
-
-
-Kind = Literal["sphere", "cylinder", "capsule", "box"]
-
-
-@dataclass(frozen=True)
-class LinkGeometry:
-    """One primitive shape of a link."""
-
-    link: str
-    """Name of the link that carries it."""
-    kind: Kind
-    size: tuple[float, ...]
-    """Metres. sphere: (radius,); cylinder, along z: (radius, length); capsule, along z: (radius, length without the
-    round ends); box: (x, y, z)."""
-    origin_44: np.ndarray
-    """Pose (4, 4) of the shape's centre in the link's frame."""
-    color: Color
-    """RGB, 0..1."""
-
-
-def read_geometry(urdf: yourdfpy.URDF, default_color: Color = ROBOT_COLOR) -> list[LinkGeometry]:
-    """The spheres, cylinders and boxes of every link: those of its visual elements, or, where these hold none, those
-    of its collision elements. Meshes are skipped, and so is what has no size. URDF has no capsules: a cylinder with a
-    sphere of its radius and colour at either end becomes one.
-    """
-    palette = {material.name: _rgb(material) for material in urdf.robot.materials}
-    shapes: list[LinkGeometry] = []
-    for link in urdf.robot.links:
-        materials = [visual.material for visual in link.visuals]
-        colors = [_rgb(material) or palette.get(getattr(material, "name", None)) for material in materials]
-        named = next((color for color in colors if color is not None), default_color)
-        visible = [
-            _shape(link.name, item, color or default_color) for item, color in zip(link.visuals, colors, strict=True)
-        ]
-        solid = [_shape(link.name, item, named) for item in link.collisions]
-        found = [shape for shape in visible if shape is not None] or [shape for shape in solid if shape is not None]
-        shapes.extend(_with_capsules(found))
-    return shapes
-
-
-def _with_capsules(shapes: list[LinkGeometry]) -> list[LinkGeometry]:
-    """The shapes of one link, with every cylinder and the two spheres that round it off replaced by a capsule."""
-    spheres = [shape for shape in shapes if shape.kind == "sphere"]
-    used: set[int] = set()
-    kept: list[LinkGeometry] = []
-    for shape in shapes:
-        ends: list[LinkGeometry] = []
-        if shape.kind == "cylinder":
-            radius, length = shape.size
-            for sign in (-0.5, 0.5):
-                tip_3 = shape.origin_44[:3, 3] + sign * length * shape.origin_44[:3, 2]
-                ends += [sphere for sphere in spheres if _rounds_off(sphere, tip_3, radius, shape.color)][:1]
-        if len(ends) == 2:
-            used.update(id(sphere) for sphere in ends)
-            shape = replace(shape, kind="capsule")
-        kept.append(shape)
-    return [shape for shape in kept if id(shape) not in used]
-
-
-def _rounds_off(sphere: LinkGeometry, tip_3: np.ndarray, radius: float, color: Color) -> bool:
-    apart = float(np.abs(sphere.origin_44[:3, 3] - tip_3).max())
-    return apart < 1e-3 * radius + 1e-6 and abs(sphere.size[0] - radius) < 1e-3 * radius and sphere.color == color
-
-
-def _rgb(material: yourdfpy.urdf.Material | None) -> Color | None:
-    if material is None or material.color is None:
-        return None
-    red, green, blue = np.clip(np.asarray(material.color.rgba, float)[:3], 0.0, 1.0).tolist()
-    return red, green, blue
-
-
-def _shape(link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, color: Color) -> LinkGeometry | None:
-    geometry = element.geometry
-    origin_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
-    if geometry is None:
-        return None
-    if geometry.sphere is not None:
-        kind: Kind = "sphere"
-        size: tuple[float, ...] = (float(geometry.sphere.radius),)
-    elif geometry.cylinder is not None:
-        kind, size = "cylinder", (float(geometry.cylinder.radius), float(geometry.cylinder.length))
-    elif geometry.box is not None:
-        kind, size = "box", tuple(np.asarray(geometry.box.size, float).tolist())
-    else:
-        return None
-    return LinkGeometry(link, kind, size, origin_44, color) if min(size) > 0.0 else None
 
 
 def robot_solids(

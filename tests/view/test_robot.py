@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from mrhubo.view import read_geometry, render, robot_solids, stick_solids
+from mrhubo.robot import read_geometry
+from mrhubo.view import render, robot_solids, stick_solids
 
 URDF = """<robot name="toy">
   <material name="orange"><color rgba="1 0.5 0 1"/></material>

@@ -1,0 +1,133 @@
+"""A robot motion as near to the human's as it can be without the robot touching itself.
+
+    cost(q) + weight * sum_p max(0, margin - distance_p(q))^2
+
+in place of the cost of `solve`, with the same limits, the same smoothness and the same solver. Both arms can meet, so
+all joints are one block. The margin is wider than what the penalty gives way, so the result is free of collision, not
+nearly so; where it still is not (every start of a frame ends in a collision), the motion rests in the free pose that is
+nearest in time.
+
+Legend: B problems, T frames, S starts, D directions, N joints, C = 1 block, X contacts.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from mrhubo.errors import UserError
+from mrhubo.reference.solve import DirectionProblem, Quadratic
+from mrhubo.reference.starts import StartPool
+from mrhubo.reference.trajectory import best_path, refine
+from mrhubo.robot import BodyMap, SelfCollision
+
+_WEIGHTS = (1e3, 1e4)
+_MARGIN = 0.005
+_REACH = 12
+
+
+class CollisionFreeProblem(DirectionProblem):
+    """The cost above for one body map, on the device on which the body map is when this is built."""
+
+    def __init__(self, body_map: BodyMap, margin: float = _MARGIN) -> None:
+        super().__init__(body_map)
+        self.collision, self.margin, self.weight = SelfCollision(body_map.robot), margin, _WEIGHTS[-1]
+        self.block_N = torch.zeros_like(self.block_N)
+        self.joints_NC = torch.ones_like(self.joints_NC[:, :1])
+        self.directions_DC = torch.ones_like(self.directions_DC[:, :1])
+
+    def quadratic(self, q_BN: Tensor, target_BD3: Tensor) -> Quadratic:
+        """Cost, with its penalty, and Gauss-Newton model at joint angles (B, N) [rad] for directions (B, D, 3)."""
+        model = super().quadratic(q_BN, target_BD3)
+        near = self.collision.near(q_BN, self.margin)
+        short_X1 = (self.margin - near.distance_X)[:, None]
+        rows_XN = near.jacobian_XN
+        cost_BC = model.cost_BC.index_add(0, near.row_X, self.weight * short_X1.square())
+        gradient_BN = model.gradient_BN.index_add(0, near.row_X, -self.weight * short_X1 * rows_XN)
+        square_XNN = self.weight * rows_XN[:, :, None] * rows_XN[:, None, :]
+        return Quadratic(cost_BC, gradient_BN, model.hessian_BNN.index_add(0, near.row_X, square_XNN))
+
+
+def avoid_collisions(
+    problem: CollisionFreeProblem, pool: StartPool, q_TN: Tensor, target_TD3: Tensor, pull: float
+) -> tuple[Tensor, Tensor]:
+    """A motion (T, N) [rad] without collision, from the best one that may have some, and which frames had to rest (T,).
+
+    Args:
+        problem: cost and collision geometry.
+        pool: where frames that cannot be freed by small steps start again.
+        q_TN: the motion to begin with.
+        target_TD3: the human's directions.
+        pull: weight of |q_t - q_(t-1)|^2.
+
+    Raises:
+        UserError: no frame, and not even the robot's home pose, is free of collision.
+    """
+    rests_T = torch.zeros(len(q_TN), dtype=torch.bool, device=q_TN.device)
+    close_T = rests_T.index_fill(0, problem.collision.near(q_TN, problem.margin).row_X, True)
+    if not bool(close_T.any()):
+        return q_TN, rests_T
+    free_TN = _refine_around(problem, q_TN, close_T, target_TD3, pull)
+    if bool((touching_T := problem.collision.collides(free_TN)).any()):
+        again_TN = _start_again(problem, pool, free_TN, touching_T, target_TD3, pull)
+        changed_T = (again_TN != free_TN).any(dim=1)
+        free_TN = _refine_around(problem, again_TN, changed_T | touching_T, target_TD3, pull)
+    if bool((rests_T := problem.collision.collides(free_TN)).any()):
+        free_TN = _rest(problem, free_TN, rests_T)
+    return free_TN, rests_T
+
+
+def _refine_around(
+    problem: CollisionFreeProblem, q_TN: Tensor, close_T: Tensor, target_TD3: Tensor, pull: float
+) -> Tensor:
+    """`refine` for the frames within half a second of those in `close_T`; the others stay.
+
+    Of a stretch of frames that stay, only the first and the last matter to the others, so the rest is left out; what
+    the smoothness then costs between those two is constant.
+    """
+    near_T, kept_T = (_widen(close_T, reach) for reach in (_REACH, _REACH + 1))
+    part_TN = q_TN[kept_T]
+    for problem.weight in _WEIGHTS:
+        part_TN = refine(problem, part_TN, target_TD3[kept_T], pull, fixed_T=~near_T[kept_T])[0]
+    found_TN = q_TN.clone()
+    found_TN[kept_T] = part_TN
+    return found_TN
+
+
+def _widen(mask_T: Tensor, frames: int) -> Tensor:
+    return torch.nn.functional.max_pool1d(mask_T[None].float(), 2 * frames + 1, 1, frames)[0] > 0
+
+
+def _start_again(
+    problem: CollisionFreeProblem, pool: StartPool, q_TN: Tensor, touching_T: Tensor, target_TD3: Tensor, pull: float
+) -> Tensor:
+    """The best path (T, N) through new candidates in the frames that touch and near them, elsewhere what there was."""
+    count = pool.starts
+    around_T = _widen(touching_T, _REACH)
+    candidates_TSN = q_TN[:, None].repeat(1, count + 1, 1)
+    cost_TSC = problem.quadratic(q_TN, target_TD3).cost_BC[:, None].repeat(1, count + 1, 1)
+    target_XD3 = target_TD3[around_T]
+    found_YN, cost_YC = problem.minimise(
+        pool.near(target_XD3).flatten(0, 1), target_XD3.repeat_interleave(count, dim=0), steps=25, tolerance=1e-3
+    )
+    candidates_TSN[around_T, 1:] = found_YN.unflatten(0, (-1, count))
+    cost_TSC[around_T, 1:] = cost_YC.unflatten(0, (-1, count))
+    # Whatever it costs, a candidate that touches is only taken where there is no other.
+    touches_TS = problem.collision.collides(candidates_TSN.flatten(0, 1)).unflatten(0, candidates_TSN.shape[:2])
+    return best_path(candidates_TSN, cost_TSC + 10.0 * touches_TS[..., None], problem.joints_NC, pull)[0]
+
+
+def _rest(problem: CollisionFreeProblem, q_TN: Tensor, touching_T: Tensor) -> Tensor:
+    """The motion with the pose of the nearest free frame in every frame that touches."""
+    if bool(touching_T.all()):
+        home_N = problem.robot.home()
+        if bool(problem.collision.collides(home_N[None])):
+            raise UserError(
+                f"{problem.robot.urdf}: the robot collides with itself in every pose that was tried, its home pose"
+                " among them; check the collision geometry"
+            )
+        return home_N.expand_as(q_TN).clone()
+    free_X = torch.nonzero(~touching_T)[:, 0]
+    frames_T = torch.arange(len(q_TN), device=q_TN.device)
+    nearest_T = free_X[(frames_T[:, None] - free_X[None]).abs().argmin(dim=1)]
+    return q_TN[nearest_T]

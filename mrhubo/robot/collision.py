@@ -1,0 +1,189 @@
+"""Self-collision of a robot: signed distances between the capsules of its links, and how they change with the joints.
+
+The shapes are those of the URDF's collision elements, each inside one or more capsules: a sphere and a cylinder with
+round ends are capsules, a flat-ended cylinder gets round ends, a box becomes capsules side by side. Meshes are not
+read; `uncovered` names the links that have nothing else.
+
+Links that the sampled joints do not move against each other are one body. Two bodies that share a joint cannot be kept
+apart, so they are not compared; nor are two of which some capsules overlap in more than half of all random poses (an
+upper arm and a forearm with an axis of its own between the two, both of which reach around the elbow).
+
+Legend: B batch, C capsules, P pairs of them, X pairs in some pose, A driven joints, N joints of q, L bodies.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry
+from mrhubo.robot.urdf import link_poses, load_urdf
+
+_SAMPLES = 2_000
+_ALWAYS = 0.5
+_SHORT = 1e-9
+_SLACK = 1e-3
+_CHUNK = 1024
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Pairs of capsules that are near each other, one entry each (X)."""
+
+    row_X: Tensor
+    """Which of the B poses."""
+    pair_X: Tensor
+    """Which of `SelfCollision.pairs`."""
+    distance_X: Tensor
+    """Signed distance of the surfaces [m]; negative where they overlap."""
+    jacobian_XN: Tensor
+    """Its derivative by the joint angles [m/rad].
+
+    The closest points may slide along the capsules without changing the distance to first order, so only the motion of
+    the bodies counts: with the normal n at the contact c, a joint with the axis a through o changes the distance by
+    n . (a x (c - o)) = (c x n) . a - n . (a x o).
+    """
+
+
+class SelfCollision:
+    """Capsule pairs of one robot; built for the device on which the robot is."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Reads the collision geometry.
+
+        Raises:
+            UserError: the URDF cannot be read.
+        """
+        urdf, description = load_urdf(robot.urdf), robot.description
+        shapes = read_collision_geometry(urdf)
+        shaped = {shape.link for shape in shapes}
+        self.uncovered = tuple(x.name for x in urdf.robot.links if x.collisions and x.name not in shaped)
+        """Links whose collision geometry is of meshes alone, which are not looked at."""
+        joints = [description.joints[name] for name in robot.driven_joints]
+        self.robot = robot.with_links([joint.child for joint in joints])
+        device = robot.lower_N.device
+        self._children = [self.robot.link_index(joint.child) for joint in joints]
+        self._axes_A3 = torch.tensor(np.array([joint.axis_3 for joint in joints]), dtype=torch.float32, device=device)
+        self._rotary_A = torch.tensor([float(joint.rotary) for joint in joints], device=device)
+
+        def body(link: str) -> str:
+            above = (joint.child for joint in description.joints_above(link) if joint.name in robot.driven_joints)
+            return next(above, description.root)
+
+        rest = link_poses(urdf, robot.configuration(robot.home().cpu().numpy()))
+        bodies = [description.root, *(joint.child for joint in joints)]
+        capsules = []
+        for shape in shapes:
+            carrier = body(shape.link)
+            pose_44 = np.linalg.inv(rest[carrier]) @ rest[shape.link] @ shape.origin_44
+            capsules += [(shape.link, carrier, *row) for row in _capsules(shape, pose_44)]
+        self._links = tuple(capsule[0] for capsule in capsules)
+        body_C = [bodies.index(capsule[1]) for capsule in capsules]
+        self._body_C = torch.tensor(body_C, dtype=torch.long, device=device)
+        ends = np.array([capsule[2:4] for capsule in capsules], dtype=np.float32).reshape(-1, 2, 3)
+        self._ends_C23 = torch.tensor(ends, device=device)
+        self._radius_C = torch.tensor([capsule[4] for capsule in capsules], dtype=torch.float32, device=device)
+        self._reach_C = (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C
+        self._above_LA = torch.tensor(
+            [[float(joint in description.joints_above(link)) for joint in joints] for link in bodies], device=device
+        )
+        parent = {joint.child: body(joint.parent) for joint in joints}
+        kin = {frozenset(pair) for pair in parent.items()}
+        carriers = [capsule[1] for capsule in capsules]
+        apart = [
+            (i, j)
+            for i, j in itertools.combinations(range(len(capsules)), 2)
+            if carriers[i] != carriers[j] and frozenset((carriers[i], carriers[j])) not in kin
+        ]
+        self._pair_2P = torch.tensor(apart, dtype=torch.long, device=device).reshape(-1, 2).T.contiguous()
+        near = self.near(self.robot.sample(_SAMPLES, torch.Generator().manual_seed(0)), 0.0)
+        share_P = torch.bincount(near.pair_X, minlength=len(apart)) / _SAMPLES
+        kin |= {frozenset((carriers[i], carriers[j])) for (i, j), s in zip(apart, share_P, strict=True) if s > _ALWAYS}
+        separate = [frozenset((carriers[i], carriers[j])) not in kin for i, j in apart]
+        self._pair_2P = self._pair_2P[:, torch.tensor(separate, dtype=torch.bool, device=device)]
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The links (a, b) of each pair."""
+        return tuple((self._links[i], self._links[j]) for i, j in self._pair_2P.T.tolist())
+
+    def collides(self, q_BN: Tensor) -> Tensor:
+        """Whether any pair overlaps (B,), at joint angles (B, N) [rad]."""
+        found_B = torch.zeros(len(q_BN), dtype=torch.bool, device=q_BN.device)
+        found_B[self.near(q_BN, 0.0).row_X] = True
+        return found_B
+
+    def near(self, q_BN: Tensor, margin: float) -> Contacts:
+        """The pairs that are closer than `margin` [m] at joint angles (B, N) [rad]."""
+        parts = []
+        for first in range(0, len(q_BN), _CHUNK):
+            part = self._near(self.robot.forward(q_BN[first : first + _CHUNK]), margin)
+            parts.append(Contacts(part.row_X + first, *(getattr(part, f.name) for f in fields(Contacts)[1:])))
+        return Contacts(*(torch.cat([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
+
+    def _near(self, poses: LinkPoses, margin: float) -> Contacts:
+        count = len(poses.position_BL3)
+        eye_B133 = torch.eye(3, device=poses.position_BL3.device).expand(count, 1, 3, 3)
+        rotation_BL33 = torch.cat((eye_B133, poses.rotation_BL33[:, self._children]), dim=1)
+        position_BL3 = torch.cat((eye_B133[..., 0] * 0, poses.position_BL3[:, self._children]), dim=1)
+        ends_BC23 = self._ends_C23 @ rotation_BL33[:, self._body_C].mT + position_BL3[:, self._body_C, None]
+        # The spheres around the capsules tell cheaply which pairs need a closer look.
+        i_P, j_P = self._pair_2P
+        centre_BC3 = ends_BC23.mean(dim=2)
+        apart_BP = torch.cdist(centre_BC3, centre_BC3).flatten(1)[:, i_P * len(self._links) + j_P]
+        row_X, pair_X = torch.nonzero(apart_BP < self._reach_C[i_P] + self._reach_C[j_P] + margin + _SLACK).T
+        i_X, j_X = self._pair_2P[:, pair_X]
+        point_X3, other_X3 = closest_points(ends_BC23[row_X, i_X], ends_BC23[row_X, j_X])
+        apart_X3 = point_X3 - other_X3
+        length_X = apart_X3.norm(dim=-1)
+        distance_X = length_X - self._radius_C[i_X] - self._radius_C[j_X]
+        x = torch.nonzero(distance_X < margin)[:, 0]
+        row_X, normal_X3 = row_X[x], apart_X3[x] / length_X[x, None].clamp_min(_SHORT)
+        axis_XA3 = ((rotation_BL33[:, 1:] @ self._axes_A3[..., None])[..., 0])[row_X]
+        lever_XA3 = torch.linalg.cross(axis_XA3, position_BL3[:, 1:][row_X])
+        moment_X31 = torch.linalg.cross(point_X3[x], normal_X3)[..., None]
+        turn_XA = (axis_XA3 @ moment_X31 - lever_XA3 @ normal_X3[..., None])[..., 0]
+        slide_XA = (axis_XA3 @ normal_X3[..., None])[..., 0]
+        sign_XA = self._above_LA[self._body_C[i_X[x]]] - self._above_LA[self._body_C[j_X[x]]]
+        moved_XA = torch.where(self._rotary_A > 0, turn_XA, slide_XA) * sign_XA
+        return Contacts(row_X, pair_X[x], distance_X[x], moved_XA @ self.robot.drive_DN)
+
+
+def closest_points(a_23: Tensor, b_23: Tensor) -> tuple[Tensor, Tensor]:
+    """The points (..., 3) where segments a and b (..., 2, 3) are nearest; a segment may be a point.
+
+    C. Ericson, Real-Time Collision Detection (2005), section 5.1.9, without branches.
+    """
+    start_a, start_b = a_23[..., 0, :], b_23[..., 0, :]
+    along_a, along_b, r = a_23[..., 1, :] - start_a, b_23[..., 1, :] - start_b, start_a - start_b
+    a, e, b = along_a.square().sum(-1), along_b.square().sum(-1), (along_a * along_b).sum(-1)
+    c, f = (along_a * r).sum(-1), (along_b * r).sum(-1)
+    safe_a, safe_e = a.clamp_min(_SHORT), e.clamp_min(_SHORT)
+    # Nearly parallel segments have no one answer; any point of a will do, the other end follows from it.
+    determinant = a * e - b * b
+    s = torch.where(determinant > 1e-7 * a * e, (b * f - c * e) / determinant.clamp_min(_SHORT * _SHORT), 0.0)
+    t = ((b * s.clamp(0, 1) + f) / safe_e).clamp(0, 1)
+    s = ((b * t - c) / safe_a).clamp(0, 1)
+    t = ((b * s + f) / safe_e).clamp(0, 1)
+    return start_a + s[..., None] * along_a, start_b + t[..., None] * along_b
+
+
+def _capsules(shape: LinkGeometry, pose_44: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Capsules (start (3,), end (3,), radius) around a shape whose centre is at the pose."""
+    centre_3, axes_33 = pose_44[:3, 3], pose_44[:3, :3]
+    if shape.kind != "box":
+        half_3 = 0.5 * (shape.size[1] if len(shape.size) == 2 else 0.0) * axes_33[:, 2]
+        return [(centre_3 - half_3, centre_3 + half_3, shape.size[0])]
+    thin, wide, long = np.argsort(shape.size)
+    count = max(1, math.ceil(shape.size[wide] / max(shape.size[thin], 0.1 * shape.size[wide])))
+    step = shape.size[wide] / count
+    radius = 0.5 * math.hypot(shape.size[thin], step)
+    half_3 = max(0.0, 0.5 * shape.size[long]) * axes_33[:, long]
+    centres = [centre_3 + ((k + 0.5) * step - 0.5 * shape.size[wide]) * axes_33[:, wide] for k in range(count)]
+    return [(centre - half_3, centre + half_3, radius) for centre in centres]

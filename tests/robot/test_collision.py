@@ -1,0 +1,147 @@
+"""Distances between capsules against brute force, their derivatives against differences, on toys and on the robots."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mrhubo.config import load_config
+from mrhubo.robot import Robot, SelfCollision, build_body_map
+from mrhubo.robot.collision import closest_points
+
+ROBOTS = ["nao", "coman", "reachy"]
+
+
+def robot_of(root: Path, name: str) -> Robot:
+    return build_body_map(load_config(root / "conf" / f"{name}.yaml").robot).robot
+
+
+def toy(folder: Path, fore: str, middle: str = "", trunk: str = "<sphere radius='0.1'/>") -> Robot:
+    """A trunk, an upper arm 0.3 long, a forearm with the given shape in its middle; both joints turn about z."""
+    path = folder / "toy.urdf"
+    limit = "<limit lower='-3' upper='3' effort='1' velocity='1'/><axis xyz='0 0 1'/>"
+    path.write_text(
+        f"""<robot name="toy">
+        <link name="trunk"><collision><geometry>{trunk}</geometry></collision></link>
+        <link name="upper">{middle}</link>
+        <link name="fore"><collision><origin xyz="0.2 0 0"/><geometry>{fore}</geometry></collision></link>
+        <joint name="shoulder" type="revolute"><parent link="trunk"/><child link="upper"/>
+          <origin xyz="0 0 0"/>{limit}</joint>
+        <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/>
+          <origin xyz="0.3 0 0"/>{limit}</joint></robot>"""
+    )
+    return Robot(path, ["shoulder", "elbow"])
+
+
+points = st.lists(st.floats(-1, 1, width=32), min_size=12, max_size=12)
+
+
+@given(points, st.integers(0, 3))
+def test_closest_points_are_no_farther_than_any_others(numbers: list[float], degenerate: int) -> None:
+    a, b = torch.tensor(numbers, dtype=torch.float64).reshape(2, 2, 3)
+    if degenerate & 1:
+        a = a[:1].expand(2, 3)
+    if degenerate & 2:
+        b = a + torch.tensor([0.0, 0.3, 0.0])  # parallel
+    found_a, found_b = closest_points(a, b)
+    along = torch.linspace(0, 1, 41, dtype=torch.float64)[:, None]
+    others = torch.cdist(a[0] + along * (a[1] - a[0]), b[0] + along * (b[1] - b[0]))
+    assert float((found_a - found_b).norm()) <= float(others.min()) + 1e-4
+    for found, ends in ((found_a, a), (found_b, b)):  # on the segment
+        assert float((found - ends[0]).norm() + (found - ends[1]).norm()) == pytest.approx(
+            float((ends[1] - ends[0]).norm()), abs=1e-6
+        )
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_derivatives_equal_differences(root: Path, name: str) -> None:
+    robot = robot_of(root, name)
+    shapes = SelfCollision(robot)
+    q_BN = robot.sample(300, torch.Generator().manual_seed(1))
+    near = shapes.near(q_BN, 0.02)
+    assert len(near.row_X) > 20
+    step = 1e-3
+    for x in range(0, len(near.row_X), max(1, len(near.row_X) // 15)):
+        row, pair = int(near.row_X[x]), int(near.pair_X[x])
+        for joint in range(q_BN.shape[1]):
+            ends = []
+            for sign in (-1, 1):
+                moved = q_BN[row : row + 1].clone()
+                moved[0, joint] += sign * step
+                close = shapes.near(moved, 1.0)
+                ends.append(float(close.distance_X[close.pair_X == pair]))
+            difference = (ends[1] - ends[0]) / (2 * step)
+            assert float(near.jacobian_XN[x, joint]) == pytest.approx(difference, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_shipped_robots_stand_free_and_all_their_limbs_are_covered(root: Path, name: str) -> None:
+    robot = robot_of(root, name)
+    shapes = SelfCollision(robot)
+    assert not shapes.uncovered and not bool(shapes.collides(robot.home()[None]))
+    share = float(shapes.collides(robot.sample(2000, torch.Generator().manual_seed(0))).float().mean())
+    assert 0.01 < share < 0.5
+    sides = {(a[0].lower(), b[0].lower()) for a, b in shapes.pairs}
+    assert ("l", "r") in sides or ("r", "l") in sides  # the arms can meet
+    # links far apart in the tree only: never two of one body or of neighbours
+    description = robot.description
+    for a, b in shapes.pairs:
+        moved = [{j.name for j in description.joints_above(x) if j.name in robot.driven_joints} for x in (a, b)]
+        assert len(moved[0] ^ moved[1]) >= 2
+
+
+@pytest.mark.parametrize(
+    "fore",
+    [
+        "<sphere radius='0.05'/>",
+        "<cylinder radius='0.05' length='0.1'/>",
+        "<box size='0.1 0.1 0.1'/>",
+        "<box size='0.3 0.05 0.01'/>",
+    ],
+)
+def test_a_folded_arm_touches_the_trunk(tmp_path: Path, fore: str) -> None:
+    shapes = SelfCollision(toy(tmp_path, fore))
+    straight, folded = torch.tensor([[0.5, 0.0]]), torch.tensor([[0.5, 2.9]])
+    assert not bool(shapes.collides(straight)) and bool(shapes.collides(folded))
+    assert shapes.collides(torch.cat((straight, folded, straight))).tolist() == [False, True, False]
+    assert set(shapes.pairs) == {("trunk", "fore")}
+
+
+def test_distance_of_spheres_is_exact(tmp_path: Path) -> None:
+    shapes = SelfCollision(toy(tmp_path, "<sphere radius='0.05'/>"))
+    near = shapes.near(torch.tensor([[0.7, 0.0], [0.7, torch.pi / 2]]), 1.0)
+    expected = [0.5 - 0.15, (0.3**2 + 0.2**2) ** 0.5 - 0.15]
+    assert near.distance_X.tolist() == pytest.approx(expected, abs=1e-6)
+    assert float(near.jacobian_XN[:, 0].abs().max()) < 1e-6  # the shoulder turns both about the trunk's centre
+
+
+def test_boxes_lie_inside_their_capsules(tmp_path: Path) -> None:
+    for size in ((0.1, 0.2, 0.3), (0.02, 0.3, 0.2), (0.1, 0.1, 0.1)):
+        box = f"<box size='{size[0]} {size[1]} {size[2]}'/>"
+        shapes = SelfCollision(toy(tmp_path, "<sphere radius='0.000001'/>", trunk=box))
+        corner = torch.tensor(list(itertools.product(*([-x / 2, 0.0, x / 2] for x in size))))
+        ends, radius = shapes._ends_C23[:-1], shapes._radius_C[:-1]
+        nearest = [
+            min(
+                float((closest_points(end, c.expand(2, 3))[0] - c).norm()) - float(r)
+                for end, r in zip(ends, radius, strict=True)
+            )
+            for c in corner
+        ]
+        assert max(nearest) <= 1e-6
+
+
+def test_meshes_are_named_as_not_covered(tmp_path: Path) -> None:
+    mesh = "<collision><geometry><mesh filename='a.stl'/></geometry></collision>"
+    assert SelfCollision(toy(tmp_path, "<sphere radius='0.05'/>", mesh)).uncovered == ("upper",)
+
+
+def test_a_robot_without_shapes_never_collides(tmp_path: Path) -> None:
+    mesh = "<mesh filename='a.stl'/>"
+    shapes = SelfCollision(toy(tmp_path, mesh, trunk=mesh))
+    assert shapes.pairs == () and not bool(shapes.collides(torch.zeros(3, 2)).any())
