@@ -2,7 +2,7 @@
 
     cost(q) + weight * sum_p max(0, margin - distance_p(q))^2
 
-in place of the cost of `solve`, with the same limits, the same smoothness and the same solver. Both arms can meet, so
+in place of the cost of `solve`, with the same limits and the same solver, and ten times the smoothness. Both arms can meet, so
 all joints are one block. The margin is wider than what the penalty gives way, so the result is free of collision, not
 nearly so; where it still is not (every start of a frame ends in a collision), the motion rests in the free pose that is
 nearest in time.
@@ -24,6 +24,7 @@ from mrhubo.robot import BodyMap, SelfCollision
 _WEIGHTS = (1e3, 1e4)
 _MARGIN = 0.005
 _REACH = 12
+_SMOOTHER = 10.0
 
 
 class CollisionFreeProblem(DirectionProblem):
@@ -64,6 +65,8 @@ def avoid_collisions(
         UserError: no frame, and not even the robot's home pose, is free of collision.
     """
     rests_T = torch.zeros(len(q_TN), dtype=torch.bool, device=q_TN.device)
+    # Pushed by many contacts, frames find different ways out; at the pull of free motion the way would change often.
+    pull = _SMOOTHER * pull
     close_T = rests_T.index_fill(0, problem.collision.near(q_TN, problem.margin).row_X, True)
     if not bool(close_T.any()):
         return q_TN, rests_T
