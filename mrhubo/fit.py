@@ -31,8 +31,9 @@ class FitResult:
     measures: dict[str, float]
 
 
-def fit(config: Config, quiet: bool = False) -> FitResult | None:
-    """Runs all steps; what an earlier, interrupted call finished is not done again.
+def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitResult | None:
+    """Runs all steps; what an earlier, interrupted call finished is not done again. `parent`: the id of the MLflow run
+    that this one belongs to.
 
     Started by torchrun or SLURM, all ranks make pairs and train; the first does the rest, the others get None.
 
@@ -57,7 +58,7 @@ def fit(config: Config, quiet: bool = False) -> FitResult | None:
         _help(prepared, workspace, ranks)
         return None
     with workspace:
-        with Recording.start(prepared, workspace) as recording:
+        with Recording.start(prepared, workspace, parent) as recording:
             report = pipeline.make_pairs(prepared, quiet, ranks)
             validation, test = pipeline.make_references(prepared, quiet)
             ranks.wait()

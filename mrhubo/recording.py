@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import logging
 import shlex
 import sys
 import tempfile
@@ -50,11 +49,9 @@ class Recording:
         return config.tracking.dir or default_tracking()
 
     @classmethod
-    def start(cls, prepared: Prepared, workspace: Workspace) -> Recording:
-        """Opens a new run, or the unfinished one that the workspace remembers."""
+    def start(cls, prepared: Prepared, workspace: Workspace, parent: str | None = None) -> Recording:
+        """Opens a new run, or the unfinished one that the workspace remembers; as part of the run `parent`."""
         config, folder = prepared.config, cls.folder(prepared.config)
-        for name in ("alembic", "mlflow.store.db.utils", "mlflow.tracking", "mlflow.system_metrics"):
-            logging.getLogger(name).setLevel(logging.ERROR)
         run_id = resumable_run(folder, config.tracking.uri, workspace.run_id)
         provenance = _provenance(prepared)
         tags = {
@@ -62,6 +59,7 @@ class Recording:
             **provenance,
             "config_fingerprint": prepared.fingerprint,
             "motions": prepared.motions.folder.name,
+            **({"mlflow.parentRunId": parent} if parent else {}),
             **{f"version.{name}": number for name, number in library_versions().items()},
         }
         name = config.tracking.run_name or run_name(config)
@@ -124,10 +122,10 @@ class Recording:
 
     def scores(self, scores: Sequence[Evaluation], best_link_cm: float) -> None:
         """What `evaluate_clips` gave for the test clips: metrics and a table."""
-        *clips, over_clips, _ = scores
+        *clips, over_clips, over_frames = scores
         metrics = {"val/best_link_cm": best_link_cm}
         metrics |= {f"test/{name}": value for name, value in measures(over_clips).items()}
-        for clip in clips:
+        for clip in (*clips, dataclasses.replace(over_frames, name="over_frames")):
             metrics |= {f"test/{clip.name}/joint_rad": clip.joint_rad, f"test/{clip.name}/link_cm": clip.link_cm}
         self.logger.log_metrics(metrics)
         rows = [dataclasses.asdict(score) for score in scores]
@@ -137,7 +135,7 @@ class Recording:
     def key_poses(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
         """A picture a test clip: human, reference and prediction side by side."""
         for clip, prediction in zip(clips, predictions, strict=True):
-            self._picture(self.artist.key_poses(clip, prediction), f"test/key_poses_{clip.name}.png")
+            self._picture(self.artist.key_poses(clip, {"mrhubo": prediction}), f"test/key_poses_{clip.name}.png")
 
     def package(self, retargeter: Retargeter, score: Evaluation, checkpoint: Path) -> Path:
         """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""

@@ -6,6 +6,7 @@ imported only when a run starts: it costs two seconds.
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
@@ -16,6 +17,8 @@ from mrhubo.errors import UserError
 
 if TYPE_CHECKING:
     from lightning.pytorch.loggers import MLFlowLogger
+    from mlflow import MlflowClient
+    from mlflow.entities import Run
 
 _LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yourdfpy", "roma", "safetensors", "scipy")
 
@@ -23,6 +26,31 @@ _LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yo
 def database_uri(folder: Path) -> str:
     """SQLite tracking URI of `mlflow.db` in a folder."""
     return f"sqlite:///{folder.resolve() / 'mlflow.db'}"
+
+
+def open_client(folder: Path, experiment: str, uri: str | None = None) -> MlflowClient:
+    """A client whose database and experiment exist; artifacts go under `folder`/artifacts.
+
+    Raises:
+        UserError: the tracking server or database cannot be reached.
+    """
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    import mlflow
+
+    for name in ("alembic", "mlflow.store.db.utils", "mlflow.tracking", "mlflow.system_metrics"):
+        logging.getLogger(name).setLevel(logging.ERROR)
+    folder.mkdir(parents=True, exist_ok=True)
+    uri = uri or database_uri(folder)
+    try:
+        client = mlflow.MlflowClient(tracking_uri=uri)
+        if client.get_experiment_by_name(experiment) is None:
+            location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
+            # The tag opens the experiment in the dashboard's view of trainings, not of language models.
+            kind = {"mlflow.experimentKind": "custom_model_development"}
+            client.create_experiment(experiment, artifact_location=location, tags=kind)
+    except Exception as error:
+        raise _unreachable(uri, error) from error
+    return client
 
 
 def open_logger(
@@ -33,31 +61,38 @@ def open_logger(
     uri: str | None = None,
     run_id: str | None = None,
 ) -> MLFlowLogger:
-    """A Lightning logger whose database and experiment exist; artifacts go under `folder`/artifacts.
+    """A Lightning logger of a new run, or of the run `run_id`, in what `open_client` opens.
 
     Raises:
         UserError: the tracking server or database cannot be reached.
     """
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    import mlflow
+    open_client(folder, experiment, uri)
     from lightning.pytorch.loggers import MLFlowLogger
 
-    folder.mkdir(parents=True, exist_ok=True)
     uri = uri or database_uri(folder)
     try:
-        client = mlflow.MlflowClient(tracking_uri=uri)
-        if client.get_experiment_by_name(experiment) is None:
-            location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
-            # The tag opens the experiment in the dashboard's view of trainings, not of language models.
-            kind = {"mlflow.experimentKind": "custom_model_development"}
-            client.create_experiment(experiment, artifact_location=location, tags=kind)
         logger = MLFlowLogger(
             experiment_name=experiment, run_name=run_name, tracking_uri=uri, tags=tags, run_id=run_id, log_model=False
         )
         _ = logger.run_id
     except Exception as error:
-        raise UserError(f"tracking.uri: MLflow cannot open {uri}: {str(error).splitlines()[0]}") from error
+        raise _unreachable(uri, error) from error
     return logger
+
+
+def _unreachable(uri: str, error: Exception) -> UserError:
+    return UserError(f"tracking.uri: MLflow cannot open {uri}: {str(error).splitlines()[0]}")
+
+
+def find_run(client: MlflowClient, experiment: str, tags: dict[str, str], finished: bool = False) -> Run | None:
+    """The newest run of an experiment that has these tags (and is finished), if there is one."""
+    found = client.get_experiment_by_name(experiment)
+    if found is None:
+        return None
+    wanted = [f"tags.`{name}` = '{value}'" for name, value in tags.items()]
+    if finished:
+        wanted.append("attributes.status = 'FINISHED'")
+    return next(iter(client.search_runs([found.experiment_id], " and ".join(wanted), max_results=1)), None)
 
 
 def resumable_run(folder: Path, uri: str | None, run_id: str | None) -> str | None:

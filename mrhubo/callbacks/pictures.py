@@ -99,14 +99,14 @@ class Artist:
         caption = f"{self.robot.name}: best, median and worst of {len(order):,} pairs, by the cost of their keypoints"
         return figure_sheet(rows, titles, ["robot pose q", "human pose H"], caption, (170, 220))
 
-    def key_poses(self, clip: Clip, prediction_TN: Tensor, count: int = 6) -> Image:
-        """Human, reference and prediction at evenly spaced frames of a clip."""
-        frames = [round(f) for f in np.linspace(0.08, 0.92, count) * (len(prediction_TN) - 1)]
+    def key_poses(self, clip: Clip, predictions: Mapping[str, Tensor], count: int = 6) -> Image:
+        """Human, reference and predictions (T, N) by their names at evenly spaced frames of a clip."""
+        frames = [round(f) for f in np.linspace(0.08, 0.92, count) * (len(clip.reference_TN) - 1)]
         rows = [
             [self.human(clip.motion.pose_TJ6[f]) for f in frames],
             [self.robot_figure(clip.reference_TN[f]).recolored(_REFERENCE_TINT) for f in frames],
-            [self.robot_figure(prediction_TN[f]) for f in frames],
+            *([self.robot_figure(q_TN[f]) for f in frames] for q_TN in predictions.values()),
         ]
         columns = [f"{f / clip.motion.frame_rate:.1f} s" for f in frames]
         name = f"{self.robot.name}: {clip.name}" + (f" ({clip.motion.description})" if clip.motion.description else "")
-        return figure_sheet(rows, columns, ["human", "reference", "mrhubo"], name)
+        return figure_sheet(rows, columns, ["human", "reference", *predictions], name)

@@ -1,6 +1,6 @@
 """Settings: YAML plus ``key.sub=value`` -> typed dataclasses; every mistake is one sentence."""
 
-from mrhubo.config.command import parse_arguments, run_command
+from mrhubo.config.command import parse_arguments, run_command, split_arguments
 from mrhubo.config.help import field_docs, help_text
 from mrhubo.config.loading import load_config
 from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
@@ -34,6 +34,7 @@ __all__ = [
     "help_text",
     "load_config",
     "parse_arguments",
+    "split_arguments",
     "run_command",
     "to_plain",
     "to_yaml",

@@ -25,7 +25,17 @@ def parse_arguments(
     schema: type[T] = Config,
     flags: Mapping[str, str] | None = None,
 ) -> tuple[T, dict[str, Any]]:
-    """``--config FILE``, ``--help``, the given flags and ``key.sub=value`` -> (config, {flag: given?}).
+    """``--config FILE``, ``--help``, the given flags and ``key.sub=value`` -> (config, {flag: given?})."""
+    files, overrides, given = split_arguments(argv, prog, description, schema, flags)
+    if not files and requires_anything(schema):
+        raise UserError(f"command line: --config FILE is missing; {prog} --help lists the keys of that file")
+    return load_config(Path(files[0]) if files else None, overrides, schema), given
+
+
+def split_arguments(
+    argv: Sequence[str], prog: str, description: str, schema: type, flags: Mapping[str, str] | None = None
+) -> tuple[list[str], list[str], dict[str, Any]]:
+    """The file of ``--config`` if it is given, the overrides, and {flag: given?}, for a command that loads by itself.
 
     `flags` maps a name (``quiet`` for ``--quiet``) to its meaning. One with a word for its value (``out FILE`` for
     ``--out FILE``) gives that value, or None if it is not given. ``--help`` prints `help_text` and exits with 0.
@@ -63,9 +73,7 @@ def parse_arguments(
             raise UserError(_stray(argument, schema))
     if len(files) > 1:
         raise UserError(f"command line: --config is given {len(files)} times; one file is read")
-    if not files and requires_anything(schema):
-        raise UserError(f"command line: --config FILE is missing; {prog} --help lists the keys of that file")
-    return load_config(Path(files[0]) if files else None, overrides, schema), given
+    return files, overrides, given
 
 
 _INTERRUPTED = "interrupted; the same command resumes"

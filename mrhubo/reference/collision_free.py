@@ -2,8 +2,8 @@
 
     cost(q) + weight * sum_p max(0, margin - distance_p(q))^2
 
-in place of the cost of `solve`, with the same limits and the same solver, and ten times the smoothness. Both arms can meet, so
-all joints are one block. The margin is wider than what the penalty gives way, so the result is free of collision, not
+in place of the cost of `solve`, with the same limits and the same solver, and ten times the smoothness. Both arms can
+meet, so all joints are one block. The margin is wider than what the penalty gives way, so the result is free of collision, not
 nearly so; where it still is not (every start of a frame ends in a collision), the motion rests in the free pose that is
 nearest in time.
 

@@ -37,8 +37,10 @@ def test_key_poses_show_what_differs(root: Path, tmp_path: Path, shapes: bool) -
     pose = prior.decode(torch.randn(3, 32, generator=torch.Generator().manual_seed(0)))
     q = robot.sample(3, torch.Generator().manual_seed(1))
     clip = Clip(Motion("clip", pose, 24.0, "a motion"), q)
-    same, again = (np.asarray(artist.key_poses(clip, q, count=2), float) for _ in range(2))
-    other = np.asarray(artist.key_poses(clip, robot.sample(3, torch.Generator().manual_seed(2)), count=2), float)
+    same, again = (np.asarray(artist.key_poses(clip, {"mrhubo": q}, count=2), float) for _ in range(2))
+    other = np.asarray(
+        artist.key_poses(clip, {"mrhubo": robot.sample(3, torch.Generator().manual_seed(2))}, count=2), float
+    )
     assert np.array_equal(same, again)
     assert same.shape == other.shape and np.abs(same - other)[2 * same.shape[0] // 3 :].max() > 50
 

@@ -1,0 +1,119 @@
+"""`python -m mrhubo.reproduce`: the paper's tables, the paper's figures beside ours."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from mrhubo.config import Config, fingerprint, run_command, split_arguments, to_plain
+from mrhubo.errors import UserError, was_interrupted
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+
+    from mrhubo.reproduction import Part
+
+DESCRIPTION = (
+    "Trains everything that the paper's tables compare, on the shipped robots, and prints them with the paper's figures"
+    " beside ours. Every training is a tracked fit under one parent run; what is finished is not done again."
+    " key.sub=value changes a setting of every training."
+)
+FLAGS = {
+    "robots NAMES": "comma-separated: nao,coman,reachy (default: all)",
+    "seeds NUMBER": "trainings of each kind, seeds 0, 1, ... (default: 3)",
+    "quiet": "no progress lines",
+}
+
+
+def reproduce(robots: Sequence[str], seeds: int, overrides: Sequence[str], quiet: bool = False) -> str:
+    """Does what is not done yet and returns the tables.
+
+    Raises:
+        UserError: a robot or a setting is wrong (before any work).
+        KeyboardInterrupt: the user stopped it; the same call goes on.
+    """
+    from mrhubo.reproduction import chart, parts, tables
+
+    work = parts(robots, seeds, overrides)
+    client, parent = _open_parent(work)
+    status, start, results = "FAILED", time.monotonic(), {}
+    try:
+        for part in work:
+            measures = _measures(part, client, parent, quiet)
+            results.setdefault((part.robot, part.method), []).append(measures)
+        text = tables({key: results[key] for key in sorted(results, key=lambda key: robots.index(key[0]))})
+        client.log_text(parent, text + "\n", "tables.md")
+        client.log_image(parent, chart(results), artifact_file="errors.png")
+        client.log_metric(parent, "seconds", time.monotonic() - start)
+        status = "FINISHED"
+    except BaseException as error:
+        status = "KILLED" if was_interrupted(error) else "FAILED"
+        raise
+    finally:
+        client.set_terminated(parent, status)
+    return text
+
+
+def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
+    """The run that all trainings belong to: that of an earlier call with the same settings, or a new one."""
+    from mrhubo.locations import project_root
+    from mrhubo.recording import Recording
+    from mrhubo.tracking import find_run, git_commit, open_client
+
+    config = work[0].config
+    tags = {
+        "reproduce": fingerprint([[part.robot, part.method, part.seed, to_plain(part.config)] for part in work]),
+        "git_commit": git_commit(project_root()),
+    }
+    folder = Recording.folder(config)
+    name = f"reproduce {', '.join(dict.fromkeys(part.robot for part in work))}"
+    client = open_client(folder, config.tracking.experiment, config.tracking.uri)
+    found = find_run(client, config.tracking.experiment, {"reproduce": tags["reproduce"]})
+    if found is None:
+        experiment = client.get_experiment_by_name(config.tracking.experiment)
+        assert experiment is not None
+        found = client.create_run(experiment.experiment_id, tags=tags, run_name=name)
+    client.update_run(found.info.run_id, status="RUNNING")
+    return client, found.info.run_id
+
+
+def _measures(part: Part, client: MlflowClient, parent: str, quiet: bool) -> dict[str, float]:
+    """Test measures of a finished run with the same settings, pairs, prior and motions, or of a new fit."""
+    from mrhubo.fit import fit
+    from mrhubo.pipeline import prepare
+    from mrhubo.tracking import find_run
+
+    wanted = {"config_fingerprint": prepare(part.config).fingerprint}
+    experiment = part.config.tracking.experiment
+    run = find_run(client, experiment, wanted, finished=True)
+    if run is None:
+        if not quiet:
+            print(f"{part.robot}, {part.method}, seed {part.seed}", flush=True)
+        fit(part.config, quiet, parent)
+        run = find_run(client, experiment, wanted, finished=True)
+    if run is None:
+        raise UserError(f"{part.robot}, {part.method}: the run of this training is not in the tracking database")
+    return {name.removeprefix("test/"): value for name, value in run.data.metrics.items() if name.startswith("test/")}
+
+
+def main(argv: list[str]) -> None:
+    """The command."""
+    files, overrides, given = split_arguments(argv, "mrhubo.reproduce", DESCRIPTION, Config, FLAGS)
+    if files:
+        raise UserError("command line: mrhubo.reproduce has its own configs; choose among them with --robots")
+    for override in overrides:
+        if override.startswith("trainer.seed"):
+            raise UserError("command line: trainer.seed is set by --seeds")
+    try:
+        seeds = int(given["seeds"] or 3)
+    except ValueError:
+        seeds = 0
+    if not 1 <= seeds <= 100:
+        raise UserError(f"command line: --seeds must be 1 .. 100, found '{given['seeds']}'")
+    robots = [name.strip() for name in (given["robots"] or "nao,coman,reachy").split(",")]
+    print(reproduce(list(dict.fromkeys(robots)), seeds, overrides, given["quiet"]))
+
+
+if __name__ == "__main__":
+    run_command(main)

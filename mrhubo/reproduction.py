@@ -1,0 +1,144 @@
+"""The paper's tables from our own runs: which trainings they need, what they gave, how they are shown.
+
+Figuera, Park, Ahn: "Redefining Data Pairing for Motion Retargeting Leveraging a Human Body Prior", IROS 2024, tables I
+(joint error) and II (link error).
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL.Image import Image
+
+from mrhubo.config import Config, load_config
+from mrhubo.errors import UserError, unknown_name
+from mrhubo.locations import project_root
+from mrhubo.view.bars import grouped_bars
+
+METHODS: Mapping[str, Sequence[str]] = {
+    "proposed": ["pairs.reverse_share=0"],
+    "without filter": ["pairs.reverse_share=0", "pairs.filter=none"],
+    "one stage": ["pairs.reverse_share=0", "model.stages=1"],
+    "our default": [],
+}
+"""The settings of each column. The paper's three have forward pairs alone; our default adds reverse ones."""
+
+PAPER: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "reachy": {"proposed": (0.253, 8.678), "without filter": (0.257, 8.698), "one stage": (0.263, 9.519)},
+    "coman": {"proposed": (0.295, 4.913), "without filter": (0.297, 5.008), "one stage": (0.314, 5.148)},
+    "nao": {"proposed": (0.389, 3.887), "without filter": (0.413, 3.956), "one stage": (0.506, 4.895)},
+}
+"""The paper's figures: joint error [rad], link error [cm]."""
+
+_TITLES = {"joint_rad": "joint error [rad]", "link_cm": "link error [cm]"}
+_DIGITS = {"joint_rad": 3, "link_cm": 2}
+_MORE = {
+    "over_frames/joint_rad": ("joint, over frames [rad]", 1, 3),
+    "over_frames/link_cm": ("link, over frames [cm]", 1, 2),
+    "limb_deg": ("limbs [deg]", 1, 1),
+    "reference_limb_deg": ("reference's", 1, 1),
+    "hand_deg": ("hands [deg]", 1, 1),
+    "head_deg": ("head [deg]", 1, 1),
+    "jerk_ratio": ("jerk ratio", 1, 2),
+    "at_limit": ("at a limit [%]", 100, 1),
+    "collision": ("collision [%]", 100, 1),
+    "reference_collision": ("reference's", 100, 1),
+}
+
+Results = Mapping[tuple[str, str], Sequence[Mapping[str, float]]]
+"""Test measures (names without `test/`) of every seed, by (robot, method)."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One training."""
+
+    robot: str
+    method: str
+    seed: int
+    config: Config
+
+
+def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str]) -> list[Part]:
+    """All trainings, seed by seed, so that an interrupted table has every column as early as possible.
+
+    Raises:
+        UserError: a robot has no config, or a setting is wrong.
+    """
+    folder = project_root() / "conf"
+    known = sorted(path.stem for path in folder.glob("*.yaml") if path.stem in PAPER)
+    for robot in robots:
+        if robot not in known:
+            raise UserError(f"command line: --robots: {unknown_name('robot', robot, known)}")
+    return [
+        Part(robot, method, seed, load_config(file, [*change, *overrides, f"trainer.seed={seed}"]))
+        for seed in range(seeds)
+        for robot in robots
+        for file in [Path(folder / f"{robot}.yaml")]
+        for method, change in METHODS.items()
+    ]
+
+
+def tables(results: Results) -> str:
+    """The paper's two tables with its figures in brackets beside ours, then the other measures; Markdown."""
+    robots = list(dict.fromkeys(robot for robot, _ in results))
+    methods = [method for method in METHODS if any(m == method for _, m in results)]
+    blocks = []
+    for index, (measure, title) in enumerate(_TITLES.items()):
+        rows = []
+        for robot in robots:
+            cells = []
+            for method in methods:
+                ours = _cell(results.get((robot, method), []), measure, 1, _DIGITS[measure])
+                theirs = PAPER[robot].get(method)
+                cells.append(ours + (f" ({theirs[index]:.3f})" if theirs and ours else ""))
+            rows.append([robot, *cells])
+        blocks.append(f"Table {'I' * (index + 1)}: {title}, mean over the test clips (the paper's in brackets)\n")
+        blocks.append(markdown(["robot", *methods], rows) + "\n")
+    rows = [
+        [robot, method, *(_cell(found, name, unit, digits) for name, (_, unit, digits) in _MORE.items())]
+        for (robot, method), found in results.items()
+    ]
+    blocks.append("Beyond the paper, means over the test clips\n")
+    blocks.append(markdown(["robot", "method", *(title for title, _, _ in _MORE.values())], rows))
+    return "\n".join(blocks)
+
+
+def chart(results: Results) -> Image:
+    """Joint and link errors as bars, the paper's as marks."""
+    panels = {
+        title: {
+            robot: {m: _mean_and_spread([x[measure] for x in found]) for (r, m), found in results.items() if r == robot}
+            for robot in dict.fromkeys(robot for robot, _ in results)
+        }
+        for measure, title in _TITLES.items()
+    }
+    marks = {
+        title: {robot: {m: figures[index] for m, figures in PAPER[robot].items()} for robot in PAPER}
+        for index, title in enumerate(_TITLES.values())
+    }
+    return grouped_bars(panels, marks, "the paper")
+
+
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table with aligned columns."""
+    lines = [list(heads), *map(list, rows)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(heads))]
+    text = ["| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines]
+    text.insert(1, "|" + "|".join("-" * (width + 2) for width in widths) + "|")
+    return "\n".join(text)
+
+
+def _cell(found: Sequence[Mapping[str, float]], name: str, unit: float, digits: int) -> str:
+    values = [unit * seed[name] for seed in found if name in seed]
+    if not values:
+        return ""
+    mean, spread = _mean_and_spread(values)
+    return f"{mean:.{digits}f}" + (f" ± {spread:.{digits}f}" if len(values) > 1 else "")
+
+
+def _mean_and_spread(values: Sequence[float]) -> tuple[float, float]:
+    return statistics.fmean(values), statistics.stdev(values) if len(values) > 1 else 0.0
