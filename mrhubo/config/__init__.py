@@ -5,12 +5,14 @@ from mrhubo.config.help import field_docs, help_text
 from mrhubo.config.loading import load_config
 from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
 from mrhubo.config.schema import (
+    BaselineConfig,
     BodyConfig,
     Config,
     EvaluationConfig,
     ModelConfig,
     PairsConfig,
     RobotConfig,
+    S3LEConfig,
     TrackingConfig,
     TrainerConfig,
     bounded,
@@ -18,12 +20,14 @@ from mrhubo.config.schema import (
 )
 
 __all__ = [
+    "BaselineConfig",
     "BodyConfig",
     "Config",
     "EvaluationConfig",
     "ModelConfig",
     "PairsConfig",
     "RobotConfig",
+    "S3LEConfig",
     "TrackingConfig",
     "TrainerConfig",
     "bounded",

@@ -3,9 +3,9 @@
     cost(q) + weight * sum_p max(0, margin - distance_p(q))^2
 
 in place of the cost of `solve`, with the same limits and the same solver, and ten times the smoothness. Both arms can
-meet, so all joints are one block. The margin is wider than what the penalty gives way, so the result is free of collision, not
-nearly so; where it still is not (every start of a frame ends in a collision), the motion rests in the free pose that is
-nearest in time.
+meet, so all joints are one block. The margin is wider than what the penalty gives way, so the result is free of
+collision, not nearly so; where it still is not (every start of a frame ends in a collision), the motion rests in the
+free pose that is nearest in time.
 
 Legend: B problems, T frames, S starts, D directions, N joints, C = 1 block, X contacts.
 """

@@ -45,7 +45,8 @@ class PoseFeatures(nn.Module):
         return rotation.matrix_to_sixd(chest @ rotations[:, self._joints]).flatten(1)
 
 
-def _mlp(size_in: int, hidden: int, layers: int, size_out: int) -> nn.Sequential:
+def mlp(size_in: int, hidden: int, layers: int, size_out: int) -> nn.Sequential:
+    """Linear layers with GELU between them; `layers` hidden ones of width `hidden`."""
     sizes = [size_in, *[hidden] * layers]
     body = [m for a, b in zip(sizes[:-1], sizes[1:], strict=True) for m in (nn.Linear(a, b), nn.GELU())]
     return nn.Sequential(*body, nn.Linear(sizes[-1], size_out))
@@ -94,8 +95,8 @@ class RetargetNetwork(nn.Module):
         super().__init__()
         self.features, self.stages, joints = features, stages, len(lower_N)
         links = 6 * joints
-        self.pre = _mlp(features.size, hidden, layers, links) if stages == 2 else None
-        self.post = _mlp(links if stages == 2 else features.size, hidden, layers, joints)
+        self.pre = mlp(features.size, hidden, layers, links) if stages == 2 else None
+        self.post = mlp(links if stages == 2 else features.size, hidden, layers, joints)
         self.limited = LimitedOutput(lower_N, upper_N, bound_output)
 
     def links(self, features_BF: Tensor) -> Tensor:
