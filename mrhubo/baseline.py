@@ -52,12 +52,12 @@ class Baseline:
 
         from mrhubo import pipeline
         from mrhubo.body.dataset import load_training_poses, sound_frames
-        from mrhubo.locations import project_root
+        from mrhubo.locations import default_capture
         from mrhubo.progress import Progress
         from mrhubo.retargeter.s3le_training import make_data
 
         prepared = pipeline.prepare(config)
-        path = config.s3le.poses or project_root() / "data" / "external" / "cmu" / "training_poses.npz"
+        path = config.s3le.poses or default_capture()
         if not path.is_file():
             raise UserError(f"s3le.poses: {path} does not exist; the baseline learns from human motion capture")
         pose_FJ6 = load_training_poses(path)[0]
@@ -188,7 +188,7 @@ def _fingerprint(baseline: Baseline, settings: S3LEConfig) -> str:
 
 
 def _open_run(
-    baseline: Baseline, settings: S3LEConfig, parent: str | None, name: str, more: dict[str, str] | None = None
+    baseline: Baseline, settings: S3LEConfig, parent: str | None, name: str, trial: dict[str, str] | None = None
 ) -> tuple[MlflowClient, str]:
     from mrhubo.locations import project_root
     from mrhubo.tracking import git_commit
@@ -198,9 +198,8 @@ def _open_run(
         "robot": config.robot.name,
         "method": "S3LE",
         "git_commit": git_commit(project_root()),
-        "config_fingerprint": baseline.prepared.fingerprint,
         **({"mlflow.parentRunId": parent} if parent else {}),
-        **(more or {}),
+        **(trial or {"config_fingerprint": baseline.prepared.fingerprint}),
     }
     experiment = client.get_experiment_by_name(config.tracking.experiment)
     assert experiment is not None

@@ -23,6 +23,11 @@ def default_motions() -> list[Path]:
     return [data / "external" / "cmu" / "evaluation", data / "motions"]
 
 
+def default_capture() -> Path:
+    """File of human motion capture that the baseline learns from."""
+    return project_root() / "data" / "external" / "cmu" / "training_poses.npz"
+
+
 def default_tracking() -> Path:
     """Folder of the MLflow database, its artifacts, and unfinished runs."""
     return project_root() / "mlruns"

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from mrhubo.config import Config, fingerprint, run_command, split_arguments, to_plain
+from mrhubo.config import BaselineConfig, fingerprint, run_command, split_arguments, to_plain
 from mrhubo.errors import UserError, was_interrupted
 
 if TYPE_CHECKING:
@@ -33,9 +33,13 @@ def reproduce(robots: Sequence[str], seeds: int, overrides: Sequence[str], quiet
         UserError: a robot or a setting is wrong (before any work).
         KeyboardInterrupt: the user stopped it; the same call goes on.
     """
+    from mrhubo.locations import default_capture
     from mrhubo.reproduction import chart, parts, tables
 
-    work = parts(robots, seeds, overrides)
+    capture = default_capture()
+    if not capture.is_file() and not quiet:
+        print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
+    work = parts(robots, seeds, overrides, baseline=capture.is_file())
     client, parent = _open_parent(work)
     status, start, results = "FAILED", time.monotonic(), {}
     try:
@@ -80,6 +84,7 @@ def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
 
 def _measures(part: Part, client: MlflowClient, parent: str, quiet: bool) -> dict[str, float]:
     """Test measures of a finished run with the same settings, pairs, prior and motions, or of a new fit."""
+    from mrhubo.baseline import run_baseline
     from mrhubo.fit import fit
     from mrhubo.pipeline import prepare
     from mrhubo.tracking import find_run
@@ -90,7 +95,10 @@ def _measures(part: Part, client: MlflowClient, parent: str, quiet: bool) -> dic
     if run is None:
         if not quiet:
             print(f"{part.robot}, {part.method}, seed {part.seed}", flush=True)
-        fit(part.config, quiet, parent)
+        if isinstance(part.config, BaselineConfig):
+            run_baseline(part.config, quiet, parent)
+        else:
+            fit(part.config, quiet, parent)
         run = find_run(client, experiment, wanted, finished=True)
     if run is None:
         raise UserError(f"{part.robot}, {part.method}: the run of this training is not in the tracking database")
@@ -99,12 +107,12 @@ def _measures(part: Part, client: MlflowClient, parent: str, quiet: bool) -> dic
 
 def main(argv: list[str]) -> None:
     """The command."""
-    files, overrides, given = split_arguments(argv, "mrhubo.reproduce", DESCRIPTION, Config, FLAGS)
+    files, overrides, given = split_arguments(argv, "mrhubo.reproduce", DESCRIPTION, BaselineConfig, FLAGS)
     if files:
         raise UserError("command line: mrhubo.reproduce has its own configs; choose among them with --robots")
     for override in overrides:
-        if override.startswith("trainer.seed"):
-            raise UserError("command line: trainer.seed is set by --seeds")
+        if override.startswith(("trainer.seed", "s3le.seed")):
+            raise UserError("command line: the seeds are set by --seeds")
     try:
         seeds = int(given["seeds"] or 3)
     except ValueError:

@@ -9,11 +9,10 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from PIL.Image import Image
 
-from mrhubo.config import Config, load_config
+from mrhubo.config import BaselineConfig, Config, load_config
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.locations import project_root
 from mrhubo.view.bars import grouped_bars
@@ -25,10 +24,19 @@ METHODS: Mapping[str, Sequence[str]] = {
     "our default": [],
 }
 """The settings of each column. The paper's three have forward pairs alone; our default adds reverse ones."""
+BASELINE = "S3LE"
+"""The column of the baseline, which has settings of its own and needs human motion capture."""
+BASELINE_ROBOTS = ("coman",)
+"""The robots that the paper measures it on, and for which its settings were searched."""
 
 PAPER: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "reachy": {"proposed": (0.253, 8.678), "without filter": (0.257, 8.698), "one stage": (0.263, 9.519)},
-    "coman": {"proposed": (0.295, 4.913), "without filter": (0.297, 5.008), "one stage": (0.314, 5.148)},
+    "coman": {
+        "proposed": (0.295, 4.913),
+        "without filter": (0.297, 5.008),
+        "one stage": (0.314, 5.148),
+        "S3LE": (0.281, 5.956),
+    },  # fmt: skip
     "nao": {"proposed": (0.389, 3.887), "without filter": (0.413, 3.956), "one stage": (0.506, 4.895)},
 }
 """The paper's figures: joint error [rad], link error [cm]."""
@@ -62,8 +70,14 @@ class Part:
     config: Config
 
 
-def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str]) -> list[Part]:
+def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str], baseline: bool = True) -> list[Part]:
     """All trainings, seed by seed, so that an interrupted table has every column as early as possible.
+
+    Args:
+        robots: names of shipped robots.
+        seeds: trainings of each kind.
+        overrides: `key.sub=value` for all of them; those of `s3le` are for the baseline.
+        baseline: whether the baseline is wanted.
 
     Raises:
         UserError: a robot has no config, or a setting is wrong.
@@ -73,19 +87,24 @@ def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str]) -> list[P
     for robot in robots:
         if robot not in known:
             raise UserError(f"command line: --robots: {unknown_name('robot', robot, known)}")
-    return [
-        Part(robot, method, seed, load_config(file, [*change, *overrides, f"trainer.seed={seed}"]))
-        for seed in range(seeds)
-        for robot in robots
-        for file in [Path(folder / f"{robot}.yaml")]
-        for method, change in METHODS.items()
-    ]
+    ours = [override for override in overrides if not override.startswith("s3le.")]
+    found = []
+    for seed in range(seeds):
+        for robot in robots:
+            file = folder / f"{robot}.yaml"
+            for method, change in METHODS.items():
+                config = load_config(file, [*change, *ours, f"trainer.seed={seed}"])
+                found.append(Part(robot, method, seed, config))
+            if baseline and robot in BASELINE_ROBOTS:
+                config = load_config(file, [*overrides, f"s3le.seed={seed}"], BaselineConfig)
+                found.append(Part(robot, BASELINE, seed, config))
+    return found
 
 
 def tables(results: Results) -> str:
     """The paper's two tables with its figures in brackets beside ours, then the other measures; Markdown."""
     robots = list(dict.fromkeys(robot for robot, _ in results))
-    methods = [method for method in METHODS if any(m == method for _, m in results)]
+    methods = [method for method in (*METHODS, BASELINE) if any(m == method for _, m in results)]
     blocks = []
     for index, (measure, title) in enumerate(_TITLES.items()):
         rows = []
