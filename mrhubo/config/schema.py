@@ -198,7 +198,7 @@ class S3LEConfig:
     """How far their robot poses go beyond the limits, as a share of the range."""
     latent: int = bounded(16, 1, 1_024)
     """Size of the shared latent space."""
-    hidden: int = bounded(512, 1, 65_536)
+    hidden: int = bounded(256, 1, 65_536)
     """Width of the two hidden layers of every encoder and decoder."""
     steps: int = bounded(4_000, 2, 1_000_000_000)
     """Optimiser steps, the first half without self-made pairs."""

@@ -101,9 +101,12 @@ def normality_gap(code_BZ: Tensor, normal_BZ: Tensor) -> Tensor:
     count, latent = code_BZ.shape
     off = 1 - torch.eye(count, device=code_BZ.device)
     gap = code_BZ.new_zeros(())
-    inside, outside, across = (
-        torch.cdist(a, b).square() for a, b in ((code_BZ, code_BZ), (normal_BZ, normal_BZ), (code_BZ, normal_BZ))
-    )
+
+    def square(a_BZ: Tensor, b_BZ: Tensor) -> Tensor:  # cdist's gradient takes three times as long
+        both = a_BZ.square().sum(1)[:, None] + b_BZ.square().sum(1)
+        return (both - 2 * a_BZ @ b_BZ.T).clamp_min(0)
+
+    inside, outside, across = square(code_BZ, code_BZ), square(normal_BZ, normal_BZ), square(code_BZ, normal_BZ)
     for scale in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0):
         c = 2.0 * latent * scale
         same = ((c / (c + inside) + c / (c + outside)) * off).sum() / (count * (count - 1))

@@ -79,7 +79,7 @@ def train_s3le(
         model = S3LE(len(body_map.directions), robot.lower_N, robot.upper_N, settings.hidden, settings.latent)
     free_GN = data.robot_GN[~data.collision.collides(data.robot_GN)]
     feasible_FN = torch.cat((free_GN, data.random_UN))
-    optimizer = torch.optim.Adam(model.parameters(), settings.lr)
+    optimizer = torch.optim.Adam(model.parameters(), settings.lr, fused=True)
     schedule = cosine_schedule(optimizer, settings.steps)
     generator = torch.Generator().manual_seed(settings.seed + 1)
     bootstrap = settings.steps // 2
