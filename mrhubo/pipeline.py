@@ -27,7 +27,15 @@ from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Evaluation, evaluate_clips
 from mrhubo.locations import default_motions, default_pairs
-from mrhubo.pairing import PairFilter, PairGenerator, PairingReport, PairSetup, generate_pairs, make_filter
+from mrhubo.pairing import (
+    PairFilter,
+    PairGenerator,
+    PairingReport,
+    PairSetup,
+    generate_pairs,
+    make_filter,
+    pose_settings,
+)
 from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.progress import Progress
 from mrhubo.ranks import Ranks
@@ -45,8 +53,9 @@ class Prepared(PairSetup):
     def fingerprint(self) -> str:
         """Of everything that decides the result of a fit."""
         plain = to_plain(self.config)
-        for key in ("tracking", "evaluation"):
+        for key in ("tracking", "evaluation", "body"):  # the checksums of prior and skeleton are in the store's header
             plain.pop(key)
+        plain["robot"] = [pose_settings(self.config), self.config.robot.key_links]  # wherever the URDF lies
         for key in ("dir", "workers"):
             plain["pairs"].pop(key)
         clips = {motion.name: motion.checksum for motion in self.motions.all}

@@ -22,12 +22,15 @@ DESCRIPTION = (
 FLAGS = {
     "robots NAMES": "comma-separated: nao,coman,reachy (default: all)",
     "seeds NUMBER": "trainings of each kind, seeds 0, 1, ... (default: 3)",
+    "paper": "the paper's settings to the letter, conf/paper, in place of ours",
     "quiet": "no progress lines",
 }
 
 
-def reproduce(robots: Sequence[str], seeds: int, overrides: Sequence[str], quiet: bool = False) -> str:
-    """Does what is not done yet and returns the tables.
+def reproduce(
+    robots: Sequence[str], seeds: int, overrides: Sequence[str], quiet: bool = False, paper: bool = False
+) -> str:
+    """Does what is not done yet and returns the tables; `paper`: with the paper's settings in place of ours.
 
     Raises:
         UserError: a robot or a setting is wrong (before any work).
@@ -39,7 +42,7 @@ def reproduce(robots: Sequence[str], seeds: int, overrides: Sequence[str], quiet
     capture = default_capture()
     if not capture.is_file() and not quiet:
         print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
-    work = parts(robots, seeds, overrides, baseline=capture.is_file())
+    work = parts(robots, seeds, overrides, baseline=capture.is_file(), paper=paper)
     client, parent = _open_parent(work)
     status, start, results = "FAILED", time.monotonic(), {}
     try:
@@ -120,7 +123,7 @@ def main(argv: list[str]) -> None:
     if not 1 <= seeds <= 100:
         raise UserError(f"command line: --seeds must be 1 .. 100, found '{given['seeds']}'")
     robots = [name.strip() for name in (given["robots"] or "nao,coman,reachy").split(",")]
-    print(reproduce(list(dict.fromkeys(robots)), seeds, overrides, given["quiet"]))
+    print(reproduce(list(dict.fromkeys(robots)), seeds, overrides, given["quiet"], given["paper"]))
 
 
 if __name__ == "__main__":

@@ -17,11 +17,12 @@ from mrhubo.errors import UserError, unknown_name
 from mrhubo.locations import project_root
 from mrhubo.view.bars import grouped_bars
 
+OUR_DEFAULT = "our default"
 METHODS: Mapping[str, Sequence[str]] = {
     "proposed": ["pairs.reverse_share=0"],
     "without filter": ["pairs.reverse_share=0", "pairs.filter=none"],
     "one stage": ["pairs.reverse_share=0", "model.stages=1"],
-    "our default": [],
+    OUR_DEFAULT: [],
 }
 """The settings of each column. The paper's three have forward pairs alone; our default adds reverse ones."""
 BASELINE = "S3LE"
@@ -70,7 +71,9 @@ class Part:
     config: Config
 
 
-def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str], baseline: bool = True) -> list[Part]:
+def parts(
+    robots: Sequence[str], seeds: int, overrides: Sequence[str], baseline: bool = True, paper: bool = False
+) -> list[Part]:
     """All trainings, seed by seed, so that an interrupted table has every column as early as possible.
 
     Args:
@@ -78,11 +81,12 @@ def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str], baseline:
         seeds: trainings of each kind.
         overrides: `key.sub=value` for all of them; those of `s3le` are for the baseline.
         baseline: whether the baseline is wanted.
+        paper: with the paper's settings (`conf/paper`) in place of ours.
 
     Raises:
         UserError: a robot has no config, or a setting is wrong.
     """
-    folder = project_root() / "conf"
+    folder = project_root() / "conf" / ("paper" if paper else ".")
     known = sorted(path.stem for path in folder.glob("*.yaml") if path.stem in PAPER)
     for robot in robots:
         if robot not in known:
@@ -93,6 +97,8 @@ def parts(robots: Sequence[str], seeds: int, overrides: Sequence[str], baseline:
         for robot in robots:
             file = folder / f"{robot}.yaml"
             for method, change in METHODS.items():
+                if paper and method == OUR_DEFAULT:
+                    continue
                 config = load_config(file, [*change, *ours, f"trainer.seed={seed}"])
                 found.append(Part(robot, method, seed, config))
             if baseline and robot in BASELINE_ROBOTS:

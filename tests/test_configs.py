@@ -22,6 +22,19 @@ def test_robots(path: Path) -> None:
     assert set(config.robot.key_links) <= set(body_map.robot.links)
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "conf" / "paper").glob("*.yaml")), ids=lambda path: path.stem)
+def test_the_papers_settings(path: Path) -> None:
+    config, ours = load_config(path), load_config(ROOT / "conf" / path.name)
+    assert build_body_map(config.robot).robot.joint_names == tuple(ours.robot.joints)
+    for key in ("name", "urdf", "joints", "ranges", "keypoints", "key_links"):
+        assert getattr(config.robot, key) == getattr(ours.robot, key), key
+    assert config.robot.scale == "manual" and config.robot.manual is not None
+    assert (config.pairs.solver, config.pairs.w_prior, config.pairs.reverse_share) == ("paper", 0.01, 0)
+    assert (config.pairs.filter, config.pairs.filter_k) == ("linear", 1)
+    assert (config.model.stages, config.model.hidden, config.model.layers) == (2, 512, 1)
+    assert (config.trainer.loss, config.trainer.batch_size, config.trainer.lr) == ("mse", 2048, 1e-4)
+
+
 def test_prior() -> None:
     config = load_config(ROOT / "conf" / "prior.yaml", schema=PriorConfig)
     assert config.data == ROOT / "data" / "external" / "cmu" / "training_poses.npz"

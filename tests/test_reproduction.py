@@ -37,6 +37,9 @@ def test_every_robot_method_and_seed_is_a_part() -> None:
     assert [p.method for p in work if p.robot == "nao" and p.config.pairs.filter == "none"] == ["without filter"] * 2
     assert {p.method for p in work if p.config.model.stages == 1} == {"one stage"}
     assert len(parts(["coman"], 1, [], baseline=False)) == len(METHODS)
+    paper = parts(["nao"], 1, [], paper=True)
+    assert [p.method for p in paper] == ["proposed", "without filter", "one stage"]
+    assert {p.config.robot.scale for p in paper} == {"manual"} and {p.config.trainer.loss for p in paper} == {"mse"}
     with pytest.raises(UserError, match="'naoo' .*nao"):
         parts(["naoo"], 1, [])
 

@@ -74,7 +74,10 @@ def requires_anything(schema: type) -> bool:
 def example(schema: type) -> str:
     """A KEY=VALUE that the schema knows, for messages."""
     numbers = [key for key in walk(schema) if key.kind in (int, float) and isinstance(key.field.default, int | float)]
-    return f"{numbers[0].name}={numbers[0].field.default}" if numbers else "name=value"
+    if not numbers:
+        return "name=value"
+    key = min(numbers, key=lambda key: key.name.count("."))
+    return f"{key.name}={key.field.default}"
 
 
 def noun(kind: Any) -> str:

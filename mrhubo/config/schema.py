@@ -18,6 +18,24 @@ def choice(default: str, *choices: str) -> Any:
 
 
 @dataclass
+class ManualScaleConfig:
+    """The numbers of `robot.scale: manual`, in the robot's base frame (x forward, y left, z up)."""
+
+    keypoints: dict[str, Any]
+    """Where each human keypoint is: a link name, {link: NAME, offset: [x, y, z]} (m), {links: {NAME: WEIGHT, ...},
+    offset: ...} for a weighted mean, or {offset: ...} for a constant. Names: SMPL's body joints, and `left_` and
+    `right_` `eye`, `thumb`, `index`, `middle`, `pinky`, `toe`, `heel`. `pelvis` is needed."""
+    upper_arm: float = bounded(0.0, -0.9, 100.0)
+    """Extra length of the upper arm, as a share of the robot's."""
+    forearm: float = bounded(0.0, -0.9, 100.0)
+    """Extra length of the forearm, as a share of the robot's."""
+    shift: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """Added to every keypoint, [x, y, z], m."""
+    factor: float = bounded(1.0, 1e-3, 1e3)
+    """Everything is multiplied by it, after the shift."""
+
+
+@dataclass
 class RobotConfig:
     """The robot: its URDF, which joints move, and which links stand for which part of the human body."""
 
@@ -39,8 +57,11 @@ class RobotConfig:
     """Ranges narrower than the URDF's limits, [lower, upper] in rad, by joint name."""
     hold: dict[str, float] = field(default_factory=dict)
     """Angles in rad at which joints outside `joints` are held; default 0, clamped to the joint's limits."""
-    scale: str = choice("auto", "auto")
-    """How lengths are matched: `auto` keeps the robot's limb directions and gives each limb the human's length."""
+    scale: str = choice("auto", "auto", "manual")
+    """How lengths are matched: `auto` keeps the robot's limb directions and gives each limb the human's length;
+    `manual` takes the numbers of `manual` (the paper)."""
+    manual: ManualScaleConfig | None = None
+    """Numbers for `scale: manual`."""
 
 
 @dataclass

@@ -98,7 +98,8 @@ class PairGenerator:
             z_BZ, q_BN = self._draw(direction, generator)
             with torch.no_grad():
                 poses = self.robot.forward(q_BN)
-                target_BK3 = self.body_map.targets(poses)
+                upright = direction == "reverse"
+                target_BK3 = (self.body_map.upright_keypoints if upright else self.body_map.targets)(poses)
                 orientation_BM6 = self.robot.moving_orientations(poses)
             if z_BZ is None:
                 z_BZ = self.solve(target_BK3)

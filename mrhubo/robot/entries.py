@@ -37,11 +37,12 @@ def _read_link(key: str, value: Any) -> str:
     return link
 
 
-def _read_vector(key: str, value: Any) -> tuple[float, float, float]:
+def read_vector(key: str, value: Any) -> tuple[float, float, float]:
+    """Three numbers; `key` names the entry in the error."""
     numbers = value if isinstance(value, (list, tuple)) else []
     good = len(numbers) == 3 and all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in numbers)
     if not good or not all(abs(x) < 1e3 for x in numbers):
-        raise UserError(f"robot.keypoints.{key}: expected three numbers [x, y, z], found {value!r}")
+        raise UserError(f"{key}: expected three numbers [x, y, z], found {value!r}")
     return float(numbers[0]), float(numbers[1]), float(numbers[2])
 
 
@@ -55,7 +56,7 @@ def read_point(key: str, value: Any) -> Point:
     """A link name, or {link: NAME, offset: [x, y, z]}."""
     _refuse_unknown(key, value, ("link", "offset"))
     offset = value.get("offset", [0, 0, 0]) if isinstance(value, Mapping) else [0, 0, 0]
-    return Point(_read_link(key, value), _read_vector(f"{key}.offset", offset))
+    return Point(_read_link(key, value), read_vector(f"robot.keypoints.{key}.offset", offset))
 
 
 def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
@@ -69,7 +70,9 @@ def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
                 f"robot.keypoints.{key}: '{word}' is missing; give {{link: NAME, {words[0]}: [x, y, z], "
                 f"{words[1]}: [x, y, z]}} in the link's frame"
             )
-        axes.append(torch.tensor(_DEFAULT_AXES[word] if given is None else _read_vector(f"{key}.{word}", given)))
+        axes.append(
+            torch.tensor(_DEFAULT_AXES[word] if given is None else read_vector(f"robot.keypoints.{key}.{word}", given))
+        )
     first, second = axes
     if first.norm() < 1e-6 or torch.linalg.cross(first, second).norm() < 1e-3 * first.norm() * max(second.norm(), 1e-6):
         raise UserError(f"robot.keypoints.{key}: {words[0]} and {words[1]} must be two different directions")

@@ -5,7 +5,7 @@ base faces matter. Limbs (upper arm, forearm) have one direction, oriented ends 
 forward and up.
 
 `scale: auto` then gives each limb the human's length: keypoints are chained outwards from the shoulders of a human who
-stands upright, along the robot's directions. No number is tuned.
+stands upright, along the robot's directions. No number is tuned. `scale: manual` is in `scale`.
 
 Legend: B batch, D directions, K keypoints, L robot links, N robot joints.
 """
@@ -24,6 +24,7 @@ from mrhubo.config import RobotConfig
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.entries import End, Point, read_end, read_point
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.scale import ManualScale
 
 _SIDES = ("left", "right")
 _LIMBS = (("shoulder", "elbow"), ("elbow", "wrist"))
@@ -49,9 +50,18 @@ class BodyMap:
     """What a robot shares with a human body, read from `robot.keypoints` of the config."""
 
     def __init__(
-        self, robot: Robot, points: Mapping[str, Point], ends: Mapping[str, End], chest: End, skeleton: Skeleton
+        self,
+        robot: Robot,
+        points: Mapping[str, Point],
+        ends: Mapping[str, End],
+        chest: End,
+        skeleton: Skeleton,
+        manual: ManualScale | None = None,
     ) -> None:
         self.robot, self.points, self.ends, self.chest, self.skeleton = robot, points, ends, chest, skeleton
+        self.manual = manual
+        if manual is not None:
+            manual.prepare(robot)
         self.directions = self._list_directions()
         self.direction_names = tuple(d.name for d in self.directions)
         index = robot.link_index
@@ -74,6 +84,8 @@ class BodyMap:
         """Moves robot, skeleton and constants to the device, in place."""
         self.robot.to(device)
         self.skeleton.to(device)
+        if self.manual is not None:
+            self.manual.to(device)
         for name in ("_limb_offsets_2E3", "_axes_A3", "_order", "_chest_33", "_chained_K3", "_rest_K3"):
             setattr(self, name, getattr(self, name).to(device))
         return self
@@ -153,10 +165,13 @@ class BodyMap:
                 names += ["head", "left_eye", "right_eye"]
             else:
                 names += [part.replace("hand", point) for point in _HAND_POINTS]
-        self.keypoint_names = tuple(names)
-        self.keypoint_indices = keypoint_indices(names)
-        """Positions of `keypoint_names` in the skeleton's keypoints."""
-        self._rest_K3 = self.skeleton.rest_K3[self.keypoint_indices]
+        self._chained_names = tuple(names)
+        source = self.manual.keypoint_names if self.manual else self._chained_names
+        self.keypoint_names = source
+        """Names of the target keypoints."""
+        self.keypoint_indices = keypoint_indices(source)
+        """Their positions in the skeleton's keypoints."""
+        self._rest_K3 = self.skeleton.rest_K3[keypoint_indices(names)]
         parent = {name: "neck" if name == "head" else "head" if "eye" in name else self._parent(name) for name in names}
         rest = self.skeleton.rest_K3
         offsets = [rest[KEYPOINT_NAMES.index(n)] - rest[KEYPOINT_NAMES.index(parent[n])] for n in names]
@@ -171,8 +186,8 @@ class BodyMap:
     def human_keypoints(self, directions_BD3: Tensor) -> Tensor:
         """P: target keypoints (B, K, 3) [m] of an upright human whose limbs have these directions (`scale: auto`)."""
         batch = len(directions_BD3)
-        found: dict[str, Tensor] = {n: self._rest_K3[i].expand(batch, 3) for i, n in enumerate(self.keypoint_names)}
-        offset = dict(zip(self.keypoint_names, self._chained_K3, strict=True))
+        found: dict[str, Tensor] = {n: self._rest_K3[i].expand(batch, 3) for i, n in enumerate(self._chained_names)}
+        offset = dict(zip(self._chained_names, self._chained_K3, strict=True))
         column = {name: directions_BD3[:, i] for i, name in enumerate(self.direction_names)}
         for d in self.directions:
             if d.axis_3 is None:
@@ -188,10 +203,16 @@ class BodyMap:
                 points, base = [part.replace("hand", p) for p in _HAND_POINTS], part.replace("hand", "wrist")
             for point in points:
                 found[point] = found[base] + turn @ offset[point]
-        return torch.stack([found[name] for name in self.keypoint_names], dim=1)
+        return torch.stack([found[name] for name in self._chained_names], dim=1)
 
     def targets(self, poses: LinkPoses) -> Tensor:
         """Target keypoints (B, K, 3) [m], human frame, of robot poses."""
+        if self.manual is not None:
+            return self.manual.targets(poses)
+        return self.upright_keypoints(poses)
+
+    def upright_keypoints(self, poses: LinkPoses) -> Tensor:
+        """`human_keypoints` (B, K, 3) [m] of robot poses."""
         return self.human_keypoints(self.robot_directions(poses))
 
     def input_joints(self) -> tuple[str, ...]:
@@ -258,11 +279,15 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
         if name != "head" and name.replace("hand", "wrist") not in points:
             raise UserError(f"robot.keypoints: '{name}' needs '{name.replace('hand', 'wrist')}' too")
     chest = read_end("chest", entries["chest"], ("forward", "up"))
+    if (config.scale == "manual") and config.manual is None:
+        raise UserError("robot.manual: is missing; `scale: manual` needs its numbers")
+    manual = ManualScale(config.manual) if config.scale == "manual" and config.manual else None
     links = [chest.link, *(p.link for p in points.values()), *(e.link for e in ends.values()), *config.key_links]
+    links += manual.links if manual else []
     if not config.key_links:
         raise UserError("robot.key_links: is empty; name the links whose error is measured")
     robot = Robot(config.urdf, config.joints, links, config.ranges, config.hold, config.name)
-    body_map = BodyMap(robot, points, ends, chest, skeleton or Skeleton())
+    body_map = BodyMap(robot, points, ends, chest, skeleton or Skeleton(), manual)
     _check_lengths(body_map)
     body_map.check_moved()
     return body_map

@@ -1,0 +1,115 @@
+"""`scale: manual`: the scale factor theta as the paper's authors set it, by numbers for each robot.
+
+Everything is in the robot's base frame, in metres: a keypoint is a link's position (or a weighted mean of several, or
+none) plus a constant; upper arms and forearms are lengthened along themselves, and what hangs on them moves along; all
+points are shifted, then scaled. The result, turned into human axes, is placed with its pelvis on the human's: the
+body prior moves no root, so a shift of all points is there to hold the authors' numbers and changes nothing.
+
+Figuera, Park, Ahn: MR.HuBo, IROS 2024, section III, and its published code.
+
+Legend: B batch, K keypoints, L robot links.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from mrhubo.body.skeleton import KEYPOINT_NAMES, keypoint_indices
+from mrhubo.config import ManualScaleConfig
+from mrhubo.errors import UserError, unknown_name
+from mrhubo.robot.entries import read_vector
+from mrhubo.robot.model import LinkPoses, Robot
+
+_SIDES = ("left", "right")
+_HAND = ("thumb", "index", "middle", "pinky")
+HUMAN_FROM_BASE = (1, 2, 0)
+"""The base frame's axes (forward, left, up) that are the human's left, up and forward (REP 103 and SMPL)."""
+
+
+class ManualScale:
+    """Target keypoints of one robot by the numbers of `robot.manual`."""
+
+    def __init__(self, config: ManualScaleConfig) -> None:
+        """Checks the entries.
+
+        Raises:
+            UserError: a keypoint does not exist, or an entry is none of the forms; names it.
+        """
+        self.config = config
+        self._entries: dict[str, tuple[dict[str, float], tuple[float, float, float]]] = {}
+        for name, value in config.keypoints.items():
+            if name not in KEYPOINT_NAMES:
+                raise UserError(f"robot.manual.keypoints: {unknown_name('keypoint', name, KEYPOINT_NAMES)}")
+            self._entries[name] = _read_entry(name, value)
+        if "pelvis" not in self._entries:
+            raise UserError("robot.manual.keypoints: 'pelvis' is missing; the others are placed relative to it")
+        if len(self._entries) < 2:
+            raise UserError("robot.manual.keypoints: names the pelvis alone; name what is to be matched")
+        self.shift_3 = torch.tensor(read_vector("robot.manual.shift", config.shift))
+        self.keypoint_names = tuple(self._entries)
+        self.keypoint_indices = keypoint_indices(self.keypoint_names)
+
+    @property
+    def links(self) -> list[str]:
+        """Every link that a keypoint is taken from."""
+        return list(dict.fromkeys(link for weights, _ in self._entries.values() for link in weights))
+
+    def prepare(self, robot: Robot) -> None:
+        """Looks the links up in a robot that computes the poses of all of them."""
+        self._weight_KL = torch.zeros(len(self._entries), len(robot.links))
+        for row, (weights, _) in enumerate(self._entries.values()):
+            for link, weight in weights.items():
+                self._weight_KL[row, robot.link_index(link)] = weight / sum(weights.values())
+        self._offset_K3 = torch.tensor([offset for _, offset in self._entries.values()])
+        self._place = {name: row for row, name in enumerate(self.keypoint_names)}
+
+    def to(self, device: torch.device | str) -> ManualScale:
+        """Moves the constants, in place."""
+        for name in ("shift_3", "_weight_KL", "_offset_K3"):
+            setattr(self, name, getattr(self, name).to(device))
+        return self
+
+    def targets(self, poses: LinkPoses) -> Tensor:
+        """Target keypoints (B, K, 3) [m], human frame, of robot poses."""
+        base_BK3 = self._weight_KL @ poses.position_BL3 + self._offset_K3
+        moved_BK3 = base_BK3.clone()
+        for side in _SIDES:
+            shoulder, elbow, wrist = (self._place.get(f"{side}_{part}") for part in ("shoulder", "elbow", "wrist"))
+            hand = [self._place[f"{side}_{part}"] for part in _HAND if f"{side}_{part}" in self._place]
+            if shoulder is not None and elbow is not None:
+                more_B13 = self.config.upper_arm * (base_BK3[:, [elbow]] - base_BK3[:, [shoulder]])
+                moved_BK3[:, [elbow, *([] if wrist is None else [wrist]), *hand]] += more_B13
+            if elbow is not None and wrist is not None:
+                more_B13 = self.config.forearm * (base_BK3[:, [wrist]] - base_BK3[:, [elbow]])
+                moved_BK3[:, [wrist, *hand]] += more_B13
+        scaled_BK3 = (moved_BK3 + self.shift_3) * self.config.factor
+        human_BK3 = scaled_BK3[..., HUMAN_FROM_BASE]
+        pelvis = self._place["pelvis"]
+        return human_BK3 - human_BK3[:, [pelvis]]
+
+
+def _read_entry(name: str, value: Any) -> tuple[dict[str, float], tuple[float, float, float]]:
+    """A link name, {link: NAME, offset: [x, y, z]}, {links: {NAME: WEIGHT, ...}, offset: ...} or {offset: ...}."""
+    key = f"robot.manual.keypoints.{name}"
+    if isinstance(value, str):
+        return {value: 1.0}, (0.0, 0.0, 0.0)
+    if not isinstance(value, Mapping) or not value:
+        raise UserError(f"{key}: expected a link name, {{link: NAME, offset: [x, y, z]}}, {{links: {{NAME: WEIGHT}}}} "
+                        f"or {{offset: [x, y, z]}}, found {value!r}")  # fmt: skip
+    for word in value:
+        if word not in ("link", "links", "offset"):
+            raise UserError(f"{key}: {unknown_name('entry', str(word), ('link', 'links', 'offset'))}")
+    if "link" in value and "links" in value:
+        raise UserError(f"{key}: has both 'link' and 'links'; give one of them")
+    weights = value.get("links", {value["link"]: 1.0} if "link" in value else {})
+    good = isinstance(weights, Mapping) and all(
+        isinstance(link, str) and isinstance(weight, int | float) and not isinstance(weight, bool) and 0 < weight < 1e6
+        for link, weight in weights.items()
+    )
+    if not good:
+        raise UserError(f"{key}: expected links with weights above 0, found {weights!r}")
+    return dict(weights), read_vector(f"{key}.offset", value.get("offset", [0, 0, 0]))
