@@ -10,6 +10,7 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 from __future__ import annotations
 
 import copy
+import functools
 import json
 import shutil
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.reference import direction_error
 from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
-from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
 
 SCHEMA = "mrhubo.retargeter/1"
@@ -46,6 +47,8 @@ class RetargetResult:
     """Angle [deg] between the robot's and the human's limb, hand and head directions."""
     phi_T: Tensor
     """Reconstruction error of the human pose under the body prior."""
+    collision_T: Tensor
+    """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it."""
 
 
 def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
@@ -66,6 +69,11 @@ class Retargeter:
     ) -> None:
         self.network = network.requires_grad_(False).eval()
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
+
+    @functools.cached_property
+    def collision(self) -> SelfCollision:
+        """The robot's collision shapes."""
+        return SelfCollision(self.body_map.robot)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -95,7 +103,7 @@ class Retargeter:
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
         plausible = (self.phi_threshold / phi_T.clamp_min(1e-12)).clamp(max=1.0)
         agreement = torch.exp(-(error_TD.mean(dim=1) / _AGREEMENT_DEG).square())
-        return RetargetResult(q_TN, plausible * agreement, error_TD, phi_T)
+        return RetargetResult(q_TN, plausible * agreement, error_TD, phi_T, self.collision.collides(q_TN))
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
