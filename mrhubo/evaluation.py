@@ -56,6 +56,9 @@ def evaluate_clip(
         columns = [i for i, name in enumerate(names) if part[name] in parts]
         return float(angles_TD[:, columns].mean())  # NaN where there are none
 
+    def collision_share(q_TN: Tensor) -> float:
+        return float(shapes.collides(q_TN).float().mean()) if shapes.pairs else float("nan")
+
     jerk, human_jerk = (float(direction_jerk(d, clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3))
     return Evaluation(
         **vars(score_clip(clip, q_TN, robot, key_links)),
@@ -65,8 +68,8 @@ def evaluate_clip(
         head_deg=mean(error_TD, "head"),
         jerk_ratio=jerk / human_jerk if human_jerk else float("nan"),
         at_limit=float(at_limit_share(robot, q_TN).mean()),
-        collision=float(shapes.collides(q_TN).float().mean()),
-        reference_collision=float(shapes.collides(clip.reference_TN).float().mean()),
+        collision=collision_share(q_TN),
+        reference_collision=collision_share(clip.reference_TN),
     )
 
 

@@ -75,6 +75,8 @@ def test_the_papers_figures_are_those_of_its_tables() -> None:
 def test_the_command_trains_once_and_finds_what_is_done(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    methods = {name: change for name, change in METHODS.items() if name in ("one stage", "our default")}
+    monkeypatch.setattr("mrhubo.reproduction.METHODS", methods)
     motions = tmp_path / "motions"
     motions.mkdir()
     for name in ("drinking", "wave"):
@@ -83,13 +85,13 @@ def test_the_command_trains_once_and_finds_what_is_done(
     given += [f"tracking.dir={tmp_path / 'mlruns'}", f"evaluation.motions=[{motions}]", "trainer.accelerator=cpu"]
     main(given)
     first = capsys.readouterr().out
-    assert "Table I: joint error" in first and "(0.389)" in first and "Beyond the paper" in first
+    assert "Table I: joint error" in first and "(0.506)" in first and "Beyond the paper" in first
     client = mlflow.MlflowClient(tracking_uri=database_uri(tmp_path / "mlruns"))
     (experiment,) = [e for e in client.search_experiments() if e.name == "mrhubo"]
     runs = client.search_runs([experiment.experiment_id])
     (parent,) = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
     children = [run for run in runs if run is not parent]
-    assert len(children) == len(METHODS) and {run.info.status for run in runs} == {"FINISHED"}
+    assert len(children) == len(methods) and {run.info.status for run in runs} == {"FINISHED"}
     assert {run.data.tags["mlflow.parentRunId"] for run in children} == {parent.info.run_id}
     assert {file.path for file in client.list_artifacts(parent.info.run_id)} == {"tables.md", "errors.png"}
     link = np.array([run.data.metrics["test/link_cm"] for run in children])

@@ -19,6 +19,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
+import yourdfpy
 from torch import Tensor
 
 from mrhubo.robot.model import LinkPoses, Robot
@@ -60,53 +61,60 @@ class SelfCollision:
         Raises:
             UserError: the URDF cannot be read.
         """
-        urdf, description = load_urdf(robot.urdf), robot.description
-        shapes = read_collision_geometry(urdf)
-        shaped = {shape.link for shape in shapes}
-        self.uncovered = tuple(x.name for x in urdf.robot.links if x.collisions and x.name not in shaped)
-        """Links whose collision geometry is of meshes alone, which are not looked at."""
-        joints = [description.joints[name] for name in robot.driven_joints]
+        urdf, device = load_urdf(robot.urdf), robot.lower_N.device
+        joints = [robot.description.joints[name] for name in robot.driven_joints]
         self.robot = robot.with_links([joint.child for joint in joints])
-        device = robot.lower_N.device
         self._children = [self.robot.link_index(joint.child) for joint in joints]
         self._axes_A3 = torch.tensor(np.array([joint.axis_3 for joint in joints]), dtype=torch.float32, device=device)
         self._rotary_A = torch.tensor([float(joint.rotary) for joint in joints], device=device)
+        self._bodies = [robot.description.root, *(joint.child for joint in joints)]
+        above = [{joint.name for joint in robot.description.joints_above(link)} for link in self._bodies]
+        self._above_LA = torch.tensor([[float(j.name in names) for j in joints] for names in above], device=device)
+        self._read_capsules(urdf)
+        self._choose_pairs({frozenset((joint.child, self._body(joint.parent))) for joint in joints})
 
-        def body(link: str) -> str:
-            above = (joint.child for joint in description.joints_above(link) if joint.name in robot.driven_joints)
-            return next(above, description.root)
+    def _body(self, link: str) -> str:
+        """The link that stands for all that move with this one."""
+        above = self.robot.description.joints_above(link)
+        found = (joint.child for joint in above if joint.name in self.robot.driven_joints)
+        return next(found, self.robot.description.root)
 
-        rest = link_poses(urdf, robot.configuration(robot.home().cpu().numpy()))
-        bodies = [description.root, *(joint.child for joint in joints)]
-        capsules = []
+    def _read_capsules(self, urdf: yourdfpy.URDF) -> None:
+        shapes, device = read_collision_geometry(urdf), self._above_LA.device
+        shaped = {shape.link for shape in shapes}
+        self.uncovered = tuple(x.name for x in urdf.robot.links if x.collisions and x.name not in shaped)
+        """Links whose collision geometry is of meshes alone, which are not looked at."""
+        rest = link_poses(urdf, self.robot.configuration(self.robot.home().cpu().numpy()))
+        self._links: list[str] = []
+        ends, radii = [], []
         for shape in shapes:
-            carrier = body(shape.link)
-            pose_44 = np.linalg.inv(rest[carrier]) @ rest[shape.link] @ shape.origin_44
-            capsules += [(shape.link, carrier, *row) for row in _capsules(shape, pose_44)]
-        self._links = tuple(capsule[0] for capsule in capsules)
-        body_C = [bodies.index(capsule[1]) for capsule in capsules]
+            pose_44 = np.linalg.inv(rest[self._body(shape.link)]) @ rest[shape.link] @ shape.origin_44
+            for start_3, end_3, radius in _capsules(shape, pose_44):
+                self._links.append(shape.link)
+                ends.append((start_3, end_3))
+                radii.append(radius)
+        body_C = [self._bodies.index(self._body(link)) for link in self._links]
         self._body_C = torch.tensor(body_C, dtype=torch.long, device=device)
-        ends = np.array([capsule[2:4] for capsule in capsules], dtype=np.float32).reshape(-1, 2, 3)
-        self._ends_C23 = torch.tensor(ends, device=device)
-        self._radius_C = torch.tensor([capsule[4] for capsule in capsules], dtype=torch.float32, device=device)
+        self._ends_C23 = torch.tensor(np.array(ends, dtype=np.float32).reshape(-1, 2, 3), device=device)
+        self._radius_C = torch.tensor(radii, dtype=torch.float32, device=device)
         self._reach_C = (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C
-        self._above_LA = torch.tensor(
-            [[float(joint in description.joints_above(link)) for joint in joints] for link in bodies], device=device
-        )
-        parent = {joint.child: body(joint.parent) for joint in joints}
-        kin = {frozenset(pair) for pair in parent.items()}
-        carriers = [capsule[1] for capsule in capsules]
-        apart = [
-            (i, j)
-            for i, j in itertools.combinations(range(len(capsules)), 2)
-            if carriers[i] != carriers[j] and frozenset((carriers[i], carriers[j])) not in kin
-        ]
-        self._pair_2P = torch.tensor(apart, dtype=torch.long, device=device).reshape(-1, 2).T.contiguous()
+
+    def _choose_pairs(self, neighbours: set[frozenset[str]]) -> None:
+        """All pairs of capsules of different bodies that can be kept apart; `neighbours` share a joint."""
+        bodies = [self._bodies[i] for i in self._body_C.tolist()]
+        every = [(i, j) for i, j in itertools.combinations(range(len(bodies)), 2) if bodies[i] != bodies[j]]
+        both = [frozenset((bodies[i], bodies[j])) for i, j in every]
+
+        def keep(wanted: list[bool]) -> Tensor:
+            chosen = [pair for pair, good in zip(every, wanted, strict=True) if good]
+            return torch.tensor(chosen, dtype=torch.long, device=self._body_C.device).reshape(-1, 2).T.contiguous()
+
+        self._pair_2P = keep([names not in neighbours for names in both])
         near = self.near(self.robot.sample(_SAMPLES, torch.Generator().manual_seed(0)), 0.0)
-        share_P = torch.bincount(near.pair_X, minlength=len(apart)) / _SAMPLES
-        kin |= {frozenset((carriers[i], carriers[j])) for (i, j), s in zip(apart, share_P, strict=True) if s > _ALWAYS}
-        separate = [frozenset((carriers[i], carriers[j])) not in kin for i, j in apart]
-        self._pair_2P = self._pair_2P[:, torch.tensor(separate, dtype=torch.bool, device=device)]
+        often_P = torch.bincount(near.pair_X, minlength=self._pair_2P.shape[1]) > _ALWAYS * _SAMPLES
+        first = self._pair_2P[:, often_P].T.tolist()
+        inseparable = {frozenset((bodies[i], bodies[j])) for i, j in first}
+        self._pair_2P = keep([names not in neighbours | inseparable for names in both])
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -122,7 +130,7 @@ class SelfCollision:
     def near(self, q_BN: Tensor, margin: float) -> Contacts:
         """The pairs that are closer than `margin` [m] at joint angles (B, N) [rad]."""
         parts = []
-        for first in range(0, len(q_BN), _CHUNK):
+        for first in range(0, max(1, len(q_BN)), _CHUNK):
             part = self._near(self.robot.forward(q_BN[first : first + _CHUNK]), margin)
             parts.append(Contacts(part.row_X + first, *(getattr(part, f.name) for f in fields(Contacts)[1:])))
         return Contacts(*(torch.cat([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))

@@ -136,6 +136,13 @@ def test_boxes_lie_inside_their_capsules(tmp_path: Path) -> None:
         assert max(nearest) <= 1e-6
 
 
+def test_no_pose_is_no_special_case(root: Path) -> None:
+    shapes = SelfCollision(robot_of(root, "nao"))
+    assert shapes.collides(torch.zeros(0, 8)).shape == (0,) and shapes.near(
+        torch.zeros(0, 8), 1.0
+    ).jacobian_XN.shape == (0, 8)
+
+
 def test_meshes_are_named_as_not_covered(tmp_path: Path) -> None:
     mesh = "<collision><geometry><mesh filename='a.stl'/></geometry></collision>"
     assert SelfCollision(toy(tmp_path, "<sphere radius='0.05'/>", mesh)).uncovered == ("upper",)
