@@ -18,19 +18,19 @@ DESCRIPTION = (
 )
 FLAGS = {
     "retargeter FOLDER": "the package that a fit ended with",
+    "polish NUMBER": "steps of optimisation after the networks (default: 0)",
     "validation": "the validation clips, for choosing between retargeters; else the test clips",
     "quiet": "no progress line",
 }
 
 
-def evaluate(config: Config, package: Path, validation: bool = False, quiet: bool = False) -> str:
+def evaluate(config: Config, package: Path, validation: bool = False, quiet: bool = False, polish: int = 0) -> str:
     """Returns the table of clips and their means, and the latency.
 
     Raises:
         UserError: the config, the package or the motions cannot be used, or the package is of another robot.
     """
     from mrhubo import pipeline
-    from mrhubo.callbacks import predict_clips
     from mrhubo.evaluation import evaluate_clips, latency_us, table
     from mrhubo.retargeter import Retargeter
 
@@ -44,9 +44,10 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
             f" the config's ('{config.robot.name}': {', '.join(config.robot.joints)})"
         )
     clips = pipeline.make_references(prepared, quiet)[0 if validation else 1]
-    found = evaluate_clips(predict_clips(retargeter.network, clips), clips, body_map, config.robot.key_links)
+    predictions = [retargeter.predict(clip.motion.pose_TJ6, polish) for clip in clips]
+    found = evaluate_clips(predictions, clips, body_map, config.robot.key_links)
     pose_TJ6 = clips[0].motion.pose_TJ6
-    one, many = (latency_us(retargeter.predict, pose_TJ6, batch) for batch in (1, 1_000))
+    one, many = (latency_us(lambda pose: retargeter.predict(pose, polish), pose_TJ6, batch) for batch in (1, 1_000))
     latency = f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once"
     return "\n".join([table(found), "", *_not_covered(body_map.robot), latency])
 
@@ -65,7 +66,10 @@ def main(argv: list[str]) -> None:
     config, flags = parse_arguments(argv, "mrhubo.evaluate", DESCRIPTION, flags=FLAGS)
     if flags["retargeter"] is None:
         raise UserError("command line: --retargeter FOLDER is missing; a fit ends with the folder's name")
-    print(evaluate(config, Path(flags["retargeter"]), flags["validation"], flags["quiet"]))
+    polish = flags["polish"] or "0"
+    if not polish.isdigit() or int(polish) > 1_000:
+        raise UserError(f"command line: --polish must be 0 .. 1000 steps, found '{polish}'")
+    print(evaluate(config, Path(flags["retargeter"]), flags["validation"], flags["quiet"], int(polish)))
 
 
 if __name__ == "__main__":

@@ -131,6 +131,16 @@ def test_the_command_measures_a_package_and_refuses_another_robots(
         main(["--config", str(root / "conf" / "nao.yaml"), *given, *flags])
         output = capsys.readouterr().out
         assert f"\n{clip} " in output and "mean over frames" in output and "us for one frame" in output
+    main(["--config", str(root / "conf" / "nao.yaml"), *given, "--polish", "2"])
+    polished = capsys.readouterr().out
+
+    def limbs(table: str) -> float:
+        return float(next(line for line in table.splitlines() if line.startswith("wave")).split()[4])
+
+    main(["--config", str(root / "conf" / "nao.yaml"), *given])
+    assert limbs(polished) < 0.7 * limbs(capsys.readouterr().out)
+    with pytest.raises(UserError, match="--polish must be"):
+        main(["--config", str(root / "conf" / "nao.yaml"), *given, "--polish", "x"])
     with pytest.raises(UserError, match="another robot or other joints"):
         main(["--config", str(root / "conf" / "coman.yaml"), *given])
     with pytest.raises(UserError, match="another robot or other joints"):

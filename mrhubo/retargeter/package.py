@@ -2,6 +2,7 @@
 
     retargeter = Retargeter.load("package")
     q_TN = retargeter.predict(pose_TJ6)             # the two networks alone
+    q_TN = retargeter.predict(pose_TJ6, polish=1)   # and a step of optimisation
     result = retargeter.retarget(pose_TJ6)          # with a confidence for each frame
 
 Legend: T frames, J = 21 human joints, N robot joints, D directions.
@@ -24,7 +25,7 @@ from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
-from mrhubo.reference import direction_error
+from mrhubo.reference import DirectionProblem, direction_error
 from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
@@ -75,29 +76,45 @@ class Retargeter:
         """The robot's collision shapes."""
         return SelfCollision(self.body_map.robot)
 
+    @functools.cached_property
+    def directions(self) -> DirectionProblem:
+        """The reference retargeter's cost."""
+        return DirectionProblem(self.body_map)
+
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Joints of the output, in order."""
         return self.body_map.robot.joint_names
 
     @torch.no_grad()
-    def predict(self, pose_TJ6: Tensor) -> Tensor:
+    def predict(self, pose_TJ6: Tensor, polish: int = 0) -> Tensor:
         """Joint angles (T, N) [rad] of human poses (T, 21, 6); inside the limits.
 
+        Args:
+            pose_TJ6: human poses, 6D.
+            polish: Levenberg-Marquardt steps of the reference retargeter from the networks' answer, each frame on its
+                own; a step that does not bring the limbs nearer to the human's is not taken. 0: the networks alone.
+
         Raises:
-            UserError: the poses have another shape, or hold NaN or infinite numbers.
+            UserError: the poses have another shape, or hold NaN or infinite numbers; `polish` is negative.
         """
+        if polish < 0:
+            raise UserError(f"polish must be 0 or more steps, found {polish}")
         if pose_TJ6.ndim != 3 or pose_TJ6.shape[1:] != (len(POSED_JOINT_NAMES), 6):
             raise UserError(f"human poses must have the shape (frames, 21, 6), found {tuple(pose_TJ6.shape)}")
         finite = torch.isfinite(pose_TJ6).all(dim=2).all(dim=1)
         if not bool(finite.all()):
             raise UserError(f"human pose {int((~finite).nonzero()[0, 0])} holds NaN or infinite numbers")
-        return self.network(pose_TJ6.float())
+        q_TN = self.network(pose_TJ6.float())
+        if not polish or not len(q_TN):
+            return q_TN
+        target_TD3 = self.body_map.human_directions(pose_TJ6.float())
+        return self.directions.minimise(q_TN, target_TD3, steps=polish)[0]
 
     @torch.no_grad()
-    def retarget(self, pose_TJ6: Tensor) -> RetargetResult:
-        """Joint angles with a confidence for each frame; poses as for `predict`."""
-        q_TN = self.predict(pose_TJ6)
+    def retarget(self, pose_TJ6: Tensor, polish: int = 0) -> RetargetResult:
+        """Joint angles with a confidence for each frame; arguments as for `predict`."""
+        q_TN = self.predict(pose_TJ6, polish)
         pose_TJ6 = pose_TJ6.float()
         error_TD = direction_error(self.body_map, q_TN, pose_TJ6)
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))

@@ -84,6 +84,23 @@ def test_confidence_falls_for_implausible_poses(made: Retargeter) -> None:
     assert float(bad.confidence_T.max()) < 0.5
 
 
+def test_polish_brings_every_frame_nearer_and_stays_inside_the_limits(made: Retargeter) -> None:
+    pose, robot = human(60), made.body_map.robot
+    errors = []
+    for steps in (0, 1, 3):
+        result = made.retarget(pose, polish=steps)
+        assert torch.equal(result.q_TN, made.predict(pose, steps))
+        assert bool(((result.q_TN >= robot.lower_N) & (result.q_TN <= robot.upper_N)).all())
+        assert torch.equal(result.collision_T, made.collision.collides(result.q_TN))
+        errors.append(made.directions.quadratic(result.q_TN, made.body_map.human_directions(pose)).cost_BC)
+    assert torch.equal(made.predict(pose), made.network(pose))
+    assert bool((errors[1] <= errors[0]).all()) and bool((errors[2] <= errors[1]).all())
+    assert float(errors[2].sum(1).mean()) < 0.5 * float(errors[0].sum(1).mean())
+    assert made.predict(pose[:0], 1).shape == (0, 17)
+    with pytest.raises(UserError, match="polish"):
+        made.predict(pose, -1)
+
+
 @pytest.mark.parametrize("shape", [(5, 20, 6), (21, 6), (5, 21, 3)])
 def test_a_wrong_shape_is_refused(made: Retargeter, shape: tuple[int, ...]) -> None:
     with pytest.raises(UserError, match="shape"):
