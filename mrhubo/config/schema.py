@@ -215,25 +215,25 @@ class S3LEConfig:
     """Random robot poses; those that collide are left out."""
     self_made: int = bounded(20_000, 100, 10_000_000)
     """Self-made pairs."""
-    beyond: float = bounded(0.2, 0.0, 2.0)
+    beyond: float = bounded(0.35, 0.0, 2.0)
     """How far their robot poses go beyond the limits, as a share of the range."""
-    latent: int = bounded(16, 1, 1_024)
+    latent: int = bounded(64, 1, 1_024)
     """Size of the shared latent space."""
     hidden: int = bounded(256, 1, 65_536)
     """Width of the two hidden layers of every encoder and decoder."""
-    steps: int = bounded(4_000, 2, 1_000_000_000)
+    steps: int = bounded(6_000, 2, 1_000_000_000)
     """Optimiser steps, the first half without self-made pairs."""
     batch_size: int = bounded(256, 2, 1_000_000)
     """Pairs of each kind per step."""
-    lr: float = bounded(1e-3, 1e-9, 1.0)
+    lr: float = bounded(0.00175, 1e-9, 1.0)
     """Learning rate of Adam, with cosine decay to 0."""
-    normal_weight: float = bounded(0.1, 0.0)
+    normal_weight: float = bounded(0.263, 0.0)
     """Weight of the codes' distance from a normal distribution (maximum mean discrepancy)."""
-    pair_weight: float = bounded(10.0, 0.0)
+    pair_weight: float = bounded(83.4, 0.0)
     """Weight of the squared distance between the codes of a pair."""
-    projection_weight: float = bounded(10.0, 0.0)
+    projection_weight: float = bounded(0.739, 0.0)
     """Weight of the same for self-made pairs and their mixtures."""
-    neighbours: int = bounded(10, 1, 10_000)
+    neighbours: int = bounded(30, 1, 10_000)
     """Feasible poses that an answer is a mean of; 1 = the nearest."""
     width: float = bounded(0.5, 1e-3, 100.0)
     """Width of the kernel, in distances of the farthest of them."""
