@@ -170,8 +170,11 @@ def _provenance(prepared: Prepared) -> dict[str, str]:
 def run_name(config: Config) -> str:
     """The robot's name and the settings that differ from the defaults: `nao stages=1 filter=none`."""
     sections = (config.body, config.pairs, config.model, config.trainer)
-    changed = [f"{name}={value}" for section in sections for name, value in changed_settings(section).items()]
-    return " ".join([config.robot.name, *changed])
+    changed = {name: value for section in sections for name, value in changed_settings(section).items()}
+    changed.pop("workers", None)  # the result does not depend on it
+    if config.robot.scale != "auto":
+        changed["scale"] = config.robot.scale
+    return " ".join([config.robot.name, *(f"{name}={value}" for name, value in changed.items())])
 
 
 def dashboard_command(folder: Path, config: Config) -> str:

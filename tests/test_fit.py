@@ -25,6 +25,7 @@ from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.fit import main
 from mrhubo.ranks import Ranks
+from mrhubo.recording import run_name
 from mrhubo.retargeter import Retargeter
 
 SMALL = [
@@ -263,3 +264,9 @@ def test_ranks_that_cannot_share_a_batch_are_refused(
     monkeypatch.setattr(Ranks, "join", lambda accelerator: Ranks(0, 2))
     with pytest.raises(UserError, match="batch_size: must be a multiple of the 2 processes"):
         main(arguments(root, tmp_path, motions, "trainer.batch_size=127"))
+
+
+def test_runs_are_named_after_what_differs(root: Path) -> None:
+    config = load_config(root / "conf" / "nao.yaml", ["pairs.workers=3", "model.stages=1", "pairs.filter=none"])
+    assert run_name(config) == "nao filter=none stages=1"
+    assert run_name(load_config(root / "conf" / "paper" / "reachy.yaml")).endswith(" scale=manual")
