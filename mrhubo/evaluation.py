@@ -112,7 +112,7 @@ def table(evaluations: Sequence[Evaluation]) -> str:
     return "\n".join(lines)
 
 
-def latency_us(predict: Callable[[Tensor], Tensor], pose_TJ6: Tensor, batch: int, seconds: float = 1.0) -> float:
+def latency_us(predict: Callable[[Tensor], Tensor], pose_TJ6: Tensor, batch: int, seconds: float = 0.5) -> float:
     """Median time a frame [us] of `batch` frames at once, one thread, over calls that take `seconds` together."""
     frames = pose_TJ6.repeat(-(-batch // len(pose_TJ6)), 1, 1)[:batch]
     found = []

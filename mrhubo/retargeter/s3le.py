@@ -40,6 +40,8 @@ class Autoencoder(nn.Module):
 class S3LE(nn.Module):
     """Both autoencoders and the feasible robot poses; answers human directions with joint angles."""
 
+    lower_N: Tensor
+    upper_N: Tensor
     middle_N: Tensor
     half_N: Tensor
     feasible_FN: Tensor
@@ -49,6 +51,8 @@ class S3LE(nn.Module):
         super().__init__()
         self.human = Autoencoder(3 * directions, hidden, latent)
         self.robot = Autoencoder(len(lower_N), hidden, latent)
+        self.register_buffer("lower_N", lower_N.clone())
+        self.register_buffer("upper_N", upper_N.clone())
         self.register_buffer("middle_N", (upper_N + lower_N) / 2)
         self.register_buffer("half_N", (upper_N - lower_N) / 2)
         self.register_buffer("feasible_FN", torch.zeros(0, len(lower_N)))
@@ -89,6 +93,7 @@ class S3LE(nn.Module):
             weight_BK = torch.softmax(-0.5 * (distance_BK / scale_B1).square(), dim=1)
             near_BKN = self.feasible_FN[index_BK]
             mean_BN = (weight_BK[..., None] * near_BKN).sum(dim=1)
+            mean_BN = torch.clamp(mean_BN, self.lower_N, self.upper_N)  # which rounding may leave
             touches_B1 = collision.collides(mean_BN)[:, None]
             found.append(torch.where(touches_B1, near_BKN[:, 0], mean_BN))
         return torch.cat(found)
