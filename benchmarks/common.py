@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import platform
 import shlex
-import statistics
 import sys
 from collections.abc import Sequence
 
 import torch
 
 from mrhubo.locations import project_root
+from mrhubo.tables import markdown
 from mrhubo.tracking import git_commit
 
 
@@ -22,12 +22,6 @@ def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list
             sys.exit(f"{argv[0]}: is unknown or lacks its value; there are --{', --'.join(defaults)}")
         defaults[name], argv = argv[1], argv[2:]
     return defaults, argv
-
-
-def mean_and_spread(values: Sequence[float], digits: int) -> str:
-    """Mean and standard deviation of several seeds, or the value of one."""
-    spread = f" ± {statistics.stdev(values):.{digits}f}" if len(values) > 1 else ""
-    return f"{statistics.fmean(values):.{digits}f}{spread}"
 
 
 def print_header() -> None:
@@ -46,8 +40,4 @@ def print_header() -> None:
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A Markdown table with aligned columns."""
-    table = [list(columns), *[list(row) for row in rows]]
-    widths = [max(len(row[i]) for row in table) for i in range(len(columns))]
-    lines = ["| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |" for row in table]
-    lines.insert(1, "|" + "|".join("-" * (w + 2) for w in widths) + "|")
-    print("\n".join(lines))
+    print(markdown(columns, rows))

@@ -20,7 +20,7 @@ from mrhubo.config import load_config
 from mrhubo.locations import default_motions
 from mrhubo.motion import Motion
 from mrhubo.reference import ReferenceResult, ReferenceRetargeter, direction_jerk
-from mrhubo.robot import SelfCollision, build_body_map
+from mrhubo.robot import build_body_map
 
 
 def main(argv: list[str]) -> None:
@@ -61,7 +61,7 @@ def measures(
 ) -> list[str]:
     """The cells of a row, means over frames."""
     body_map = retargeter.body_map
-    shapes, names = SelfCollision(body_map.robot), body_map.direction_names
+    shapes, names = body_map.collision, body_map.direction_names
     q_TN, residual_TD = torch.cat([f.q_TN for f in found]), torch.cat([f.residual_deg_TD for f in found])
     jerks = []
     for motion, result in zip(motions, found, strict=True):

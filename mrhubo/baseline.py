@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import copy
+import functools
 import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mrhubo.config import BaselineConfig, S3LEConfig, parse_arguments, run_command, to_plain
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.config import BaselineConfig, S3LEConfig, fingerprint, parse_arguments, run_command, to_plain
+from mrhubo.errors import UserError
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -67,9 +68,18 @@ class Baseline:
         if not len(chosen):
             raise UserError(f"s3le.poses: {path} holds no pose that a human can strike")
         with Progress("glue pairs", len(chosen), quiet=quiet) as progress:
-            data = make_data(prepared.body_map, chosen, config.s3le, lambda done, _: progress.update(done))
+            data = make_data(prepared.body_map, chosen, config.s3le, progress.update)
         validation, test = pipeline.make_references(prepared, quiet)
         return cls(prepared, data, validation, test)
+
+    @functools.cached_property
+    def client(self) -> MlflowClient:
+        """Where runs are kept."""
+        from mrhubo.recording import Recording
+        from mrhubo.tracking import open_client
+
+        config = self.prepared.config
+        return open_client(Recording.folder(config), config.tracking.experiment, config.tracking.uri)
 
     def train(self, settings: S3LEConfig, quiet: bool = False) -> S3LE:
         """A trained model."""
@@ -104,49 +114,48 @@ class Baseline:
 
 def run_baseline(config: BaselineConfig, quiet: bool = False, parent: str | None = None) -> str:
     """Trains S3LE, measures it on the test clips, tracks it, and returns the table."""
-    from mrhubo.evaluation import evaluate_clips, measures, table
+    from mrhubo.evaluation import evaluate_clips, run_metrics, table
+    from mrhubo.tracking import ending, log_all
 
     baseline = Baseline.open(config, quiet)
-    client, run = _open_run(baseline, config.s3le, parent, "S3LE")
-    with _Ended(client, run):
+    client = baseline.client
+    run = _open_run(baseline, config.s3le, parent, "S3LE")
+    with ending(client, run):
         model = baseline.train(config.s3le, quiet)
         predictions = baseline.predict(model, config.s3le, baseline.test)
-        body_map, links = baseline.prepared.body_map, config.robot.key_links
-        *clips, over_clips, over_frames = scores = evaluate_clips(predictions, baseline.test, body_map, links)
-        metrics = {f"test/{name}": value for name, value in measures(over_clips).items()}
-        for name, score in [*((clip.name, clip) for clip in clips), ("over_frames", over_frames)]:
-            metrics |= {f"test/{name}/joint_rad": score.joint_rad, f"test/{name}/link_cm": score.link_cm}
-        metrics["val/best_link_cm"] = baseline.validation_link_cm(model, config.s3le)
-        for name, value in metrics.items():
-            client.log_metric(run, name, value)
+        scores = evaluate_clips(predictions, baseline.test, baseline.prepared.body_map, config.robot.key_links)
+        metrics = {"val/best_link_cm": baseline.validation_link_cm(model, config.s3le), **run_metrics(scores)}
+        log_all(client, run, metrics)
         client.log_text(run, table(scores) + "\n", "test/clips.txt")
     return table(scores)
 
 
 def search(config: BaselineConfig, trials: int, quiet: bool = False) -> str:
     """Random settings on the validation clips; the best first, as overrides of `config`."""
-    from mrhubo.tracking import find_run
+    from mrhubo.tracking import ending, find_run, log_all
 
     baseline = Baseline.open(config, quiet)
-    found = []
+    client, found = baseline.client, []
     for trial in range(trials):
         settings = draw_settings(config.s3le, trial)
-        client, tags = _client(baseline), {"s3le_trial": _fingerprint(baseline, settings)}
+        tags = {"s3le_trial": fingerprint([baseline.prepared.fingerprint, to_plain(settings)])}
         run = find_run(client, config.tracking.experiment, tags, finished=True)
         if run is None:
-            _, run_id = _open_run(baseline, settings, None, f"S3LE, trial {trial}", tags)
-            with _Ended(client, run_id):
+            run_id = _open_run(baseline, settings, None, f"S3LE, trial {trial}", tags)
+            with ending(client, run_id):
                 model = baseline.train(settings, quiet)
+                metrics = {}
                 for neighbours in NEIGHBOURS:
                     for width in WIDTHS if neighbours > 1 else WIDTHS[:1]:
                         settings.neighbours, settings.width = neighbours, width
                         link_cm = baseline.validation_link_cm(model, settings)
-                        client.log_metric(run_id, f"val/link_cm_{neighbours}_{width}", link_cm)
+                        metrics[f"val/link_cm_{neighbours}_{width}"] = link_cm
+                log_all(client, run_id, metrics)
             run = client.get_run(run_id)
         errors = {name: v for name, v in run.data.metrics.items() if name.startswith("val/link_cm_")}
         best = min(errors, key=lambda name: errors[name])
         neighbours, width = best.removeprefix("val/link_cm_").split("_")
-        changed = {name: f"{run.data.params[f's3le/{name}']}" for name in _SEARCHED}
+        changed = {name: run.data.params[f"s3le/{name}"] for name in _SEARCHED}
         changed |= {"neighbours": neighbours, "width": width}
         found.append((errors[best], " ".join(f"s3le.{name}={value}" for name, value in changed.items())))
         if not quiet:
@@ -173,27 +182,13 @@ def draw_settings(base: S3LEConfig, trial: int) -> S3LEConfig:
     return settings
 
 
-def _client(baseline: Baseline) -> MlflowClient:
-    from mrhubo.recording import Recording
-    from mrhubo.tracking import open_client
-
-    tracking = baseline.prepared.config.tracking
-    return open_client(Recording.folder(baseline.prepared.config), tracking.experiment, tracking.uri)
-
-
-def _fingerprint(baseline: Baseline, settings: S3LEConfig) -> str:
-    from mrhubo.config import fingerprint
-
-    return fingerprint([baseline.prepared.fingerprint, to_plain(settings)])
-
-
 def _open_run(
     baseline: Baseline, settings: S3LEConfig, parent: str | None, name: str, trial: dict[str, str] | None = None
-) -> tuple[MlflowClient, str]:
+) -> str:
     from mrhubo.locations import project_root
-    from mrhubo.tracking import git_commit
+    from mrhubo.tracking import git_commit, log_all, start_run
 
-    config, client = baseline.prepared.config, _client(baseline)
+    config, client = baseline.prepared.config, baseline.client
     tags = {
         "robot": config.robot.name,
         "method": "S3LE",
@@ -201,26 +196,9 @@ def _open_run(
         **({"mlflow.parentRunId": parent} if parent else {}),
         **(trial or {"config_fingerprint": baseline.prepared.fingerprint}),
     }
-    experiment = client.get_experiment_by_name(config.tracking.experiment)
-    assert experiment is not None
-    run = client.create_run(experiment.experiment_id, tags=tags, run_name=f"{config.robot.name} {name}").info.run_id
-    for key, value in to_plain(settings).items():
-        client.log_param(run, f"s3le/{key}", value)
-    return client, run
-
-
-class _Ended:
-    """Closes a run as finished, failed or killed."""
-
-    def __init__(self, client: MlflowClient, run: str) -> None:
-        self.client, self.run = client, run
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        status = "FINISHED" if error is None else "KILLED" if was_interrupted(error) else "FAILED"
-        self.client.set_terminated(self.run, status)
+    run = start_run(client, config.tracking.experiment, f"{config.robot.name} {name}", tags).info.run_id
+    log_all(client, run, {}, {f"s3le/{key}": value for key, value in to_plain(settings).items()})
+    return run
 
 
 def main(argv: list[str]) -> None:

@@ -9,7 +9,7 @@ from mrhubo.config import Config, parse_arguments, run_command
 from mrhubo.errors import UserError
 
 if TYPE_CHECKING:
-    from mrhubo.robot import Robot
+    from mrhubo.robot import SelfCollision
 
 DESCRIPTION = (
     "Measures a trained retargeter on human motion: against the reference retargeter (joints, links), against the"
@@ -49,13 +49,11 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
     pose_TJ6 = clips[0].motion.pose_TJ6
     one, many = (latency_us(lambda pose: retargeter.predict(pose, polish), pose_TJ6, batch) for batch in (1, 1_000))
     latency = f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once"
-    return "\n".join([table(found), "", *_not_covered(body_map.robot), latency])
+    return "\n".join([table(found), "", *_not_covered(body_map.collision), latency])
 
 
-def _not_covered(robot: Robot) -> list[str]:
-    from mrhubo.robot import SelfCollision
-
-    links = SelfCollision(robot).uncovered
+def _not_covered(shapes: SelfCollision) -> list[str]:
+    links = shapes.uncovered
     return [f"collision: {len(links)} links have meshes for collision, which are not read: {', '.join(links)}"] * bool(
         links
     )

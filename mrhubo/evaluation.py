@@ -14,7 +14,7 @@ from torch import Tensor
 
 from mrhubo.callbacks import Clip, ClipScore, mean_score, score_clip
 from mrhubo.reference import angle_between, at_limit_share, direction_jerk
-from mrhubo.robot import BodyMap, SelfCollision
+from mrhubo.robot import BodyMap
 from mrhubo.threads import use_threads
 
 _ENDS = ("left_hand", "right_hand", "head")
@@ -42,11 +42,9 @@ class Evaluation(ClipScore):
     """The same for the reference, which is not told to avoid it."""
 
 
-def evaluate_clip(
-    clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str], shapes: SelfCollision
-) -> Evaluation:
+def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str]) -> Evaluation:
     """Measures of predicted joint angles (T, N) [rad]."""
-    robot, human_TD3 = body_map.robot, body_map.human_directions(clip.motion.pose_TJ6)
+    robot, shapes, human_TD3 = body_map.robot, body_map.collision, body_map.human_directions(clip.motion.pose_TJ6)
     robot_TD3, reference_TD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_TN, clip.reference_TN))
     error_TD, reference_TD = (torch.rad2deg(angle_between(d, human_TD3)) for d in (robot_TD3, reference_TD3))
     names = body_map.direction_names
@@ -77,8 +75,7 @@ def evaluate_clips(
     predictions: Sequence[Tensor], clips: Sequence[Clip], body_map: BodyMap, key_links: Sequence[str]
 ) -> list[Evaluation]:
     """Measures clip by clip, then their means over clips and over frames."""
-    shapes = SelfCollision(body_map.robot)
-    found = [evaluate_clip(c, q_TN, body_map, key_links, shapes) for c, q_TN in zip(clips, predictions, strict=True)]
+    found = [evaluate_clip(c, q_TN, body_map, key_links) for c, q_TN in zip(clips, predictions, strict=True)]
     return [*found, mean_score(found), mean_score(found, over_frames=True)]
 
 
@@ -86,6 +83,15 @@ def measures(evaluation: Evaluation) -> dict[str, float]:
     """The measures by name; those that the robot does not have are left out."""
     found = {field.name: getattr(evaluation, field.name) for field in fields(Evaluation)[2:]}
     return {name: value for name, value in found.items() if value == value}
+
+
+def run_metrics(evaluations: Sequence[Evaluation]) -> dict[str, float]:
+    """What `evaluate_clips` gave for the test clips, under the names that a run has for it."""
+    *clips, over_clips, over_frames = evaluations
+    found = {f"test/{name}": value for name, value in measures(over_clips).items()}
+    for name, score in [*((clip.name, clip) for clip in clips), ("over_frames", over_frames)]:
+        found |= {f"test/{name}/joint_rad": score.joint_rad, f"test/{name}/link_cm": score.link_cm}
+    return found
 
 
 def table(evaluations: Sequence[Evaluation]) -> str:

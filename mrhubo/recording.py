@@ -17,13 +17,12 @@ from torch import Tensor
 from mrhubo.callbacks import Clip
 from mrhubo.callbacks.pictures import Artist
 from mrhubo.config import Config, changed_settings, to_plain, to_yaml
-from mrhubo.errors import was_interrupted
-from mrhubo.evaluation import Evaluation, measures, table
+from mrhubo.evaluation import Evaluation, run_metrics, table
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
-from mrhubo.tracking import database_uri, git_commit, library_versions, open_logger, resumable_run
+from mrhubo.tracking import database_uri, git_commit, library_versions, open_logger, resumable_run, run_status
 from mrhubo.view import phi_histogram, save_png
 from mrhubo.workspace import Workspace
 
@@ -85,11 +84,10 @@ class Recording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        status = "FINISHED" if error is None else "KILLED" if was_interrupted(error) else "FAILED"
         try:
             self._monitor.finish()
         finally:  # Lightning's logger has called an interrupted run failed; whatever else goes wrong, that is put right
-            self.client.set_terminated(self.run_id, status)
+            self.client.set_terminated(self.run_id, run_status(error))
         if error is not None:
             self.client.set_tag(self.run_id, "ended_by", f"{type(error).__name__}: {error}"[:500])
 
@@ -122,12 +120,7 @@ class Recording:
 
     def scores(self, scores: Sequence[Evaluation], best_link_cm: float) -> None:
         """What `evaluate_clips` gave for the test clips: metrics and a table."""
-        *clips, over_clips, over_frames = scores
-        metrics = {"val/best_link_cm": best_link_cm}
-        metrics |= {f"test/{name}": value for name, value in measures(over_clips).items()}
-        for clip in (*clips, dataclasses.replace(over_frames, name="over_frames")):
-            metrics |= {f"test/{clip.name}/joint_rad": clip.joint_rad, f"test/{clip.name}/link_cm": clip.link_cm}
-        self.logger.log_metrics(metrics)
+        self.logger.log_metrics({"val/best_link_cm": best_link_cm, **run_metrics(scores)})
         rows = [dataclasses.asdict(score) for score in scores]
         self.client.log_table(self.run_id, {key: [row[key] for row in rows] for key in rows[0]}, "test/clips.json")
         self.client.log_text(self.run_id, table(scores) + "\n", "test/clips.txt")

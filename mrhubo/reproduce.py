@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mrhubo.config import BaselineConfig, fingerprint, run_command, split_arguments, to_plain
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import UserError
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -38,14 +38,15 @@ def reproduce(
     """
     from mrhubo.locations import default_capture
     from mrhubo.reproduction import chart, parts, tables
+    from mrhubo.tracking import ending
 
     capture = default_capture()
     if not capture.is_file() and not quiet:
         print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
     work = parts(robots, seeds, overrides, baseline=capture.is_file(), paper=paper)
     client, parent = _open_parent(work)
-    status, start, results = "FAILED", time.monotonic(), {}
-    try:
+    start, results = time.monotonic(), {}
+    with ending(client, parent):
         for part in work:
             measures = _measures(part, client, parent, quiet)
             results.setdefault((part.robot, part.method), []).append(measures)
@@ -53,12 +54,6 @@ def reproduce(
         client.log_text(parent, text + "\n", "tables.md")
         client.log_image(parent, chart(results), artifact_file="errors.png")
         client.log_metric(parent, "seconds", time.monotonic() - start)
-        status = "FINISHED"
-    except BaseException as error:
-        status = "KILLED" if was_interrupted(error) else "FAILED"
-        raise
-    finally:
-        client.set_terminated(parent, status)
     return text
 
 
@@ -66,7 +61,7 @@ def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     """The run that all trainings belong to: that of an earlier call with the same settings, or a new one."""
     from mrhubo.locations import project_root
     from mrhubo.recording import Recording
-    from mrhubo.tracking import find_run, git_commit, open_client
+    from mrhubo.tracking import find_run, git_commit, open_client, start_run
 
     config = work[0].config
     tags = {
@@ -78,9 +73,7 @@ def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     client = open_client(folder, config.tracking.experiment, config.tracking.uri)
     found = find_run(client, config.tracking.experiment, {"reproduce": tags["reproduce"]})
     if found is None:
-        experiment = client.get_experiment_by_name(config.tracking.experiment)
-        assert experiment is not None
-        found = client.create_run(experiment.experiment_id, tags=tags, run_name=name)
+        found = start_run(client, config.tracking.experiment, name, tags)
     client.update_run(found.info.run_id, status="RUNNING")
     return client, found.info.run_id
 

@@ -7,7 +7,7 @@ Figuera, Park, Ahn: "Redefining Data Pairing for Motion Retargeting Leveraging a
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from PIL.Image import Image
@@ -15,6 +15,7 @@ from PIL.Image import Image
 from mrhubo.config import BaselineConfig, Config, load_config
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.locations import project_root
+from mrhubo.tables import markdown, mean_and_spread, spread_of
 from mrhubo.view.bars import grouped_bars
 
 OUR_DEFAULT = "our default"
@@ -86,7 +87,9 @@ def parts(
     Raises:
         UserError: a robot has no config, or a setting is wrong.
     """
-    folder = project_root() / "conf" / ("paper" if paper else ".")
+    folder = project_root() / "conf"
+    if paper:
+        folder = folder / "paper"
     known = sorted(path.stem for path in folder.glob("*.yaml") if path.stem in PAPER)
     for robot in robots:
         if robot not in known:
@@ -148,22 +151,10 @@ def chart(results: Results) -> Image:
     return grouped_bars(panels, marks, "the paper")
 
 
-def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table with aligned columns."""
-    lines = [list(heads), *map(list, rows)]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(heads))]
-    text = ["| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines]
-    text.insert(1, "|" + "|".join("-" * (width + 2) for width in widths) + "|")
-    return "\n".join(text)
-
-
 def _cell(found: Sequence[Mapping[str, float]], name: str, unit: float, digits: int) -> str:
     values = [unit * seed[name] for seed in found if name in seed]
-    if not values:
-        return ""
-    mean, spread = _mean_and_spread(values)
-    return f"{mean:.{digits}f}" + (f" ± {spread:.{digits}f}" if len(values) > 1 else "")
+    return mean_and_spread(values, digits) if values else ""
 
 
 def _mean_and_spread(values: Sequence[float]) -> tuple[float, float]:
-    return statistics.fmean(values), statistics.stdev(values) if len(values) > 1 else 0.0
+    return statistics.fmean(values), spread_of(values)

@@ -19,7 +19,7 @@ from mrhubo.errors import UserError
 from mrhubo.reference.solve import DirectionProblem, Quadratic
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.trajectory import best_path, refine
-from mrhubo.robot import BodyMap, SelfCollision
+from mrhubo.robot import BodyMap
 
 _WEIGHTS = (1e3, 1e4)
 _MARGIN = 0.005
@@ -32,7 +32,7 @@ class CollisionFreeProblem(DirectionProblem):
 
     def __init__(self, body_map: BodyMap, margin: float = _MARGIN) -> None:
         super().__init__(body_map)
-        self.collision, self.margin, self.weight = SelfCollision(body_map.robot), margin, _WEIGHTS[-1]
+        self.collision, self.margin, self.weight = body_map.collision, margin, _WEIGHTS[-1]
         self.block_N = torch.zeros_like(self.block_N)
         self.joints_NC = torch.ones_like(self.joints_NC[:, :1])
         self.directions_DC = torch.ones_like(self.directions_DC[:, :1])

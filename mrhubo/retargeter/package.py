@@ -71,10 +71,10 @@ class Retargeter:
         self.network = network.requires_grad_(False).eval()
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
 
-    @functools.cached_property
+    @property
     def collision(self) -> SelfCollision:
         """The robot's collision shapes."""
-        return SelfCollision(self.body_map.robot)
+        return self.body_map.collision
 
     @functools.cached_property
     def directions(self) -> DirectionProblem:

@@ -37,14 +37,14 @@ class S3LEData:
 
 
 def make_data(
-    body_map: BodyMap, pose_GJ6: Tensor, settings: S3LEConfig, progress: Callable[[int, str], None] = lambda n, s: None
+    body_map: BodyMap, pose_GJ6: Tensor, settings: S3LEConfig, progress: Callable[[int], None] = lambda done: None
 ) -> S3LEData:
     """Glue pairs of human poses (G, 21, 6) from motion capture, and random robot poses."""
-    robot, collision = body_map.robot, SelfCollision(body_map.robot)
+    robot, collision = body_map.robot, body_map.collision
     retargeter = ReferenceRetargeter(body_map)
     answers = []
     for done, part in enumerate(pose_GJ6.split(2_000)):
-        progress(2_000 * done, "glue pairs")
+        progress(2_000 * done)
         answers.append(retargeter.solve_frames(part)[0])
     generator = torch.Generator().manual_seed(settings.seed)
     random_UN = robot.sample(settings.random_poses, generator)

@@ -12,6 +12,7 @@ Legend: B batch, D directions, K keypoints, L robot links, N robot joints.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ from mrhubo import rotation
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.config import RobotConfig
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.entries import End, Point, read_end, read_point
 from mrhubo.robot.model import LinkPoses, Robot
 from mrhubo.robot.scale import ManualScale
@@ -80,8 +82,14 @@ class BodyMap:
         self._chest_link = index(chest.link)
         self._list_keypoints()
 
+    @functools.cached_property
+    def collision(self) -> SelfCollision:
+        """The robot's collision shapes, on the device on which it is; read when first asked for."""
+        return SelfCollision(self.robot)
+
     def to(self, device: torch.device | str) -> BodyMap:
         """Moves robot, skeleton and constants to the device, in place."""
+        self.__dict__.pop("collision", None)
         self.robot.to(device)
         self.skeleton.to(device)
         if self.manual is not None:
