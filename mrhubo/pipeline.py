@@ -5,6 +5,7 @@ Everything a user can get wrong is checked by `prepare`, before any work.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -156,6 +157,7 @@ def train(
     resume: Path | None,
     quiet: bool,
     ranks: Ranks | None = None,
+    watchers: Sequence[lightning.Callback] = (),
 ) -> Training:
     """Trains on the pairs and returns the network of the best validation link error.
 
@@ -167,6 +169,7 @@ def train(
         resume: checkpoint to go on from, or None.
         quiet: no progress line.
         ranks: the processes that train together (DDP), each on its share of every batch; default: this one alone.
+        watchers: callbacks that look at every validation.
 
     Raises:
         KeyboardInterrupt: the user stopped it; the last checkpoint is there.
@@ -192,7 +195,7 @@ def train(
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
     progress = TrainingProgress(prepared.config.trainer.max_steps, quiet)
     with quiet_lightning():
-        trainer = _trainer(prepared.config, logger, [metrics, progress, saver], ranks)
+        trainer = _trainer(prepared.config, logger, [metrics, *watchers, progress, saver], ranks)
         run_trainer(trainer, module, resume, datamodule=data)
     best = torch.load(saver.best_model_path, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})

@@ -6,6 +6,7 @@ data.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import platform
@@ -53,6 +54,26 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+class Locked(UserError):
+    """Another process holds the lock."""
+
+
+@contextmanager
+def locked(path: Path, wait: bool = False) -> Iterator[None]:
+    """Holds a lock that one process at a time can have; it ends with the process, however that ends.
+
+    Raises:
+        Locked: another process has it, and `wait` is False.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "w") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except OSError as error:
+            raise Locked(f"{path.parent}: another process is at work there; wait for it or stop it") from error
+        yield
 
 
 def remove_leftovers(folder: Path) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrhubo.errors import UserError, was_interrupted
+from mrhubo.storage import locked
 
 if TYPE_CHECKING:
     from lightning.pytorch.loggers import MLFlowLogger
@@ -45,12 +46,13 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Mlflow
     folder.mkdir(parents=True, exist_ok=True)
     uri = uri or database_uri(folder)
     try:
-        client = mlflow.MlflowClient(tracking_uri=uri)
-        if client.get_experiment_by_name(experiment) is None:
-            location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
-            # The tag opens the experiment in the dashboard's view of trainings, not of language models.
-            kind = {"mlflow.experimentKind": "custom_model_development"}
-            client.create_experiment(experiment, artifact_location=location, tags=kind)
+        with locked(folder / "mlflow.lock", wait=True):  # two processes cannot make a database at once
+            client = mlflow.MlflowClient(tracking_uri=uri)
+            if client.get_experiment_by_name(experiment) is None:
+                location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
+                # The tag opens the experiment in the dashboard's view of trainings, not of language models.
+                kind = {"mlflow.experimentKind": "custom_model_development"}
+                client.create_experiment(experiment, artifact_location=location, tags=kind)
     except Exception as error:
         raise _unreachable(uri, error) from error
     return client

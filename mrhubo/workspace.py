@@ -6,7 +6,6 @@ mark, and the same command then starts a new run. A lock keeps two processes out
 
 from __future__ import annotations
 
-import fcntl
 import json
 import shutil
 from pathlib import Path
@@ -14,8 +13,7 @@ from types import TracebackType
 
 import torch
 
-from mrhubo.errors import UserError
-from mrhubo.storage import atomic_path
+from mrhubo.storage import Locked, atomic_path, locked
 
 
 class Workspace:
@@ -26,15 +24,11 @@ class Workspace:
         self._state_file = self.folder / "state.json"
 
     def __enter__(self) -> Workspace:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._lock = open(self.folder / "lock", "w")  # noqa: SIM115 (held until __exit__)
+        self._lock = locked(self.folder / "lock")
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self._lock.close()
-            raise UserError(
-                f"{self.folder}: another process is running this very fit; wait for it or stop it"
-            ) from error
+            self._lock.__enter__()
+        except Locked as error:
+            raise Locked(f"{self.folder}: another process is running this very fit; wait for it or stop it") from error
         if self._read().get("finished"):
             self._clear()
         return self
@@ -42,7 +36,7 @@ class Workspace:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._lock.close()
+        self._lock.__exit__(kind, error, trace)
 
     @property
     def run_id(self) -> str | None:

@@ -2,6 +2,7 @@
 
 from mrhubo.config.command import parse_arguments, run_command, split_arguments
 from mrhubo.config.help import field_docs, help_text
+from mrhubo.config.kinds import keys_of
 from mrhubo.config.loading import load_config
 from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
 from mrhubo.config.schema import (
@@ -19,6 +20,7 @@ from mrhubo.config.schema import (
     bounded,
     choice,
 )
+from mrhubo.config.sweeps import SweepConfig
 
 __all__ = [
     "BaselineConfig",
@@ -30,6 +32,7 @@ __all__ = [
     "PairsConfig",
     "RobotConfig",
     "S3LEConfig",
+    "SweepConfig",
     "TrackingConfig",
     "TrainerConfig",
     "bounded",
@@ -38,6 +41,7 @@ __all__ = [
     "field_docs",
     "fingerprint",
     "help_text",
+    "keys_of",
     "load_config",
     "parse_arguments",
     "split_arguments",

@@ -66,6 +66,11 @@ def walk(schema: type, prefix: str = "") -> Iterator[Key]:
             yield from walk(key.kind, f"{key.name}.")
 
 
+def keys_of(schema: type) -> dict[str, Any]:
+    """Full name and type of every key that holds a value: `trainer.lr` -> float."""
+    return {key.name: key.kind for key in walk(schema) if not key.is_section}
+
+
 def requires_anything(schema: type) -> bool:
     """Whether some field has no default."""
     return any(key.required and not key.is_section for key in walk(schema))

@@ -1,0 +1,117 @@
+"""A search space over config keys: read from YAML, checked against the schema, drawn from by an Optuna trial."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mrhubo.config import Config, keys_of
+from mrhubo.errors import UserError, unknown_name
+
+if TYPE_CHECKING:
+    from optuna import Trial
+
+_FIXED_SECTIONS = {
+    "tracking": "it decides where runs go, not what they give",
+    "evaluation": "trials are compared by it",
+}
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """One config key and the values that it may take."""
+
+    key: str
+    choices: tuple[str, ...] = ()
+    """Values as they are written on the command line; empty for a range."""
+    low: float = 0.0
+    high: float = 0.0
+    log: bool = False
+    whole: bool = False
+
+    def draw(self, trial: Trial) -> str:
+        """`key=value` of a trial's value."""
+        if self.choices:
+            value: Any = trial.suggest_categorical(self.key, self.choices)
+        elif self.whole:
+            value = trial.suggest_int(self.key, int(self.low), int(self.high), log=self.log)
+        else:
+            value = trial.suggest_float(self.key, self.low, self.high, log=self.log)
+        return f"{self.key}={value}"
+
+    @property
+    def extremes(self) -> list[str]:
+        """`key=value` of all choices, or of both ends of the range."""
+        numbers = (int(self.low), int(self.high)) if self.whole else (self.low, self.high)
+        return [f"{self.key}={value}" for value in self.choices or numbers]
+
+    def describe(self) -> str:
+        """The dimension in a few words."""
+        if self.choices:
+            return ", ".join(self.choices)
+        low, high = self.extremes
+        return f"{low.split('=')[1]} .. {high.split('=')[1]}{', logarithmic' if self.log else ''}"
+
+
+def read_space(space: Mapping[str, Any], check: Callable[[str], object]) -> list[Dimension]:
+    """The dimensions of `space`, as `SweepConfig.space` describes it.
+
+    Args:
+        space: what is to vary.
+        check: loads the config with a `key=value`, and raises UserError if that is impossible.
+
+    Raises:
+        UserError: a key does not exist or cannot vary, an entry is none of the forms, or a value is impossible.
+    """
+    if not space:
+        raise UserError("space: is empty; name the keys that are to vary")
+    kinds = keys_of(Config)
+    dimensions = []
+    for key, entry in space.items():
+        section = key.split(".")[0]
+        if section in _FIXED_SECTIONS:
+            raise UserError(f"space: '{key}' cannot vary: {_FIXED_SECTIONS[section]}")
+        if key not in kinds:
+            raise UserError(f"space: {unknown_name('key', key, kinds)}")
+        dimension = _read_entry(key, entry, kinds[key])
+        for text in dimension.extremes:
+            try:
+                check(text)
+            except UserError as error:
+                raise UserError(f"space.{key}: {str(error).removeprefix('command line: ')}") from error
+        dimensions.append(dimension)
+    return dimensions
+
+
+def override(key: str, value: Any) -> str:
+    """`key=value` as it would be typed, of a value that YAML gave."""
+    return f"{key}={value if isinstance(value, str) else json.dumps(value)}"
+
+
+def _read_entry(key: str, entry: Any, kind: Any) -> Dimension:
+    if isinstance(entry, list):
+        choices = tuple(dict.fromkeys(override(key, value).partition("=")[2] for value in entry))
+        if len(choices) < 2:
+            raise UserError(f"space.{key}: a choice needs two values or more")
+        return Dimension(key, choices)
+    forms = "a list of choices or {low: NUMBER, high: NUMBER, log: true}"
+    if not isinstance(entry, Mapping) or not {"low", "high"} <= set(entry):
+        raise UserError(f"space.{key}: must be {forms}, found {entry!r}")
+    for word in entry:
+        if word not in ("low", "high", "log"):
+            raise UserError(f"space.{key}: {unknown_name('entry', str(word), ('low', 'high', 'log'))}")
+    low, high, log = entry["low"], entry["high"], entry.get("log", False)
+    if kind not in (int, float):
+        raise UserError(f"space.{key}: is no number, so it has no range; give a list of choices")
+    right = int if kind is int else int | float
+    if not isinstance(low, right) or not isinstance(high, right) or isinstance(low, bool) or isinstance(high, bool):
+        raise UserError(f"space.{key}: low and high must be {'whole ' * (kind is int)}numbers, found {low!r}, {high!r}")
+    if not isinstance(log, bool):
+        raise UserError(f"space.{key}: log must be true or false, found {log!r}")
+    if not low < high:
+        raise UserError(f"space.{key}: low must be below high, found {low} and {high}")
+    if log and low <= 0:
+        raise UserError(f"space.{key}: a logarithmic range starts above 0, found {low}")
+    return Dimension(key, (), low, high, log, kind is int)

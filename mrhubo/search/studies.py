@@ -1,0 +1,205 @@
+"""Optuna studies that any number of processes work on, and that survive the death of any of them.
+
+A trial whose process is gone (same machine: looked up; other machines: no heartbeat for a while) is drawn again with
+the same values. Every trial's draw is seeded by (seed, number of the trial), so a study that was stopped goes on as it
+would have.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import psutil
+
+from mrhubo.errors import UserError
+from mrhubo.storage import locked
+
+if TYPE_CHECKING:
+    import optuna
+    from optuna.samplers import BaseSampler
+    from optuna.study import Study
+    from optuna.trial import FrozenTrial, Trial
+
+_HEARTBEAT, _GRACE = 30, 120
+"""Seconds between two signs of life, and until a process on another machine is taken for dead."""
+_OWNER, _ERROR = "owner", "error"
+_FAILURES = 3
+"""Trials that may fail one after the other before something is wrong with all of them."""
+
+
+def database_of(folder: Path, url: str | None = None) -> str:
+    """URL of the studies' database: SQLite in the tracking folder unless `url` says otherwise."""
+    return url or f"sqlite:///{folder.resolve() / 'studies.db'}"
+
+
+def open_study(folder: Path, url: str | None, name: str, sampler: str, seed: int, pruner: str = "none") -> Study:
+    """The study of that name, new or as it was left.
+
+    Args:
+        folder: tracking folder; the SQLite database and a lock for its creation are there.
+        url: SQLAlchemy URL of another database.
+        name: of the study.
+        sampler: `tpe`, `random` or `cmaes`.
+        seed: of the sampler.
+        pruner: `median`, `halving` or `none`.
+
+    Raises:
+        UserError: the database cannot be opened.
+    """
+    import warnings
+
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+    database = database_of(folder, url)
+    pruners = {
+        "median": lambda: optuna.pruners.MedianPruner(n_startup_trials=5, n_warmup_steps=0),
+        "halving": lambda: optuna.pruners.SuccessiveHalvingPruner(min_resource=1, reduction_factor=4),
+        "none": optuna.pruners.NopPruner,
+    }
+    try:
+        with locked(folder / "studies.lock", wait=True):  # two processes cannot make the tables at once
+            storage = optuna.storages.RDBStorage(
+                database, heartbeat_interval=_HEARTBEAT, grace_period=_GRACE, heartbeat_stale_trial_callback=_retry
+            )
+            return optuna.create_study(
+                storage=storage,
+                study_name=name,
+                sampler=_seeded_by_trial(sampler, seed),
+                pruner=pruners[pruner](),
+                load_if_exists=True,
+            )
+    except Exception as error:  # SQLAlchemy's, its drivers', and ModuleNotFoundError for a driver that is not there
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise UserError(f"storage: the study's database {database} cannot be opened: {reason}") from error
+
+
+def _seeded_by_trial(kind: str, seed: int) -> BaseSampler:
+    import optuna
+
+    def fresh(number: int) -> BaseSampler:
+        mixed = (seed * 1_000_003 + number) % 2**32
+        if kind == "tpe":  # the liar: trials that others are at count as bad, so that nobody draws the same
+            return optuna.samplers.TPESampler(seed=mixed, constant_liar=True, multivariate=True, group=True)
+        if kind == "cmaes":
+            others = optuna.samplers.RandomSampler(seed=mixed)
+            return optuna.samplers.CmaEsSampler(seed=mixed, independent_sampler=others, warn_independent_sampling=False)
+        return optuna.samplers.RandomSampler(seed=mixed)
+
+    class SeededByTrial(optuna.samplers.BaseSampler):
+        """A new sampler for each trial; what the library's samplers remember is in the study itself."""
+
+        def __init__(self) -> None:
+            self.inner = fresh(0)
+
+        def before_trial(self, study: Study, trial: FrozenTrial) -> None:
+            self.inner = fresh(trial.number)
+            self.inner.before_trial(study, trial)
+
+        def infer_relative_search_space(self, study: Study, trial: FrozenTrial) -> dict[str, Any]:
+            return self.inner.infer_relative_search_space(study, trial)
+
+        def sample_relative(self, study: Study, trial: FrozenTrial, search_space: dict[str, Any]) -> dict[str, Any]:
+            return self.inner.sample_relative(study, trial, search_space)
+
+        def sample_independent(self, study: Study, trial: FrozenTrial, param_name: str, param_distribution: Any) -> Any:
+            return self.inner.sample_independent(study, trial, param_name, param_distribution)
+
+        def after_trial(self, study: Study, trial: FrozenTrial, state: Any, values: Any) -> None:
+            self.inner.after_trial(study, trial, state, values)
+
+    return SeededByTrial()
+
+
+def open_trials(study: Study) -> list[FrozenTrial]:
+    """Trials that some process is at."""
+    from optuna.trial import TrialState
+
+    return study.get_trials(deepcopy=False, states=(TrialState.RUNNING,))
+
+
+def remaining(study: Study, trials: int) -> int:
+    """How many trials are still to be begun, of `trials` in all. One that failed by itself counts as done."""
+    from optuna.trial import TrialState
+
+    over = (TrialState.COMPLETE, TrialState.PRUNED, TrialState.RUNNING)
+    counted = [t for t in study.get_trials(deepcopy=False) if t.state in over or _ERROR in t.user_attrs]
+    return trials - len(counted)
+
+
+def work_on(
+    study: Study, objective: Callable[[Trial], float], trials: int, time_is_up: Callable[[], bool] = lambda: False
+) -> None:
+    """Does trials until the study has `trials` of them, together with all other processes that work on it.
+
+    A trial that is interrupted is drawn again at the next start; one that raises UserError counts as failed.
+
+    Raises:
+        UserError: three trials in a row failed; the reason of the last.
+    """
+    failures = 0
+
+    def guarded(trial: optuna.Trial) -> float:
+        nonlocal failures
+        trial.set_user_attr(_OWNER, _process())
+        try:
+            value = objective(trial)
+        except KeyboardInterrupt:
+            _retry(study, study.trials[trial.number])
+            raise
+        except UserError as error:
+            failures += 1
+            trial.set_user_attr(_ERROR, str(error))
+            if failures >= _FAILURES:
+                raise UserError(f"{failures} trials failed one after the other; the last: {error}") from error
+            raise _Failed from error
+        failures = 0
+        return value
+
+    while not time_is_up():
+        _free_the_dead(study)
+        if remaining(study, trials) <= 0:
+            return
+        study.optimize(guarded, n_trials=1, catch=(_Failed,))
+
+
+class _Failed(Exception):
+    """A trial failed; the study goes on."""
+
+
+def _process() -> str:
+    """This process, so that another one on the same machine can see whether it lives."""
+    return f"{platform.node()} {os.getpid()} {psutil.Process().create_time()}"
+
+
+def _free_the_dead(study: Study) -> None:
+    from optuna.exceptions import UpdateFinishedTrialError
+    from optuna.trial import TrialState
+
+    for trial in open_trials(study):
+        node, _, rest = trial.user_attrs.get(_OWNER, "").partition(" ")
+        if node != platform.node() or _lives(rest):
+            continue
+        try:
+            study.tell(trial.number, state=TrialState.FAIL)
+        except (UpdateFinishedTrialError, ValueError):  # another process was faster
+            continue
+        _retry(study, trial)
+
+
+def _lives(process: str) -> bool:
+    number, _, born = process.partition(" ")
+    try:
+        return psutil.Process(int(number)).create_time() == float(born)
+    except (psutil.NoSuchProcess, ValueError):
+        return False
+
+
+def _retry(study: Study, trial: FrozenTrial) -> None:
+    if trial.params:
+        study.enqueue_trial(trial.params)

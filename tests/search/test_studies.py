@@ -1,0 +1,90 @@
+"""Studies: reproducible draws, exact numbers of trials, dead and interrupted processes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import optuna
+import pytest
+
+from mrhubo.errors import UserError
+from mrhubo.search import open_study, open_trials, remaining, work_on
+
+
+def objective(trial: optuna.Trial) -> float:
+    return trial.suggest_float("x", -1, 1) ** 2 + trial.suggest_int("n", 0, 3)
+
+
+@pytest.mark.parametrize("sampler", ["random", "tpe", "cmaes"])
+def test_a_stopped_study_goes_on_as_it_would_have(tmp_path: Path, sampler: str) -> None:
+    found = []
+    for folder, parts in (("whole", [14]), ("stopped", [3, 12, 14])):
+        for trials in parts:
+            study = open_study(tmp_path / folder, None, "s", sampler, 5)
+            work_on(study, objective, trials)
+        found.append([trial.params for trial in study.trials])
+    assert found[0] == found[1] and len(found[0]) == 14
+    assert len({params["x"] for params in found[0]}) == 14
+
+
+def test_an_interrupted_trial_is_drawn_again(tmp_path: Path) -> None:
+    def stop(trial: optuna.Trial) -> float:
+        value = objective(trial)
+        if trial.number == 2:
+            raise KeyboardInterrupt
+        return value
+
+    study = open_study(tmp_path, None, "s", "random", 0)
+    with pytest.raises(KeyboardInterrupt):
+        work_on(study, stop, 4)
+    assert remaining(study, 4) == 2
+    work_on(study, objective, 4)
+    assert study.trials[3].params == study.trials[2].params
+    assert [trial.state.name for trial in study.trials] == ["COMPLETE", "COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
+
+
+def test_a_dead_process_trial_is_drawn_again_at_once(tmp_path: Path) -> None:
+    code = (
+        "import os, sys; from pathlib import Path; from mrhubo.search import open_study, work_on\n"
+        "def die(trial): trial.suggest_float('x', -1, 1); trial.suggest_int('n', 0, 3); os.kill(os.getpid(), 9)\n"
+        "work_on(open_study(Path(sys.argv[1]), None, 's', 'random', 0), die, 2)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=120)
+    assert ended.returncode == -9
+    study = open_study(tmp_path, None, "s", "random", 0)
+    assert len(open_trials(study)) == 1
+    work_on(study, objective, 2)
+    assert [trial.state.name for trial in study.trials] == ["FAIL", "COMPLETE", "COMPLETE"]
+    assert study.trials[1].params == study.trials[0].params and not open_trials(study)
+
+
+def test_a_failing_trial_counts_and_three_in_a_row_end_it(tmp_path: Path) -> None:
+    def sometimes(trial: optuna.Trial) -> float:
+        if trial.number % 2:
+            raise UserError("pairs.filter_k: drops every pair")
+        return objective(trial)
+
+    study = open_study(tmp_path, None, "s", "random", 0)
+    work_on(study, sometimes, 6)
+    assert len(study.trials) == 6 and study.trials[1].user_attrs["error"].startswith("pairs.filter_k")
+
+    def always(trial: optuna.Trial) -> float:
+        raise UserError("the disk is full")
+
+    with pytest.raises(UserError, match="3 trials failed.*the disk is full"):
+        work_on(study, always, 20)
+    assert len(study.trials) == 9
+
+
+def test_time_is_up(tmp_path: Path) -> None:
+    study = open_study(tmp_path, None, "s", "random", 0)
+    work_on(study, objective, 5, lambda: len(study.trials) >= 2)
+    assert len(study.trials) == 2
+
+
+@pytest.mark.parametrize("url", ["postgresql://nobody@127.0.0.1:1/none", "nonsense", "sqlite:////proc/none/studies.db"])
+def test_a_database_that_cannot_be_opened(tmp_path: Path, url: str) -> None:
+    with pytest.raises(UserError, match="storage: the study's database"):
+        open_study(tmp_path, url, "s", "random", 0)
