@@ -10,8 +10,10 @@ from mrhubo.config import Config, parse_arguments, run_command
 from mrhubo.errors import UserError
 
 if TYPE_CHECKING:
+    from mrhubo.callbacks.scale_search import ScaleFactorSearch
     from mrhubo.pipeline import Prepared
     from mrhubo.ranks import Ranks
+    from mrhubo.recording import Recording
     from mrhubo.workspace import Workspace
 
 DESCRIPTION = (
@@ -48,9 +50,11 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
     from mrhubo.retargeter import Retargeter
     from mrhubo.workspace import Workspace
 
-    prepared = pipeline.prepare(config)
+    prepared = pipeline.prepare(config, search=True)
     folder = Recording.folder(config)
     ranks = Ranks.join(config.trainer.accelerator)
+    if ranks.count > 1 and config.robot.scale == "search":
+        raise UserError("robot.scale: 'search' runs in one process; run it once, then train with what it found")
     if config.trainer.batch_size % ranks.count:
         raise UserError(f"trainer.batch_size: must be a multiple of the {ranks.count} processes that share each batch")
     workspace = Workspace(folder / "fits", config.robot.name, prepared.fingerprint)
@@ -59,17 +63,22 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
         return None
     with workspace:
         with Recording.start(prepared, workspace, parent) as recording:
+            watchers = []
+            if config.robot.scale == "search":
+                search = _search_scale(prepared, recording, quiet)
+                prepared, watchers = recording.prepared, [search]
             report = pipeline.make_pairs(prepared, quiet, ranks)
             validation, test = pipeline.make_references(prepared, quiet)
             ranks.wait()
+            resume = workspace.last_checkpoint()
             training = pipeline.train(
-                prepared, validation, recording.logger, workspace.checkpoints, workspace.last_checkpoint(), quiet, ranks
+                prepared, validation, recording.logger, workspace.checkpoints, resume, quiet, ranks, watchers
             )
             recording.resume_after_training()
             recording.pairs(training.pairs, training.filter, report)
             predictions, scores = pipeline.score_test(prepared, training.network, test)
             retargeter = Retargeter(
-                training.network, prepared.body_map, prepared.prior, config, training.filter.threshold
+                training.network, prepared.body_map, prepared.prior, prepared.config, training.filter.threshold
             )
             recording.scores(scores, training.best_link_cm)
             recording.key_poses(test, predictions)
@@ -77,6 +86,22 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
             package = recording.package(retargeter, over_clips, training.best_checkpoint)
             workspace.finish()
         return FitResult(package, recording.run_id, table(scores), measures(over_clips))
+
+
+def _search_scale(prepared: Prepared, recording: Recording, quiet: bool) -> ScaleFactorSearch:
+    """Finds the scale factor, and goes on with a config that has it."""
+    from mrhubo import pipeline
+    from mrhubo.callbacks.scale_search import ScaleFactorSearch
+    from mrhubo.progress import Progress
+
+    config, settings = prepared.config, prepared.config.robot.search
+    assert settings is not None
+    validation, _ = pipeline.make_references(prepared, quiet)
+    search = ScaleFactorSearch(config, prepared.body_map, prepared.prior, validation, recording.folder(config))
+    with Progress("scale factor", settings.trials, "trials", quiet) as progress:
+        result = search.search(recording.client, config.tracking.experiment, recording.run_id, progress.update)
+    recording.scale(pipeline.prepare(result.config), result)
+    return search
 
 
 def _help(prepared: Prepared, workspace: Workspace, ranks: Ranks) -> None:

@@ -64,12 +64,18 @@ class Prepared(PairSetup):
         return fingerprint([plain, self.store.header, clips, evaluation])
 
 
-def prepare_pairs(config: Config) -> PairSetup:
-    """Fills in the default folder and opens everything that making pairs needs.
+def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
+    """Fills in the default folder and opens everything that making pairs needs; `search`: the caller can do
+    `robot.scale: search`.
 
     Raises:
         UserError: anything in the config, the URDF or the prior is wrong.
     """
+    if config.robot.scale == "search" and not search:
+        raise UserError(
+            "robot.scale: 'search' is done by mrhubo.fit alone, in one process; take what it found, config.yaml in its "
+            "run, or 'manual' or 'auto'"
+        )
     config.pairs.dir = config.pairs.dir or default_pairs()
     setup = PairSetup.open(config)
     if config.trainer.accelerator == "gpu" and not torch.cuda.is_available():
@@ -77,14 +83,14 @@ def prepare_pairs(config: Config) -> PairSetup:
     return setup
 
 
-def prepare(config: Config) -> Prepared:
-    """Fills in default folders and opens everything that the run will need.
+def prepare(config: Config, search: bool = False) -> Prepared:
+    """Fills in default folders and opens everything that the run will need; `search` as for `prepare_pairs`.
 
     Raises:
         UserError: anything in the config, the URDF, the prior or the motions is wrong.
     """
     config.evaluation.motions = config.evaluation.motions or default_motions()
-    setup = prepare_pairs(config)
+    setup = prepare_pairs(config, search)
     build_network(config, setup.body_map)
     return Prepared(config, setup.body_map, setup.prior, setup.store, load_motions(config))
 

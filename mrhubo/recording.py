@@ -22,13 +22,14 @@ from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
-from mrhubo.tracking import database_uri, git_commit, library_versions, open_logger, resumable_run, run_status
+from mrhubo.tracking import database_uri, git_commit, library_versions, log_all, open_logger, resumable_run, run_status
 from mrhubo.view import phi_histogram, save_png
 from mrhubo.workspace import Workspace
 
 if TYPE_CHECKING:
     from lightning.pytorch.loggers import MLFlowLogger
 
+    from mrhubo.callbacks.scale_search import ScaleResult
     from mrhubo.pipeline import Prepared
 
 
@@ -94,6 +95,21 @@ class Recording:
     def resume_after_training(self) -> None:
         """Lightning's logger closes the run when the training ends; the test is still to come."""
         self.client.update_run(self.run_id, status="RUNNING")
+
+    def scale(self, prepared: Prepared, found: ScaleResult) -> None:
+        """The scale factor that was found: from here on the run is that of `prepared`."""
+        self.prepared, self.provenance = prepared, _provenance(prepared)
+        for name, value in self.provenance.items():
+            self.client.set_tag(self.run_id, name, value)
+        log_all(
+            self.client,
+            self.run_id,
+            {"scale/distance_rad": found.distance_rad, "scale/start_distance_rad": found.start_distance_rad},
+            {f"scale_factor/{name}": value for name, value in found.values.items()},
+        )
+        self.client.log_text(self.run_id, to_yaml(prepared.config), "config.yaml")
+        for name, picture in found.pictures.items():
+            self._picture(picture, f"scale/{name}.png")
 
     def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, report: PairingReport) -> None:
         """Metrics and pictures of the pairs."""

@@ -37,7 +37,7 @@ def main(argv: list[str]) -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     load_config(files[0], overrides)  # a mistake there is told before the seconds that the imports below take
     from mrhubo.recording import dashboard_command
-    from mrhubo.search.sweeping import Sweep
+    from mrhubo.sweeping import Sweep
 
     try:
         sweep = Sweep(Path(files[0]), overrides, settings, given["quiet"])

@@ -1,4 +1,4 @@
-"""What happens around a training: metrics on clips, pictures, progress."""
+"""What happens around a training: metrics on clips, pictures, progress, the search of the scale factor."""
 
 from mrhubo.callbacks.clips import Clip, Motions, load_motions, solve_references
 from mrhubo.callbacks.metrics import ClipMetrics, ClipScore, mean_score, predict_clips, score_clip

@@ -84,9 +84,11 @@ def solve_references(
         folder: where answers are kept.
         progress: called with (clips done, all clips, name of the next).
     """
+    # Directions are all that the reference sees of a robot, whatever its lengths are made of.
+    directions = {k: v for k, v in pose_settings(config).items() if k not in ("scale", "manual", "search")}
     common = {
         "schema": REFERENCE_SCHEMA,
-        "robot": fingerprint(pose_settings(config)),
+        "robot": fingerprint(directions),
         "skeleton": body_map.skeleton.checksum,
         "kinematics": body_map.robot.description.kinematics,
         "smoothness": repr(config.evaluation.smoothness),

@@ -36,6 +36,24 @@ class ManualScaleConfig:
 
 
 @dataclass
+class ScaleSearchConfig:
+    """The search of `robot.scale: search`: which numbers of `manual` vary."""
+
+    ranges: dict[str, list[float]]
+    """What varies, [low, high]: `factor`, `upper_arm`, `forearm`, and in m `KEYPOINT.x`, `.y` or `.z`, added to the
+    offset of a keypoint of `manual`; `shoulder.z` without a side moves both, `.y` apart from each other. `pelvis.z`
+    is the height of all others (the paper's shift)."""
+    trials: int = bounded(200, 1, 1_000_000)
+    """Draws of the numbers."""
+    sampler: str = choice("tpe", "tpe", "random", "cmaes")
+    """Who draws: `tpe` (tree-structured Parzen estimator), `random` (the paper), or `cmaes`."""
+    poses: int = bounded(200, 10, 100_000)
+    """Human poses of the validation clips that they are measured on, with the reference retargeter's answers."""
+    seed: int = bounded(0, 0, 2**32 - 1)
+    """Seed of the draws."""
+
+
+@dataclass
 class RobotConfig:
     """The robot: its URDF, which joints move, and which links stand for which part of the human body."""
 
@@ -57,11 +75,13 @@ class RobotConfig:
     """Ranges narrower than the URDF's limits, [lower, upper] in rad, by joint name."""
     hold: dict[str, float] = field(default_factory=dict)
     """Angles in rad at which joints outside `joints` are held; default 0, clamped to the joint's limits."""
-    scale: str = choice("auto", "auto", "manual")
+    scale: str = choice("auto", "auto", "manual", "search")
     """How lengths are matched: `auto` keeps the robot's limb directions and gives each limb the human's length;
-    `manual` takes the numbers of `manual` (the paper)."""
+    `manual` takes the numbers of `manual` (the paper); `search` looks for better ones first, as `search` says."""
     manual: ManualScaleConfig | None = None
-    """Numbers for `scale: manual`."""
+    """Numbers for `scale: manual`, and what `scale: search` departs from."""
+    search: ScaleSearchConfig | None = None
+    """Ranges for `scale: search`."""
 
 
 @dataclass

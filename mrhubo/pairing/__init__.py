@@ -3,6 +3,7 @@
 from mrhubo.pairing.filter import PairFilter, make_filter
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.inverse import solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pairing.proportions import ProportionTest
 from mrhubo.pairing.setup import PairSetup
 from mrhubo.pairing.store import PairStore, pose_settings
 from mrhubo.pairing.workers import PairingReport, generate_pairs
@@ -13,6 +14,7 @@ __all__ = [
     "PairSetup",
     "PairStore",
     "PairingReport",
+    "ProportionTest",
     "generate_pairs",
     "make_filter",
     "pose_settings",

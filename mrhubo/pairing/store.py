@@ -34,7 +34,8 @@ _NOT_IN_ROBOT = ("urdf", "key_links")
 
 def pose_settings(config: Config) -> dict[str, Any]:
     """`robot` settings that decide how robot and human poses correspond, not where files lie or what is measured."""
-    unused = () if config.robot.scale == "manual" else ("manual",)
+    used = {"manual": ("manual",), "search": ("manual", "search")}.get(config.robot.scale, ())
+    unused = {"manual", "search"}.difference(used)
     return {k: v for k, v in to_plain(config.robot).items() if k not in (*_NOT_IN_ROBOT, *unused)}
 
 

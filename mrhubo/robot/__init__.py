@@ -3,6 +3,7 @@
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.keypoints import BodyMap, build_body_map
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.scale import ManualScale, varied
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import link_poses, load_urdf
 
@@ -11,6 +12,7 @@ __all__ = [
     "BodyMap",
     "LinkGeometry",
     "LinkPoses",
+    "ManualScale",
     "Robot",
     "SelfCollision",
     "build_body_map",
@@ -18,4 +20,5 @@ __all__ = [
     "load_urdf",
     "read_collision_geometry",
     "read_geometry",
+    "varied",
 ]

@@ -26,7 +26,7 @@ from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.entries import End, Point, read_end, read_point
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.scale import ManualScale
+from mrhubo.robot.scale import ManualScale, check_ranges
 
 _SIDES = ("left", "right")
 _LIMBS = (("shoulder", "elbow"), ("elbow", "wrist"))
@@ -287,9 +287,13 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
         if name != "head" and name.replace("hand", "wrist") not in points:
             raise UserError(f"robot.keypoints: '{name}' needs '{name.replace('hand', 'wrist')}' too")
     chest = read_end("chest", entries["chest"], ("forward", "up"))
-    if (config.scale == "manual") and config.manual is None:
-        raise UserError("robot.manual: is missing; `scale: manual` needs its numbers")
-    manual = ManualScale(config.manual) if config.scale == "manual" and config.manual else None
+    if config.scale != "auto" and config.manual is None:
+        raise UserError(f"robot.manual: is missing; `scale: {config.scale}` needs its numbers")
+    if config.scale == "search" and config.search is None:
+        raise UserError("robot.search: is missing; `scale: search` needs the ranges of what varies")
+    manual = ManualScale(config.manual) if config.scale != "auto" and config.manual else None
+    if config.scale == "search" and config.search and config.manual:
+        check_ranges(config.manual, config.search.ranges)
     links = [chest.link, *(p.link for p in points.values()), *(e.link for e in ends.values()), *config.key_links]
     links += manual.links if manual else []
     if not config.key_links:

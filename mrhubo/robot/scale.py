@@ -12,7 +12,9 @@ Legend: B batch, K keypoints, L robot links.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import copy
+import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -26,6 +28,13 @@ from mrhubo.robot.model import LinkPoses, Robot
 
 _SIDES = ("left", "right")
 _HAND = ("thumb", "index", "middle", "pinky")
+_AXES = ("x", "y", "z")
+_NUMBERS = {
+    field.name: (field.metadata["low"], field.metadata["high"])
+    for field in dataclasses.fields(ManualScaleConfig)
+    if "low" in field.metadata
+}
+"""The numbers that stand alone, with the range that the config allows."""
 HUMAN_FROM_BASE = (1, 2, 0)
 """The base frame's axes (forward, left, up) that are the human's left, up and forward (REP 103 and SMPL)."""
 
@@ -90,6 +99,54 @@ class ManualScale:
         human_BK3 = scaled_BK3[..., HUMAN_FROM_BASE]
         pelvis = self._place["pelvis"]
         return human_BK3 - human_BK3[:, [pelvis]]
+
+
+def varied(config: ManualScaleConfig, values: Mapping[str, float]) -> ManualScaleConfig:
+    """A copy with other numbers: `factor`, `upper_arm`, `forearm` are replaced, `KEYPOINT.x` (or y, z) is added to that
+    keypoint's offset [m]; without a side to those of both sides, y mirrored.
+    """
+    config = copy.deepcopy(config)
+    for name, value in values.items():
+        if name in _NUMBERS:
+            setattr(config, name, value)
+            continue
+        part, axis = name.split(".")
+        for keypoint, sign in _keypoints_of(part, config):
+            links, offset = _read_entry(keypoint, config.keypoints[keypoint])
+            moved = list(offset)
+            moved[_AXES.index(axis)] += value * (sign if axis == "y" else 1)
+            config.keypoints[keypoint] = {**({"links": links} if links else {}), "offset": moved}
+    return config
+
+
+def check_ranges(config: ManualScaleConfig, ranges: Mapping[str, Sequence[float]]) -> None:
+    """Refuses ranges that `varied` could not take.
+
+    Raises:
+        UserError: names the entry.
+    """
+    if not ranges:
+        raise UserError("robot.search.ranges: is empty; name what varies")
+    for name, range_2 in ranges.items():
+        key = f"robot.search.ranges.{name}"
+        part, dot, axis = name.partition(".")
+        if not dot and name not in _NUMBERS or dot and (axis not in _AXES or not _keypoints_of(part, config)):
+            known = [f"{keypoint}.z" for keypoint in config.keypoints]
+            known += [f"{keypoint.removeprefix('left_')}.z" for keypoint in config.keypoints if "left_" in keypoint]
+            raise UserError(f"robot.search.ranges: {unknown_name('number', name, [*_NUMBERS, *known])}")
+        if len(range_2) != 2 or not range_2[0] < range_2[1]:
+            raise UserError(f"{key}: expected [low, high] with low below high, found {list(range_2)}")
+        low, high = _NUMBERS[name] if not dot else (-1e3, 1e3)
+        if range_2[0] < low or range_2[1] > high:
+            raise UserError(f"{key}: must lie within [{low}, {high}], found {list(range_2)}")
+
+
+def _keypoints_of(part: str, config: ManualScaleConfig) -> list[tuple[str, int]]:
+    """The keypoints that a name of a range stands for, with the sign of y."""
+    if part in config.keypoints:
+        return [(part, 1)]
+    sides = [(f"{side}_{part}", sign) for side, sign in zip(_SIDES, (1, -1), strict=True)]
+    return [(name, sign) for name, sign in sides if name in config.keypoints]
 
 
 def _read_entry(name: str, value: Any) -> tuple[dict[str, float], tuple[float, float, float]]:

@@ -36,7 +36,9 @@ def database_of(folder: Path, url: str | None = None) -> str:
     return url or f"sqlite:///{folder.resolve() / 'studies.db'}"
 
 
-def open_study(folder: Path, url: str | None, name: str, sampler: str, seed: int, pruner: str = "none") -> Study:
+def open_study(
+    folder: Path, url: str | None, name: str, sampler: str, seed: int, pruner: str = "none", shared: bool = True
+) -> Study:
     """The study of that name, new or as it was left.
 
     Args:
@@ -46,6 +48,7 @@ def open_study(folder: Path, url: str | None, name: str, sampler: str, seed: int
         sampler: `tpe`, `random` or `cmaes`.
         seed: of the sampler.
         pruner: `median`, `halving` or `none`.
+        shared: several processes may work on it, by `work_on`.
 
     Raises:
         UserError: the database cannot be opened.
@@ -64,9 +67,9 @@ def open_study(folder: Path, url: str | None, name: str, sampler: str, seed: int
     }
     try:
         with locked(folder / "studies.lock", wait=True):  # two processes cannot make the tables at once
-            storage = optuna.storages.RDBStorage(
-                database, heartbeat_interval=_HEARTBEAT, grace_period=_GRACE, heartbeat_stale_trial_callback=_retry
-            )
+            beats: dict[str, Any] = {"heartbeat_interval": _HEARTBEAT, "grace_period": _GRACE}
+            beats["heartbeat_stale_trial_callback"] = _retry
+            storage = optuna.storages.RDBStorage(database, **(beats if shared else {}))
             return optuna.create_study(
                 storage=storage,
                 study_name=name,

@@ -15,7 +15,7 @@ from mrhubo.config import ManualScaleConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.pairing import PairGenerator
 from mrhubo.robot import BodyMap, LinkPoses, build_body_map
-from mrhubo.robot.scale import HUMAN_FROM_BASE
+from mrhubo.robot.scale import HUMAN_FROM_BASE, check_ranges, varied
 
 ROBOTS = ["nao", "coman", "reachy"]
 
@@ -129,3 +129,48 @@ def test_its_numbers_are_needed(root: Path) -> None:
     with pytest.raises(UserError, match="robot.manual: is missing"):
         build_body_map(config)
     assert ManualScaleConfig({}).factor == 1
+
+
+def test_varied_numbers_and_offsets(root: Path) -> None:
+    start = load_config(root / "conf" / "paper" / "nao.yaml").robot
+    assert start.manual is not None
+    plain = targets(body_map_of(root, "nao"))
+    changed = load_config(root / "conf" / "paper" / "nao.yaml").robot
+    changed.manual = varied(start.manual, {"factor": 1.0, "shoulder.y": 0.02, "pelvis.z": 0.1})
+    moved = dict(zip(
+        (body_map := build_body_map(changed)).keypoint_names, body_map.targets(some_poses(body_map)).unbind(1), strict=True
+    ))  # fmt: skip
+    up, left = torch.tensor([0.0, 0.1, 0.0]), torch.tensor([0.02, 0.0, 0.0])  # human axes
+    torch.testing.assert_close(moved["neck"], plain["neck"] / 2 - up)
+    torch.testing.assert_close(moved["left_shoulder"], plain["left_shoulder"] / 2 - up + left)
+    torch.testing.assert_close(moved["right_shoulder"], plain["right_shoulder"] / 2 - up - left)
+    assert start.manual.factor == 2.0 and start.manual.keypoints["left_shoulder"] == "LShoulder"
+
+
+@pytest.mark.parametrize(
+    ("ranges", "words"),
+    [
+        ({}, "empty"),
+        ({"facto": [1.0, 2.0]}, "'facto' .*'factor'"),
+        ({"sholder.y": [0.0, 1.0]}, "'sholder.y' .*'shoulder"),
+        ({"shoulder.w": [0.0, 1.0]}, "'shoulder.w' .*'shoulder.z'"),
+        ({"left_toe.x": [0.0, 1.0]}, "'left_toe.x' does not exist"),
+        ({"factor": [2.0, 1.0]}, "low below high"),
+        ({"factor": [1.0]}, "low below high"),
+        ({"factor": [0.0, 2.0]}, "within .0.001, 1000"),
+        ({"upper_arm": [-2.0, 2.0]}, "within .-0.9, 100"),
+    ],
+)
+def test_impossible_ranges(root: Path, ranges: dict[str, list[float]], words: str) -> None:
+    manual = load_config(root / "conf" / "paper" / "nao.yaml").robot.manual
+    assert manual is not None
+    with pytest.raises(UserError, match=words):
+        check_ranges(manual, ranges)
+
+
+@pytest.mark.parametrize("missing", ["manual", "search"])
+def test_search_needs_numbers_and_ranges(root: Path, missing: str) -> None:
+    config = load_config(root / "conf" / "paper" / "nao.yaml", ["robot.scale=search"]).robot
+    setattr(config, missing, None)
+    with pytest.raises(UserError, match=rf"robot\.{missing}: is missing"):
+        build_body_map(config)

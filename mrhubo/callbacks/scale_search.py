@@ -1,0 +1,174 @@
+"""The search of the robot's scale factor theta, before pairs are made.
+
+Legend: C scale factors, P pairs of robot and human pose, N robot joints, J = 21 human joints.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import lightning
+import numpy as np
+import torch
+from PIL.Image import Image
+
+from mrhubo.body import BodyPrior
+from mrhubo.callbacks.clips import Clip
+from mrhubo.callbacks.pictures import Artist
+from mrhubo.config import Config, ManualScaleConfig, fingerprint
+from mrhubo.pairing import ProportionTest, pose_settings
+from mrhubo.robot import BodyMap, varied
+from mrhubo.search import open_study, open_trials
+from mrhubo.search.plots import study_plots
+from mrhubo.tracking import log_all, start_run
+from mrhubo.view import figure_sheet
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from optuna import Study
+
+_AT_ONCE = 20
+"""Trials drawn and solved together."""
+
+
+@dataclass(frozen=True)
+class ScaleResult:
+    """What the search has found."""
+
+    config: Config
+    """The run's config with `scale: manual` and the best numbers."""
+    values: dict[str, float]
+    """Those that varied."""
+    distance_rad: float
+    """Their distance."""
+    start_distance_rad: float
+    """That of the numbers that the search departed from."""
+    pictures: dict[str, Image]
+    """The search, and pairs of the best and the worst numbers, by name."""
+
+
+class ScaleFactorSearch(lightning.Callback):
+    """Draws theta from the ranges of `robot.search`, keeps the one whose human poses come nearest to a reference set.
+
+    The reference set are frames of the validation clips with the joint angles that the reference retargeter gives
+    them; the distance is that of `ProportionTest`. Pairs exist before Lightning's trainer starts, so `search` is called
+    first; as a callback it then writes into the training's run what it found. Trials are kept in an Optuna study: a
+    search that was stopped goes on, a finished one is read.
+    """
+
+    def __init__(
+        self, config: Config, body_map: BodyMap, prior: BodyPrior, clips: Sequence[Clip], folder: Path
+    ) -> None:
+        """`clips` are the validation clips, `folder` is the tracking folder."""
+        assert config.robot.search is not None and config.robot.manual is not None
+        self.config, self.start, self.settings = config, config.robot.manual, config.robot.search
+        pose_FJ6 = torch.cat([clip.motion.pose_TJ6 for clip in clips])
+        reference_FN = torch.cat([clip.reference_TN for clip in clips])
+        frames = np.linspace(0, len(pose_FJ6) - 1, min(self.settings.poses, len(pose_FJ6))).round()
+        chosen = torch.from_numpy(frames).long()
+        self.q_PN, self.pose_PJ6 = reference_FN[chosen], pose_FJ6[chosen]
+        self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6)
+        self.artist = Artist(body_map.robot, body_map.skeleton)
+        self.folder = folder
+        checksums = [clip.motion.checksum for clip in clips]
+        pairs, robot = config.pairs, pose_settings(config)
+        robot["search"] = {**robot["search"], "trials": 0}  # more of them go on where fewer stopped
+        self.name = f"{config.robot.name}-scale-" + fingerprint(
+            [
+                robot, prior.checksum, body_map.robot.description.kinematics,
+                body_map.skeleton.checksum, checksums, [pairs.w_data, pairs.w_prior, pairs.fine_steps],
+            ]
+        )  # fmt: skip
+        self.result: ScaleResult | None = None
+
+    def search(
+        self,
+        client: MlflowClient,
+        experiment: str,
+        parent: str,
+        progress: Callable[[int, str], None] = lambda done, measure: None,
+    ) -> ScaleResult:
+        """Does the trials that are missing, each an MLflow run under `parent`; `progress` gets (done, best so far)."""
+        settings = self.settings
+        study = open_study(self.folder, None, self.name, settings.sampler, settings.seed, shared=False)
+        if not study.get_trials(deepcopy=False) and (start := self._start_values()):
+            study.enqueue_trial(start)  # so that the search ends nowhere worse than where it started
+        while True:
+            done = self._finished(study)
+            best = f"best {math.degrees(done[0][1]):.2f} deg" if done else ""
+            progress(min(len(done), self.settings.trials), best)
+            if len(done) >= self.settings.trials:
+                break
+            self._measure(study, self._draw(study, len(done)), client, experiment, parent)
+        (values, distance), (worst, _) = done[0], done[-1]
+        config = copy.deepcopy(self.config)
+        config.robot.scale, config.robot.search = "manual", None
+        config.robot.manual = varied(self.start, values)
+        pictures = {
+            **study_plots(study, "arm distance [rad]"),
+            "poses": self._poses(config.robot.manual, varied(self.start, worst)),
+        }
+        start = float(self.test.measure([self.start]))
+        self.result = ScaleResult(config, values, distance, start, pictures)
+        return self.result
+
+    def on_fit_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
+        """Writes the distances into the training's run."""
+        if self.result is not None and trainer.logger is not None:
+            found = {"scale/distance_rad": self.result.distance_rad}
+            trainer.logger.log_metrics({**found, "scale/start_distance_rad": self.result.start_distance_rad})
+
+    def _start_values(self) -> dict[str, float]:
+        """The numbers that the search departs from, if they lie in the ranges."""
+        values = {name: float(getattr(self.start, name, 0.0)) for name in self.settings.ranges}
+        inside = all(low <= values[name] <= high for name, (low, high) in self.settings.ranges.items())
+        return values if inside else {}
+
+    def _finished(self, study: Study) -> list[tuple[dict[str, float], float]]:
+        """Numbers and distances of all trials, the nearest first."""
+        from optuna.trial import TrialState
+
+        trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))[: self.settings.trials]
+        found = [(dict(trial.params), float(trial.value or 0.0)) for trial in trials]
+        return sorted(found, key=lambda one: one[1])
+
+    def _draw(self, study: Study, done: int) -> dict[int, dict[str, float]]:
+        """The next trials' numbers, by trial; what was drawn and never measured comes first."""
+        ranges = self.settings.ranges
+        drawn = {trial.number: dict(trial.params) for trial in open_trials(study)}
+        drawn = {number: values for number, values in drawn.items() if set(values) == set(ranges)}
+        for _ in range(min(_AT_ONCE, self.settings.trials - done) - len(drawn)):
+            trial = study.ask()
+            drawn[trial.number] = {name: trial.suggest_float(name, *ranges[name]) for name in ranges}
+        return drawn
+
+    def _measure(
+        self, study: Study, drawn: dict[int, dict[str, float]], client: MlflowClient, experiment: str, parent: str
+    ) -> None:
+        distances = self.test.measure([varied(self.start, values) for values in drawn.values()]).tolist()
+        for (number, values), distance in zip(drawn.items(), distances, strict=True):
+            tags = {"mlflow.parentRunId": parent, "robot": self.config.robot.name, "scale_search": self.name}
+            name = f"{self.config.robot.name} scale {number}"
+            run = start_run(client, experiment, name, tags).info.run_id
+            log_all(client, run, {"scale/distance_rad": distance, **{f"scale/{k}": v for k, v in values.items()}})
+            client.set_terminated(run)
+            study.tell(number, distance)
+
+    def _poses(self, best: ManualScaleConfig, worst: ManualScaleConfig, count: int = 5) -> Image:
+        """Human poses, the reference's robot poses, and what the best and the worst numbers make of those."""
+        pose_2PJ6 = self.test.human_poses([best, worst])
+        shown = [round(place) for place in np.linspace(0.1, 0.9, count) * (len(self.q_PN) - 1)]
+        rows = [
+            [self.artist.human(self.pose_PJ6[i]) for i in shown],
+            [self.artist.robot_figure(self.q_PN[i]) for i in shown],
+            *([self.artist.human(pose_PJ6[i]) for i in shown] for pose_PJ6 in pose_2PJ6),
+        ]
+        best_deg, worst_deg = self.test.distances(pose_2PJ6).rad2deg().mean(dim=1).tolist()
+        titles = ["human", "reference", f"best: {best_deg:.1f} deg", f"worst: {worst_deg:.1f} deg"]
+        caption = f"{self.config.robot.name}: what the best and the worst scale factor make of the robot's poses"
+        return figure_sheet(rows, (), titles, caption)

@@ -1,0 +1,68 @@
+"""How well a scale factor theta turns robot poses into the human poses that they were made for.
+
+For pairs (q, H) of the reference retargeter, the distance between g_theta(q), the human pose that pairing would give q,
+and H: the mean geodesic distance of the arm joints' local rotations. Figuera, Park, Ahn: MR.HuBo, IROS 2024, section
+III-D.
+
+Legend: C scale factors, P pairs, K keypoints, J = 21 human joints, Z latent numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior
+from mrhubo.body.inverse import nearest_samples, poses_at_once, solve_quasi_newton
+from mrhubo.body.latent import LatentProblem
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config import ManualScaleConfig, PairsConfig
+from mrhubo.robot import BodyMap, ManualScale
+from mrhubo.threads import use_threads
+
+_NO_ARM = ("neck", "head", "collar")
+
+
+class ProportionTest:
+    """Measures scale factors on a set of pairs, many at once."""
+
+    def __init__(
+        self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig, q_PN: Tensor, pose_PJ6: Tensor
+    ) -> None:
+        """Robot poses (P, N) [rad] and the human poses (P, 21, 6) that they imitate."""
+        self.body_map, self.prior, self.settings, self.pose_PJ6 = body_map, prior, settings, pose_PJ6
+        self._poses = body_map.robot.forward(q_PN)
+        names = [name for name in body_map.input_joints() if not name.endswith(_NO_ARM)]
+        self.arm_joints = [POSED_JOINT_NAMES.index(name) for name in names]
+        """Positions of the joints that count."""
+
+    @torch.no_grad()
+    def human_poses(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
+        """g_theta(q): human poses (C, P, 21, 6), solved from the nearest of 4,096 samples of the prior."""
+        scales = [ManualScale(config) for config in configs]
+        targets = []
+        for scale in scales:
+            scale.prepare(self.body_map.robot)
+            targets.append(scale.targets(self._poses))
+        target_BK3 = torch.cat(targets)
+        problem = LatentProblem(
+            self.prior, self.body_map.skeleton, scales[0].keypoint_indices, self.settings.w_data, self.settings.w_prior
+        )
+        start_BZ = nearest_samples(problem, target_BK3)
+        z_BZ = solve_quasi_newton(problem, start_BZ, target_BK3, self.settings.fine_steps)
+        pose_BJ6 = torch.cat([self.prior.decode(part) for part in z_BZ.split(poses_at_once(z_BZ.device))])
+        return pose_BJ6.unflatten(0, (len(configs), -1))
+
+    @torch.no_grad()
+    def distances(self, pose_CPJ6: Tensor) -> Tensor:
+        """Distance (C, P) [rad] of human poses to those that the robot poses imitate."""
+        found, wanted = (rotation.sixd_to_matrix(pose[..., self.arm_joints, :]) for pose in (pose_CPJ6, self.pose_PJ6))
+        return rotation.geodesic_distance(found, wanted.expand_as(found)).mean(dim=-1)
+
+    def measure(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
+        """Mean distance (C,) [rad] of scale factors over the pairs."""
+        with use_threads():
+            return self.distances(self.human_poses(configs)).mean(dim=1)

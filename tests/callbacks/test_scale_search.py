@@ -1,0 +1,149 @@
+"""The search of the scale factor: it finds a known one, goes on where it stopped, and a fit goes on with what it found."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import mlflow
+import pytest
+import torch
+
+from mrhubo import pipeline, rotation
+from mrhubo.body import BodyPrior
+from mrhubo.callbacks import Clip
+from mrhubo.callbacks.scale_search import ScaleFactorSearch
+from mrhubo.config import Config, load_config
+from mrhubo.errors import UserError
+from mrhubo.fit import main
+from mrhubo.motion import Motion
+from mrhubo.pairing import ProportionTest
+from mrhubo.retargeter import Retargeter
+from mrhubo.robot import BodyMap, build_body_map, varied
+from mrhubo.tracking import open_client, start_run
+
+RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 30, poses: 12}"
+
+
+@pytest.fixture(scope="module")
+def config(root: Path) -> Config:
+    return load_config(root / "conf" / "paper" / "nao.yaml", ["robot.scale=search", RANGES, "pairs.w_prior=0.001"])
+
+
+@pytest.fixture(scope="module")
+def body_map(config: Config) -> BodyMap:
+    return build_body_map(config.robot)
+
+
+@pytest.fixture(scope="module")
+def prior() -> BodyPrior:
+    return BodyPrior.open()
+
+
+@pytest.fixture(scope="module")
+def clip(config: Config, body_map: BodyMap, prior: BodyPrior) -> Clip:
+    """Robot poses, and the human poses that the config's own numbers make of them: a theta without error exists."""
+    q_PN = body_map.robot.sample(12, torch.Generator().manual_seed(0))
+    assert config.robot.manual is not None
+    test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 6))
+    return Clip(Motion("made", test.human_poses([config.robot.manual])[0], 24.0, ""), q_PN)
+
+
+def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip) -> None:
+    manual = config.robot.manual
+    assert manual is not None
+    test = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.pose_TJ6)
+    same, other = test.measure([manual, varied(manual, {"factor": 2.6})]).tolist()
+    assert same < 0.01 < 0.03 < other
+    pose = clip.motion.pose_TJ6.clone()
+    pose[:, [0, 1, 2, 11]] = torch.tensor([0.0, 1.0, 0.0, -1.0, 0.0, 0.0])  # hips, spine, neck turned by 90 degrees
+    assert float(test.distances(pose).max()) < 1e-3
+    turned = rotation.sixd_to_matrix(pose)
+    turn = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.5, 0.0]))
+    turned[:, test.arm_joints[0]] = turned[:, test.arm_joints[0]] @ turn
+    expected = torch.full((12,), 0.5 / len(test.arm_joints))
+    torch.testing.assert_close(test.distances(rotation.matrix_to_sixd(turned)), expected, atol=1e-3, rtol=0)
+
+
+@pytest.fixture()
+def runs(tmp_path: Path) -> tuple[Any, str]:
+    client = open_client(tmp_path, "mrhubo")
+    return client, start_run(client, "mrhubo", "fit", {}).info.run_id
+
+
+def test_it_comes_near_the_numbers_that_made_the_poses(
+    config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip, tmp_path: Path, runs: tuple[Any, str]
+) -> None:
+    start = copy.deepcopy(config)
+    assert start.robot.manual is not None and config.robot.manual is not None
+    start.robot.manual.factor, start.robot.manual.upper_arm = 2.7, 0.7  # far off
+    search = ScaleFactorSearch(start, body_map, prior, [clip], tmp_path)
+    lines = []
+    found = search.search(runs[0], "mrhubo", runs[1], lambda done, measure: lines.append((done, measure)))
+    assert found.distance_rad < 0.6 * found.start_distance_rad
+    assert found.config.robot.scale == "manual" and found.config.robot.search is None
+    manual = found.config.robot.manual
+    assert manual is not None and manual.factor == found.values["factor"] and 1.0 <= manual.factor <= 3.0
+    assert set(found.pictures) >= {"history", "poses"} and lines[-1][0] == 30
+    nested = runs[0].search_runs(
+        [runs[0].get_experiment_by_name("mrhubo").experiment_id], f"tags.`mlflow.parentRunId` = '{runs[1]}'"
+    )
+    assert len(nested) == 30 and all(run.info.status == "FINISHED" for run in nested)
+    best = min(run.data.metrics["scale/distance_rad"] for run in nested)
+    assert best == pytest.approx(found.distance_rad)
+    assert start.robot.manual.factor == 2.7  # the config that was given stays as it was
+
+
+def test_it_goes_on_where_it_stopped(
+    config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip, tmp_path: Path, runs: tuple[Any, str]
+) -> None:
+    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search(runs[0], "mrhubo", runs[1])
+
+    def stop(done: int, measure: str) -> None:
+        if done >= 20:
+            raise KeyboardInterrupt
+
+    stopped = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "stopped")
+    with pytest.raises(KeyboardInterrupt):
+        stopped.search(runs[0], "mrhubo", runs[1], stop)
+    assert stopped.search(runs[0], "mrhubo", runs[1]).values == whole.values
+    assert whole.distance_rad < 0.01  # it starts from the numbers that made the poses
+
+
+def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
+    (tmp_path / "motions").mkdir()
+    for name in ("drinking", "wave"):
+        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "motions")
+    arguments = [
+        "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("30", "8"),
+        "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=20", "pairs.fine_steps=5", "pairs.solver=fine",
+        "model.hidden=16", "trainer.max_steps=20", "trainer.batch_size=64", "trainer.accelerator=cpu",
+        f"evaluation.motions=[{tmp_path / 'motions'}]", f"pairs.dir={tmp_path / 'pairs'}", f"tracking.dir={tmp_path / 'runs'}",
+    ]  # fmt: skip
+    with contextlib.redirect_stdout(io.StringIO()):
+        main(arguments)
+    client = mlflow.MlflowClient(tracking_uri=f"sqlite:///{tmp_path / 'runs' / 'mlflow.db'}")
+    experiment = client.get_experiment_by_name("mrhubo")
+    assert experiment is not None
+    found = client.search_runs([experiment.experiment_id])
+    (run,) = [run for run in found if "mlflow.parentRunId" not in run.data.tags]
+    assert len(found) == 1 + 8 and run.info.status == "FINISHED"
+    assert 0 < run.data.metrics["scale/distance_rad"] <= run.data.metrics["scale/start_distance_rad"] < math.pi
+    artifacts = tmp_path / "runs" / "artifacts" / run.info.run_id / "artifacts"
+    assert {path.name for path in (artifacts / "scale").iterdir()} >= {"history.png", "poses.png"}
+    written = load_config(artifacts / "config.yaml")
+    assert written.robot.scale == "manual" and written.robot.manual is not None
+    assert str(written.robot.manual.factor) == run.data.params["scale_factor/factor"]
+    (package,) = (tmp_path / "runs" / "packages").iterdir()
+    assert Retargeter.load(package).body_map.manual is not None
+    assert pipeline.prepare(written).store.header["fingerprint"] == run.data.tags["pairs_fingerprint"]
+
+
+def test_other_commands_refuse_it(config: Config) -> None:
+    with pytest.raises(UserError, match=r"robot\.scale: 'search' is done by mrhubo\.fit alone"):
+        pipeline.prepare(copy.deepcopy(config))
