@@ -17,7 +17,6 @@ import lightning
 import torch
 from common import print_header, print_table, read_options
 
-from mrhubo.callbacks import TrainingProgress
 from mrhubo.config import load_config
 from mrhubo.pairing import make_filter
 from mrhubo.pairing.data import PairData, PairTable
@@ -25,6 +24,7 @@ from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
 from mrhubo.robot import build_body_map
 from mrhubo.tracking import open_logger
 from mrhubo.trainer import cosine_schedule
+from mrhubo.training_progress import TrainingProgress
 
 
 class Stopwatch(lightning.Callback):
@@ -82,7 +82,7 @@ def main(argv: list[str]) -> None:
             fit = lightning.Trainer(
                 max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=LOG_EVERY, enable_progress_bar=False,
                 enable_model_summary=False, enable_checkpointing=False,
-                callbacks=[TrainingProgress(steps, quiet=True), watch := Stopwatch()],
+                callbacks=[TrainingProgress(steps, {}, quiet=True), watch := Stopwatch()],
             )  # fmt: skip
             net, pairs = module(), data()
             fit.fit(net, datamodule=pairs)

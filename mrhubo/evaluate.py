@@ -32,6 +32,7 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
     """
     from mrhubo import pipeline
     from mrhubo.evaluation import evaluate_clips, latency_us, table
+    from mrhubo.progress import Progress
     from mrhubo.retargeter import Retargeter
 
     retargeter = Retargeter.load(package)
@@ -44,7 +45,11 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
             f" the config's ('{config.robot.name}': {', '.join(config.robot.joints)})"
         )
     clips = pipeline.make_references(prepared, quiet)[0 if validation else 1]
-    predictions = [retargeter.predict(clip.motion.pose_TJ6, polish) for clip in clips]
+    predictions = []
+    with Progress("evaluation", len(clips), "clips", quiet) as progress:
+        for done, clip in enumerate(clips, start=1):
+            predictions.append(retargeter.predict(clip.motion.pose_TJ6, polish))
+            progress.update(done, clip.name)
     found = evaluate_clips(predictions, clips, body_map, config.robot.key_links)
     pose_TJ6 = clips[0].motion.pose_TJ6
     one, many = (latency_us(lambda pose: retargeter.predict(pose, polish), pose_TJ6, batch) for batch in (1, 1_000))

@@ -19,7 +19,6 @@ from mrhubo.callbacks import (
     Clip,
     ClipMetrics,
     Motions,
-    TrainingProgress,
     load_motions,
     predict_clips,
     solve_references,
@@ -42,6 +41,7 @@ from mrhubo.progress import Progress
 from mrhubo.ranks import Ranks
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
 from mrhubo.trainer import quiet_lightning, run_trainer
+from mrhubo.training_progress import TrainingProgress
 
 
 @dataclass
@@ -199,7 +199,7 @@ def train(
         enable_version_counter=False,
     )
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
-    progress = TrainingProgress(prepared.config.trainer.max_steps, quiet)
+    progress = TrainingProgress(prepared.config.trainer.max_steps, SHOWN, quiet)
     with quiet_lightning():
         trainer = _trainer(prepared.config, logger, [metrics, *watchers, progress, saver], ranks)
         run_trainer(trainer, module, resume, datamodule=data)
@@ -210,6 +210,10 @@ def train(
     return Training(
         network, pairs, pair_filter, Path(saver.best_model_path), float("nan") if score is None else float(score)
     )
+
+
+SHOWN = {"val/joint_rad": "validation joint rad", "val/link_cm": "link cm"}
+"""Metrics on a training's progress line, and what they are called there."""
 
 
 def _filter(config: Config, pairs: dict[str, Tensor]) -> PairFilter:

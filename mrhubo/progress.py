@@ -1,5 +1,5 @@
-"""One line that shows how a long step is getting on: in a terminal it is redrawn, in a log file it is printed now
-and then.
+"""One line that shows how a long step is getting on: in a terminal or a notebook it is redrawn, in a log file it is
+printed now and then.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Progress:
     ) -> None:
         self.title, self.total, self.unit, self.quiet = title, total, unit, quiet
         self.stream = stream or sys.stderr
-        self.terminal = self.stream.isatty()
+        self.terminal = self.stream.isatty() or type(self.stream).__module__.startswith("ipykernel.")  # or a notebook
         self.start = time.monotonic()
         self._first: int | None = None
         self._shown, self._width, self._last = -float("inf"), 0, ""

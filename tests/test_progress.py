@@ -46,6 +46,15 @@ def test_a_file_gets_few_lines_and_the_last(clock: list[float]) -> None:
     )
 
 
+def test_a_notebook_redraws(clock: list[float]) -> None:
+    stream = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    with Progress("training", 10, "steps", stream=stream) as line:
+        for step in range(11):
+            clock[0] = step
+            line.update(step)
+    assert stream.getvalue().count("\r") == 11 and stream.getvalue().count("\n") == 1
+
+
 def test_quiet_is_quiet(clock: list[float]) -> None:
     stream = Terminal()
     with Progress("pairs", 10, quiet=True, stream=stream) as line:

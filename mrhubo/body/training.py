@@ -47,11 +47,13 @@ from mrhubo.config import (
 from mrhubo.errors import UserError
 from mrhubo.tracking import git_commit, open_logger, resumable_run
 from mrhubo.trainer import cosine_schedule, quiet_lightning, run_trainer
+from mrhubo.training_progress import TrainingProgress
 from mrhubo.workspace import Workspace
 
 _KNOWN, _UNSEEN = 50_000, 5_000
 """Poses that the final measures take from the training clips and from those held out."""
 
+_SHOWN = {"val/joint_mm": "held-out joints mm", "val/geodesic_deg": "deg"}
 _EPOCH = 1_000
 """Steps between validations and checkpoints."""
 _ROTATION_KNEE, _POSITION_KNEE = 0.02, 0.002
@@ -163,7 +165,7 @@ class PriorTraining(lightning.LightningModule):
         """Encode, take the mean, decode: distance of the 22 joints and angle of the 21 rotations."""
         error_mm, angle_deg = reconstruction(self.prior, self.skeleton, pose_BJ6)
         values = {"val/joint_mm": error_mm.mean(), "val/geodesic_deg": angle_deg.mean()}
-        self.log_dict(values, batch_size=len(pose_BJ6), prog_bar=True)
+        self.log_dict(values, batch_size=len(pose_BJ6))
 
     def configure_optimizers(self) -> Any:
         """AdamW, linear warm-up over 2% of the steps, cosine decay to 0."""
@@ -209,7 +211,7 @@ class Split:
         return self.held_out[:: max(1, len(self.held_out) // _UNSEEN)]
 
 
-def train(config: PriorConfig) -> BodyPrior:
+def train(config: PriorConfig, quiet: bool = False) -> BodyPrior:
     """Trains, measures, saves the weights with their card, and returns the prior."""
     lightning.seed_everything(config.seed, verbose=False)
     split, module = Split.of(config), PriorTraining(config)
@@ -230,9 +232,11 @@ def train(config: PriorConfig) -> BodyPrior:
             devices=1,
             gradient_clip_val=1.0,
             enable_model_summary=False,
+            enable_progress_bar=False,
             num_sanity_val_steps=0,
             callbacks=[
-                ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True)
+                TrainingProgress(config.steps, _SHOWN, quiet),
+                ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
             ],
         )
         batches = RandomBatches(len(split.kept), config.batch_size, epoch, config.seed)
@@ -276,10 +280,11 @@ def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict
 
 def main(argv: list[str]) -> None:
     """`python -m mrhubo.body.training --config conf/prior.yaml [key=value ...]`."""
-    config, _ = parse_arguments(argv, "mrhubo.body.training", "Trains the open body prior.", PriorConfig)
+    flags = {"quiet": "no progress line"}
+    config, given = parse_arguments(argv, "mrhubo.body.training", "Trains the open body prior.", PriorConfig, flags)
     if not config.data.is_file():
         raise UserError(f"data: {config.data} does not exist; name a file of training poses (docs/prior.md says which)")
-    train(config)
+    train(config, given["quiet"])
     print(f"body prior: {config.output}")
 
 

@@ -2,14 +2,12 @@
 
 from mrhubo.callbacks.clips import Clip, Motions, load_motions, solve_references
 from mrhubo.callbacks.metrics import ClipMetrics, ClipScore, mean_score, predict_clips, score_clip
-from mrhubo.callbacks.progress import TrainingProgress
 
 __all__ = [
     "Clip",
     "ClipMetrics",
     "ClipScore",
     "Motions",
-    "TrainingProgress",
     "load_motions",
     "mean_score",
     "predict_clips",

@@ -276,7 +276,11 @@ def test_missing_keys_are_named_together(tmp_path):
 
 def test_missing_keys_of_a_missing_section(tmp_path):
     sentence = refusal(tmp_path, "trainer: {}", schema=Config)
-    required = [key for key in walk(Config) if key.required and not key.is_section and ".manual" not in key.name and ".search" not in key.name]
+    required = [
+        key
+        for key in walk(Config)
+        if key.required and not key.is_section and ".manual" not in key.name and ".search" not in key.name
+    ]
     assert required and all(f"{key.name} (" in sentence for key in required)
 
 

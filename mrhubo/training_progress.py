@@ -14,11 +14,11 @@ _EVERY = 10
 
 
 class TrainingProgress(lightning.Callback):
-    """Steps, rate, time left and the last validation errors on one line."""
+    """Steps, rate, time left and the last metrics on one line."""
 
-    def __init__(self, steps: int, quiet: bool = False) -> None:
-        """`steps` is the length of the whole training."""
-        self.steps, self.quiet = steps, quiet
+    def __init__(self, steps: int, shown: Mapping[str, str], quiet: bool = False) -> None:
+        """`steps` is the length of the whole training, `shown` the metrics on the line and what they are called."""
+        self.steps, self.shown, self.quiet = steps, shown, quiet
         self._progress: Progress | None = None
 
     def on_train_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
@@ -56,9 +56,6 @@ class TrainingProgress(lightning.Callback):
 
     def _update(self, trainer: lightning.Trainer) -> None:
         metrics = trainer.callback_metrics
-        known = [f"{name} {float(metrics[key]):.3f}" for name, key in _SHOWN.items() if key in metrics]
+        known = [f"{name} {float(metrics[key]):.3f}" for key, name in self.shown.items() if key in metrics]
         if self._progress is not None:
             self._progress.update(trainer.global_step, ", ".join(known))
-
-
-_SHOWN = {"validation joint rad": "val/joint_rad", "link cm": "val/link_cm"}
