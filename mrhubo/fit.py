@@ -73,6 +73,7 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
             )
             recording.scores(scores, training.best_link_cm)
             recording.key_poses(test, predictions)
+            recording.animation(test, predictions)
             over_clips = scores[-2]
             package = recording.package(retargeter, over_clips, training.best_checkpoint)
             workspace.finish()

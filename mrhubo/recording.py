@@ -7,15 +7,16 @@ import shlex
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from PIL.Image import Image
 from torch import Tensor
 
 from mrhubo.callbacks import Clip
-from mrhubo.callbacks.pictures import Artist
+from mrhubo.callbacks.pictures import GIF_RATE, Artist, liveliness
 from mrhubo.config import Config, changed_settings, to_plain, to_yaml
 from mrhubo.evaluation import Evaluation, run_metrics, table
 from mrhubo.locations import default_tracking, project_root
@@ -23,7 +24,7 @@ from mrhubo.pairing import PairFilter, PairingReport
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
 from mrhubo.tracking import database_uri, git_commit, library_versions, open_logger, resumable_run, run_status
-from mrhubo.view import phi_histogram, save_png
+from mrhubo.view import phi_histogram, save_gif, save_png
 from mrhubo.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -130,6 +131,12 @@ class Recording:
         for clip, prediction in zip(clips, predictions, strict=True):
             self._picture(self.artist.key_poses(clip, {"mrhubo": prediction}), f"test/key_poses_{clip.name}.png")
 
+    def animation(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
+        """A GIF of the liveliest test clip."""
+        clip, prediction = max(zip(clips, predictions, strict=True), key=lambda pair: liveliness(pair[0]))
+        frames = self.artist.animation(clip, {"mrhubo": prediction})
+        self._artifact(lambda path: save_gif(frames, path, GIF_RATE), f"test/{clip.name}.gif")
+
     def package(self, retargeter: Retargeter, score: Evaluation, checkpoint: Path) -> Path:
         """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""
         provenance = {
@@ -143,10 +150,13 @@ class Recording:
         self.client.log_artifact(self.run_id, str(checkpoint), "checkpoint")
         return folder
 
-    def _picture(self, image: Any, name: str) -> None:
+    def _picture(self, image: Image, name: str) -> None:
+        self._artifact(lambda path: save_png(image, path), name)
+
+    def _artifact(self, write: Callable[[Path], object], name: str) -> None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / Path(name).name
-            save_png(image, path)
+            write(path)
             self.client.log_artifact(self.run_id, str(path), str(Path(name).parent))
 
 
