@@ -18,9 +18,11 @@ from torch import Tensor
 from mrhubo.callbacks import Clip
 from mrhubo.callbacks.pictures import GIF_RATE, Artist, liveliness
 from mrhubo.config import Config, changed_settings, to_plain, to_yaml
+from mrhubo.datasets import datasets
 from mrhubo.evaluation import Evaluation, run_metrics, table
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
+from mrhubo.registry import register
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
 from mrhubo.tracking import database_uri, git_commit, library_versions, open_logger, resumable_run, run_status
@@ -31,6 +33,10 @@ if TYPE_CHECKING:
     from lightning.pytorch.loggers import MLFlowLogger
 
     from mrhubo.pipeline import Prepared
+
+
+_EXAMPLE = 8
+"""Frames of a model's input example."""
 
 
 class Recording:
@@ -69,8 +75,11 @@ class Recording:
         if run_id is None:
             logger.log_hyperparams(to_plain(config))
             recording.client.log_text(recording.run_id, to_yaml(config), "config.yaml")
+            recording.client.log_inputs(recording.run_id, datasets(prepared))
         else:
             recording.client.set_tag(recording.run_id, "resumed", time.strftime("%Y-%m-%d %H:%M:%S"))
+            if "ended_by" in recording.client.get_run(recording.run_id).data.tags:
+                recording.client.delete_tag(recording.run_id, "ended_by")
         return recording
 
     def __enter__(self) -> Recording:
@@ -149,6 +158,23 @@ class Recording:
         self.client.log_artifacts(self.run_id, str(folder), "package")
         self.client.log_artifact(self.run_id, str(checkpoint), "checkpoint")
         return folder
+
+    def register(self, retargeter: Retargeter, score: Evaluation, clip: Clip) -> str:
+        """Makes the package a version of the robot's model, with the start of a clip as the example.
+
+        Returns:
+            the version's URI, or why there is none: a server without a registry ends no fit.
+        """
+        tags = {
+            "run_id": self.run_id,
+            **self.provenance,
+            "test_joint_rad": f"{score.joint_rad:.4f}",
+            "test_link_cm": f"{score.link_cm:.3f}",
+        }
+        try:
+            return register(self.client, self.run_id, self.files, retargeter, clip.motion.pose_TJ6[:_EXAMPLE], tags)
+        except Exception as error:  # MLflow's own, the network's, the database's
+            return f"not registered: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
     def _picture(self, image: Image, name: str) -> None:
         self._artifact(lambda path: save_png(image, path), name)
