@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,14 @@ def runs_of(folder: Path) -> list[Any]:
     experiment = client.get_experiment_by_name("mrhubo")
     assert experiment is not None
     return client.search_runs([experiment.experiment_id])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_frames() -> Iterator[None]:
+    """Short animations: a whole one takes four seconds a fit."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mrhubo.callbacks.pictures.GIF_RATE", 1.0)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +142,7 @@ def test_a_fit_that_fails_says_why_and_goes_on_when_the_cause_is_gone(
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
     given = arguments(root, tmp_path, motions, "trainer.max_steps=30")
 
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise UserError("checkpoints: no space left on device")
 
     with monkeypatch.context() as patch, pytest.raises(UserError):
