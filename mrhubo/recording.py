@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from mrhubo.pipeline import Prepared
 
 
+_SIZES = ("count", "max_steps", "seed")
+"""Settings that lengthen or repeat a fit, rather than change what it does."""
 _EXAMPLE = 8
 """Frames of a model's input example."""
 
@@ -203,6 +205,7 @@ def run_name(config: Config) -> str:
     changed.pop("workers", None)  # the result does not depend on it
     if config.robot.scale != "auto":
         changed["scale"] = config.robot.scale
+    changed |= {name: changed.pop(name) for name in _SIZES if name in changed}  # last: tables cut long names off
     return " ".join([config.robot.name, *(f"{name}={value}" for name, value in changed.items())])
 
 

@@ -332,4 +332,6 @@ def test_ranks_that_cannot_share_a_batch_are_refused(
 def test_runs_are_named_after_what_differs(root: Path) -> None:
     config = load_config(root / "conf" / "nao.yaml", ["pairs.workers=3", "model.stages=1", "pairs.filter=none"])
     assert run_name(config) == "nao filter=none stages=1"
+    config.pairs.count = 10
+    assert run_name(config) == "nao filter=none stages=1 count=10"
     assert run_name(load_config(root / "conf" / "paper" / "reachy.yaml")).endswith(" scale=manual")
