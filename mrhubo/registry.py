@@ -65,7 +65,9 @@ def register(
         client.create_registered_model(name, description=about)
     # Not "models:/<id>": the registry would look that up with MLflow's global tracking URI.
     source = model.artifact_location
-    version = client.create_model_version(name, source, run_id, dict(tags), model_id=model.model_id).version
+    version = client.create_model_version(
+        name, source, run_id, dict(tags), description=run.info.run_name, model_id=model.model_id
+    ).version
     # The dashboard's link from the run to the version reads this tag, which MLflow's own register_model writes too.
     link = json.dumps([{"name": name, "version": version}])
     client.set_logged_model_tags(model.model_id, {"mlflow.modelVersions": link})

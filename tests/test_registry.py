@@ -12,7 +12,6 @@ import torch
 
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
-from mrhubo.errors import UserError
 from mrhubo.registry import example_input, register
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
@@ -98,8 +97,8 @@ def test_bad_poses_are_named(served: Any, pose: torch.Tensor) -> None:
     pose_T63 = example_input(pose)
     with pytest.raises(mlflow.MlflowException, match=r"Shape of input \(20, 60\) does not match .*\(-1, 63\)"):
         served.predict(pose_T63[:, :60])
-    with pytest.raises(UserError, match=r"shape \(frames, 63\), axis-angle .* found \(60,\)"):
+    with pytest.raises(mlflow.MlflowException, match=r"shape \(frames, 63\), axis-angle .* found \(60,\)"):
         served.unwrap_python_model().predict(None, pose_T63[0, :60])
     pose_T63[7, 5] = np.nan
-    with pytest.raises(UserError, match="human pose 7 holds NaN"):
+    with pytest.raises(mlflow.MlflowException, match="human pose 7 holds NaN"):
         served.predict(pose_T63)

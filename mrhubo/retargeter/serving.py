@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import torch
+from mlflow.exceptions import MlflowException
 from mlflow.models import set_model
 from mlflow.pyfunc.model import PythonModel, PythonModelContext
 
@@ -40,9 +41,15 @@ class ServedRetargeter(PythonModel):
             params: none are known.
 
         Raises:
-            UserError: the poses have another shape, or hold NaN or infinite numbers.
+            MlflowException: the poses have another shape, or hold NaN or infinite numbers; a server answers with the
+                sentence and status 400.
         """
-        pose_T63 = np.asarray(model_input, np.float32)
+        try:
+            return self._retarget(np.asarray(model_input, np.float32))
+        except UserError as error:
+            raise MlflowException.invalid_parameter_value(str(error)) from error
+
+    def _retarget(self, pose_T63: np.ndarray) -> pd.DataFrame:
         width = 3 * len(POSED_JOINT_NAMES)
         if pose_T63.ndim != 2 or pose_T63.shape[1] != width:
             raise UserError(
