@@ -189,6 +189,21 @@ def test_the_readmes_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch
     assert names["q_TN"].shape == (frames, 8) and not bool(retargeter.collision.collides(names["q_TN"]).any())
 
 
+def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "dashboard.md").read_text(), re.S)
+    monkeypatch.chdir(root)
+    before = mlflow.get_tracking_uri()
+    names: dict[str, Any] = {}
+    try:
+        exec(code.replace("sqlite:///mlruns", f"sqlite:///{fitted[0] / 'mlruns'}"), names)
+    finally:
+        mlflow.set_tracking_uri(before)
+    (package, *_) = sorted((fitted[0] / "mlruns" / "packages").iterdir(), key=lambda path: path.stat().st_mtime)
+    retargeter, pose_TJ6 = Retargeter.load(package), read_motion(root / "data" / "motions" / "wave.npz").pose_TJ6
+    q_TN = torch.tensor(names["table"][list(retargeter.joint_names)].to_numpy())
+    torch.testing.assert_close(q_TN, retargeter.predict(pose_TJ6), atol=1e-4, rtol=0)
+
+
 def final_metrics(folder: Path) -> dict[str, float]:
     (found,) = runs_of(folder)
     assert found.info.status == "FINISHED"
