@@ -28,6 +28,8 @@ class FitResult:
     """What a fit leaves behind."""
 
     package: Path
+    model: str
+    """URI of the model version in MLflow's registry, or why there is none."""
     run_id: str
     table: str
     measures: dict[str, float]
@@ -82,10 +84,12 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
             )
             recording.scores(scores, training.best_link_cm)
             recording.key_poses(test, predictions)
+            recording.animation(test, predictions)
             over_clips = scores[-2]
             package = recording.package(retargeter, over_clips, training.best_checkpoint)
+            model = recording.register(retargeter, over_clips, test[0])
             workspace.finish()
-        return FitResult(package, recording.run_id, table(scores), measures(over_clips))
+        return FitResult(package, model, recording.run_id, table(scores), measures(over_clips))
 
 
 def _search_scale(prepared: Prepared, recording: Recording, quiet: bool) -> ScaleFactorSearch:
@@ -122,7 +126,7 @@ def main(argv: list[str]) -> None:
         return
     from mrhubo.recording import Recording, dashboard_command
 
-    print(f"\n{result.table}\n\npackage:   {result.package}")
+    print(f"\n{result.table}\n\npackage:   {result.package}\nmodel:     {result.model}")
     print(f"dashboard: {dashboard_command(Recording.folder(config), config)}")
 
 

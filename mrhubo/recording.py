@@ -7,23 +7,26 @@ import shlex
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from PIL.Image import Image
 from torch import Tensor
 
 from mrhubo.callbacks import Clip
-from mrhubo.callbacks.pictures import Artist
+from mrhubo.callbacks.pictures import GIF_RATE, Artist, liveliness
 from mrhubo.config import Config, changed_settings, to_plain, to_yaml
+from mrhubo.datasets import datasets
 from mrhubo.evaluation import Evaluation, run_metrics, table
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
+from mrhubo.registry import register
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
 from mrhubo.tracking import database_uri, git_commit, library_versions, log_all, open_logger, resumable_run, run_status
-from mrhubo.view import phi_histogram, save_png
+from mrhubo.view import phi_histogram, save_gif, save_png
 from mrhubo.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -31,6 +34,12 @@ if TYPE_CHECKING:
 
     from mrhubo.callbacks.scale_search import ScaleResult
     from mrhubo.pipeline import Prepared
+
+
+_SIZES = ("count", "max_steps", "seed")
+"""Settings that lengthen or repeat a fit, rather than change what it does."""
+_EXAMPLE = 8
+"""Frames of a model's input example."""
 
 
 class Recording:
@@ -69,8 +78,12 @@ class Recording:
         if run_id is None:
             logger.log_hyperparams(to_plain(config))
             recording.client.log_text(recording.run_id, to_yaml(config), "config.yaml")
+            if config.robot.scale != "search":  # else the pairs are not known yet
+                recording.client.log_inputs(recording.run_id, datasets(prepared))
         else:
             recording.client.set_tag(recording.run_id, "resumed", time.strftime("%Y-%m-%d %H:%M:%S"))
+            if "ended_by" in recording.client.get_run(recording.run_id).data.tags:
+                recording.client.delete_tag(recording.run_id, "ended_by")
         return recording
 
     def __enter__(self) -> Recording:
@@ -108,6 +121,7 @@ class Recording:
             {f"scale_factor/{name}": value for name, value in found.values.items()},
         )
         self.client.log_text(self.run_id, to_yaml(prepared.config), "config.yaml")
+        self.client.log_inputs(self.run_id, datasets(prepared))
         for name, picture in found.pictures.items():
             self._picture(picture, f"scale/{name}.png")
 
@@ -146,6 +160,12 @@ class Recording:
         for clip, prediction in zip(clips, predictions, strict=True):
             self._picture(self.artist.key_poses(clip, {"mrhubo": prediction}), f"test/key_poses_{clip.name}.png")
 
+    def animation(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
+        """A GIF of the liveliest test clip."""
+        clip, prediction = max(zip(clips, predictions, strict=True), key=lambda pair: liveliness(pair[0]))
+        frames = self.artist.animation(clip, {"mrhubo": prediction})
+        self._artifact(lambda path: save_gif(frames, path, GIF_RATE), f"test/{clip.name}.gif")
+
     def package(self, retargeter: Retargeter, score: Evaluation, checkpoint: Path) -> Path:
         """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""
         provenance = {
@@ -159,10 +179,30 @@ class Recording:
         self.client.log_artifact(self.run_id, str(checkpoint), "checkpoint")
         return folder
 
-    def _picture(self, image: Any, name: str) -> None:
+    def register(self, retargeter: Retargeter, score: Evaluation, clip: Clip) -> str:
+        """Makes the package a version of the robot's model, with the start of a clip as the example.
+
+        Returns:
+            the version's URI, or why there is none: a server without a registry ends no fit.
+        """
+        tags = {
+            "run_id": self.run_id,
+            **self.provenance,
+            "test_joint_rad": f"{score.joint_rad:.4f}",
+            "test_link_cm": f"{score.link_cm:.3f}",
+        }
+        try:
+            return register(self.client, self.run_id, self.files, retargeter, clip.motion.pose_TJ6[:_EXAMPLE], tags)
+        except Exception as error:  # MLflow's own, the network's, the database's
+            return f"not registered: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
+
+    def _picture(self, image: Image, name: str) -> None:
+        self._artifact(lambda path: save_png(image, path), name)
+
+    def _artifact(self, write: Callable[[Path], object], name: str) -> None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / Path(name).name
-            save_png(image, path)
+            write(path)
             self.client.log_artifact(self.run_id, str(path), str(Path(name).parent))
 
 
@@ -183,6 +223,7 @@ def run_name(config: Config) -> str:
     changed.pop("workers", None)  # the result does not depend on it
     if config.robot.scale != "auto":
         changed["scale"] = config.robot.scale
+    changed |= {name: changed.pop(name) for name in _SIZES if name in changed}  # last: tables cut long names off
     return " ".join([config.robot.name, *(f"{name}={value}" for name, value in changed.items())])
 
 

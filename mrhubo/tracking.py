@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yourdfpy", "roma", "safetensors", "scipy")
 
+_TALKATIVE = ("alembic", "mlflow.store", "mlflow.tracking", "mlflow.system_metrics", "mlflow.pyfunc")
+
 
 def database_uri(folder: Path) -> str:
     """SQLite tracking URI of `mlflow.db` in a folder."""
@@ -39,9 +41,10 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Mlflow
         UserError: the tracking server or database cannot be reached.
     """
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     import mlflow
 
-    for name in ("alembic", "mlflow.store.db.utils", "mlflow.tracking", "mlflow.system_metrics"):
+    for name in _TALKATIVE:
         logging.getLogger(name).setLevel(logging.ERROR)
     folder.mkdir(parents=True, exist_ok=True)
     uri = uri or database_uri(folder)

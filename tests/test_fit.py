@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import os
 import re
 import shutil
@@ -11,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +21,16 @@ import numpy as np
 import pytest
 import torch
 
-from mrhubo.body import Skeleton, VPoser, save_skeleton
+from mrhubo.body import BodyPrior, Skeleton, VPoser, save_skeleton
 from mrhubo.callbacks import load_motions
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.fit import main
+from mrhubo.motion import read_motion
 from mrhubo.ranks import Ranks
 from mrhubo.recording import run_name
 from mrhubo.retargeter import Retargeter
+from mrhubo.storage import checksum_file
 
 SMALL = [
     "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=40", "pairs.fine_steps=3", "model.hidden=64",
@@ -59,6 +63,14 @@ def runs_of(folder: Path) -> list[Any]:
     experiment = client.get_experiment_by_name("mrhubo")
     assert experiment is not None
     return client.search_runs([experiment.experiment_id])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_frames() -> Iterator[None]:
+    """Short animations: a whole one takes four seconds a fit."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mrhubo.callbacks.pictures.GIF_RATE", 1.0)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +109,55 @@ def test_the_run_holds_everything(fitted: tuple[Path, str]) -> None:
         "config.yaml", "pairs/phi_histogram.png", "pairs/feasible_and_extreme.png", "test/clips.json",
         "test/key_poses_wave.png", "package/retargeter.safetensors", "package/robot.urdf", "checkpoint/best.ckpt",
     }  # fmt: skip
+    (animation,) = [name for name in names if name.endswith(".gif")]
+    assert animation.startswith("test/") and (artifacts / animation).stat().st_size < 1_500_000
+
+
+def test_a_model_version_leads_back_to_run_pairs_prior_urdf_and_motions(
+    root: Path, fitted: tuple[Path, str], motions: Path
+) -> None:
+    folder, output = fitted
+    found = min(runs_of(folder), key=lambda run: run.info.start_time)
+    assert "model:     models:/mrhubo-nao/1\n" in output
+    client = mlflow.MlflowClient(tracking_uri=f"sqlite:///{folder / 'mlruns' / 'mlflow.db'}")
+    version = client.get_model_version("mrhubo-nao", "1")
+    assert version.run_id == version.tags["run_id"] == found.info.run_id
+    assert version.tags["urdf_xxh3"] == checksum_file(root / "data" / "robots" / "nao" / "nao.urdf")
+    assert version.tags["prior_xxh3"] == BodyPrior.open().checksum
+    assert float(version.tags["test_link_cm"]) == pytest.approx(found.data.metrics["test/link_cm"], abs=1e-3)
+    data = {entry.tags[0].value: entry.dataset for entry in found.inputs.dataset_inputs}
+    assert set(data) == {"training", "validation", "testing"}
+    pairs = json.loads(data["training"].profile)
+    assert data["training"].digest == version.tags["pairs_fingerprint"] == pairs["fingerprint"]
+    assert (pairs["robot"], pairs["forward"] + pairs["reverse"]) == ("nao", 600)
+    assert pairs["prior_xxh3"] == version.tags["prior_xxh3"]
+    clips = json.loads(data["testing"].profile)["motion_xxh3"]
+    assert "wave" in clips and clips == {name: read_motion(motions / f"{name}.npz").checksum for name in clips}
+
+
+def test_a_fit_that_fails_says_why_and_goes_on_when_the_cause_is_gone(
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And one whose server has no registry still ends well."""
+    shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
+    given = arguments(root, tmp_path, motions, "trainer.max_steps=30")
+
+    def full(*_: object, **__: object) -> None:
+        raise UserError("checkpoints: no space left on device")
+
+    with monkeypatch.context() as patch, pytest.raises(UserError):
+        patch.setattr("mrhubo.pipeline.train", full)
+        main(given)
+    (failed,) = runs_of(tmp_path)
+    assert failed.info.status == "FAILED"
+    assert failed.data.tags["ended_by"] == "UserError: checkpoints: no space left on device"
+    with monkeypatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as output:
+        patch.setattr(mlflow.MlflowClient, "create_model_version", full)
+        main(given)
+    (found,) = runs_of(tmp_path)
+    assert found.info.run_id == failed.info.run_id and found.info.status == "FINISHED"
+    assert "resumed" in found.data.tags and "ended_by" not in found.data.tags
+    assert "\nmodel:     not registered: UserError: checkpoints" in output.getvalue()
 
 
 def test_the_package_retargets(root: Path, fitted: tuple[Path, str], motions: Path) -> None:
@@ -128,6 +189,21 @@ def test_the_readmes_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch
     assert names["q_TN"].shape == (frames, 8) and not bool(retargeter.collision.collides(names["q_TN"]).any())
 
 
+def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "dashboard.md").read_text(), re.S)
+    monkeypatch.chdir(root)
+    before = mlflow.get_tracking_uri()
+    names: dict[str, Any] = {}
+    try:
+        exec(code.replace("sqlite:///mlruns", f"sqlite:///{fitted[0] / 'mlruns'}"), names)
+    finally:
+        mlflow.set_tracking_uri(before)
+    (package, *_) = sorted((fitted[0] / "mlruns" / "packages").iterdir(), key=lambda path: path.stat().st_mtime)
+    retargeter, pose_TJ6 = Retargeter.load(package), read_motion(root / "data" / "motions" / "wave.npz").pose_TJ6
+    q_TN = torch.tensor(names["table"][list(retargeter.joint_names)].to_numpy())
+    torch.testing.assert_close(q_TN, retargeter.predict(pose_TJ6), atol=1e-4, rtol=0)
+
+
 def final_metrics(folder: Path) -> dict[str, float]:
     (found,) = runs_of(folder)
     assert found.info.status == "FINISHED"
@@ -157,9 +233,11 @@ def test_stopped_in_training_it_resumes_to_the_same_metrics(
     assert process.wait(timeout=60) == (status if status is not None else -stop)
     (unfinished,) = runs_of(tmp_path)
     assert unfinished.info.status == ("KILLED" if stop == signal.SIGINT else "RUNNING")
+    assert ("ended_by" in unfinished.data.tags) is (stop == signal.SIGINT)
     main(given)
     (found,) = runs_of(tmp_path)
     assert found.info.run_id == unfinished.info.run_id and "resumed" in found.data.tags
+    assert "ended_by" not in found.data.tags
     expected, got = final_metrics(fitted[0]), final_metrics(tmp_path)
     assert got.keys() == expected.keys()
     for name, value in expected.items():
@@ -269,4 +347,6 @@ def test_ranks_that_cannot_share_a_batch_are_refused(
 def test_runs_are_named_after_what_differs(root: Path) -> None:
     config = load_config(root / "conf" / "nao.yaml", ["pairs.workers=3", "model.stages=1", "pairs.filter=none"])
     assert run_name(config) == "nao filter=none stages=1"
+    config.pairs.count = 10
+    assert run_name(config) == "nao filter=none stages=1 count=10"
     assert run_name(load_config(root / "conf" / "paper" / "reachy.yaml")).endswith(" scale=manual")

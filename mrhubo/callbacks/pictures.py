@@ -20,6 +20,7 @@ from mrhubo.view import (
     Solids,
     contact_sheet,
     distributions,
+    figure_animation,
     figure_sheet,
     human_figure,
     robot_solids,
@@ -31,6 +32,8 @@ PAIR_MEASURES = {"phi": 1.0, "residual_m": 1000.0, "z_norm": 1.0}
 """Their units in pictures, per unit in the files."""
 _REFERENCE_TINT = (0.55, 0.62, 0.72)
 _FIGURE_HEIGHT_M = 1.7
+GIF_RATE = 12.0
+"""Frames per second of an animation."""
 
 
 class Artist:
@@ -108,5 +111,28 @@ class Artist:
             *([self.robot_figure(q_TN[f]) for f in frames] for q_TN in predictions.values()),
         ]
         columns = [f"{f / clip.motion.frame_rate:.1f} s" for f in frames]
-        name = f"{self.robot.name}: {clip.name}" + (f" ({clip.motion.description})" if clip.motion.description else "")
-        return figure_sheet(rows, columns, ["human", "reference", *predictions], name)
+        return figure_sheet(rows, columns, ["human", "reference", *predictions], self.clip_title(clip))
+
+    def animation(self, clip: Clip, predictions: Mapping[str, Tensor], seconds: float = 4.0) -> list[Image]:
+        """The middle of a clip, `GIF_RATE` frames a second: human, reference and predictions (T, N) by their names."""
+        rate, last = clip.motion.frame_rate, len(clip.reference_TN) - 1
+        shown = min(seconds * rate, last)
+        times = np.arange((last - shown) / 2, (last + shown) / 2 + 1e-6, rate / GIF_RATE)
+        frames = [round(f) for f in times]
+        columns = [
+            [self.human(clip.motion.pose_TJ6[f]) for f in frames],
+            [self.robot_figure(clip.reference_TN[f]).recolored(_REFERENCE_TINT) for f in frames],
+            *([self.robot_figure(q_TN[f]) for f in frames] for q_TN in predictions.values()),
+        ]
+        captions = [f"{self.clip_title(clip)}, {f / rate:.1f} s" for f in frames]
+        return figure_animation(columns, ["human", "reference", *predictions], captions)
+
+    def clip_title(self, clip: Clip) -> str:
+        """`nao: 13_18 (laugh)`."""
+        description = f" ({clip.motion.description})" if clip.motion.description != clip.name else ""
+        return f"{self.robot.name}: {clip.name}{description}"
+
+
+def liveliness(clip: Clip) -> float:
+    """Mean speed [rad/s] of the robot's joints in the reference's answer to a clip."""
+    return float(clip.reference_TN.diff(dim=0).abs().mean()) * clip.motion.frame_rate

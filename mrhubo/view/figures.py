@@ -1,9 +1,10 @@
-"""Figures side by side: a human from a pose, and tables of figures drawn at one scale."""
+"""Figures side by side: a human from a pose, tables of figures at one scale, and the same in motion."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import torch
 from PIL.Image import Image
 from torch import Tensor
@@ -38,3 +39,33 @@ def figure_sheet(
     cameras = iter(common_cameras([figure for row in rows for figure in row], size))
     pictures = [[render(figure, size, next(cameras)) for figure in row] for row in rows]
     return contact_sheet(pictures, columns, titles, caption)
+
+
+def figure_animation(
+    columns: Sequence[Sequence[Solids]],
+    titles: Sequence[str],
+    captions: Sequence[str],
+    size: tuple[int, int] = (200, 270),
+) -> list[Image]:
+    """Frames of moving figures side by side, all at one scale; the camera and the floor stand still.
+
+    Args:
+        columns: the figures of each column, one a frame.
+        titles: above the columns.
+        captions: below each frame.
+        size: of a cell, in pixels.
+
+    Raises:
+        ValueError: there is no frame, or a column has not as many figures as there are captions.
+    """
+    if not captions or any(len(figures) != len(captions) for figures in columns):
+        raise ValueError(f"figure_animation: columns of {[len(c) for c in columns]} figures, {len(captions)} captions")
+    paths = [Solids.concatenate(figures) for figures in columns]
+    cameras = common_cameras(paths, size)
+    floors = [path.extent(np.array([0.0, 0.0, 1.0]))[0] for path in paths]
+    frames = []
+    for figures, caption in zip(zip(*columns, strict=True), captions, strict=True):
+        views = zip(figures, cameras, floors, strict=True)
+        row = [render(figure, size, camera, ground=floor) for figure, camera, floor in views]
+        frames.append(contact_sheet([row], titles, caption=caption))
+    return frames

@@ -16,6 +16,7 @@ _INK = (38, 43, 51)
 _GREY = (108, 115, 125)
 _LINE = (222, 225, 230)
 _KEPT, _DROPPED = "#3b76af", "#d9822b"
+_GIF_COLORS = 128
 
 
 def contact_sheet(
@@ -179,4 +180,25 @@ def save_png(image: Image.Image, path: str | Path) -> Path:
     path = Path(path)
     with atomic_path(path) as temporary:
         image.save(temporary, format="PNG")
+    return path
+
+
+def save_gif(frames: Sequence[Image.Image], path: str | Path, frame_rate: float) -> Path:
+    """Write an endless GIF of pictures of one size, atomically as `save_png` does; ``frame_rate``: frames per second.
+
+    All frames share one palette, taken from a few of them: a palette a frame would flicker.
+    """
+    if not frames:
+        raise ValueError("save_gif: there is no frame")
+    few = [frames[round(place)] for place in np.linspace(0, len(frames) - 1, min(4, len(frames)))]
+    samples = Image.fromarray(np.concatenate([np.asarray(frame.convert("RGB")) for frame in few]))
+    palette = samples.quantize(_GIF_COLORS)
+    first, *rest = [frame.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    colors = np.asarray(palette.getpalette()).reshape(-1, 3)
+    colors[colors.min(axis=1) >= 250] = 255  # Pillow's white is greyish
+    for frame in (first, *rest):
+        frame.putpalette(colors.ravel().tolist())
+    path, duration_ms = Path(path), round(1000 / frame_rate)
+    with atomic_path(path) as temporary:
+        first.save(temporary, format="GIF", save_all=True, append_images=rest, duration=duration_ms, loop=0)
     return path
