@@ -115,6 +115,7 @@ class Baseline:
 def run_baseline(config: BaselineConfig, quiet: bool = False, parent: str | None = None) -> str:
     """Trains S3LE, measures it on the test clips, tracks it, and returns the table."""
     from mrhubo.evaluation import evaluate_clips, run_metrics, table
+    from mrhubo.predictions import log_predictions
     from mrhubo.tracking import ending, log_all
 
     baseline = Baseline.open(config, quiet)
@@ -126,6 +127,7 @@ def run_baseline(config: BaselineConfig, quiet: bool = False, parent: str | None
         scores = evaluate_clips(predictions, baseline.test, baseline.prepared.body_map, config.robot.key_links)
         metrics = {"val/best_link_cm": baseline.validation_link_cm(model, config.s3le), **run_metrics(scores)}
         log_all(client, run, metrics)
+        log_predictions(client, run, baseline.test, predictions)
         client.log_text(run, table(scores) + "\n", "test/clips.txt")
     return table(scores)
 

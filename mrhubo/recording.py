@@ -22,6 +22,7 @@ from mrhubo.datasets import datasets
 from mrhubo.evaluation import Evaluation, run_metrics, table
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
+from mrhubo.predictions import log_predictions
 from mrhubo.registry import register
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
@@ -156,7 +157,8 @@ class Recording:
         self.client.log_text(self.run_id, table(scores) + "\n", "test/clips.txt")
 
     def key_poses(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
-        """A picture a test clip: human, reference and prediction side by side."""
+        """The answers themselves, and a picture a test clip: human, reference and prediction."""
+        log_predictions(self.client, self.run_id, clips, predictions)
         for clip, prediction in zip(clips, predictions, strict=True):
             self._picture(self.artist.key_poses(clip, {"mrhubo": prediction}), f"test/key_poses_{clip.name}.png")
 

@@ -11,6 +11,8 @@ from mrhubo.errors import UserError
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
+    from mlflow.entities import Run
+    from PIL.Image import Image
 
     from mrhubo.reproduction import Part
 
@@ -45,14 +47,21 @@ def reproduce(
         print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
     work = parts(robots, seeds, overrides, baseline=capture.is_file(), paper=paper)
     client, parent = _open_parent(work)
-    start, results = time.monotonic(), {}
+    start, results, first = time.monotonic(), {}, {}
     with ending(client, parent):
         for part in work:
-            measures = _measures(part, client, parent, quiet)
+            run = _run_of(part, client, parent, quiet)
+            measures = {k.removeprefix("test/"): v for k, v in run.data.metrics.items() if k.startswith("test/")}
             results.setdefault((part.robot, part.method), []).append(measures)
+            if part.seed == 0:
+                first.setdefault(part.robot, []).append((part, run.info.run_id))
         text = tables({key: results[key] for key in sorted(results, key=lambda key: robots.index(key[0]))})
         client.log_text(parent, text + "\n", "tables.md")
         client.log_image(parent, chart(results), artifact_file="errors.png")
+        for robot, runs in first.items():
+            picture = _key_poses(client, runs, quiet)
+            if picture is not None:
+                client.log_image(parent, picture, artifact_file=f"key_poses_{robot}.png")
         client.log_metric(parent, "seconds", time.monotonic() - start)
     return text
 
@@ -78,8 +87,26 @@ def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     return client, found.info.run_id
 
 
-def _measures(part: Part, client: MlflowClient, parent: str, quiet: bool) -> dict[str, float]:
-    """Test measures of a finished run with the same settings, pairs, prior and motions, or of a new fit."""
+def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], quiet: bool) -> Image | None:
+    """Human, reference, and what the two-stage network and the baseline made of one test clip, as in the paper's
+    figure 3; None if no run has kept its answers.
+    """
+    from mrhubo import pipeline
+    from mrhubo.callbacks.pictures import Artist, liveliness
+    from mrhubo.predictions import read_predictions
+    from mrhubo.reproduction import BASELINE, OUR_DEFAULT
+
+    shown = {part.method: run for part, run in runs if part.method in ("proposed", OUR_DEFAULT, BASELINE)}
+    found = {method: read_predictions(client, run) for method, run in shown.items()}
+    prepared = pipeline.prepare(runs[0][0].config)
+    clip = max(pipeline.make_references(prepared, quiet)[1], key=liveliness)
+    answers = {method: answer[clip.name] for method, answer in found.items() if clip.name in answer}
+    artist = Artist(prepared.body_map.robot, prepared.body_map.skeleton)
+    return artist.key_poses(clip, answers) if answers else None
+
+
+def _run_of(part: Part, client: MlflowClient, parent: str, quiet: bool) -> Run:
+    """A finished run with the same settings, pairs, prior and motions, or that of a new fit."""
     from mrhubo.baseline import run_baseline
     from mrhubo.fit import fit
     from mrhubo.pipeline import prepare
@@ -98,7 +125,7 @@ def _measures(part: Part, client: MlflowClient, parent: str, quiet: bool) -> dic
         run = find_run(client, experiment, wanted, finished=True)
     if run is None:
         raise UserError(f"{part.robot}, {part.method}: the run of this training is not in the tracking database")
-    return {name.removeprefix("test/"): value for name, value in run.data.metrics.items() if name.startswith("test/")}
+    return run
 
 
 def main(argv: list[str]) -> None:

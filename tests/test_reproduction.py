@@ -12,6 +12,7 @@ import pytest
 from mrhubo import reproduce as command
 from mrhubo.config import BaselineConfig
 from mrhubo.errors import UserError
+from mrhubo.predictions import read_predictions
 from mrhubo.reproduce import main
 from mrhubo.reproduction import METHODS, PAPER, Part, chart, parts, tables
 from mrhubo.tracking import database_uri
@@ -93,7 +94,11 @@ def test_the_command_trains_once_and_finds_what_is_done(
     children = [run for run in runs if run is not parent]
     assert len(children) == len(methods) and {run.info.status for run in runs} == {"FINISHED"}
     assert {run.data.tags["mlflow.parentRunId"] for run in children} == {parent.info.run_id}
-    assert {file.path for file in client.list_artifacts(parent.info.run_id)} == {"tables.md", "errors.png"}
+    artifacts = {file.path for file in client.list_artifacts(parent.info.run_id)}
+    assert artifacts == {"tables.md", "errors.png", "key_poses_nao.png"}
+    for run in children:
+        (answer,) = read_predictions(client, run.info.run_id).values()  # one of the two clips is for validation
+        assert answer.shape[1] == 8 and bool(answer.isfinite().all())
     link = np.array([run.data.metrics["test/link_cm"] for run in children])
     assert all(f"{value:.2f} (" in first or f" {value:.2f} " in first for value in link)
     monkeypatch.setattr("mrhubo.fit.fit", lambda *a, **k: pytest.fail("trained again"))
