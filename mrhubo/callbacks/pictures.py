@@ -129,7 +129,8 @@ class Artist:
 
     def clip_title(self, clip: Clip) -> str:
         """`nao: 13_18 (laugh)`."""
-        description = f" ({clip.motion.description})" if clip.motion.description != clip.name else ""
+        known = ("", clip.name)
+        description = "" if clip.motion.description in known else f" ({clip.motion.description})"
         return f"{self.robot.name}: {clip.name}{description}"
 
 
