@@ -30,7 +30,7 @@ test: .venv/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
 
 dashboard: export MLFLOW_SERVER_ENABLE_JOB_EXECUTION = false
 dashboard: export MLFLOW_DISABLE_TELEMETRY = true

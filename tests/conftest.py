@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+# Tests share the cores with each other and with the processes that they start. Threads that spin while they wait make
+# all of them many times slower; read when torch is imported, after this.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
 ROOT = Path(__file__).resolve().parent.parent
 
 

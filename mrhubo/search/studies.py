@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,7 +80,8 @@ def open_study(
             )
     except Exception as error:  # SQLAlchemy's, its drivers', and ModuleNotFoundError for a driver that is not there
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise UserError(f"storage: the study's database {database} cannot be opened: {reason}") from error
+        shown = re.sub(r"//([^:/@]*):[^@]*@", r"//\1:***@", database)  # logs are no place for a password
+        raise UserError(f"storage: the study's database {shown} cannot be opened: {reason}") from error
 
 
 def _seeded_by_trial(kind: str, seed: int) -> BaseSampler:

@@ -84,7 +84,10 @@ def test_time_is_up(tmp_path: Path) -> None:
     assert len(study.trials) == 2
 
 
-@pytest.mark.parametrize("url", ["postgresql://nobody@127.0.0.1:1/none", "nonsense", "sqlite:////proc/none/studies.db"])
+@pytest.mark.parametrize(
+    "url", ["postgresql://nobody:secret@127.0.0.1:1/none", "nonsense", "sqlite:////proc/none/studies.db"]
+)
 def test_a_database_that_cannot_be_opened(tmp_path: Path, url: str) -> None:
-    with pytest.raises(UserError, match="storage: the study's database"):
+    with pytest.raises(UserError, match="storage: the study's database") as error:
         open_study(tmp_path, url, "s", "random", 0)
+    assert "secret" not in str(error.value)
