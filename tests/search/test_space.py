@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import optuna
@@ -30,6 +31,13 @@ def draw(entry: object, key: str, seed: int) -> str:
 def test_the_shipped_sweeps_are_good(root: Path, name: str) -> None:
     settings = load_config(root / "conf" / "sweeps" / f"{name}.yaml", [], SweepConfig)
     assert settings.name == name and read_space(settings.space, check)
+
+
+def test_the_example_of_the_docs_is_good(root: Path, tmp_path: Path) -> None:
+    (text,) = re.findall(r"```yaml\n(.*?)```", (root / "docs" / "sweeps.md").read_text(), re.S)
+    (tmp_path / "mine.yaml").write_text(text)
+    settings = load_config(tmp_path / "mine.yaml", [], SweepConfig)
+    assert len(read_space(settings.space, check)) == 3 and settings.fixed == {"trainer.max_steps": 2000}
 
 
 def test_the_scale_factors_sweep_is_for_the_papers_configs(root: Path) -> None:
