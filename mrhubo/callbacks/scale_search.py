@@ -72,7 +72,7 @@ class ScaleFactorSearch(lightning.Callback):
         frames = np.linspace(0, len(pose_FJ6) - 1, min(self.settings.poses, len(pose_FJ6))).round()
         chosen = torch.from_numpy(frames).long()
         self.q_PN, self.pose_PJ6 = reference_FN[chosen], pose_FJ6[chosen]
-        self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6)
+        self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6, config.model.input_frame)
         self.artist = Artist(body_map.robot, body_map.skeleton)
         self.folder = folder
         checksums = [clip.motion.checksum for clip in clips]
@@ -80,8 +80,8 @@ class ScaleFactorSearch(lightning.Callback):
         robot["search"] = {**robot["search"], "trials": 0}  # more of them go on where fewer stopped
         self.name = f"{config.robot.name}-scale-" + fingerprint(
             [
-                robot, prior.checksum, body_map.robot.description.kinematics,
-                body_map.skeleton.checksum, checksums, [pairs.w_data, pairs.w_prior, pairs.fine_steps],
+                robot, prior.checksum, body_map.robot.description.kinematics, body_map.skeleton.checksum, checksums,
+                [pairs.w_data, pairs.w_prior, pairs.fine_steps, config.model.input_frame],
             ]
         )  # fmt: skip
         self.result: ScaleResult | None = None

@@ -1,8 +1,9 @@
 """How well a scale factor theta turns robot poses into the human poses that they were made for.
 
 For pairs (q, H) of the reference retargeter, the distance between g_theta(q), the human pose that pairing would give q,
-and H: the mean geodesic distance of the arm joints' local rotations. Figuera, Park, Ahn: MR.HuBo, IROS 2024, section
-III-D.
+and H: the mean geodesic distance of the arm joints' rotations. Figuera, Park, Ahn: MR.HuBo, IROS 2024, section III-D.
+They are compared in the frame in which the network reads them: collars and spine can make up for a shoulder, so that
+what is near in local rotations may be far as seen from the chest.
 
 Legend: C scale factors, P pairs, K keypoints, J = 21 human joints, Z latent numbers.
 """
@@ -18,7 +19,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.body.inverse import nearest_samples, poses_at_once, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
-from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.config import ManualScaleConfig, PairsConfig
 from mrhubo.robot import BodyMap, ManualScale
 from mrhubo.threads import use_threads
@@ -30,10 +31,11 @@ class ProportionTest:
     """Measures scale factors on a set of pairs, many at once."""
 
     def __init__(
-        self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig, q_PN: Tensor, pose_PJ6: Tensor
+        self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig, q_PN: Tensor, pose_PJ6: Tensor, frame: str
     ) -> None:
-        """Robot poses (P, N) [rad] and the human poses (P, 21, 6) that they imitate."""
+        """Robot poses (P, N) [rad] and the human poses (P, 21, 6) that they imitate; `frame` as `model.input_frame`."""
         self.body_map, self.prior, self.settings, self.pose_PJ6 = body_map, prior, settings, pose_PJ6
+        self.frame = frame
         self._poses = body_map.robot.forward(q_PN)
         names = [name for name in body_map.input_joints() if not name.endswith(_NO_ARM)]
         self.arm_joints = [POSED_JOINT_NAMES.index(name) for name in names]
@@ -59,8 +61,18 @@ class ProportionTest:
     @torch.no_grad()
     def distances(self, pose_CPJ6: Tensor) -> Tensor:
         """Distance (C, P) [rad] of human poses to those that the robot poses imitate."""
-        found, wanted = (rotation.sixd_to_matrix(pose[..., self.arm_joints, :]) for pose in (pose_CPJ6, self.pose_PJ6))
+        found, wanted = (self._arms(pose) for pose in (pose_CPJ6, self.pose_PJ6))
         return rotation.geodesic_distance(found, wanted.expand_as(found)).mean(dim=-1)
+
+    def _arms(self, pose_XJ6: Tensor) -> Tensor:
+        """Rotations (..., arm joints, 3, 3) of poses (..., 21, 6)."""
+        matrices = rotation.sixd_to_matrix(pose_XJ6)
+        if self.frame == "local":
+            return matrices[..., self.arm_joints, :, :]
+        turned = self.body_map.skeleton.global_rotations(matrices.flatten(0, -4))
+        chest = turned[:, [JOINT_NAMES.index("spine3")]].transpose(-1, -2)
+        seen = chest @ turned[:, [1 + joint for joint in self.arm_joints]]
+        return seen.unflatten(0, pose_XJ6.shape[:-2])
 
     def measure(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
         """Mean distance (C,) [rad] of scale factors over the pairs."""

@@ -50,14 +50,14 @@ def clip(config: Config, body_map: BodyMap, prior: BodyPrior) -> Clip:
     """Robot poses, and the human poses that the config's own numbers make of them: a theta without error exists."""
     q_PN = body_map.robot.sample(12, torch.Generator().manual_seed(0))
     assert config.robot.manual is not None
-    test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 6))
+    test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 6), "local")
     return Clip(Motion("made", test.human_poses([config.robot.manual])[0], 24.0, ""), q_PN)
 
 
 def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip) -> None:
     manual = config.robot.manual
     assert manual is not None
-    test = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.pose_TJ6)
+    test = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.pose_TJ6, "local")
     same, other = test.measure([manual, varied(manual, {"factor": 2.6})]).tolist()
     assert same < 0.01 < 0.03 < other
     pose = clip.motion.pose_TJ6.clone()
@@ -68,6 +68,12 @@ def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prio
     turned[:, test.arm_joints[0]] = turned[:, test.arm_joints[0]] @ turn
     expected = torch.full((12,), 0.5 / len(test.arm_joints))
     torch.testing.assert_close(test.distances(rotation.matrix_to_sixd(turned)), expected, atol=1e-3, rtol=0)
+    seen = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.pose_TJ6, "chest")
+    collar = rotation.sixd_to_matrix(clip.motion.pose_TJ6)
+    collar[:, 12] = collar[:, 12] @ turn  # carries shoulder and elbow along, as seen from the chest
+    pose = rotation.matrix_to_sixd(collar)
+    assert float(test.distances(pose).max()) < 1e-3
+    torch.testing.assert_close(seen.distances(pose), 2 * expected, atol=1e-3, rtol=0)
 
 
 @pytest.fixture()
