@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import subprocess
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -77,9 +79,18 @@ def open_logger(
     open_client(folder, experiment, uri)
     from lightning.pytorch.loggers import MLFlowLogger
 
+    class Logger(MLFlowLogger):
+        def log_metrics(self, metrics: Mapping[str, float], step: int | None = None) -> None:
+            with uninterrupted():
+                super().log_metrics(metrics, step)
+
+        def finalize(self, status: str = "success") -> None:
+            with uninterrupted():
+                super().finalize(status)
+
     uri = uri or database_uri(folder)
     try:
-        logger = MLFlowLogger(
+        logger = Logger(
             experiment_name=experiment, run_name=run_name, tracking_uri=uri, tags=tags, run_id=run_id, log_model=False
         )
         _ = logger.run_id
@@ -105,6 +116,26 @@ def log_all(client: MlflowClient, run_id: str, metrics: dict[str, float], params
         [Metric(name, value, now, 0) for name, value in metrics.items()],
         [Param(name, str(value)) for name, value in (params or {}).items()],
     )
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Holds Ctrl-C back until the block has ended.
+
+    A transaction of SQLite that is broken off keeps its lock as long as the traceback lives, and whoever then wants to
+    mark the run as killed waits for minutes.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only the main thread is interrupted
+        yield
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        if held:
+            signal.raise_signal(signal.SIGINT)
 
 
 def run_status(error: BaseException | None) -> str:
