@@ -63,6 +63,26 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Mlflow
     return client
 
 
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Holds Ctrl-C back until the block has ended.
+
+    A transaction of SQLite that is broken off keeps its lock as long as the traceback lives, and whoever then wants to
+    mark the run as killed waits for minutes.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only the main thread is interrupted
+        yield
+        return
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        if held:
+            signal.raise_signal(signal.SIGINT)
+
+
 def open_logger(
     folder: Path,
     experiment: str,
@@ -103,7 +123,8 @@ def start_run(client: MlflowClient, experiment: str, name: str, tags: dict[str, 
     """A new run in an experiment that `open_client` has opened."""
     found = client.get_experiment_by_name(experiment)
     assert found is not None
-    return client.create_run(found.experiment_id, tags=tags, run_name=name)
+    with uninterrupted():
+        return client.create_run(found.experiment_id, tags=tags, run_name=name)
 
 
 def log_all(client: MlflowClient, run_id: str, metrics: dict[str, float], params: dict[str, Any] | None = None) -> None:
@@ -111,31 +132,9 @@ def log_all(client: MlflowClient, run_id: str, metrics: dict[str, float], params
     from mlflow.entities import Metric, Param
 
     now = int(1000 * time.time())
-    client.log_batch(
-        run_id,
-        [Metric(name, value, now, 0) for name, value in metrics.items()],
-        [Param(name, str(value)) for name, value in (params or {}).items()],
-    )
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Holds Ctrl-C back until the block has ended.
-
-    A transaction of SQLite that is broken off keeps its lock as long as the traceback lives, and whoever then wants to
-    mark the run as killed waits for minutes.
-    """
-    if threading.current_thread() is not threading.main_thread():  # only the main thread is interrupted
-        yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
-        if held:
-            signal.raise_signal(signal.SIGINT)
+    written = [Param(name, str(value)) for name, value in (params or {}).items()]
+    with uninterrupted():
+        client.log_batch(run_id, [Metric(name, value, now, 0) for name, value in metrics.items()], written)
 
 
 def run_status(error: BaseException | None) -> str:
