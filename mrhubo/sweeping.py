@@ -53,7 +53,7 @@ class Sweep:
             UserError: anything is wrong.
         """
         self.settings, self.quiet, self.file = settings, quiet, file
-        self.overrides = [*overrides, *(override(key, value) for key, value in settings.fixed.items())]
+        self.overrides = [*(override(key, value) for key, value in settings.fixed.items()), *overrides]
         self.base = self._config([])
         self.space = read_space(settings.space, lambda text: self._config([text]))
         self.prepared = pipeline.prepare(self.base)

@@ -100,12 +100,16 @@ def test_one_of_two_processes_dies(arguments: list[str], tmp_path: Path, capfd: 
 
 
 def test_a_known_config_is_not_trained_again(arguments: list[str], tmp_path: Path) -> None:
-    (tmp_path / "sweep.yaml").write_text("name: two\ntrials: 4\nspace: {model.hidden: [8, 16]}\npruner: none\n")
+    (tmp_path / "sweep.yaml").write_text(
+        "name: two\ntrials: 4\nspace: {model.hidden: [8, 16]}\npruner: none\nfixed: {trainer.max_steps: 9999}\n"
+    )
     main(arguments)
     assert len(runs_of(tmp_path / "runs")) <= 1 + 2
     (study,) = studies_of(tmp_path / "runs")
     values = {(trial.params["model.hidden"], trial.value) for trial in study.trials}
     assert len(study.trials) == 4 and len(values) <= 2
+    (best,) = (tmp_path / "runs" / "sweeps").glob("*.yaml")
+    assert load_config(best).trainer.max_steps == 60  # the command line's, not the file's
 
 
 @pytest.mark.parametrize(
