@@ -16,12 +16,14 @@ import lightning
 import numpy as np
 import torch
 from PIL.Image import Image
+from torch import Tensor
 
 from mrhubo.body import BodyPrior
 from mrhubo.callbacks.clips import Clip
 from mrhubo.callbacks.pictures import Artist
 from mrhubo.config import Config, ManualScaleConfig, fingerprint
 from mrhubo.pairing import ProportionTest, pose_settings
+from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
 from mrhubo.search import open_study, open_trials
 from mrhubo.search.plots import study_plots
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 _AT_ONCE = 20
 """Trials drawn and solved together."""
+_REACHED_RAD = math.radians(3.0)
+"""Angle between robot and human up to which a pose counts as reached."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +60,10 @@ class ScaleFactorSearch(lightning.Callback):
     """Draws theta from the ranges of `robot.search`, keeps the one whose human poses come nearest to a reference set.
 
     The reference set are frames of the validation clips with the joint angles that the reference retargeter gives
-    them; the distance is that of `ProportionTest`. Pairs exist before Lightning's trainer starts, so `search` is called
-    first; as a callback it then writes into the training's run what it found. Trials are kept in an Optuna study: a
-    search that was stopped goes on, a finished one is read.
+    them, where the robot can do what the human does: elsewhere no theta can be right, and one that distorts the arms
+    would win. The distance is that of `ProportionTest`. Pairs exist before Lightning's trainer starts, so `search` is
+    called first; as a callback it then writes into the training's run what it found. Trials are kept in an Optuna
+    study: a search that was stopped goes on, a finished one is read.
     """
 
     def __init__(
@@ -69,8 +74,7 @@ class ScaleFactorSearch(lightning.Callback):
         self.config, self.start, self.settings = config, config.robot.manual, config.robot.search
         pose_FJ6 = torch.cat([clip.motion.pose_TJ6 for clip in clips])
         reference_FN = torch.cat([clip.reference_TN for clip in clips])
-        frames = np.linspace(0, len(pose_FJ6) - 1, min(self.settings.poses, len(pose_FJ6))).round()
-        chosen = torch.from_numpy(frames).long()
+        chosen = _reachable(body_map, reference_FN, pose_FJ6, self.settings.poses)
         self.q_PN, self.pose_PJ6 = reference_FN[chosen], pose_FJ6[chosen]
         self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6, config.model.input_frame)
         self.artist = Artist(body_map.robot, body_map.skeleton)
@@ -172,3 +176,14 @@ class ScaleFactorSearch(lightning.Callback):
         titles = ["human", "reference", f"best: {best_deg:.1f} deg", f"worst: {worst_deg:.1f} deg"]
         caption = f"{self.config.robot.name}: what the best and the worst scale factor make of the robot's poses"
         return figure_sheet(rows, (), titles, caption)
+
+
+@torch.no_grad()
+def _reachable(body_map: BodyMap, q_FN: Tensor, pose_FJ6: Tensor, count: int) -> Tensor:
+    """`count` frames, evenly spaced among those in which every limb of the robot points where the human's does."""
+    robot_FD3 = body_map.robot_directions(body_map.robot.forward(q_FN))
+    off_F = angle_between(robot_FD3, body_map.human_directions(pose_FJ6)).amax(dim=1)
+    reached = (off_F < _REACHED_RAD).nonzero()[:, 0]
+    if len(reached) < count:
+        reached = off_F.argsort()[:count].sort().values
+    return reached[torch.linspace(0, len(reached) - 1, min(count, len(reached))).round().long()]

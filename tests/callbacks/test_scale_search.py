@@ -76,6 +76,18 @@ def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prio
     torch.testing.assert_close(seen.distances(pose), 2 * expected, atol=1e-3, rtol=0)
 
 
+def test_only_reached_poses_are_measured_on(
+    config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip, tmp_path: Path
+) -> None:
+    """The reference's answers to half of the frames are spoilt: none of them is taken."""
+    with torch.no_grad():
+        reached = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path).pose_PJ6
+        q_FN, pose_FJ6 = clip.reference_TN.repeat(2, 1), torch.cat((clip.motion.pose_TJ6, clip.motion.pose_TJ6.flip(0)))
+    both = Clip(Motion("both", pose_FJ6, 24.0, ""), q_FN)
+    search = ScaleFactorSearch(config, body_map, prior, [both], tmp_path)
+    assert search.pose_PJ6.shape == reached.shape and torch.equal(search.pose_PJ6, clip.motion.pose_TJ6)
+
+
 @pytest.fixture()
 def runs(tmp_path: Path) -> tuple[Any, str]:
     client = open_client(tmp_path, "mrhubo")
