@@ -27,6 +27,7 @@ from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
 from mrhubo.search import open_study, open_trials
 from mrhubo.search.plots import study_plots
+from mrhubo.storage import checksum_tensors
 from mrhubo.tracking import log_all, start_run
 from mrhubo.view import figure_sheet
 
@@ -79,12 +80,12 @@ class ScaleFactorSearch(lightning.Callback):
         self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6, config.model.input_frame)
         self.artist = Artist(body_map.robot, body_map.skeleton)
         self.folder = folder
-        checksums = [clip.motion.checksum for clip in clips]
+        measured_on = checksum_tensors({"q": self.q_PN, "pose": self.pose_PJ6}, {})
         pairs, robot = config.pairs, pose_settings(config)
         robot["search"] = {**robot["search"], "trials": 0}  # more of them go on where fewer stopped
         self.name = f"{config.robot.name}-scale-" + fingerprint(
             [
-                robot, prior.checksum, body_map.robot.description.kinematics, body_map.skeleton.checksum, checksums,
+                robot, prior.checksum, body_map.robot.description.kinematics, body_map.skeleton.checksum, measured_on,
                 [pairs.w_data, pairs.w_prior, pairs.fine_steps, config.model.input_frame],
             ]
         )  # fmt: skip

@@ -85,6 +85,8 @@ def test_only_reached_poses_are_measured_on(
         q_FN, pose_FJ6 = clip.reference_TN.repeat(2, 1), torch.cat((clip.motion.pose_TJ6, clip.motion.pose_TJ6.flip(0)))
     both = Clip(Motion("both", pose_FJ6, 24.0, ""), q_FN)
     search = ScaleFactorSearch(config, body_map, prior, [both], tmp_path)
+    other = ScaleFactorSearch(config, body_map, prior, [Clip(both.motion, q_FN.flip(0))], tmp_path)
+    assert other.name != search.name, "another reference set is another study"
     assert search.pose_PJ6.shape == reached.shape and torch.equal(search.pose_PJ6, clip.motion.pose_TJ6)
 
 
