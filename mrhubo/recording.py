@@ -115,12 +115,7 @@ class Recording:
         self.prepared, self.provenance = prepared, _provenance(prepared)
         for name, value in self.provenance.items():
             self.client.set_tag(self.run_id, name, value)
-        log_all(
-            self.client,
-            self.run_id,
-            {"scale/distance_rad": found.distance_rad, "scale/start_distance_rad": found.start_distance_rad},
-            {f"scale_factor/{name}": value for name, value in found.values.items()},
-        )
+        log_all(self.client, self.run_id, {}, {f"scale_factor/{k}": value for k, value in found.values.items()})
         self.client.log_text(self.run_id, to_yaml(prepared.config), "config.yaml")
         self.client.log_inputs(self.run_id, datasets(prepared))
         for name, picture in found.pictures.items():

@@ -27,7 +27,7 @@ from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
 from mrhubo.search import open_study, open_trials
 from mrhubo.search.plots import study_plots
-from mrhubo.storage import checksum_tensors
+from mrhubo.storage import checksum_tensors, locked
 from mrhubo.tracking import log_all, start_run
 from mrhubo.view import figure_sheet
 
@@ -99,8 +99,30 @@ class ScaleFactorSearch(lightning.Callback):
         progress: Callable[[int, str], None] = lambda done, measure: None,
     ) -> ScaleResult:
         """Does the trials that are missing, each an MLflow run under `parent`; `progress` gets (done, best so far)."""
+        # Fits that differ in other settings share the study.
+        with locked(self.folder / "fits" / f"{self.name}.lock", wait=True):
+            ranking = self._do_trials(client, experiment, parent, progress)
+        (values, distance), (worst, _) = ranking[0], ranking[-1]
+        config = copy.deepcopy(self.config)
+        config.robot.scale, config.robot.search = "manual", None
+        config.robot.manual = varied(self.start, values)
+        pictures = {
+            **study_plots(self._open(), "arm distance [rad]"),
+            "poses": self._poses(config.robot.manual, varied(self.start, worst)),
+        }
+        start = float(self.test.measure([self.start]))
+        self.result = ScaleResult(config, values, distance, start, pictures)
+        return self.result
+
+    def _open(self) -> Study:
         settings = self.settings
-        study = open_study(self.folder, None, self.name, settings.sampler, settings.seed, shared=False)
+        return open_study(self.folder, None, self.name, settings.sampler, settings.seed, shared=False)
+
+    def _do_trials(
+        self, client: MlflowClient, experiment: str, parent: str, progress: Callable[[int, str], None]
+    ) -> list[tuple[dict[str, float], float]]:
+        """Numbers and distances of all trials, the nearest first."""
+        study = self._open()
         if not study.get_trials(deepcopy=False) and (start := self._start_values()):
             study.enqueue_trial(start)  # so that the search ends nowhere worse than where it started
         while True:
@@ -108,19 +130,8 @@ class ScaleFactorSearch(lightning.Callback):
             best = f"best {math.degrees(done[0][1]):.2f} deg" if done else ""
             progress(min(len(done), self.settings.trials), best)
             if len(done) >= self.settings.trials:
-                break
+                return done
             self._measure(study, self._draw(study, len(done)), client, experiment, parent)
-        (values, distance), (worst, _) = done[0], done[-1]
-        config = copy.deepcopy(self.config)
-        config.robot.scale, config.robot.search = "manual", None
-        config.robot.manual = varied(self.start, values)
-        pictures = {
-            **study_plots(study, "arm distance [rad]"),
-            "poses": self._poses(config.robot.manual, varied(self.start, worst)),
-        }
-        start = float(self.test.measure([self.start]))
-        self.result = ScaleResult(config, values, distance, start, pictures)
-        return self.result
 
     def on_fit_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Writes the distances into the training's run."""
