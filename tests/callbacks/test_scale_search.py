@@ -27,7 +27,7 @@ from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap, build_body_map, varied
 from mrhubo.tracking import open_client, start_run
 
-RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 30, poses: 12}"
+RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 24, poses: 12}"
 
 
 @pytest.fixture(scope="module")
@@ -109,11 +109,11 @@ def test_it_comes_near_the_numbers_that_made_the_poses(
     assert found.config.robot.scale == "manual" and found.config.robot.search is None
     manual = found.config.robot.manual
     assert manual is not None and manual.factor == found.values["factor"] and 1.0 <= manual.factor <= 3.0
-    assert set(found.pictures) >= {"history", "poses"} and lines[-1][0] == 30
+    assert set(found.pictures) >= {"history", "poses"} and lines[-1][0] == 24
     nested = runs[0].search_runs(
         [runs[0].get_experiment_by_name("mrhubo").experiment_id], f"tags.`mlflow.parentRunId` = '{runs[1]}'"
     )
-    assert len(nested) == 30 and all(run.info.status == "FINISHED" for run in nested)
+    assert len(nested) == 24 and all(run.info.status == "FINISHED" for run in nested)
     best = min(run.data.metrics["scale/distance_rad"] for run in nested)
     assert best == pytest.approx(found.distance_rad)
     assert start.robot.manual.factor == 2.7  # the config that was given stays as it was
@@ -140,7 +140,7 @@ def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
     for name in ("drinking", "wave"):
         shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "motions")
     arguments = [
-        "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("30", "8"),
+        "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("24", "8"),
         "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=20", "pairs.fine_steps=5", "pairs.solver=fine",
         "model.hidden=16", "trainer.max_steps=20", "trainer.batch_size=64", "trainer.accelerator=cpu",
         f"evaluation.motions=[{tmp_path / 'motions'}]", f"pairs.dir={tmp_path / 'pairs'}", f"tracking.dir={tmp_path / 'runs'}",
