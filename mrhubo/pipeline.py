@@ -43,6 +43,9 @@ from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_
 from mrhubo.trainer import quiet_lightning, run_trainer
 from mrhubo.training_progress import TrainingProgress
 
+_SHOWN = {"val/joint_rad": "validation joint rad", "val/link_cm": "link cm"}
+"""Metrics on a training's progress line, and what they are called there."""
+
 
 @dataclass
 class Prepared(PairSetup):
@@ -199,7 +202,7 @@ def train(
         enable_version_counter=False,
     )
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
-    progress = TrainingProgress(prepared.config.trainer.max_steps, SHOWN, quiet)
+    progress = TrainingProgress(prepared.config.trainer.max_steps, _SHOWN, quiet)
     with quiet_lightning():
         trainer = _trainer(prepared.config, logger, [metrics, *watchers, progress, saver], ranks)
         run_trainer(trainer, module, resume, datamodule=data)
@@ -210,10 +213,6 @@ def train(
     return Training(
         network, pairs, pair_filter, Path(saver.best_model_path), float("nan") if score is None else float(score)
     )
-
-
-SHOWN = {"val/joint_rad": "validation joint rad", "val/link_cm": "link cm"}
-"""Metrics on a training's progress line, and what they are called there."""
 
 
 def _filter(config: Config, pairs: dict[str, Tensor]) -> PairFilter:

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from mrhubo.callbacks import Clip
 from mrhubo.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.tracking import log_file
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -23,10 +24,8 @@ _ARTIFACT = "test/predictions.safetensors"
 
 def log_predictions(client: MlflowClient, run_id: str, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
     """Writes joint angles (T, N) [rad] of every clip to a run."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / Path(_ARTIFACT).name
-        write_tensors(path, {clip.name: q_TN.float() for clip, q_TN in zip(clips, predictions, strict=True)}, {})
-        client.log_artifact(run_id, str(path), str(Path(_ARTIFACT).parent))
+    answers = {clip.name: q_TN.float() for clip, q_TN in zip(clips, predictions, strict=True)}
+    log_file(client, run_id, _ARTIFACT, lambda path: write_tensors(path, answers, {}))
 
 
 def read_predictions(client: MlflowClient, run_id: str) -> Mapping[str, Tensor]:

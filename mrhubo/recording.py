@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import shlex
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -26,7 +26,16 @@ from mrhubo.predictions import log_predictions
 from mrhubo.registry import register
 from mrhubo.retargeter import Retargeter
 from mrhubo.storage import checksum_file
-from mrhubo.tracking import database_uri, git_commit, library_versions, log_all, open_logger, resumable_run, run_status
+from mrhubo.tracking import (
+    database_uri,
+    git_commit,
+    library_versions,
+    log_all,
+    log_file,
+    open_logger,
+    resumable_run,
+    run_status,
+)
 from mrhubo.view import phi_histogram, save_gif, save_png
 from mrhubo.workspace import Workspace
 
@@ -161,7 +170,8 @@ class Recording:
         """A GIF of the liveliest test clip."""
         clip, prediction = max(zip(clips, predictions, strict=True), key=lambda pair: liveliness(pair[0]))
         frames = self.artist.animation(clip, {"mrhubo": prediction})
-        self._artifact(lambda path: save_gif(frames, path, GIF_RATE), f"test/{clip.name}.gif")
+        write = functools.partial(save_gif, frames, frame_rate=GIF_RATE)
+        log_file(self.client, self.run_id, f"test/{clip.name}.gif", write)
 
     def package(self, retargeter: Retargeter, score: Evaluation, checkpoint: Path) -> Path:
         """Writes the package to `mlruns/packages`, and package and checkpoint to the run; returns the folder."""
@@ -194,13 +204,7 @@ class Recording:
             return f"not registered: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
     def _picture(self, image: Image, name: str) -> None:
-        self._artifact(lambda path: save_png(image, path), name)
-
-    def _artifact(self, write: Callable[[Path], object], name: str) -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / Path(name).name
-            write(path)
-            self.client.log_artifact(self.run_id, str(path), str(Path(name).parent))
+        log_file(self.client, self.run_id, name, functools.partial(save_png, image))
 
 
 def _provenance(prepared: Prepared) -> dict[str, str]:

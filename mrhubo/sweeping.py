@@ -19,8 +19,7 @@ from mrhubo.errors import UserError
 from mrhubo.locations import project_root
 from mrhubo.progress import Progress
 from mrhubo.recording import Recording
-from mrhubo.search.space import override, read_space
-from mrhubo.search.studies import open_study, open_trials, remaining, work_on
+from mrhubo.search import open_study, open_trials, override, read_space, remaining, work_on
 from mrhubo.storage import atomic_path, locked
 from mrhubo.tables import markdown
 from mrhubo.tracking import find_run, git_commit, log_all, open_client, run_status, start_run
@@ -56,10 +55,10 @@ class Sweep:
         self.overrides = [*(override(key, value) for key, value in settings.fixed.items()), *overrides]
         self.base = self._config([])
         self.space = read_space(settings.space, lambda text: self._config([text]))
-        self.prepared = pipeline.prepare(self.base)
+        prepared = pipeline.prepare(self.base)
         self.folder = Recording.folder(self.base)
         deciding = {**to_plain(settings), "trials": 0, "minutes": 0, "storage": ""}
-        mark = fingerprint([self.prepared.fingerprint, deciding])
+        mark = fingerprint([prepared.fingerprint, deciding])
         self.name = f"{self.base.robot.name}-{settings.name}-{mark[:8]}"
         """Of the study; the same settings find it again, with more trials too."""
         self.study = open_study(

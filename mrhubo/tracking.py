@@ -10,9 +10,10 @@ import logging
 import os
 import signal
 import subprocess
+import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -61,6 +62,14 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Mlflow
     except Exception as error:
         raise _unreachable(uri, error) from error
     return client
+
+
+def log_file(client: MlflowClient, run_id: str, name: str, write: Callable[[Path], object]) -> None:
+    """The artifact `name` (folder and file) of a run, made by `write`, which is given the path to write to."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / Path(name).name
+        write(path)
+        client.log_artifact(run_id, str(path), str(Path(name).parent))
 
 
 @contextmanager

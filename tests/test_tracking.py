@@ -35,5 +35,6 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
     try:
         with uninterrupted():
             signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)

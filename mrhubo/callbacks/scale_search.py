@@ -101,28 +101,30 @@ class ScaleFactorSearch(lightning.Callback):
         """Does the trials that are missing, each an MLflow run under `parent`; `progress` gets (done, best so far)."""
         # Fits that differ in other settings share the study.
         with locked(self.folder / "fits" / f"{self.name}.lock", wait=True):
-            ranking = self._do_trials(client, experiment, parent, progress)
+            settings = self.settings
+            study = open_study(self.folder, None, self.name, settings.sampler, settings.seed, shared=False)
+            ranking = self._do_trials(study, client, experiment, parent, progress)
         (values, distance), (worst, _) = ranking[0], ranking[-1]
         config = copy.deepcopy(self.config)
         config.robot.scale, config.robot.search = "manual", None
         config.robot.manual = varied(self.start, values)
         pictures = {
-            **study_plots(self._open(), "arm distance [rad]"),
+            **study_plots(study, "arm distance [rad]"),
             "poses": self._poses(config.robot.manual, varied(self.start, worst)),
         }
         start = float(self.test.measure([self.start]))
         self.result = ScaleResult(config, values, distance, start, pictures)
         return self.result
 
-    def _open(self) -> Study:
-        settings = self.settings
-        return open_study(self.folder, None, self.name, settings.sampler, settings.seed, shared=False)
-
     def _do_trials(
-        self, client: MlflowClient, experiment: str, parent: str, progress: Callable[[int, str], None]
+        self,
+        study: Study,
+        client: MlflowClient,
+        experiment: str,
+        parent: str,
+        progress: Callable[[int, str], None],
     ) -> list[tuple[dict[str, float], float]]:
         """Numbers and distances of all trials, the nearest first."""
-        study = self._open()
         if not study.get_trials(deepcopy=False) and (start := self._start_values()):
             study.enqueue_trial(start)  # so that the search ends nowhere worse than where it started
         while True:

@@ -32,18 +32,13 @@ _FAILURES = 3
 """Trials that may fail one after the other before something is wrong with all of them."""
 
 
-def database_of(folder: Path, url: str | None = None) -> str:
-    """URL of the studies' database: SQLite in the tracking folder unless `url` says otherwise."""
-    return url or f"sqlite:///{folder.resolve() / 'studies.db'}"
-
-
 def open_study(
     folder: Path, url: str | None, name: str, sampler: str, seed: int, pruner: str = "none", shared: bool = True
 ) -> Study:
     """The study of that name, new or as it was left.
 
     Args:
-        folder: tracking folder; the SQLite database and a lock for its creation are there.
+        folder: tracking folder; the SQLite database `studies.db` and a lock for its creation are there.
         url: SQLAlchemy URL of another database.
         name: of the study.
         sampler: `tpe`, `random` or `cmaes`.
@@ -60,7 +55,7 @@ def open_study(
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-    database = database_of(folder, url)
+    database = url or f"sqlite:///{folder.resolve() / 'studies.db'}"
     pruners = {
         "median": lambda: optuna.pruners.MedianPruner(n_startup_trials=5, n_warmup_steps=0),
         "halving": lambda: optuna.pruners.SuccessiveHalvingPruner(min_resource=1, reduction_factor=4),
