@@ -24,7 +24,7 @@ from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.inverse import solve_lbfgs
 from mrhubo.pairing.store import PairStore
 from mrhubo.reference import ReferenceRetargeter
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, align_pose
 from mrhubo.threads import use_threads
 
 _STARTS = 4
@@ -104,7 +104,8 @@ class PairGenerator:
             if z_BZ is None:
                 z_BZ = self.solve(target_BK3)
             chunk = poses_at_once(self.device)
-            cut = zip(z_BZ.split(chunk), target_BK3.split(chunk), strict=True)
+            aims = z_BZ, target_BK3, self.body_map.robot_directions(poses)
+            cut = zip(*(tensor.split(chunk) for tensor in aims), strict=True)
             parts = [self._describe(*part, direction) for part in cut]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
@@ -121,12 +122,14 @@ class PairGenerator:
         return z_BZ, self.reference.solve_frames(torch.cat(poses))[0]
 
     @torch.no_grad()
-    def _describe(self, z_BZ: Tensor, target_BK3: Tensor, direction: str) -> dict[str, Tensor]:
-        """Human poses of latents, and how good they are."""
+    def _describe(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
+        """Human poses of latents, and how good they are; cost and distance are those of the latents."""
         matrices = self.prior.decode_matrices(z_BZ)
         pose_BJ6 = rotation.matrix_to_sixd(matrices)
         if direction == "forward":
             points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
+            if self.settings.align:
+                pose_BJ6 = rotation.matrix_to_sixd(align_pose(self.body_map, matrices, direction_BD3))
         else:  # the prior's humans bend their backs; only what the robot has is compared, on an upright human
             points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(pose_BJ6))
         distance_BK = (points_BK3 - target_BK3).norm(dim=-1)

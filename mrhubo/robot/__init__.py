@@ -1,5 +1,6 @@
 """The robot: its URDF, batched kinematics, and which link stands for which part of the human body."""
 
+from mrhubo.robot.alignment import align_pose
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.keypoints import BodyMap, build_body_map
 from mrhubo.robot.model import LinkPoses, Robot
@@ -15,6 +16,7 @@ __all__ = [
     "ManualScale",
     "Robot",
     "SelfCollision",
+    "align_pose",
     "build_body_map",
     "link_poses",
     "load_urdf",

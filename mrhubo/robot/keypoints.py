@@ -26,15 +26,11 @@ from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.entries import End, Point, read_end, read_point
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.parts import ENDS, HAND_POINTS, LIMBS, POINTS, SIDES, human_axes, joint_of, limb_of, turn_of
 from mrhubo.robot.scale import ManualScale, check_ranges
 
-_SIDES = ("left", "right")
-_LIMBS = (("shoulder", "elbow"), ("elbow", "wrist"))
-_POINTS = tuple(f"{side}_{part}" for side in _SIDES for part in ("shoulder", "elbow", "wrist"))
-_ENDS = {"left_hand": ("fingers", "thumb"), "right_hand": ("fingers", "thumb"), "head": ("forward", "up")}
 _PINNED = ("left_knee", "right_knee", "left_ankle", "right_ankle", "neck", "left_shoulder", "right_shoulder")
 """Keypoints held at the upright rest pose: the robot's arms and head are retargeted, the human stands."""
-_HAND_POINTS = ("thumb", "index", "middle", "pinky")
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ class BodyMap:
         self._axes = [i for i, d in enumerate(self.directions) if d.axis_3 is not None]
         limbs, axes = [self.directions[i] for i in self._starts], [self.directions[i] for i in self._axes]
         self.limb_links = ([index(d.start.link) for d in limbs if d.start], [index(d.end.link) for d in limbs if d.end])
-        self._limb_offsets_2E3 = torch.tensor(
+        self.limb_offsets_2E3 = torch.tensor(
             [[d.start.offset_3 for d in limbs if d.start], [d.end.offset_3 for d in limbs if d.end]]
         ).reshape(2, len(limbs), 3)
         self.axis_links = [index(d.link) for d in axes]
@@ -94,19 +90,19 @@ class BodyMap:
         self.skeleton.to(device)
         if self.manual is not None:
             self.manual.to(device)
-        for name in ("_limb_offsets_2E3", "_axes_A3", "_order", "_chest_33", "_chained_K3", "_rest_K3"):
+        for name in ("limb_offsets_2E3", "_axes_A3", "_order", "_chest_33", "_chained_K3", "_rest_K3"):
             setattr(self, name, getattr(self, name).to(device))
         return self
 
     def _list_directions(self) -> list[Direction]:
         found = []
-        for side in _SIDES:
-            for a, b in _LIMBS:
+        for side in SIDES:
+            for a, b in LIMBS:
                 start, end = self.points.get(f"{side}_{a}"), self.points.get(f"{side}_{b}")
                 if start and end:
                     found.append(Direction(f"{side}_{b}", start, end, end.link, None))
         for name, end in self.ends.items():
-            for word, axis in zip(_ENDS[name], end.axes_23, strict=True):
+            for word, axis in zip(ENDS[name], end.axes_23, strict=True):
                 found.append(Direction(f"{name}_{word}", None, None, end.link, axis))
         if not found:
             raise UserError("robot.keypoints: names no limb; give at least one side's shoulder and elbow")
@@ -141,7 +137,7 @@ class BodyMap:
 
     def limb_vectors(self, poses: LinkPoses, which: int, links: list[int]) -> Tensor:
         """Start (which=0) or end (which=1) points (B, E, 3) of the limbs, base frame [m]."""
-        offset = (poses.rotation_BL33[:, links] @ self._limb_offsets_2E3[which, :, :, None])[..., 0]
+        offset = (poses.rotation_BL33[:, links] @ self.limb_offsets_2E3[which, :, :, None])[..., 0]
         return poses.position_BL3[:, links] + offset
 
     def chest_axes(self, poses: LinkPoses) -> Tensor:
@@ -154,13 +150,13 @@ class BodyMap:
         columns = []
         for d in self.directions:
             if d.axis_3 is None:
-                start, end = _limb_of(d.name)
+                start, end = limb_of(d.name)
                 ends = keypoint_indices([start, end])
                 columns.append(torch.nn.functional.normalize(keypoints[:, ends[1]] - keypoints[:, ends[0]], dim=-1))
             else:
                 part, word = d.name.rsplit("_", 1)
-                joint = JOINT_NAMES.index(part.replace("hand", "wrist"))
-                columns.append(rotations[:, joint] @ human_axes(part)[_ENDS[part].index(word)].to(rotations))
+                joint = JOINT_NAMES.index(joint_of(part))
+                columns.append(rotations[:, joint] @ human_axes(part)[ENDS[part].index(word)].to(rotations))
         return torch.stack(columns, dim=1) @ rotations[:, JOINT_NAMES.index("spine3")]
 
     def _list_keypoints(self) -> None:
@@ -172,7 +168,7 @@ class BodyMap:
             if part == "head":
                 names += ["head", "left_eye", "right_eye"]
             else:
-                names += [part.replace("hand", point) for point in _HAND_POINTS]
+                names += [part.replace("hand", point) for point in HAND_POINTS]
         self._chained_names = tuple(names)
         source = self.manual.keypoint_names if self.manual else self._chained_names
         self.keypoint_names = source
@@ -188,7 +184,7 @@ class BodyMap:
     @staticmethod
     def _parent(name: str) -> str:
         side, part = name.split("_") if "_" in name else ("", name)
-        parents = {"elbow": "shoulder", "wrist": "elbow", **dict.fromkeys(_HAND_POINTS, "wrist")}
+        parents = {"elbow": "shoulder", "wrist": "elbow", **dict.fromkeys(HAND_POINTS, "wrist")}
         return f"{side}_{parents[part]}" if part in parents else name
 
     def human_keypoints(self, directions_BD3: Tensor) -> Tensor:
@@ -199,16 +195,16 @@ class BodyMap:
         column = {name: directions_BD3[:, i] for i, name in enumerate(self.direction_names)}
         for d in self.directions:
             if d.axis_3 is None:
-                found[d.name] = found[_limb_of(d.name)[0]] + offset[d.name].norm() * column[d.name]
+                found[d.name] = found[limb_of(d.name)[0]] + offset[d.name].norm() * column[d.name]
         for part in self.ends:
-            first, second = (column[f"{part}_{word}"] for word in _ENDS[part])
-            turn = _columns(first, second) @ _columns(*human_axes(part).to(first)).T
+            first, second = (column[f"{part}_{word}"] for word in ENDS[part])
+            turn = turn_of(part, first, second)
             if part == "head":
                 half = rotation.axis_angle_to_matrix(rotation.matrix_to_axis_angle(turn) / 2)
                 found["head"] = found["neck"] + half @ offset["head"]
                 points, base = ["left_eye", "right_eye"], "head"
             else:
-                points, base = [part.replace("hand", p) for p in _HAND_POINTS], part.replace("hand", "wrist")
+                points, base = [part.replace("hand", p) for p in HAND_POINTS], joint_of(part)
             for point in points:
                 found[point] = found[base] + turn @ offset[point]
         return torch.stack([found[name] for name in self._chained_names], dim=1)
@@ -227,7 +223,7 @@ class BodyMap:
         """Human joints between the chest and the parts that the robot has: what a pose needs to tell the network."""
         wanted: list[str] = []
         for d in self.directions:
-            part = d.name.rsplit("_", 1)[0] if d.axis_3 is not None else _limb_of(d.name)[0]
+            part = d.name.rsplit("_", 1)[0] if d.axis_3 is not None else limb_of(d.name)[0]
             side = part.split("_")[0]
             if part == "head":
                 wanted += ["neck", "head"]
@@ -236,24 +232,6 @@ class BodyMap:
             else:
                 wanted += [f"{side}_collar", part]
         return tuple(name for name in POSED_JOINT_NAMES if name in wanted)
-
-
-def human_axes(part: str) -> Tensor:
-    """The two unit directions (2, 3) of an oriented part of the human at rest: fingers and thumb, or forward and up."""
-    if part == "head":
-        return torch.tensor([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-    return torch.tensor([[1.0 if part.startswith("left") else -1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _limb_of(end: str) -> tuple[str, str]:
-    """Names of the limb's two joints from its outer one."""
-    side, part = end.split("_")
-    return f"{side}_{dict((b, a) for a, b in _LIMBS)[part]}", end
-
-
-def _columns(first: Tensor, second: Tensor) -> Tensor:
-    """Rotation matrices (..., 3, 3) with the columns first, second, first x second (both unit, orthogonal)."""
-    return torch.stack((first, second, torch.linalg.cross(first, second)), dim=-1)
 
 
 def _frame(forward_up_23: Tensor) -> Tensor:
@@ -268,24 +246,24 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
         UserError: the URDF, a joint, a link or a keypoint entry is wrong; says which, and the nearest valid name.
     """
     entries = dict(config.keypoints)
-    valid = (*_POINTS, *_ENDS, "chest")
+    valid = (*POINTS, *ENDS, "chest")
     for name in entries:
         if name not in valid:
             raise UserError(f"robot.keypoints: {unknown_name('body part', name, valid)}")
     if "chest" not in entries:
         raise UserError("robot.keypoints: 'chest' is missing; name the link that carries the arms")
-    points = {name: read_point(name, entries[name]) for name in _POINTS if name in entries}
+    points = {name: read_point(name, entries[name]) for name in POINTS if name in entries}
     for name in points:
         side, part = name.split("_")
-        inner = dict((b, a) for a, b in _LIMBS).get(part)
+        inner = dict((b, a) for a, b in LIMBS).get(part)
         if inner and f"{side}_{inner}" not in points:
             raise UserError(
                 f"robot.keypoints: '{name}' needs '{side}_{inner}' too; a limb is a direction between the two"
             )
-    ends = {name: read_end(name, entries[name], _ENDS[name]) for name in _ENDS if name in entries}
+    ends = {name: read_end(name, entries[name], ENDS[name]) for name in ENDS if name in entries}
     for name in ends:
-        if name != "head" and name.replace("hand", "wrist") not in points:
-            raise UserError(f"robot.keypoints: '{name}' needs '{name.replace('hand', 'wrist')}' too")
+        if name != "head" and joint_of(name) not in points:
+            raise UserError(f"robot.keypoints: '{name}' needs '{joint_of(name)}' too")
     chest = read_end("chest", entries["chest"], ("forward", "up"))
     if config.scale != "auto" and config.manual is None:
         raise UserError(f"robot.manual: is missing; `scale: {config.scale}` needs its numbers")
@@ -313,6 +291,6 @@ def _check_lengths(body_map: BodyMap) -> None:
     for name, shortest in zip(names, length.tolist(), strict=True):
         if shortest < 1e-4:
             raise UserError(
-                f"robot.keypoints: '{_limb_of(name)[0]}' and '{name}' lie on one point, so the limb has no "
+                f"robot.keypoints: '{limb_of(name)[0]}' and '{name}' lie on one point, so the limb has no "
                 "direction; choose another link or an offset"
             )

@@ -47,7 +47,21 @@ def made(root: Path, tmp_path_factory: pytest.TempPathFactory) -> PairStore:
     return generate(config_of(root, tmp_path_factory.mktemp("pairs")))
 
 
-def test_pairs_are_what_they_say(root: Path, made: PairStore) -> None:
+def test_aligned_humans_point_where_the_robot_does(root: Path, made: PairStore, tmp_path: Path) -> None:
+    before = generate(config_of(root, tmp_path, "pairs.align=false")).read_all()
+    after, body_map = made.read_all(), build_body_map(config_of(root, tmp_path).robot)
+    forward = ~after["reverse"]
+    directions = body_map.robot_directions(body_map.robot.forward(after["q"][forward]))
+    torch.testing.assert_close(body_map.human_directions(after["H"][forward]), directions, atol=1e-4, rtol=0)
+    assert float((body_map.human_directions(before["H"][forward]) - directions).abs().max()) > 0.1
+    for name in ("q", "R", "cost", "residual_m", "z_norm"):
+        torch.testing.assert_close(after[name], before[name])
+    assert torch.equal(after["H"][~forward], before["H"][~forward])
+    assert float((after["phi"] - before["phi"])[forward].abs().min()) > 0
+
+
+def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
+    made = generate(config_of(root, tmp_path, "pairs.align=false"))
     pairs = made.read_all()
     config = config_of(root, made.folder.parent)
     body_map, prior = build_body_map(config.robot), BodyPrior.open()
