@@ -104,9 +104,9 @@ class PairGenerator:
             if z_BZ is None:
                 z_BZ = self.solve(target_BK3)
             chunk = poses_at_once(self.device)
-            aims = z_BZ, target_BK3, self.body_map.robot_directions(poses)
-            cut = zip(*(tensor.split(chunk) for tensor in aims), strict=True)
-            parts = [self._describe(*part, direction) for part in cut]
+            aims = self.body_map.robot_directions(poses).split(chunk)
+            cut = zip(z_BZ.split(chunk), target_BK3.split(chunk), aims, strict=True)
+            parts = [self._describe(z, target, aim, direction) for z, target, aim in cut]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
