@@ -150,6 +150,9 @@ class ModelConfig:
     """Width of the hidden layers."""
     layers: int = bounded(2, 1, 64)
     """Hidden layers of each network (the paper's text: 1, its authors' code: 2)."""
+    residual: bool = True
+    """Add what comes in to what a hidden layer gives, from the second on; deep networks train far better so. False = a
+    plain network (the paper)."""
     input_joints: list[str] | None = None
     """Human joints that are read; default: those between the chest and the keypoints that the robot has."""
     input_frame: str = choice("chest", "chest", "local")

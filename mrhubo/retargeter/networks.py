@@ -9,10 +9,14 @@ from collections.abc import Sequence
 
 import torch
 from torch import Tensor, nn
+from torch.nn.functional import gelu
 
 from mrhubo import rotation
 from mrhubo.body.skeleton import JOINT_NAMES, Skeleton, joint_index
 from mrhubo.errors import UserError
+
+_BLOCK_SCALE = 0.5
+"""Of a residual block's first weights, so that the sums of many start as small as those of few."""
 
 
 class PoseFeatures(nn.Module):
@@ -50,6 +54,31 @@ def mlp(size_in: int, hidden: int, layers: int, size_out: int) -> nn.Sequential:
     sizes = [size_in, *[hidden] * layers]
     body = [m for a, b in zip(sizes[:-1], sizes[1:], strict=True) for m in (nn.Linear(a, b), nn.GELU())]
     return nn.Sequential(*body, nn.Linear(sizes[-1], size_out))
+
+
+class ResidualMLP(nn.Module):
+    """The layers of `mlp`, each hidden one after the first added to what came in: x + linear(GELU(x)).
+
+    He et al., "Identity Mappings in Deep Residual Networks" (ECCV 2016): activation first, nothing between the sums.
+    With one hidden layer it is `mlp`.
+    """
+
+    def __init__(self, size_in: int, hidden: int, layers: int, size_out: int) -> None:
+        super().__init__()
+        self.first = nn.Linear(size_in, hidden)
+        blocks = [nn.Linear(hidden, hidden) for _ in range(layers - 1)]
+        with torch.no_grad():
+            for block in blocks:
+                block.weight *= _BLOCK_SCALE
+        self.blocks = nn.ModuleList(blocks)
+        self.last = nn.Linear(hidden, size_out)
+
+    def forward(self, x_BI: Tensor) -> Tensor:
+        """Outputs (B, size_out) of inputs (B, size_in)."""
+        x = self.first(x_BI)
+        for block in self.blocks:
+            x = x + block(gelu(x))
+        return self.last(gelu(x))
 
 
 class LimitedOutput(nn.Module):
@@ -91,12 +120,14 @@ class RetargetNetwork(nn.Module):
         hidden: int = 512,
         layers: int = 2,
         bound_output: str = "tanh",
+        residual: bool = True,
     ) -> None:
         super().__init__()
         self.features, self.stages, joints = features, stages, len(lower_N)
         links = 6 * joints
-        self.pre = mlp(features.size, hidden, layers, links) if stages == 2 else None
-        self.post = mlp(links if stages == 2 else features.size, hidden, layers, joints)
+        net = ResidualMLP if residual else mlp
+        self.pre = net(features.size, hidden, layers, links) if stages == 2 else None
+        self.post = net(links if stages == 2 else features.size, hidden, layers, joints)
         self.limited = LimitedOutput(lower_N, upper_N, bound_output)
 
     def links(self, features_BF: Tensor) -> Tensor:

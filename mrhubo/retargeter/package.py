@@ -30,7 +30,7 @@ from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
 
-SCHEMA = "mrhubo.retargeter/1"
+SCHEMA = "mrhubo.retargeter/2"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
 _AGREEMENT_DEG = 20.0
@@ -58,7 +58,14 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
     features = PoseFeatures(model.input_joints or body_map.input_joints(), model.input_frame)
     robot = body_map.robot
     return RetargetNetwork(
-        features, robot.lower_N, robot.upper_N, model.stages, model.hidden, model.layers, model.bound_output
+        features,
+        robot.lower_N,
+        robot.upper_N,
+        model.stages,
+        model.hidden,
+        model.layers,
+        model.bound_output,
+        model.residual,
     )
 
 

@@ -12,6 +12,7 @@ from mrhubo.body import Skeleton
 from mrhubo.config import TrainerConfig
 from mrhubo.errors import UserError
 from mrhubo.retargeter import PoseFeatures, RetargetModule, RetargetNetwork
+from mrhubo.retargeter.networks import ResidualMLP, mlp
 
 LOWER, UPPER = torch.tensor([-2.08567, 0.0349066, -3.0]), torch.tensor([2.08567, 1.54462, -2.9])
 ARM = ("left_shoulder", "left_elbow", "left_wrist")
@@ -36,6 +37,24 @@ def test_limits_are_never_exceeded(kind: str, stages: int, scale: float, seed: i
         for raw in (torch.full((1, 3), 1e30), torch.full((1, 3), -1e30), torch.full((1, 3), float("nan"))):
             q = torch.cat((q, net.limited(raw)))
     assert bool(((q >= LOWER) & (q <= UPPER)).all())
+
+
+def test_a_residual_network_of_one_hidden_layer_is_a_plain_one() -> None:
+    plain, residual = mlp(5, 16, 1, 3), ResidualMLP(5, 16, 1, 3)
+    residual.load_state_dict(dict(zip(residual.state_dict(), plain.state_dict().values(), strict=True)))
+    x = torch.randn(7, 5)
+    torch.testing.assert_close(residual(x), plain(x))
+
+
+def test_a_residual_network_adds_its_layers() -> None:
+    net = ResidualMLP(5, 16, 3, 3)
+    assert sum(p.numel() for p in net.parameters()) == sum(p.numel() for p in mlp(5, 16, 3, 3).parameters())
+    x = torch.randn(7, 5)
+    gelu = torch.nn.functional.gelu
+    hidden = net.first(x)
+    for block in net.blocks:
+        hidden = hidden + gelu(hidden) @ block.weight.T + block.bias  # type: ignore[operator]
+    torch.testing.assert_close(net(x), net.last(gelu(hidden)))
 
 
 @pytest.mark.parametrize("kind", ["tanh", "clamp"])

@@ -122,7 +122,7 @@ def test_incomplete_or_foreign_packages_are_refused(folder: Path, tmp_path: Path
     write_tensors(weights, tensors, {**metadata, "schema": "x/1"})
     with pytest.raises(UserError, match="schema is 'x/1'"):
         Retargeter.load(folder)
-    write_tensors(weights, {k: v for k, v in tensors.items() if "post.0" not in k}, metadata)
+    write_tensors(weights, {k: v for k, v in tensors.items() if "post.first" not in k}, metadata)
     with pytest.raises(UserError, match="do not fit"):
         Retargeter.load(folder)
     weights.write_bytes(b"junk")
