@@ -123,20 +123,20 @@ class PairGenerator:
 
     @torch.no_grad()
     def _describe(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
-        """Human poses of latents, and how good they are; cost and distance are those of the latents."""
+        """Human poses of latents, and how good they are; the measures are those of the latents, before alignment."""
         matrices = self.prior.decode_matrices(z_BZ)
-        pose_BJ6 = rotation.matrix_to_sixd(matrices)
+        found_BJ6 = pose_BJ6 = rotation.matrix_to_sixd(matrices)
         if direction == "forward":
             points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
             if self.settings.align:
                 pose_BJ6 = rotation.matrix_to_sixd(align_pose(self.body_map, matrices, direction_BD3))
         else:  # the prior's humans bend their backs; only what the robot has is compared, on an upright human
-            points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(pose_BJ6))
+            points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(found_BJ6))
         distance_BK = (points_BK3 - target_BK3).norm(dim=-1)
         prior_B = z_BZ.square().sum(-1)
         return {
             "H": pose_BJ6,
-            "phi": self.prior.reconstruction_error(pose_BJ6),
+            "phi": self.prior.reconstruction_error(found_BJ6),
             "cost": self.problem.w_data * distance_BK.square().sum(1) + self.problem.w_prior * prior_B,
             "residual_m": distance_BK.mean(dim=1),
             "z_norm": prior_B.sqrt(),

@@ -25,8 +25,8 @@ from mrhubo.robot import BodyMap
 from mrhubo.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
 
 MEASURES = ("phi", "cost", "residual_m", "z_norm")
-"""One number a pair: reconstruction error of H; cost and mean keypoint distance [m] that the inverse kinematics ended
-with, before alignment; norm of its z."""
+"""One number a pair, of the pose that the inverse kinematics ended with, before alignment: reconstruction error, cost,
+mean keypoint distance [m], norm of z."""
 SCHEMA = "mrhubo.pairs/4"
 _NOT_IN_PAIRS = ("count", "reverse_share", "dir", "workers", "filter", "filter_k")
 """Keys of `pairs` that do not change what a shard holds."""
