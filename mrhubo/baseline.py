@@ -91,16 +91,12 @@ class Baseline:
 
     def predict(self, model: S3LE, settings: S3LEConfig, clips: Sequence[Clip]) -> list[Tensor]:
         """Joint angles (T, N) for each clip."""
-        body_map = self.prepared.body_map
-        return [
-            model.answer(
-                model.human_codes(body_map.human_directions(clip.motion.pose_TJ6)),
-                settings.neighbours,
-                settings.width,
-                self.data.collision,
-            )
-            for clip in clips
-        ]
+        return [self.answer(model, settings, clip.motion.pose_TJ6) for clip in clips]
+
+    def answer(self, model: S3LE, settings: S3LEConfig, pose_TJ6: Tensor) -> Tensor:
+        """Joint angles (T, N) of human poses (T, 21, 6)."""
+        codes = model.human_codes(self.prepared.body_map.human_directions(pose_TJ6))
+        return model.answer(codes, settings.neighbours, settings.width, self.data.collision)
 
     def validation_link_cm(self, model: S3LE, settings: S3LEConfig) -> float:
         """Mean link error on the validation clips."""
@@ -114,7 +110,7 @@ class Baseline:
 
 def run_baseline(config: BaselineConfig, quiet: bool = False, parent: str | None = None) -> str:
     """Trains S3LE, measures it on the test clips, tracks it, and returns the table."""
-    from mrhubo.evaluation import evaluate_clips, run_metrics, table
+    from mrhubo.evaluation import evaluate_clips, latencies, run_metrics, table
     from mrhubo.predictions import log_predictions
     from mrhubo.tracking import ending, log_all
 
@@ -125,8 +121,9 @@ def run_baseline(config: BaselineConfig, quiet: bool = False, parent: str | None
         model = baseline.train(config.s3le, quiet)
         predictions = baseline.predict(model, config.s3le, baseline.test)
         scores = evaluate_clips(predictions, baseline.test, baseline.prepared.body_map, config.robot.key_links)
-        metrics = {"val/best_link_cm": baseline.validation_link_cm(model, config.s3le), **run_metrics(scores)}
-        log_all(client, run, metrics)
+        latency = latencies(functools.partial(baseline.answer, model, config.s3le), baseline.test)
+        best_link_cm = baseline.validation_link_cm(model, config.s3le)
+        log_all(client, run, {"val/best_link_cm": best_link_cm, **run_metrics(scores, latency)})
         log_predictions(client, run, baseline.test, predictions)
         client.log_text(run, table(scores) + "\n", "test/clips.txt")
     return table(scores)

@@ -31,7 +31,7 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
         UserError: the config, the package or the motions cannot be used, or the package is of another robot.
     """
     from mrhubo import pipeline
-    from mrhubo.evaluation import evaluate_clips, latency_us, table
+    from mrhubo.evaluation import evaluate_clips, latencies, table
     from mrhubo.progress import Progress
     from mrhubo.retargeter import Retargeter
 
@@ -51,8 +51,7 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
             predictions.append(retargeter.predict(clip.motion.pose_TJ6, polish))
             progress.update(done, clip.name)
     found = evaluate_clips(predictions, clips, body_map, config.robot.key_links)
-    pose_TJ6 = clips[0].motion.pose_TJ6
-    one, many = (latency_us(lambda pose: retargeter.predict(pose, polish), pose_TJ6, batch) for batch in (1, 1_000))
+    one, many = latencies(lambda pose: retargeter.predict(pose, polish), clips).values()
     latency = f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once"
     return "\n".join([table(found), "", *_not_covered(body_map.collision), latency])
 

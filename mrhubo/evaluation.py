@@ -6,7 +6,7 @@ Legend: T frames, D directions, N joints.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import torch
@@ -85,10 +85,10 @@ def measures(evaluation: Evaluation) -> dict[str, float]:
     return {name: value for name, value in found.items() if value == value}
 
 
-def run_metrics(evaluations: Sequence[Evaluation]) -> dict[str, float]:
-    """What `evaluate_clips` gave for the test clips, under the names that a run has for it."""
+def run_metrics(evaluations: Sequence[Evaluation], latency: Mapping[str, float]) -> dict[str, float]:
+    """What `evaluate_clips` and `latencies` gave for the test clips, under the names that a run has for it."""
     *clips, over_clips, over_frames = evaluations
-    found = {f"test/{name}": value for name, value in measures(over_clips).items()}
+    found = {f"test/{name}": value for name, value in {**measures(over_clips), **latency}.items()}
     for name, score in [*((clip.name, clip) for clip in clips), ("over_frames", over_frames)]:
         found |= {f"test/{name}/joint_rad": score.joint_rad, f"test/{name}/link_cm": score.link_cm}
     return found
@@ -130,3 +130,12 @@ def latency_us(predict: Callable[[Tensor], Tensor], pose_TJ6: Tensor, batch: int
             predict(frames)
             found.append(time.perf_counter() - start)
     return 1e6 * sorted(found)[len(found) // 2] / batch
+
+
+def latencies(predict: Callable[[Tensor], Tensor], clips: Sequence[Clip], seconds: float = 0.5) -> dict[str, float]:
+    """`latency_us` of one frame alone and `latency_1000_us` a frame of 1,000 at once, frames of the clips: as
+    `latency_us`.
+    """
+    pose_TJ6 = torch.cat([clip.motion.pose_TJ6 for clip in clips])
+    batches = {"latency_us": 1, "latency_1000_us": 1_000}
+    return {name: latency_us(predict, pose_TJ6, batch, seconds) for name, batch in batches.items()}

@@ -46,7 +46,7 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
         KeyboardInterrupt: the user stopped it; the same call resumes.
     """
     from mrhubo import pipeline
-    from mrhubo.evaluation import measures, table
+    from mrhubo.evaluation import latencies, measures, table
     from mrhubo.ranks import Ranks
     from mrhubo.recording import Recording
     from mrhubo.retargeter import Retargeter
@@ -82,7 +82,7 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
             retargeter = Retargeter(
                 training.network, prepared.body_map, prepared.prior, prepared.config, training.filter.threshold
             )
-            recording.scores(scores, training.best_link_cm)
+            recording.scores(scores, training.best_link_cm, latencies(retargeter.predict, test))
             recording.key_poses(test, predictions)
             recording.animation(test, predictions)
             over_clips = scores[-2]

@@ -7,7 +7,7 @@ import functools
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -153,9 +153,9 @@ class Recording:
         self._picture(phi_histogram(pairs["phi"].numpy(), pair_filter.threshold), "pairs/phi_histogram.png")
         self._picture(self.artist.pairs(pairs, pair_filter, self.prepared.prior), "pairs/feasible_and_extreme.png")
 
-    def scores(self, scores: Sequence[Evaluation], best_link_cm: float) -> None:
-        """What `evaluate_clips` gave for the test clips: metrics and a table."""
-        self.logger.log_metrics({"val/best_link_cm": best_link_cm, **run_metrics(scores)})
+    def scores(self, scores: Sequence[Evaluation], best_link_cm: float, latency: Mapping[str, float]) -> None:
+        """What `evaluate_clips` and `latencies` gave for the test clips: metrics and a table."""
+        self.logger.log_metrics({"val/best_link_cm": best_link_cm, **run_metrics(scores, latency)})
         rows = [dataclasses.asdict(score) for score in scores]
         self.client.log_table(self.run_id, {key: [row[key] for row in rows] for key in rows[0]}, "test/clips.json")
         self.client.log_text(self.run_id, table(scores) + "\n", "test/clips.txt")

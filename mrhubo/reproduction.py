@@ -56,6 +56,8 @@ _MORE = {
     "at_limit": ("at a limit [%]", 100, 1),
     "collision": ("collision [%]", 100, 1),
     "reference_collision": ("reference's", 100, 1),
+    "latency_us": ("one frame [us]", 1, 0),
+    "latency_1000_us": ("a frame of 1,000 [us]", 1, 0),
 }
 
 Results = Mapping[tuple[str, str], Sequence[Mapping[str, float]]]

@@ -99,6 +99,7 @@ def test_the_command_trains_once_and_finds_what_is_done(
     for run in children:
         (answer,) = read_predictions(client, run.info.run_id).values()  # one of the two clips is for validation
         assert answer.shape[1] == 8 and bool(answer.isfinite().all())
+        assert 0 < run.data.metrics["test/latency_1000_us"] < run.data.metrics["test/latency_us"]
     link = np.array([run.data.metrics["test/link_cm"] for run in children])
     assert all(f"{value:.2f} (" in first or f" {value:.2f} " in first for value in link)
     monkeypatch.setattr("mrhubo.fit.fit", lambda *a, **k: pytest.fail("trained again"))
