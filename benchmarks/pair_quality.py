@@ -45,6 +45,7 @@ def rows() -> list[tuple[str, list[str]]]:
                 table.append((f"{solver}, {count:,}, {name}", settings))
     base = "fine, 50,000, linear, k 1"
     table += [(f"{base}, w_prior {w}", [f"pairs.w_prior={w}", "pairs.reverse_share=0"]) for w in WEIGHTS]
+    table.append((f"{base}, not aligned", ["pairs.align=false", "pairs.reverse_share=0"]))
     return table + [
         (f"{base}, {share:.0%} of them reverse", [f"pairs.reverse_share={share}"]) for share in REVERSE_SHARES
     ]

@@ -113,7 +113,7 @@ class PairsConfig:
     solver: str = choice("fine", "fine", "fast", "paper")
     """Latent inverse kinematics: `fine` = amortised start, then a quasi-Newton search of every pose; `fast` = amortised
     only; `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
-    reverse_share: float = bounded(0.5, 0.0, 1.0)
+    reverse_share: float = bounded(0.25, 0.0, 1.0)
     """Share of the pairs that are made the other way: a human pose drawn from the prior, retargeted to the robot by
     optimisation. They teach what to do with poses that the robot cannot reach. 0 = robot poses only (the paper)."""
     reverse_spread: float = bounded(1.1, 0.1, 3.0)
@@ -146,9 +146,9 @@ class ModelConfig:
 
     stages: int = bounded(2, 1, 2)
     """2 = human -> links -> joints (the paper), 1 = human -> joints directly."""
-    hidden: int = bounded(512, 1, 65_536)
+    hidden: int = bounded(256, 1, 65_536)
     """Width of the hidden layers."""
-    layers: int = bounded(2, 1, 64)
+    layers: int = bounded(4, 1, 64)
     """Hidden layers of each network (the paper's text: 1, its authors' code: 2)."""
     residual: bool = True
     """Add what comes in to what a hidden layer gives, from the second on; deep networks train far better so. False = a
@@ -170,11 +170,11 @@ class TrainerConfig:
 
     max_steps: int = bounded(6_000, 1, 1_000_000_000)
     """Optimiser steps."""
-    batch_size: int = bounded(256, 1, 10_000_000)
+    batch_size: int = bounded(512, 1, 10_000_000)
     """Pairs per step."""
     loss: str = choice("l1", "l1", "mse")
     """Distance of links and joint angles from the pair's: `l1` = mean absolute, `mse` = mean square (the paper)."""
-    lr: float = bounded(3e-3, 1e-9, 10.0)
+    lr: float = bounded(5e-3, 1e-9, 10.0)
     """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps."""
     weight_decay: float = bounded(1e-6, 0.0, 10.0)
     """Weight decay of AdamW."""
