@@ -10,6 +10,7 @@ better: the last table of each robot tells how many pairs it makes and writes.
 from __future__ import annotations
 
 import copy
+import functools
 import resource
 import sys
 import tempfile
@@ -27,6 +28,7 @@ from mrhubo.config import load_config
 from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
 from mrhubo.pipeline import PairSetup, prepare_pairs
 from mrhubo.reference import ReferenceRetargeter
+from mrhubo.robot import align_pose
 from mrhubo.storage import read_tensors, write_tensors
 from mrhubo.threads import available_cores, use_threads
 
@@ -125,14 +127,14 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
     amortiser = maker.amortiser
     q = robot.sample(count, torch.Generator().manual_seed(0))
     poses = robot.forward(q)
-    target = setup.body_map.targets(poses)
+    target, directions = setup.body_map.targets(poses), setup.body_map.robot_directions(poses)
     z, pose = amortiser(target), prior.decode(amortiser(target))
     matrices = prior.decode_matrices(z)
     shard = maker.shard("forward", 0)
 
-    def chunks(work: Callable[[Tensor], Tensor], values: Tensor) -> None:
-        for part in values.split(512):
-            work(part)
+    def chunks(work: Callable[..., Tensor], *values: Tensor) -> None:
+        for part in zip(*(value.split(512) for value in values), strict=True):
+            work(*part)
 
     with tempfile.TemporaryDirectory(dir=setup.store.folder.parent) as folder, use_threads(1), torch.no_grad():
         config = setup.config
@@ -145,6 +147,7 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
             "amortised solver": (lambda: chunks(amortiser, target), macs(amortiser.layers)),
             "decode": (lambda: chunks(prior.decode, z), macs(prior.decoder)),
             "keypoints, cost": (lambda: chunks(setup.body_map.skeleton.keypoints, matrices), 0),
+            "alignment": (lambda: chunks(functools.partial(align_pose, setup.body_map), matrices, directions), 0),
             "phi: encode and decode": (
                 lambda: chunks(prior.reconstruction_error, pose),
                 macs(prior.encoder) + macs(prior.decoder),
