@@ -18,7 +18,7 @@ DESCRIPTION = (
 )
 FLAGS = {
     "retargeter FOLDER": "the package that a fit ended with",
-    "polish NUMBER": "steps of optimisation after the networks (default: 0)",
+    "polish NUMBER": "steps of optimisation after the networks (default: 0, the networks alone; `retarget` makes 1)",
     "validation": "the validation clips, for choosing between retargeters; else the test clips",
     "quiet": "no progress line",
 }

@@ -1,9 +1,8 @@
 """The trained retargeter as a folder that carries all it needs: weights, URDF, settings, joint names, limits, units.
 
     retargeter = Retargeter.load("package")
-    q_TN = retargeter.predict(pose_TJ6)             # the two networks alone
-    q_TN = retargeter.predict(pose_TJ6, polish=1)   # and a step of optimisation
-    result = retargeter.retarget(pose_TJ6)          # with a confidence for each frame
+    q_TN = retargeter.predict(pose_TJ6)             # the two networks alone, microseconds a frame
+    result = retargeter.retarget(pose_TJ6)          # and a step of optimisation, with a confidence for each frame
 
 Legend: T frames, J = 21 human joints, N robot joints, D directions.
 """
@@ -119,8 +118,10 @@ class Retargeter:
         return self.directions.minimise(q_TN, target_TD3, steps=polish)[0]
 
     @torch.no_grad()
-    def retarget(self, pose_TJ6: Tensor, polish: int = 0) -> RetargetResult:
-        """Joint angles with a confidence for each frame; arguments as for `predict`."""
+    def retarget(self, pose_TJ6: Tensor, polish: int = 1) -> RetargetResult:
+        """Joint angles, by default after a step of optimisation, with a confidence for each frame; arguments as for
+        `predict`.
+        """
         q_TN = self.predict(pose_TJ6, polish)
         pose_TJ6 = pose_TJ6.float()
         error_TD = direction_error(self.body_map, q_TN, pose_TJ6)
