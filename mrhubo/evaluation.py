@@ -15,9 +15,8 @@ from torch import Tensor
 from mrhubo.callbacks import Clip, ClipScore, mean_score, score_clip
 from mrhubo.reference import angle_between, at_limit_share, direction_jerk
 from mrhubo.robot import BodyMap
+from mrhubo.robot.parts import ENDS
 from mrhubo.threads import use_threads
-
-_ENDS = ("left_hand", "right_hand", "head")
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
     robot_TD3, reference_TD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_TN, clip.reference_TN))
     error_TD, reference_TD = (torch.rad2deg(angle_between(d, human_TD3)) for d in (robot_TD3, reference_TD3))
     names = body_map.direction_names
-    part = {name: next((end for end in _ENDS if name.startswith(f"{end}_")), "limb") for name in names}
+    part = {name: next((end for end in ENDS if name.startswith(f"{end}_")), "limb") for name in names}
 
     def mean(angles_TD: Tensor, *parts: str) -> float:
         columns = [i for i, name in enumerate(names) if part[name] in parts]

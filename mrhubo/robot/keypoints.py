@@ -67,7 +67,7 @@ class BodyMap:
         self._axes = [i for i, d in enumerate(self.directions) if d.axis_3 is not None]
         limbs, axes = [self.directions[i] for i in self._starts], [self.directions[i] for i in self._axes]
         self.limb_links = ([index(d.start.link) for d in limbs if d.start], [index(d.end.link) for d in limbs if d.end])
-        self.limb_offsets_2E3 = torch.tensor(
+        self._limb_offsets_2E3 = torch.tensor(
             [[d.start.offset_3 for d in limbs if d.start], [d.end.offset_3 for d in limbs if d.end]]
         ).reshape(2, len(limbs), 3)
         self.axis_links = [index(d.link) for d in axes]
@@ -90,7 +90,7 @@ class BodyMap:
         self.skeleton.to(device)
         if self.manual is not None:
             self.manual.to(device)
-        for name in ("limb_offsets_2E3", "_axes_A3", "_order", "_chest_33", "_chained_K3", "_rest_K3"):
+        for name in ("_limb_offsets_2E3", "_axes_A3", "_order", "_chest_33", "_chained_K3", "_rest_K3"):
             setattr(self, name, getattr(self, name).to(device))
         return self
 
@@ -137,7 +137,7 @@ class BodyMap:
 
     def limb_vectors(self, poses: LinkPoses, which: int, links: list[int]) -> Tensor:
         """Start (which=0) or end (which=1) points (B, E, 3) of the limbs, base frame [m]."""
-        offset = (poses.rotation_BL33[:, links] @ self.limb_offsets_2E3[which, :, :, None])[..., 0]
+        offset = (poses.rotation_BL33[:, links] @ self._limb_offsets_2E3[which, :, :, None])[..., 0]
         return poses.position_BL3[:, links] + offset
 
     def chest_axes(self, poses: LinkPoses) -> Tensor:
