@@ -76,8 +76,8 @@ def test_pairs_are_made_summed_up_and_found_again(
     main(arguments(root, tmp_path))
     first = capsys.readouterr().out
     assert (
-        "450 pairs from robot poses" in first
-        and "450 pairs from human poses" in first
+        "675 pairs from robot poses" in first
+        and "225 pairs from human poses" in first
         and "the filter keeps" in first
         and "made 900 pairs" in first
     )
