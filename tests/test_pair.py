@@ -25,7 +25,9 @@ from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
 from mrhubo.storage import remove_leftovers, write_tensors
 
-SMALL = ["pairs.count=900", "pairs.shard_size=150", "pairs.amortiser_steps=60", "pairs.fine_steps=4"]
+SMALL = [
+    "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=60", "pairs.fine_steps=4",
+]  # fmt: skip
 
 
 def arguments(root: Path, folder: Path, *more: str) -> list[str]:
@@ -76,8 +78,8 @@ def test_pairs_are_made_summed_up_and_found_again(
     main(arguments(root, tmp_path))
     first = capsys.readouterr().out
     assert (
-        "675 pairs from robot poses" in first
-        and "225 pairs from human poses" in first
+        "450 pairs from robot poses" in first
+        and "450 pairs from human poses" in first
         and "the filter keeps" in first
         and "made 900 pairs" in first
     )
