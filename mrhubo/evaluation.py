@@ -131,7 +131,7 @@ def latency_us(predict: Callable[[Tensor], Tensor], pose_TJ6: Tensor, batch: int
     return 1e6 * sorted(found)[len(found) // 2] / batch
 
 
-def latencies(predict: Callable[[Tensor], Tensor], clips: Sequence[Clip], seconds: float = 0.2) -> dict[str, float]:
+def latencies(predict: Callable[[Tensor], Tensor], clips: Sequence[Clip], seconds: float = 0.1) -> dict[str, float]:
     """`latency_us` of one frame alone and `latency_1000_us` a frame of 1,000 at once, frames of the clips: as
     `latency_us`.
     """

@@ -34,6 +34,7 @@ from mrhubo.storage import checksum_file
 
 SMALL = [
     "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=40", "pairs.fine_steps=3", "model.hidden=64",
+    "model.layers=2",
     "trainer.max_steps=120", "trainer.batch_size=128", "trainer.validate_every=30", "trainer.accelerator=cpu",
 ]  # fmt: skip
 
