@@ -146,13 +146,16 @@ class ModelConfig:
 
     stages: int = bounded(2, 1, 2)
     """2 = human -> links -> joints (the paper), 1 = human -> joints directly."""
-    hidden: int = bounded(256, 1, 65_536)
-    """Width of the hidden layers."""
+    hidden: int = bounded(160, 1, 65_536)
+    """Width of the hidden layers, of each branch."""
     layers: int = bounded(4, 1, 64)
     """Hidden layers of each network (the paper's text: 1, its authors' code: 2)."""
     residual: bool = True
     """Add what comes in to what a hidden layer gives, from the second on; deep networks train far better so. False = a
     plain network (the paper)."""
+    branches: bool = True
+    """Give each part of the robot that turns apart from the others (an arm, the head) networks of its own, which see
+    the human joints of that part alone. False = one network for the whole robot (the paper)."""
     input_joints: list[str] | None = None
     """Human joints that are read; default: those between the chest and the keypoints that the robot has."""
     input_frame: str = choice("chest", "chest", "local")
@@ -174,7 +177,7 @@ class TrainerConfig:
     """Pairs per step."""
     loss: str = choice("l1", "l1", "mse")
     """Distance of links and joint angles from the pair's: `l1` = mean absolute, `mse` = mean square (the paper)."""
-    lr: float = bounded(5e-3, 1e-9, 10.0)
+    lr: float = bounded(8e-3, 1e-9, 10.0)
     """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps."""
     weight_decay: float = bounded(1e-6, 0.0, 10.0)
     """Weight decay of AdamW."""

@@ -58,6 +58,9 @@ class DirectionJacobian:
         shape_DN = (len(body_map.directions), len(robot.joint_names))
         self.moved_DN = torch.tensor([[(d, n) in places for n in range(shape_DN[1])] for d in range(shape_DN[0])])
         """Which joints of q are above which direction (D, N)."""
+        self.blocks = _blocks(self.moved_DN)
+        """Directions and joints of each part of the robot that turns apart from the others (an arm, the head): the
+        connected components of "joint is above direction"."""
         self._direction_P = torch.tensor([d for d, _ in pairs], device=device)
         self._joint_P = torch.tensor([a for _, a in pairs], device=device)
         self._end_P1, self._start_P1, self._bend_P1, self._slide_P1 = torch.tensor(factors, device=device).T[..., None]
@@ -100,3 +103,14 @@ class DirectionJacobian:
         jacobian_BX = sum((entries_BX.index_select(1, x) for x in self._layers_KX[1:]),
                           start=entries_BX.index_select(1, self._layers_KX[0]))  # fmt: skip
         return jacobian_BX.unflatten(1, (directions_BD3.shape[1], 3, -1))
+
+
+def _blocks(moved_DN: Tensor) -> list[tuple[set[int], set[int]]]:
+    blocks: list[tuple[set[int], set[int]]] = []
+    for direction, row in enumerate(moved_DN.tolist()):
+        directions, joints = {direction}, {n for n, moved in enumerate(row) if moved}
+        for block in [b for b in blocks if b[1] & joints]:
+            directions, joints = directions | block[0], joints | block[1]
+            blocks.remove(block)
+        blocks.append((directions, joints))
+    return sorted(blocks, key=lambda block: min(block[0]))

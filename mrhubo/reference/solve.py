@@ -56,7 +56,7 @@ class DirectionProblem:
         self.ridge_N = regularisation / self.half_N.square()
         weights = [hand_weight if "hand" in name else 1.0 for name in body_map.direction_names]
         self.weight_D = torch.tensor(weights, device=self.device)
-        blocks = _blocks(self.kinematics.moved_DN)
+        blocks = self.kinematics.blocks
         self.block_N = torch.tensor([next(c for c, (_, joints) in enumerate(blocks) if n in joints)
                                      for n in range(len(self.lower_N))], device=self.device)  # fmt: skip
         self.joints_NC = torch.stack([self.block_N == c for c in range(len(blocks))], dim=1).float()
@@ -129,15 +129,3 @@ class DirectionProblem:
         system_BNN.diagonal(dim1=-2, dim2=-1).add_(extra_BN)
         factor_BNN = torch.linalg.cholesky_ex(system_BNN).L
         return -torch.cholesky_solve((model.gradient_BN * free_BN)[..., None], factor_BNN)[..., 0]
-
-
-def _blocks(moved_DN: Tensor) -> list[tuple[set[int], set[int]]]:
-    """Directions and joints of each block: the connected components of "joint is above direction"."""
-    blocks: list[tuple[set[int], set[int]]] = []
-    for direction, row in enumerate(moved_DN.tolist()):
-        directions, joints = {direction}, {n for n, moved in enumerate(row) if moved}
-        for block in [b for b in blocks if b[1] & joints]:
-            directions, joints = directions | block[0], joints | block[1]
-            blocks.remove(block)
-        blocks.append((directions, joints))
-    return sorted(blocks, key=lambda block: min(block[0]))

@@ -2,10 +2,11 @@
 
 from mrhubo.retargeter.module import LOG_EVERY, RetargetModule
 from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
-from mrhubo.retargeter.package import Retargeter, RetargetResult, build_network
+from mrhubo.retargeter.package import POLISH, Retargeter, RetargetResult, build_network
 
 __all__ = [
     "LOG_EVERY",
+    "POLISH",
     "PoseFeatures",
     "RetargetModule",
     "RetargetNetwork",

@@ -5,7 +5,8 @@ Legend: B batch, J input joints, F = 6 J input features, M robot links, N robot 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
@@ -81,6 +82,42 @@ class ResidualMLP(nn.Module):
         return self.last(gelu(x))
 
 
+@dataclass(frozen=True)
+class Branch:
+    """A part of the robot that turns apart from the others, such as an arm."""
+
+    inputs: tuple[int, ...]
+    """Positions of its human joints among the input joints."""
+    joints: tuple[int, ...]
+    """Its robot joints, as columns of q."""
+
+
+class Branched(nn.Module):
+    """A network for each branch, which sees and gives the columns of that branch alone."""
+
+    def __init__(
+        self,
+        columns_in: Sequence[Sequence[int]],
+        columns_out: Sequence[Sequence[int]],
+        make: Callable[[int, int], nn.Module],
+    ) -> None:
+        super().__init__()
+        self.parts = nn.ModuleList([make(len(a), len(b)) for a, b in zip(columns_in, columns_out, strict=True)])
+        self._names = [f"_columns_{i}" for i in range(len(self.parts))]
+        for name, columns in zip(self._names, columns_in, strict=True):
+            self.register_buffer(name, torch.tensor(columns), persistent=False)
+        order = torch.tensor([column for columns in columns_out for column in columns]).argsort()
+        self.register_buffer("_order", order, persistent=False)
+
+    def forward(self, x_BI: Tensor) -> Tensor:
+        """Outputs (B, O) of inputs (B, I); O: the columns out of all branches together."""
+        found = [
+            part(x_BI.index_select(1, self.get_buffer(name)))
+            for part, name in zip(self.parts, self._names, strict=True)
+        ]
+        return torch.cat(found, dim=1).index_select(1, self.get_buffer("_order"))
+
+
 class LimitedOutput(nn.Module):
     """Keeps joint angles inside the limits, whatever comes in.
 
@@ -121,13 +158,33 @@ class RetargetNetwork(nn.Module):
         layers: int = 2,
         bound_output: str = "tanh",
         residual: bool = True,
+        branches: Sequence[Branch] = (),
     ) -> None:
+        """Untrained networks.
+
+        Args:
+            features: what they see of a human pose.
+            lower_N: lower joint limits [rad].
+            upper_N: upper joint limits [rad].
+            stages: 2 = human -> links -> joints, 1 = human -> joints.
+            hidden: width of the hidden layers (of each branch).
+            layers: hidden layers.
+            bound_output: `LimitedOutput`'s kind.
+            residual: `ResidualMLP` in place of `mlp`.
+            branches: a network for each of them, which together have every joint; none: one for the whole robot.
+        """
         super().__init__()
         self.features, self.stages, joints = features, stages, len(lower_N)
-        links = 6 * joints
         net = ResidualMLP if residual else mlp
-        self.pre = net(features.size, hidden, layers, links) if stages == 2 else None
-        self.post = net(links if stages == 2 else features.size, hidden, layers, joints)
+        branches = branches or [Branch(tuple(range(features.size // 6)), tuple(range(joints)))]
+
+        def branched(columns_in: list[list[int]], columns_out: list[list[int]]) -> nn.Module:
+            return Branched(columns_in, columns_out, lambda a, b: net(a, hidden, layers, b))
+
+        inputs, links = ([_sixfold(b.inputs) for b in branches], [_sixfold(b.joints) for b in branches])
+        angles = [list(b.joints) for b in branches]
+        self.pre = branched(inputs, links) if stages == 2 else None
+        self.post = branched(links if stages == 2 else inputs, angles)
         self.limited = LimitedOutput(lower_N, upper_N, bound_output)
 
     def links(self, features_BF: Tensor) -> Tensor:
@@ -140,3 +197,8 @@ class RetargetNetwork(nn.Module):
         """Joint angles (B, N) [rad], inside the limits, of human poses (B, 21, 6)."""
         features = self.features(pose_BJ6)
         return self.limited(self.post(self.links(features) if self.pre is not None else features))
+
+
+def _sixfold(columns: Sequence[int]) -> list[int]:
+    """The columns of the 6D numbers of these rotations."""
+    return [6 * column + i for column in columns for i in range(6)]

@@ -13,6 +13,7 @@ import copy
 import functools
 import json
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,15 +25,17 @@ from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
-from mrhubo.reference import DirectionProblem, direction_error
-from mrhubo.retargeter.networks import PoseFeatures, RetargetNetwork
+from mrhubo.reference import DirectionJacobian, DirectionProblem, direction_error
+from mrhubo.retargeter.networks import Branch, PoseFeatures, RetargetNetwork
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
 
-SCHEMA = "mrhubo.retargeter/2"
+SCHEMA = "mrhubo.retargeter/3"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
 _AGREEMENT_DEG = 20.0
+POLISH = 1
+"""Steps of optimisation that `retarget` makes after the networks, unless told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,11 @@ class RetargetResult:
 
 
 def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
-    """An untrained network for a config's robot and `model` section."""
+    """An untrained network for a config's robot and `model` section.
+
+    Raises:
+        UserError: an input joint does not exist, or a branch would see none.
+    """
     model = config.model
     features = PoseFeatures(model.input_joints or body_map.input_joints(), model.input_frame)
     robot = body_map.robot
@@ -65,7 +72,26 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
         model.layers,
         model.bound_output,
         model.residual,
+        _branches(body_map, features.input_joints) if model.branches else (),
     )
+
+
+def _branches(body_map: BodyMap, inputs: Sequence[str]) -> list[Branch]:
+    """Of each branch its joints and its human joints; a human joint that belongs to no branch is seen by all."""
+    blocks = [block for block in DirectionJacobian(body_map).blocks if block[1]]
+    own = [body_map.input_joints(directions) for directions, _ in blocks]
+    shared = set(inputs).difference(*own)
+    found = []
+    for names, (_, joints) in zip(own, blocks, strict=True):
+        seen = tuple(i for i, name in enumerate(inputs) if name in names or name in shared)
+        if not seen:
+            moved = ", ".join(body_map.robot.joint_names[n] for n in sorted(joints))
+            raise UserError(
+                f"model.input_joints: nothing tells the angles of {moved}; add one of {', '.join(names)}, or set"
+                " model.branches to false"
+            )
+        found.append(Branch(seen, tuple(sorted(joints))))
+    return found
 
 
 class Retargeter:
@@ -118,7 +144,7 @@ class Retargeter:
         return self.directions.minimise(q_TN, target_TD3, steps=polish)[0]
 
     @torch.no_grad()
-    def retarget(self, pose_TJ6: Tensor, polish: int = 1) -> RetargetResult:
+    def retarget(self, pose_TJ6: Tensor, polish: int = POLISH) -> RetargetResult:
         """Joint angles, by default after a step of optimisation, with a confidence for each frame; arguments as for
         `predict`.
         """

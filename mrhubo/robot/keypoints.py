@@ -13,7 +13,7 @@ Legend: B batch, D directions, K keypoints, L robot links, N robot joints.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import torch
@@ -219,10 +219,12 @@ class BodyMap:
         """`human_keypoints` (B, K, 3) [m] of robot poses."""
         return self.human_keypoints(self.robot_directions(poses))
 
-    def input_joints(self) -> tuple[str, ...]:
-        """Human joints between the chest and the parts that the robot has: what a pose needs to tell the network."""
+    def input_joints(self, directions: Iterable[int] | None = None) -> tuple[str, ...]:
+        """Human joints between the chest and the parts that the robot has, or those of some directions alone: what a
+        pose needs to tell the network.
+        """
         wanted: list[str] = []
-        for d in self.directions:
+        for d in self.directions if directions is None else [self.directions[i] for i in directions]:
             part = d.name.rsplit("_", 1)[0] if d.axis_3 is not None else limb_of(d.name)[0]
             side = part.split("_")[0]
             if part == "head":

@@ -12,7 +12,7 @@ from mrhubo.body import Skeleton
 from mrhubo.config import TrainerConfig
 from mrhubo.errors import UserError
 from mrhubo.retargeter import PoseFeatures, RetargetModule, RetargetNetwork
-from mrhubo.retargeter.networks import ResidualMLP, mlp
+from mrhubo.retargeter.networks import Branch, Branched, ResidualMLP, mlp
 
 LOWER, UPPER = torch.tensor([-2.08567, 0.0349066, -3.0]), torch.tensor([2.08567, 1.54462, -2.9])
 ARM = ("left_shoulder", "left_elbow", "left_wrist")
@@ -55,6 +55,25 @@ def test_a_residual_network_adds_its_layers() -> None:
     for block in net.blocks:
         hidden = hidden + gelu(hidden) @ block.weight.T + block.bias  # type: ignore[operator]
     torch.testing.assert_close(net(x), net.last(gelu(hidden)))
+
+
+@pytest.mark.parametrize("stages", [1, 2])
+def test_a_branch_sees_its_own_human_joints_alone(stages: int) -> None:
+    branches = [Branch((1, 2), (2, 0)), Branch((0,), (1,))]
+    net = network(stages=stages, branches=branches, bound_output="clamp")
+    features = torch.randn(1, net.features.size, requires_grad=True)
+    angles = net.post(net.links(features) if stages == 2 else features)
+    for branch in branches:
+        for joint in branch.joints:
+            (slope,) = torch.autograd.grad(angles[0, joint], features, retain_graph=True)
+            assert [bool(part.abs().sum() > 0) for part in slope.view(3, 6)] == [i in branch.inputs for i in range(3)]
+
+
+def test_branches_lie_where_their_columns_say() -> None:
+    branched = Branched([[2], [0, 1]], [[1], [2, 0]], lambda a, b: mlp(a, 4, 1, b))
+    x = torch.randn(5, 3)
+    first, second = (part(columns) for part, columns in zip(branched.parts, (x[:, [2]], x[:, [0, 1]]), strict=True))
+    torch.testing.assert_close(branched(x), torch.stack((second[:, 1], first[:, 0], second[:, 0]), dim=1))
 
 
 @pytest.mark.parametrize("kind", ["tanh", "clamp"])

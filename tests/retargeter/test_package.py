@@ -10,6 +10,7 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior, save_skeleton
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter, build_network
@@ -42,6 +43,33 @@ def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: 
     pose = human(20)
     torch.testing.assert_close(opened.predict(pose), made.predict(pose))
     torch.testing.assert_close(opened.retarget(pose).confidence_T, made.retarget(pose).confidence_T)
+
+
+def test_arms_and_head_have_networks_of_their_own(made: Retargeter) -> None:
+    """The human's right arm and head move nothing of the robot's left arm; each moves its own."""
+    joints, pose = made.joint_names, human(30)
+    turned = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(30, 21, 3)))
+    for parts, own in (
+        ("r", ["right_collar", "right_shoulder", "right_elbow", "right_wrist"]),
+        ("n", ["neck", "head"]),
+    ):
+        other = pose.clone()
+        columns = [POSED_JOINT_NAMES.index(name) for name in own]
+        other[:, columns] = turned[:, columns]
+        moved = (made.predict(other) - made.predict(pose)).abs().amax(dim=0) > 1e-6
+        assert moved.tolist() == [name[0] == parts for name in joints]
+
+
+def test_a_branch_without_input_is_refused(root: Path) -> None:
+    left = ["model.input_joints=[left_shoulder, left_elbow]"]
+    config = load_config(root / "conf" / "nao.yaml", left)
+    body_map = build_body_map(config.robot)
+    with pytest.raises(UserError, match=r"RShoulderPitch.*right_shoulder.*model\.branches"):
+        build_network(config, body_map)
+    whole = load_config(root / "conf" / "nao.yaml", [*left, "model.branches=false"])
+    assert build_network(whole, body_map).features.size == 12
+    shared = load_config(root / "conf" / "nao.yaml", ["model.input_joints=[spine3, left_elbow]"])
+    assert build_network(shared, body_map).features.size == 12  # what belongs to no branch is seen by all
 
 
 def test_a_package_keeps_vposer_and_another_skeleton(root: Path, tmp_path: Path) -> None:
@@ -122,7 +150,7 @@ def test_incomplete_or_foreign_packages_are_refused(folder: Path, tmp_path: Path
     write_tensors(weights, tensors, {**metadata, "schema": "x/1"})
     with pytest.raises(UserError, match="schema is 'x/1'"):
         Retargeter.load(folder)
-    write_tensors(weights, {k: v for k, v in tensors.items() if "post.first" not in k}, metadata)
+    write_tensors(weights, {k: v for k, v in tensors.items() if not k.endswith("first.weight")}, metadata)
     with pytest.raises(UserError, match="do not fit"):
         Retargeter.load(folder)
     weights.write_bytes(b"junk")
