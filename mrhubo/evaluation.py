@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
@@ -86,15 +86,28 @@ def measures(evaluation: Evaluation) -> dict[str, float]:
 
 def run_metrics(evaluations: Sequence[Evaluation], latency: Mapping[str, float]) -> dict[str, float]:
     """What `evaluate_clips` and `latencies` gave for the test clips, under the names that a run has for it."""
-    *clips, over_clips, over_frames = evaluations
-    found = {f"test/{name}": value for name, value in {**measures(over_clips), **latency}.items()}
+    *clips, _, over_frames = evaluations
+    found = mean_metrics(evaluations, latency, "test")
     for name, score in [*((clip.name, clip) for clip in clips), ("over_frames", over_frames)]:
         found |= {f"test/{name}/joint_rad": score.joint_rad, f"test/{name}/link_cm": score.link_cm}
     return found
 
 
-def table(evaluations: Sequence[Evaluation]) -> str:
-    """What `evaluate_clips` gave, a row each; parts that the robot does not have are left out."""
+def mean_metrics(evaluations: Sequence[Evaluation], latency: Mapping[str, float], prefix: str) -> dict[str, float]:
+    """The means over clips, and the latency, alone."""
+    return {f"{prefix}/{name}": value for name, value in {**measures(evaluations[-2]), **latency}.items()}
+
+
+def table(evaluations: Sequence[Evaluation], retarget: Sequence[Evaluation] = ()) -> str:
+    """What `evaluate_clips` gave, a row each; parts that the robot does not have are left out.
+
+    Args:
+        evaluations: of the networks alone.
+        retarget: of `Retargeter.retarget`, which makes a step of optimisation after them; the means are shown.
+    """
+    means = len(evaluations) - 2
+    more = [replace(e, name=f"{e.name}, retarget") for e in retarget[-2:]]
+    evaluations = [*evaluations, *more]
     heads = {
         "frames": ("frames", "{:,}"),
         "joint_rad": ("joint [rad]", "{:.3f}"),
@@ -113,7 +126,7 @@ def table(evaluations: Sequence[Evaluation]) -> str:
     rows += [[e.name, *(form.format(getattr(e, name)) for name, (_, form) in shown.items())] for e in evaluations]
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows]
-    lines.insert(len(lines) - 2, "-" * len(lines[0]))
+    lines.insert(1 + means, "-" * len(lines[0]))
     return "\n".join(lines)
 
 

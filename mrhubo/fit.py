@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,7 +50,7 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
     from mrhubo.evaluation import latencies, measures, table
     from mrhubo.ranks import Ranks
     from mrhubo.recording import Recording
-    from mrhubo.retargeter import Retargeter
+    from mrhubo.retargeter import POLISH, Retargeter
     from mrhubo.workspace import Workspace
 
     prepared = pipeline.prepare(config, search=True)
@@ -78,18 +79,26 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
             )
             recording.resume_after_training()
             recording.pairs(training.pairs, training.filter, report)
-            predictions, scores = pipeline.score_test(prepared, training.network, test)
             retargeter = Retargeter(
                 training.network, prepared.body_map, prepared.prior, prepared.config, training.filter.threshold
             )
-            recording.scores(scores, training.best_link_cm, latencies(retargeter.predict, test))
+            polished = functools.partial(retargeter.predict, polish=POLISH)
+            predictions, scores = pipeline.score_test(prepared, retargeter.predict, test)
+            _, retarget = pipeline.score_test(prepared, polished, test)
+            recording.scores(
+                scores,
+                latencies(retargeter.predict, test),
+                retarget,
+                latencies(polished, test),
+                training.best_link_cm,
+            )
             recording.key_poses(test, predictions)
             recording.animation(test, predictions)
             over_clips = scores[-2]
             package = recording.package(retargeter, over_clips, training.best_checkpoint)
             model = recording.register(retargeter, over_clips, test[0])
             workspace.finish()
-        return FitResult(package, model, recording.run_id, table(scores), measures(over_clips))
+        return FitResult(package, model, recording.run_id, table(scores, retarget), measures(over_clips))
 
 
 def _search_scale(prepared: Prepared, recording: Recording, quiet: bool) -> ScaleFactorSearch:

@@ -5,7 +5,7 @@ Everything a user can get wrong is checked by `prepare`, before any work.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from mrhubo.callbacks import (
     ClipMetrics,
     Motions,
     load_motions,
-    predict_clips,
     solve_references,
 )
 from mrhubo.config import Config, fingerprint, to_plain
@@ -262,8 +261,8 @@ def _trainer(
 
 
 def score_test(
-    prepared: Prepared, network: RetargetNetwork, clips: list[Clip]
+    prepared: Prepared, predict: Callable[[Tensor], Tensor], clips: list[Clip]
 ) -> tuple[list[Tensor], list[Evaluation]]:
-    """Predictions (T, N) and measures on the test clips, their means over clips and over frames last."""
-    predictions = predict_clips(network, clips)
+    """Answers (T, N) of `predict` and their measures on the test clips, means over clips and over frames last."""
+    predictions = [predict(clip.motion.pose_TJ6) for clip in clips]
     return predictions, evaluate_clips(predictions, clips, prepared.body_map, prepared.config.robot.key_links)

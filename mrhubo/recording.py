@@ -19,7 +19,7 @@ from mrhubo.callbacks import Clip
 from mrhubo.callbacks.pictures import GIF_RATE, Artist, liveliness
 from mrhubo.config import Config, changed_settings, to_plain, to_yaml
 from mrhubo.datasets import datasets
-from mrhubo.evaluation import Evaluation, run_metrics, table
+from mrhubo.evaluation import Evaluation, mean_metrics, run_metrics, table
 from mrhubo.locations import default_tracking, project_root
 from mrhubo.pairing import PairFilter, PairingReport
 from mrhubo.predictions import log_predictions
@@ -153,12 +153,22 @@ class Recording:
         self._picture(phi_histogram(pairs["phi"].numpy(), pair_filter.threshold), "pairs/phi_histogram.png")
         self._picture(self.artist.pairs(pairs, pair_filter, self.prepared.prior), "pairs/feasible_and_extreme.png")
 
-    def scores(self, scores: Sequence[Evaluation], best_link_cm: float, latency: Mapping[str, float]) -> None:
-        """What `evaluate_clips` and `latencies` gave for the test clips: metrics and a table."""
-        self.logger.log_metrics({"val/best_link_cm": best_link_cm, **run_metrics(scores, latency)})
+    def scores(
+        self,
+        scores: Sequence[Evaluation],
+        latency: Mapping[str, float],
+        retarget: Sequence[Evaluation],
+        retarget_latency: Mapping[str, float],
+        best_link_cm: float,
+    ) -> None:
+        """What `evaluate_clips` and `latencies` gave for the test clips, of the networks alone and of `retarget`:
+        metrics and a table.
+        """
+        metrics = run_metrics(scores, latency) | mean_metrics(retarget, retarget_latency, "test/retarget")
+        self.logger.log_metrics({"val/best_link_cm": best_link_cm, **metrics})
         rows = [dataclasses.asdict(score) for score in scores]
         self.client.log_table(self.run_id, {key: [row[key] for row in rows] for key in rows[0]}, "test/clips.json")
-        self.client.log_text(self.run_id, table(scores) + "\n", "test/clips.txt")
+        self.client.log_text(self.run_id, table(scores, retarget) + "\n", "test/clips.txt")
 
     def key_poses(self, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
         """The answers themselves, and a picture a test clip: human, reference and prediction."""

@@ -102,6 +102,12 @@ def test_means_count_clips_or_frames() -> None:
     assert "head_deg" not in measures(over_clips) and measures(over_clips)["at_limit"] == 2
     text = table([*clips, over_clips, over_frames])
     assert "head" not in text and len({len(line) for line in text.splitlines()}) == 1
+    better = Evaluation("mean over clips", 40, *[0.5] * 5, nan, *[0.5] * 4)
+    longer = table([*clips, over_clips, over_frames], [clips[0], better, better]).splitlines()
+    assert [line.split("  ")[0] for line in longer] == [
+        "clip", "a", "b", "-" * len(longer[0]), "mean over clips", "mean over frames", *["mean over clips, retarget"] * 2,
+    ]  # fmt: skip
+    assert "0.500" in longer[-1] and len({len(line) for line in longer}) == 1
 
 
 def test_latency_is_a_time_a_frame() -> None:

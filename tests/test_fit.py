@@ -88,6 +88,7 @@ def test_it_ends_with_a_table_the_package_and_the_dashboard(fitted: tuple[Path, 
     lines = output.strip().splitlines()
     assert lines[0].split()[:6] == ["clip", "frames", "joint", "[rad]", "link", "[cm]"]
     assert {line.split()[0] for line in lines if line} >= {"boxing", "wave", "mean", "package:", "dashboard:"}
+    assert "mean over clips, retarget" in output
     package = Path(next(line.split(None, 1)[1] for line in lines if line.startswith("package:")))
     assert package.parent == folder / "mlruns" / "packages"
     assert "--host 127.0.0.1" in lines[-1]
@@ -100,8 +101,10 @@ def test_the_run_holds_everything(fitted: tuple[Path, str]) -> None:
     metrics = set(found.data.metrics)
     assert metrics >= {
         "train/loss", "train/loss_pre", "train/loss_post", "val/joint_rad", "val/link_cm", "test/joint_rad", "test/link_cm",
-        "test/wave/link_cm", "test/limb_deg", "pairs/kept_share", "pairs/ik_residual_mm", "pairs/per_second",
+        "test/wave/link_cm", "test/limb_deg", "test/latency_us", "test/retarget/limb_deg", "test/retarget/latency_us",
+        "pairs/kept_share", "pairs/ik_residual_mm", "pairs/per_second",
     }  # fmt: skip
+    assert 0 < found.data.metrics["test/retarget/limb_deg"] < found.data.metrics["test/limb_deg"]
     assert set(found.data.tags) >= {"robot", "git_commit", "pairs_fingerprint", "prior_xxh3", "version.torch"}
     assert found.data.params["trainer/max_steps"] == "120" and found.data.params["pairs/seed"] == "0"
     artifacts = Path(found.info.artifact_uri.removeprefix("file://"))

@@ -46,21 +46,24 @@ def test_every_robot_method_and_seed_is_a_part() -> None:
 
 
 def measures(joint: float, link: float) -> dict[str, float]:
-    return {"joint_rad": joint, "link_cm": link, "limb_deg": 3.0, "at_limit": 0.015}
+    return {"joint_rad": joint, "link_cm": link, "limb_deg": 3.0, "at_limit": 0.015, "retarget/limb_deg": 2.5}
 
 
 def test_the_tables_hold_both_figures() -> None:
     results = {
         ("nao", "proposed"): [measures(0.1, 1.0), measures(0.2, 2.0)],
-        ("coman", "our default"): [measures(0.05, 0.5)],
+        ("coman", "our default"): [{**measures(0.05, 0.5), "retarget/joint_rad": 0.04}],
+        ("coman", "S3LE"): [measures(0.15, 3.5)],
     }
     text = tables(results)
-    first, second, more = text.split("\n\n")[1::2]
+    first, second, more, after = text.split("\n\n")[1::2]
     assert "| nao   | 0.150 ± 0.071 (0.389) |" in first and "| coman |                       | 0.050       |" in first
     assert "| nao   | 1.50 ± 0.71 (3.887) |" in second
     assert "without filter" not in first
     assert more.splitlines()[2].split("|")[1:3] == [" nao   ", " proposed    "] and "1.5 ± 0.0" in more
-    for block in (first, second, more):
+    assert "| coman | our default | 0.040       |" in after and "| 2.5 " in after  # alone: the others lack it
+    assert "nao" not in after and "S3LE" not in after
+    for block in (first, second, more, after):
         assert len({len(line) for line in block.splitlines()}) == 1
     picture = chart(results)
     assert picture.width > 800 and len(picture.convert("RGB").getcolors(1 << 24)) > 10
