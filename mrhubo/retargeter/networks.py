@@ -12,42 +12,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import gelu
 
-from mrhubo import rotation
-from mrhubo.body.skeleton import JOINT_NAMES, Skeleton, joint_index
-from mrhubo.errors import UserError
+from mrhubo.retargeter.features import PoseFeatures
 
 _BLOCK_SCALE = 0.5
 """Of a residual block's first weights, so that the sums of many start as small as those of few."""
-
-
-class PoseFeatures(nn.Module):
-    """What the network sees of a human pose: rotations of the input joints, 6D columns, local or relative to the
-    chest.
-    """
-
-    def __init__(self, input_joints: Sequence[str], frame: str) -> None:
-        super().__init__()
-        self.input_joints, self.frame = tuple(input_joints), frame
-        if not self.input_joints:
-            raise UserError("model.input_joints: is empty; name at least one human joint")
-        self._joints = [joint_index(name) for name in self.input_joints]
-        if 0 in self._joints:
-            raise UserError("model.input_joints: 'pelvis' is the root and has no rotation in a pose")
-        self._chest = JOINT_NAMES.index("spine3")
-        self.skeleton = Skeleton()
-
-    @property
-    def size(self) -> int:
-        """F."""
-        return 6 * len(self._joints)
-
-    def forward(self, pose_BJ6: Tensor) -> Tensor:
-        """Features (B, F) of poses (B, 21, 6)."""
-        if self.frame == "local":
-            return pose_BJ6[:, [j - 1 for j in self._joints]].flatten(1)
-        rotations = self.skeleton.global_rotations(rotation.sixd_to_matrix(pose_BJ6))
-        chest = rotations[:, self._chest, None].transpose(-1, -2)
-        return rotation.matrix_to_sixd(chest @ rotations[:, self._joints]).flatten(1)
 
 
 def mlp(size_in: int, hidden: int, layers: int, size_out: int) -> nn.Sequential:

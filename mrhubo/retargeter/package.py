@@ -26,7 +26,8 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.reference import DirectionJacobian, DirectionProblem, direction_error
-from mrhubo.retargeter.networks import Branch, PoseFeatures, RetargetNetwork
+from mrhubo.retargeter.features import PoseFeatures
+from mrhubo.retargeter.networks import Branch, RetargetNetwork
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.storage import atomic_path, read_tensors, write_tensors
 

@@ -7,10 +7,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mrhubo import rotation
-from mrhubo.body import Skeleton
 from mrhubo.config import TrainerConfig
-from mrhubo.errors import UserError
 from mrhubo.retargeter import PoseFeatures, RetargetModule, RetargetNetwork
 from mrhubo.retargeter.networks import Branch, Branched, ResidualMLP, mlp
 
@@ -81,37 +78,6 @@ def test_both_ends_of_the_range_can_be_reached(kind: str) -> None:
     limited = network(bound_output=kind).limited
     torch.testing.assert_close(limited(torch.full((1, 3), 20.0))[0], UPPER)
     torch.testing.assert_close(limited(torch.full((1, 3), -20.0))[0], LOWER)
-
-
-def test_chest_features_ignore_what_lies_below_the_chest() -> None:
-    features = PoseFeatures(ARM, "chest")
-    pose = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(4, 21, 3)))
-    bent = pose.clone()
-    bent[:, [2, 5, 8]] = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(4, 3, 3)))  # the spine
-    torch.testing.assert_close(features(bent), features(pose), atol=1e-5, rtol=0)
-    moved = pose.clone()
-    moved[:, 15] = bent[:, 2]  # left_shoulder
-    assert float((features(moved) - features(pose)).abs().max()) > 0.1
-
-
-def test_chest_features_hold_the_upper_arm_direction() -> None:
-    local = rotation.axis_angle_to_matrix(0.5 * torch.randn(6, 21, 3))
-    points, turns = Skeleton().keypoints_and_rotations(local)
-    direction = torch.nn.functional.normalize(points[:, 18] - points[:, 16], dim=-1)
-    seen = (turns[:, 9].mT @ direction[..., None])[..., 0]
-    features = PoseFeatures(("left_shoulder",), "chest")(rotation.matrix_to_sixd(local))
-    torch.testing.assert_close(features[:, :3], seen, atol=1e-5, rtol=0)
-
-
-def test_local_features_are_the_pose_itself() -> None:
-    pose = torch.randn(3, 21, 6)
-    torch.testing.assert_close(PoseFeatures(("left_hip", "head"), "local")(pose), pose[:, [0, 14]].flatten(1))
-
-
-@pytest.mark.parametrize("names", [(), ("pelvis",), ("left_wirst",)])
-def test_impossible_input_joints_are_refused(names: tuple[str, ...]) -> None:
-    with pytest.raises(UserError):
-        PoseFeatures(names, "chest")
 
 
 @pytest.mark.parametrize(("loss", "power"), [("l1", 1), ("mse", 2)])
