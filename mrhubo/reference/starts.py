@@ -27,20 +27,23 @@ class StartPool:
         ridge_UN = (self._q_UN - problem.mid_N).square() * problem.ridge_N
         self._blocks = []
         for block, joints_N in enumerate(problem.joints_NC.T.bool()):
-            root_D1 = (problem.weight_D * problem.directions_DC[:, block]).sqrt()[:, None]
-            cells = _cells(from_mid_UN[:, joints_N], starts)
-            self._blocks.append((joints_N, root_D1, (directions_UD3 * root_D1).flatten(1),
-                                 ridge_UN[:, joints_N].sum(1), cells))  # fmt: skip
+            directions_D = problem.directions_DC[:, block].bool()
+            root_D1 = problem.weight_D[directions_D].sqrt()[:, None]
+            pool_UX = (directions_UD3[:, directions_D] * root_D1).flatten(1)
+            # |a - b|^2 without |a|^2, which is the same for the whole pool
+            constant_U = pool_UX.square().sum(1) + ridge_UN[:, joints_N].sum(1)
+            cells = [(pool_UX[cell_U].T.contiguous(), constant_U[cell_U], self._q_UN[cell_U][:, joints_N])
+                     for cell_U in _cells(from_mid_UN[:, joints_N], starts)]  # fmt: skip
+            self._blocks.append((joints_N, directions_D, root_D1, cells))
 
     def near(self, target_BD3: Tensor) -> Tensor:
         """Starting angles (B, S, N) [rad] for human directions (B, D, 3)."""
         start_BSN = self._q_UN.new_empty(len(target_BD3), self.starts, self._q_UN.shape[1])
-        for joints_N, root_D1, pool_UX, ridge_U, cells in self._blocks:
-            wanted_BX = (target_BD3 * root_D1).flatten(1)
-            # |a - b|^2 without |a|^2, which is the same for the whole pool
-            distance_BU = (pool_UX.square().sum(1) + ridge_U) - 2 * wanted_BX @ pool_UX.T
-            chosen = [cell_X[distance_BU[:, cell_X].argmin(1)] for cell_X in cells]
-            start_BSN[:, :, joints_N] = self._q_UN[torch.stack(chosen, 1)][..., joints_N]
+        for joints_N, directions_D, root_D1, cells in self._blocks:
+            wanted_BX = (target_BD3[:, directions_D] * root_D1).flatten(1)
+            for start, (pool_XU, constant_U, q_UN) in enumerate(cells):
+                nearest_B = torch.addmm(constant_U, wanted_BX, pool_XU, alpha=-2).argmin(1)
+                start_BSN[:, start, joints_N] = q_UN[nearest_B]
         return start_BSN
 
 
