@@ -60,7 +60,7 @@ class DirectionJacobian:
         """Which joints of q are above which direction (D, N)."""
         self.blocks = _blocks(self.moved_DN)
         """Directions and joints of each part of the robot that turns apart from the others (an arm, the head): the
-        connected components of "joint is above direction"."""
+        connected components of "joint is above direction". A direction that no joint turns is in none."""
         self._direction_P = torch.tensor([d for d, _ in pairs], device=device)
         self._joint_P = torch.tensor([a for _, a in pairs], device=device)
         self._end_P1, self._start_P1, self._bend_P1, self._slide_P1 = torch.tensor(factors, device=device).T[..., None]
@@ -112,5 +112,6 @@ def _blocks(moved_DN: Tensor) -> list[tuple[set[int], set[int]]]:
         for block in [b for b in blocks if b[1] & joints]:
             directions, joints = directions | block[0], joints | block[1]
             blocks.remove(block)
-        blocks.append((directions, joints))
+        if joints:
+            blocks.append((directions, joints))
     return sorted(blocks, key=lambda block: min(block[0]))

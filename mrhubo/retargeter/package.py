@@ -61,9 +61,9 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
     Raises:
         UserError: an input joint does not exist, or a branch would see none.
     """
-    model = config.model
-    features = PoseFeatures(model.input_joints or body_map.input_joints(), model.input_frame)
-    robot = body_map.robot
+    model, robot, blocks = config.model, body_map.robot, DirectionJacobian(body_map).blocks
+    turned = [direction for directions, _ in blocks for direction in directions]
+    features = PoseFeatures(model.input_joints or body_map.input_joints(turned), model.input_frame)
     return RetargetNetwork(
         features,
         robot.lower_N,
@@ -73,13 +73,12 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
         model.layers,
         model.bound_output,
         model.residual,
-        _branches(body_map, features.input_joints) if model.branches else (),
+        _branches(body_map, blocks, features.input_joints) if model.branches else (),
     )
 
 
-def _branches(body_map: BodyMap, inputs: Sequence[str]) -> list[Branch]:
+def _branches(body_map: BodyMap, blocks: Sequence[tuple[set[int], set[int]]], inputs: Sequence[str]) -> list[Branch]:
     """Of each branch its joints and its human joints; a human joint that belongs to no branch is seen by all."""
-    blocks = [block for block in DirectionJacobian(body_map).blocks if block[1]]
     own = [body_map.input_joints(directions) for directions, _ in blocks]
     shared = set(inputs).difference(*own)
     found = []

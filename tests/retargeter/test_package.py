@@ -13,6 +13,7 @@ from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior,
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
+from mrhubo.reference import ReferenceRetargeter, direction_error
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 from mrhubo.storage import read_metadata, read_tensors, write_tensors
@@ -58,6 +59,23 @@ def test_arms_and_head_have_networks_of_their_own(made: Retargeter) -> None:
         other[:, columns] = turned[:, columns]
         moved = (made.predict(other) - made.predict(pose)).abs().amax(dim=0) > 1e-6
         assert moved.tolist() == [name[0] == parts for name in joints]
+
+
+def test_a_head_that_no_joint_turns_is_not_looked_at(root: Path) -> None:
+    names = [
+        f"{side}_{part}" for side in "lr" for part in ("shoulder_pitch", "shoulder_roll", "arm_yaw", "elbow_pitch")
+    ]
+    overrides = [f"robot.joints=[{', '.join(names)}]", "robot.ranges={}"]
+    config = load_config(root / "conf" / "reachy.yaml", overrides)
+    body_map = build_body_map(config.robot)
+    network = build_network(config, body_map)
+    assert {"neck", "head"}.isdisjoint(network.features.input_joints) and "left_wrist" in network.features.input_joints
+    pose = human(30)
+    found = ReferenceRetargeter(body_map).retarget(pose, 24.0)
+    assert found.q_TN.shape == network(pose).shape == (30, 8)
+    limbs = [i for i, name in enumerate(body_map.direction_names) if name.endswith(("elbow", "wrist"))]
+    still = direction_error(body_map, ((body_map.robot.lower_N + body_map.robot.upper_N) / 2).expand(30, 8), pose)
+    assert float(found.residual_deg_TD[:, limbs].mean()) < 0.3 * float(still[:, limbs].mean())
 
 
 def test_a_branch_without_input_is_refused(root: Path) -> None:
