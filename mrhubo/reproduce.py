@@ -23,6 +23,7 @@ DESCRIPTION = (
 )
 FLAGS = {
     "robots NAMES": "comma-separated: nao,coman,reachy (default: all)",
+    "methods NAMES": "comma-separated: proposed,without filter,one stage,our default,S3LE (default: all)",
     "seeds NUMBER": "trainings of each kind, seeds 0, 1, ... (default: 3)",
     "paper": "the paper's settings to the letter, conf/paper, in place of ours",
     "quiet": "no progress lines",
@@ -30,22 +31,40 @@ FLAGS = {
 
 
 def reproduce(
-    robots: Sequence[str], seeds: int, overrides: Sequence[str], quiet: bool = False, paper: bool = False
+    robots: Sequence[str],
+    seeds: int,
+    overrides: Sequence[str],
+    quiet: bool = False,
+    paper: bool = False,
+    methods: Sequence[str] | None = None,
 ) -> str:
-    """Does what is not done yet and returns the tables; `paper`: with the paper's settings in place of ours.
+    """Does what is not done yet and returns the tables.
+
+    Args:
+        robots: names of shipped robots.
+        seeds: trainings of each kind.
+        overrides: `key.sub=value` for all of them.
+        quiet: no progress lines.
+        paper: with the paper's settings in place of ours.
+        methods: columns of the tables; default: all.
 
     Raises:
-        UserError: a robot or a setting is wrong (before any work).
+        UserError: a robot, a method or a setting is wrong, or S3LE is asked for by name and has nothing to learn from
+            (before any work).
         KeyboardInterrupt: the user stopped it; the same call goes on.
     """
     from mrhubo.locations import default_capture
-    from mrhubo.reproduction import chart, parts, tables
+    from mrhubo.reproduction import ALL_METHODS, BASELINE, METHODS, chart, parts, tables
     from mrhubo.tracking import ending
 
     capture = default_capture()
-    if not capture.is_file() and not quiet:
-        print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
-    work = parts(robots, seeds, overrides, baseline=capture.is_file(), paper=paper)
+    if methods is None and not capture.is_file():
+        methods = tuple(METHODS)
+        if not quiet:
+            print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
+    work = parts(robots, seeds, overrides, ALL_METHODS if methods is None else methods, paper)
+    if not capture.is_file() and any(part.method == BASELINE for part in work):
+        raise UserError(f"command line: --methods: S3LE learns from human motion capture, and {capture} does not exist")
     client, parent = _open_parent(work)
     start, results, first = time.monotonic(), {}, {}
     with ending(client, parent):
@@ -142,8 +161,13 @@ def main(argv: list[str]) -> None:
         seeds = 0
     if not 1 <= seeds <= 100:
         raise UserError(f"command line: --seeds must be 1 .. 100, found '{given['seeds']}'")
-    robots = [name.strip() for name in (given["robots"] or "nao,coman,reachy").split(",")]
-    print(reproduce(list(dict.fromkeys(robots)), seeds, overrides, given["quiet"], given["paper"]))
+    robots = _names(given["robots"] or "nao,coman,reachy")
+    methods = None if given["methods"] is None else _names(given["methods"])
+    print(reproduce(robots, seeds, overrides, given["quiet"], given["paper"], methods))
+
+
+def _names(text: str) -> list[str]:
+    return list(dict.fromkeys(name.strip() for name in text.split(",")))
 
 
 if __name__ == "__main__":

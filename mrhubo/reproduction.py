@@ -30,6 +30,7 @@ BASELINE = "S3LE"
 """The column of the baseline, which has settings of its own and needs human motion capture."""
 BASELINE_ROBOTS = ("coman",)
 """The robots that the paper measures it on, and for which its settings were searched."""
+ALL_METHODS = (*METHODS, BASELINE)
 
 PAPER: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "reachy": {"proposed": (0.253, 8.678), "without filter": (0.257, 8.698), "one stage": (0.263, 9.519)},
@@ -78,7 +79,11 @@ class Part:
 
 
 def parts(
-    robots: Sequence[str], seeds: int, overrides: Sequence[str], baseline: bool = True, paper: bool = False
+    robots: Sequence[str],
+    seeds: int,
+    overrides: Sequence[str],
+    methods: Sequence[str] = ALL_METHODS,
+    paper: bool = False,
 ) -> list[Part]:
     """All trainings, seed by seed, so that an interrupted table has every column as early as possible.
 
@@ -86,12 +91,16 @@ def parts(
         robots: names of shipped robots.
         seeds: trainings of each kind.
         overrides: `key.sub=value` for all of them; those of `s3le` are for the baseline.
-        baseline: whether the baseline is wanted.
+        methods: the columns wanted.
         paper: with the paper's settings (`conf/paper`) in place of ours.
 
     Raises:
-        UserError: a robot has no config, or a setting is wrong.
+        UserError: a robot has no config, there is no such method, these robots have none of the methods, or a setting
+            is wrong.
     """
+    for method in methods:
+        if method not in ALL_METHODS:
+            raise UserError(f"command line: --methods: {unknown_name('method', method, ALL_METHODS)}")
     folder = project_root() / "conf"
     if paper:
         folder = folder / "paper"
@@ -105,20 +114,23 @@ def parts(
         for robot in robots:
             file = folder / f"{robot}.yaml"
             for method, change in METHODS.items():
-                if paper and method == OUR_DEFAULT:
+                if method not in methods or (paper and method == OUR_DEFAULT):
                     continue
                 config = load_config(file, [*change, *ours, f"trainer.seed={seed}"])
                 found.append(Part(robot, method, seed, config))
-            if baseline and robot in BASELINE_ROBOTS:
+            if BASELINE in methods and robot in BASELINE_ROBOTS:
                 config = load_config(file, [*overrides, f"s3le.seed={seed}"], BaselineConfig)
                 found.append(Part(robot, BASELINE, seed, config))
+    if not found:
+        wanted = f"{', '.join(methods)} on {', '.join(robots)}" + (" with the paper's settings" if paper else "")
+        raise UserError(f"command line: there is nothing to train: no {wanted}")
     return found
 
 
 def tables(results: Results) -> str:
     """The paper's two tables with its figures in brackets beside ours, then the other measures; Markdown."""
     robots = list(dict.fromkeys(robot for robot, _ in results))
-    methods = [method for method in (*METHODS, BASELINE) if any(m == method for _, m in results)]
+    methods = [method for method in ALL_METHODS if any(m == method for _, m in results)]
     blocks = []
     for index, (measure, title) in enumerate(_TITLES.items()):
         rows = []

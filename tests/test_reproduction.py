@@ -37,12 +37,19 @@ def test_every_robot_method_and_seed_is_a_part() -> None:
             assert part.config.trainer.seed == part.seed
     assert [p.method for p in work if p.robot == "nao" and p.config.pairs.filter == "none"] == ["without filter"] * 2
     assert {p.method for p in work if p.config.model.stages == 1} == {"one stage"}
-    assert len(parts(["coman"], 1, [], baseline=False)) == len(METHODS)
+    assert len(parts(["coman"], 1, [], METHODS)) == len(METHODS)
+    assert [p.method for p in parts(["nao", "coman"], 1, [], ["one stage", "S3LE"])] == [*["one stage"] * 2, "S3LE"]
     paper = parts(["nao"], 1, [], paper=True)
     assert [p.method for p in paper] == ["proposed", "without filter", "one stage"]
     assert {p.config.robot.scale for p in paper} == {"manual"} and {p.config.trainer.loss for p in paper} == {"mse"}
     with pytest.raises(UserError, match="'naoo' .*nao"):
         parts(["naoo"], 1, [])
+    with pytest.raises(UserError, match="--methods: method 'propose' does not exist; nearest: 'proposed'"):
+        parts(["nao"], 1, [], ["propose"])
+    with pytest.raises(UserError, match="nothing to train: no S3LE on nao"):
+        parts(["nao"], 1, [], ["S3LE"])
+    with pytest.raises(UserError, match="nothing to train: no our default on nao with the paper's settings"):
+        parts(["nao"], 1, [], ["our default"], paper=True)
 
 
 def measures(joint: float, link: float) -> dict[str, float]:
@@ -79,17 +86,31 @@ def test_the_papers_figures_are_those_of_its_tables() -> None:
 def test_the_command_trains_once_and_finds_what_is_done(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    methods = {name: change for name, change in METHODS.items() if name in ("one stage", "our default")}
-    monkeypatch.setattr("mrhubo.reproduction.METHODS", methods)
+    methods = ("one stage", "our default")
     motions = tmp_path / "motions"
     motions.mkdir()
     for name in ("drinking", "wave"):
         shutil.copy(root / "data" / "motions" / f"{name}.npz", motions)
-    given = ["--robots", "nao", "--seeds", "1", "--quiet", *SMALL, f"pairs.dir={tmp_path / 'pairs'}"]
+    given = [
+        "--robots",
+        "nao",
+        "--methods",
+        ", ".join(methods),
+        "--seeds",
+        "1",
+        "--quiet",
+        *SMALL,
+        f"pairs.dir={tmp_path / 'pairs'}",
+    ]
     given += [f"tracking.dir={tmp_path / 'mlruns'}", f"evaluation.motions=[{motions}]", "trainer.accelerator=cpu"]
     main(given)
     first = capsys.readouterr().out
-    assert "Table I: joint error" in first and "(0.506)" in first and "Beyond the paper" in first
+    assert (
+        "Table I: joint error" in first
+        and "(0.506)" in first
+        and "proposed" not in first
+        and "Beyond the paper" in first
+    )
     client = mlflow.MlflowClient(tracking_uri=database_uri(tmp_path / "mlruns"))
     (experiment,) = [e for e in client.search_experiments() if e.name == "mrhubo"]
     runs = client.search_runs([experiment.experiment_id])
@@ -120,6 +141,8 @@ def test_mistakes_are_named() -> None:
         main(["trainer.seed=3"])
     with pytest.raises(UserError, match="robot"):
         main(["--robots", "atlas"])
+    with pytest.raises(UserError, match="--methods"):
+        main(["--methods", "all"])
 
 
 def test_s3le_is_left_out_aloud_without_motion_capture(
@@ -136,3 +159,5 @@ def test_s3le_is_left_out_aloud_without_motion_capture(
     with pytest.raises(KeyboardInterrupt):
         command.reproduce(["coman"], 1, [])
     assert "S3LE is left out" in capsys.readouterr().out and {p.method for p in seen} == set(METHODS)
+    with pytest.raises(UserError, match="S3LE learns from human motion capture"):
+        command.reproduce(["coman"], 1, [], methods=["S3LE"])
