@@ -29,7 +29,7 @@ def test_every_robot_method_and_seed_is_a_part() -> None:
     assert [p.seed for p in work] == sorted(p.seed for p in work)
     for part in work:
         assert part.config.robot.name == part.robot and part.config.model.hidden == 9
-        assert part.config.pairs.reverse_share == (0.25 if part.method in ("our default", "S3LE") else 0)
+        assert part.config.pairs.reverse_share == (0.5 if part.method in ("our default", "S3LE") else 0)
         assert isinstance(part.config, BaselineConfig) == (part.method == "S3LE")
         if isinstance(part.config, BaselineConfig):
             assert part.config.s3le.steps == 7 and part.config.s3le.seed == part.seed
@@ -37,7 +37,7 @@ def test_every_robot_method_and_seed_is_a_part() -> None:
             assert part.config.trainer.seed == part.seed
     assert [p.method for p in work if p.robot == "nao" and p.config.pairs.filter == "none"] == ["without filter"] * 2
     assert {p.method for p in work if p.config.model.stages == 1} == {"one stage"}
-    assert len(parts(["coman"], 1, [], METHODS)) == len(METHODS)
+    assert len(parts(["coman"], 1, [], list(METHODS))) == len(METHODS)
     assert [p.method for p in parts(["nao", "coman"], 1, [], ["one stage", "S3LE"])] == [*["one stage"] * 2, "S3LE"]
     paper = parts(["nao"], 1, [], paper=True)
     assert [p.method for p in paper] == ["proposed", "without filter", "one stage"]

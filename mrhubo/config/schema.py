@@ -113,7 +113,7 @@ class PairsConfig:
     solver: str = choice("fine", "fine", "fast", "paper")
     """Latent inverse kinematics: `fine` = amortised start, then a quasi-Newton search of every pose; `fast` = amortised
     only; `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
-    reverse_share: float = bounded(0.25, 0.0, 1.0)
+    reverse_share: float = bounded(0.5, 0.0, 1.0)
     """Share of the pairs that are made the other way: a human pose drawn from the prior, retargeted to the robot by
     optimisation. They teach what to do with poses that the robot cannot reach. 0 = robot poses only (the paper)."""
     reverse_spread: float = bounded(1.1, 0.1, 3.0)
