@@ -91,26 +91,13 @@ def test_the_command_trains_once_and_finds_what_is_done(
     motions.mkdir()
     for name in ("drinking", "wave"):
         shutil.copy(root / "data" / "motions" / f"{name}.npz", motions)
-    given = [
-        "--robots",
-        "nao",
-        "--methods",
-        ", ".join(methods),
-        "--seeds",
-        "1",
-        "--quiet",
-        *SMALL,
-        f"pairs.dir={tmp_path / 'pairs'}",
-    ]
+    given = ["--robots", "nao", "--methods", ", ".join(methods), "--seeds", "1", "--quiet", *SMALL]
+    given += [f"pairs.dir={tmp_path / 'pairs'}"]
     given += [f"tracking.dir={tmp_path / 'mlruns'}", f"evaluation.motions=[{motions}]", "trainer.accelerator=cpu"]
     main(given)
     first = capsys.readouterr().out
-    assert (
-        "Table I: joint error" in first
-        and "(0.506)" in first
-        and "proposed" not in first
-        and "Beyond the paper" in first
-    )
+    assert "Table I: joint error" in first and "(0.506)" in first and "Beyond the paper" in first
+    assert "proposed" not in first
     client = mlflow.MlflowClient(tracking_uri=database_uri(tmp_path / "mlruns"))
     (experiment,) = [e for e in client.search_experiments() if e.name == "mrhubo"]
     runs = client.search_runs([experiment.experiment_id])
