@@ -31,6 +31,7 @@ BASELINE = "S3LE"
 BASELINE_ROBOTS = ("coman",)
 """The robots that the paper measures it on, and for which its settings were searched."""
 ALL_METHODS = (*METHODS, BASELINE)
+"""The columns of the tables, in their order."""
 
 PAPER: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "reachy": {"proposed": (0.253, 8.678), "without filter": (0.257, 8.698), "one stage": (0.263, 9.519)},
