@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import torch
 
-from mrhubo.locations import project_root
-from mrhubo.tables import markdown
-from mrhubo.tracking import git_commit
+from mrhubo.runtime.locations import project_root
+from mrhubo.runtime.tables import markdown
+from mrhubo.runtime.tracking import git_commit
 
 
 def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list[str]]:

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from common import print_header, print_table, read_options
 
-from mrhubo.callbacks.pictures import PAIR_MEASURES, PAIR_TITLES, Artist
 from mrhubo.config import load_config
+from mrhubo.fitting.pipeline import prepare_pairs
 from mrhubo.pairing import PairGenerator
-from mrhubo.pipeline import prepare_pairs
 from mrhubo.view import contact_sheet, distributions, save_png
+from mrhubo.view.pictures import PAIR_MEASURES, PAIR_TITLES, Artist
 
 SOLVERS = ("fine", "fast", "paper")
 

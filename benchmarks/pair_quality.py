@@ -20,8 +20,8 @@ from pathlib import Path
 from common import print_header, print_table, read_options
 
 from mrhubo.config import load_config
-from mrhubo.pipeline import make_pairs, make_references, prepare, train
-from mrhubo.tables import mean_and_spread
+from mrhubo.fitting.pipeline import make_pairs, make_references, prepare, train
+from mrhubo.runtime.tables import mean_and_spread
 
 COUNTS = (12_500, 50_000, 200_000)
 FILTERS = {

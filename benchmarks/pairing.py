@@ -22,15 +22,15 @@ import torch
 from common import print_header, print_table, read_options
 from torch import Tensor
 
-from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
+from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.config import load_config
+from mrhubo.files.storage import read_tensors, write_tensors
+from mrhubo.fitting.pipeline import PairSetup, prepare_pairs
 from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
-from mrhubo.pipeline import PairSetup, prepare_pairs
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import align_pose
-from mrhubo.storage import read_tensors, write_tensors
-from mrhubo.threads import available_cores, use_threads
+from mrhubo.runtime.threads import available_cores, use_threads
 
 
 def main(argv: list[str]) -> None:

@@ -19,12 +19,12 @@ from common import print_header, print_table
 from torch import Tensor
 
 from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
-from mrhubo.body.measures import NOISE_DEG, measure, reconstruction
-from mrhubo.body.training import PriorConfig, Split
+from mrhubo.body.prior_training.measures import NOISE_DEG, measure, reconstruction
+from mrhubo.body.prior_training.train import PriorConfig, Split
 from mrhubo.config import parse_arguments
 from mrhubo.errors import UserError
-from mrhubo.locations import default_motions
 from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.runtime.locations import default_motions
 
 ROWS = {
     "encode, mean, decode: mean joint error [mm]": "joint_mm",

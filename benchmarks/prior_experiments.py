@@ -14,11 +14,11 @@ from common import print_header, print_table
 from prior import by_clip
 
 from mrhubo.body import BodyPrior
-from mrhubo.body.training import PriorConfig, train
+from mrhubo.body.prior_training.train import PriorConfig, train
 from mrhubo.config import fingerprint, parse_arguments, without_paths
 from mrhubo.errors import UserError
-from mrhubo.locations import default_motions
 from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.runtime.locations import default_motions
 
 VARIANTS = {
     "chosen": [],

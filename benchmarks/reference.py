@@ -15,12 +15,12 @@ from pathlib import Path
 import torch
 from common import print_header, print_table, read_options
 
-from mrhubo.callbacks import load_motions
 from mrhubo.config import load_config
-from mrhubo.locations import default_motions
+from mrhubo.evaluation import load_motions
 from mrhubo.motion import Motion
 from mrhubo.reference import ReferenceResult, ReferenceRetargeter, direction_jerk
 from mrhubo.robot import build_body_map
+from mrhubo.runtime.locations import default_motions
 
 
 def main(argv: list[str]) -> None:

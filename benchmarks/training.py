@@ -17,14 +17,14 @@ import lightning
 import torch
 from common import print_header, print_table, read_options
 
+from mrhubo.callbacks.progress import TrainingProgress
 from mrhubo.config import load_config
+from mrhubo.fitting.data import PairData, PairTable
 from mrhubo.pairing import make_filter
-from mrhubo.pairing.data import PairData, PairTable
 from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
 from mrhubo.robot import build_body_map
-from mrhubo.tracking import open_logger
-from mrhubo.trainer import cosine_schedule
-from mrhubo.training_progress import TrainingProgress
+from mrhubo.runtime.tracking import open_logger
+from mrhubo.runtime.trainer import cosine_schedule
 
 
 class Stopwatch(lightning.Callback):

@@ -30,10 +30,10 @@ def evaluate(config: Config, package: Path, validation: bool = False, quiet: boo
     Raises:
         UserError: the config, the package or the motions cannot be used, or the package is of another robot.
     """
-    from mrhubo import pipeline
     from mrhubo.evaluation import evaluate_clips, latencies, table
-    from mrhubo.progress import Progress
+    from mrhubo.fitting import pipeline
     from mrhubo.retargeter import Retargeter
+    from mrhubo.runtime.progress import Progress
 
     retargeter = Retargeter.load(package)
     prepared = pipeline.prepare(config)

@@ -26,9 +26,9 @@ def pair(config: Config, quiet: bool = False) -> str:
         UserError: anything in the config or the files it names is wrong (before any work), or the disk is full.
         KeyboardInterrupt: the user stopped it; the same call resumes.
     """
-    from mrhubo import pipeline
+    from mrhubo.fitting import pipeline
     from mrhubo.pairing.verify import summarise
-    from mrhubo.ranks import Ranks
+    from mrhubo.runtime.ranks import Ranks
 
     setup = pipeline.prepare_pairs(config)
     ranks = Ranks.join(config.trainer.accelerator)
@@ -46,9 +46,9 @@ def check(config: Config, quiet: bool = False) -> str:
     Raises:
         UserError: shards are missing or damaged; it names the first.
     """
-    from mrhubo import pipeline
+    from mrhubo.fitting import pipeline
     from mrhubo.pairing.verify import verify
-    from mrhubo.progress import Progress
+    from mrhubo.runtime.progress import Progress
 
     setup = pipeline.prepare_pairs(config)
     store = setup.store
@@ -68,11 +68,11 @@ def inspect(config: Config) -> str:
     Raises:
         UserError: there are no such pairs, or not all of them.
     """
-    from mrhubo import pipeline
-    from mrhubo.callbacks.pictures import Artist
+    from mrhubo.files.storage import DamagedFile
+    from mrhubo.fitting import pipeline
     from mrhubo.pairing.verify import summarise
-    from mrhubo.storage import DamagedFile
     from mrhubo.view import save_png
+    from mrhubo.view.pictures import Artist
 
     setup = pipeline.prepare_pairs(config)
     store = setup.store

@@ -2,19 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-from mrhubo.config import BaselineConfig, fingerprint, run_command, split_arguments, to_plain
+from mrhubo.config import BaselineConfig, run_command, split_arguments
 from mrhubo.errors import UserError
-
-if TYPE_CHECKING:
-    from mlflow import MlflowClient
-    from mlflow.entities import Run
-    from PIL.Image import Image
-
-    from mrhubo.reproduction import Part
 
 DESCRIPTION = (
     "Trains everything that the paper's tables compare, on the shipped robots, and prints them with the paper's figures"
@@ -28,123 +17,6 @@ FLAGS = {
     "paper": "the paper's settings to the letter, conf/paper, in place of ours",
     "quiet": "no progress lines",
 }
-
-
-def reproduce(
-    robots: Sequence[str],
-    seeds: int,
-    overrides: Sequence[str],
-    quiet: bool = False,
-    paper: bool = False,
-    methods: Sequence[str] | None = None,
-) -> str:
-    """Does what is not done yet and returns the tables.
-
-    Args:
-        robots: names of shipped robots.
-        seeds: trainings of each kind.
-        overrides: `key.sub=value` for all of them.
-        quiet: no progress lines.
-        paper: with the paper's settings in place of ours.
-        methods: columns of the tables; default: all.
-
-    Raises:
-        UserError: a robot, a method or a setting is wrong, or S3LE is asked for by name and has nothing to learn from
-            (before any work).
-        KeyboardInterrupt: the user stopped it; the same call goes on.
-    """
-    from mrhubo.locations import default_capture
-    from mrhubo.reproduction import ALL_METHODS, BASELINE, METHODS, chart, parts, tables
-    from mrhubo.tracking import ending
-
-    capture = default_capture()
-    if methods is None and not capture.is_file():
-        methods = tuple(METHODS)
-        if not quiet:
-            print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
-    work = parts(robots, seeds, overrides, ALL_METHODS if methods is None else methods, paper)
-    if not capture.is_file() and any(part.method == BASELINE for part in work):
-        raise UserError(f"command line: --methods: S3LE learns from human motion capture, and {capture} does not exist")
-    client, parent = _open_parent(work)
-    start, results, first = time.monotonic(), {}, {}
-    with ending(client, parent):
-        for part in work:
-            run = _run_of(part, client, parent, quiet)
-            measures = {k.removeprefix("test/"): v for k, v in run.data.metrics.items() if k.startswith("test/")}
-            results.setdefault((part.robot, part.method), []).append(measures)
-            if part.seed == 0:
-                first.setdefault(part.robot, []).append((part, run.info.run_id))
-        text = tables({key: results[key] for key in sorted(results, key=lambda key: robots.index(key[0]))})
-        client.log_text(parent, text + "\n", "tables.md")
-        client.log_image(parent, chart(results), artifact_file="errors.png")
-        for robot, runs in first.items():
-            picture = _key_poses(client, runs, quiet)
-            if picture is not None:
-                client.log_image(parent, picture, artifact_file=f"key_poses_{robot}.png")
-        client.log_metric(parent, "seconds", time.monotonic() - start)
-    return text
-
-
-def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
-    """The run that all trainings belong to: that of an earlier call with the same settings, or a new one."""
-    from mrhubo.locations import project_root
-    from mrhubo.recording import Recording
-    from mrhubo.tracking import find_run, git_commit, open_client, start_run
-
-    config = work[0].config
-    tags = {
-        "reproduce": fingerprint([[part.robot, part.method, part.seed, to_plain(part.config)] for part in work]),
-        "git_commit": git_commit(project_root()),
-    }
-    folder = Recording.folder(config)
-    name = f"reproduce {', '.join(dict.fromkeys(part.robot for part in work))}"
-    client = open_client(folder, config.tracking.experiment, config.tracking.uri)
-    found = find_run(client, config.tracking.experiment, {"reproduce": tags["reproduce"]})
-    if found is None:
-        found = start_run(client, config.tracking.experiment, name, tags)
-    client.update_run(found.info.run_id, status="RUNNING")
-    return client, found.info.run_id
-
-
-def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], quiet: bool) -> Image | None:
-    """Human, reference, and what the two-stage network and the baseline made of one test clip, as in the paper's
-    figure 3; None if no run has kept its answers.
-    """
-    from mrhubo import pipeline
-    from mrhubo.callbacks.pictures import Artist, liveliness
-    from mrhubo.predictions import read_predictions
-    from mrhubo.reproduction import BASELINE, OUR_DEFAULT
-
-    shown = {part.method: run for part, run in runs if part.method in ("proposed", OUR_DEFAULT, BASELINE)}
-    found = {method: read_predictions(client, run) for method, run in shown.items()}
-    prepared = pipeline.prepare(runs[0][0].config)
-    clip = max(pipeline.make_references(prepared, quiet)[1], key=liveliness)
-    answers = {method: answer[clip.name] for method, answer in found.items() if clip.name in answer}
-    artist = Artist(prepared.body_map.robot, prepared.body_map.skeleton)
-    return artist.key_poses(clip, answers) if answers else None
-
-
-def _run_of(part: Part, client: MlflowClient, parent: str, quiet: bool) -> Run:
-    """A finished run with the same settings, pairs, prior and motions, or that of a new fit."""
-    from mrhubo.baseline import run_baseline
-    from mrhubo.fit import fit
-    from mrhubo.pipeline import prepare
-    from mrhubo.tracking import find_run
-
-    wanted = {"config_fingerprint": prepare(part.config).fingerprint}
-    experiment = part.config.tracking.experiment
-    run = find_run(client, experiment, wanted, finished=True)
-    if run is None:
-        if not quiet:
-            print(f"{part.robot}, {part.method}, seed {part.seed}", flush=True)
-        if isinstance(part.config, BaselineConfig):
-            run_baseline(part.config, quiet, parent)
-        else:
-            fit(part.config, quiet, parent)
-        run = find_run(client, experiment, wanted, finished=True)
-    if run is None:
-        raise UserError(f"{part.robot}, {part.method}: the run of this training is not in the tracking database")
-    return run
 
 
 def main(argv: list[str]) -> None:
@@ -163,6 +35,8 @@ def main(argv: list[str]) -> None:
         raise UserError(f"command line: --seeds must be 1 .. 100, found '{given['seeds']}'")
     robots = _names(given["robots"] or "nao,coman,reachy")
     methods = None if given["methods"] is None else _names(given["methods"])
+    from mrhubo.paper.trainings import reproduce
+
     print(reproduce(robots, seeds, overrides, given["quiet"], given["paper"], methods))
 
 

@@ -36,8 +36,8 @@ def main(argv: list[str]) -> None:
     # others: ten times slower with two processes on two cores. Read when torch is imported, below.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     load_config(files[0], overrides)  # a mistake there is told before the seconds that the imports below take
-    from mrhubo.recording import dashboard_command
-    from mrhubo.sweeping import Sweep
+    from mrhubo.fitting.record.recording import dashboard_command
+    from mrhubo.fitting.sweeping import Sweep
 
     try:
         sweep = Sweep(Path(files[0]), overrides, settings, given["quiet"])

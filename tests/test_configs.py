@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mrhubo.body.training import PriorConfig
+from mrhubo.body.prior_training.train import PriorConfig
 from mrhubo.config import load_config
 from mrhubo.robot import build_body_map
 

@@ -22,15 +22,15 @@ import pytest
 import torch
 
 from mrhubo.body import BodyPrior, Skeleton, VPoser, save_skeleton
-from mrhubo.callbacks import load_motions
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
+from mrhubo.evaluation import load_motions
+from mrhubo.files.storage import checksum_file
 from mrhubo.fit import main
+from mrhubo.fitting.record.recording import run_name
 from mrhubo.motion import read_motion
-from mrhubo.ranks import Ranks
-from mrhubo.recording import run_name
 from mrhubo.retargeter import Retargeter
-from mrhubo.storage import checksum_file
+from mrhubo.runtime.ranks import Ranks
 
 SMALL = [
     "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=40", "pairs.fine_steps=3", "model.hidden=64",
@@ -70,7 +70,7 @@ def runs_of(folder: Path) -> list[Any]:
 def few_frames() -> Iterator[None]:
     """Short animations: a whole one takes four seconds a fit."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mrhubo.callbacks.pictures.GIF_RATE", 1.0)
+        patch.setattr("mrhubo.view.pictures.GIF_RATE", 1.0)
         yield
 
 
@@ -150,7 +150,7 @@ def test_a_fit_that_fails_says_why_and_goes_on_when_the_cause_is_gone(
         raise UserError("checkpoints: no space left on device")
 
     with monkeypatch.context() as patch, pytest.raises(UserError):
-        patch.setattr("mrhubo.pipeline.train", full)
+        patch.setattr("mrhubo.fitting.pipeline.train", full)
         main(given)
     (failed,) = runs_of(tmp_path)
     assert failed.info.status == "FAILED"

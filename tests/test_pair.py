@@ -17,13 +17,13 @@ import pytest
 import torch
 from PIL import Image
 
-from mrhubo import pipeline
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
+from mrhubo.files.storage import remove_leftovers, write_tensors
+from mrhubo.fitting import pipeline
 from mrhubo.pair import main
 from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
-from mrhubo.storage import remove_leftovers, write_tensors
 
 SMALL = [
     "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=60", "pairs.fine_steps=4",
@@ -68,7 +68,9 @@ def spoilt(root: Path, undisturbed: Path, tmp_path: Path) -> PairStore:
 def server() -> ForkServerContext:
     """Starts processes that have imported everything already."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["mrhubo.pair", "mrhubo.pipeline", "mrhubo.pairing.verify", "mrhubo.ranks"])
+    context.set_forkserver_preload(
+        ["mrhubo.pair", "mrhubo.fitting.pipeline", "mrhubo.pairing.verify", "mrhubo.runtime.ranks"]
+    )
     return context
 
 

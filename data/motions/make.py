@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.motion.amass import write_motion
-from mrhubo.motion.keyposes import Arm, Key, perform
-from mrhubo.motion.stance import Stance
+from mrhubo.motion import write_motion
+from mrhubo.motion.authoring.key_poses import Arm, Key, perform
+from mrhubo.motion.authoring.stance import Stance
 
 FRAME_RATE = 60.0
 

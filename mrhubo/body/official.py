@@ -5,7 +5,8 @@ Joints at rest are linear in the mean mesh and the shape directions, so no mesh 
     joints = J_regressor (v_template + shapedirs[:, :, :B] betas)
 
 Source: Loper et al., "SMPL" (SIGGRAPH Asia 2015), equation 10; Pavlakos et al. (CVPR 2019) for SMPL-X. Pickles are read
-without executing anything (`mrhubo.inert`). Their licences forbid passing the files on: see docs/official-files.md.
+without executing anything (`mrhubo.files.safe_pickle`). Their licences forbid passing the files on: see
+docs/official-files.md.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ import torch
 
 from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POINT_NAMES, Skeleton
 from mrhubo.errors import UserError
-from mrhubo.inert import check_file, to_array, unpickle
-from mrhubo.npz import open_npz
-from mrhubo.storage import read_tensors, write_tensors
+from mrhubo.files.npz import open_npz
+from mrhubo.files.safe_pickle import check_file, to_array, unpickle
+from mrhubo.files.storage import read_tensors, write_tensors
 
 SCHEMA = "mrhubo.skeleton/1"
 _KEYS = ("v_template", "shapedirs", "J_regressor", "kintree_table")

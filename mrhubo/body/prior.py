@@ -3,7 +3,7 @@
 It says what a human pose is: decoding any latent near the origin gives a plausible pose, and encoding, then decoding
 the mean, pulls an implausible pose back to a plausible one; how far it was pulled is its reconstruction error phi.
 After Pavlakos et al., "Expressive Body Capture" (CVPR 2019), VPoser; ours is trained on the CMU database, see
-`mrhubo.body.training`.
+`mrhubo.body.prior_training`.
 
 Legend: B batch, J = 21 joints, Z = 32 latent numbers. Poses are 6D (two columns), so H is (B, 21, 6).
 """
@@ -19,11 +19,11 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
+from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.errors import UserError
-from mrhubo.storage import checksum_tensors, read_tensors, write_tensors
+from mrhubo.files.storage import checksum_tensors, read_tensors, write_tensors
 
 SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "open_prior.safetensors"
 _JOINTS = len(POSED_JOINT_NAMES)

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.errors import UserError, unknown_name
-from mrhubo.storage import checksum_tensors
+from mrhubo.files.storage import checksum_tensors
 
 _LONGEST = 2.0
 """No bone is that long [m]; other units than metres are."""

@@ -18,7 +18,7 @@ from mrhubo import rotation
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
-from mrhubo.inert import read_checkpoint, to_tensor
+from mrhubo.files.safe_pickle import read_checkpoint, to_tensor
 
 _PREFIX = "vp_model."
 _JOINTS = len(POSED_JOINT_NAMES)

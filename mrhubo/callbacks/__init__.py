@@ -1,16 +1,8 @@
-"""What happens around a training: metrics on clips, pictures, progress, the search of the scale factor."""
+"""Lightning callbacks: joint and link metrics, the search of the scale factor, pruning, progress."""
 
-from mrhubo.callbacks.clips import Clip, Motions, load_motions, solve_references
-from mrhubo.callbacks.metrics import ClipMetrics, ClipScore, mean_score, predict_clips, score_clip
+from mrhubo.callbacks.metrics import ClipMetrics
+from mrhubo.callbacks.progress import TrainingProgress
+from mrhubo.callbacks.pruning import Pruning
+from mrhubo.callbacks.scale_search import ScaleFactorSearch, ScaleResult
 
-__all__ = [
-    "Clip",
-    "ClipMetrics",
-    "ClipScore",
-    "Motions",
-    "load_motions",
-    "mean_score",
-    "predict_clips",
-    "score_clip",
-    "solve_references",
-]
+__all__ = ["ClipMetrics", "Pruning", "ScaleFactorSearch", "ScaleResult", "TrainingProgress"]

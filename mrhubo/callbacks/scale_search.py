@@ -19,17 +19,17 @@ from PIL.Image import Image
 from torch import Tensor
 
 from mrhubo.body import BodyPrior
-from mrhubo.callbacks.clips import Clip
-from mrhubo.callbacks.pictures import Artist
 from mrhubo.config import Config, ManualScaleConfig, fingerprint
+from mrhubo.evaluation.clips import Clip
+from mrhubo.files.storage import checksum_tensors, locked
 from mrhubo.pairing import ProportionTest, pose_settings
 from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
+from mrhubo.runtime.tracking import log_all, start_run
 from mrhubo.search import open_study, open_trials
 from mrhubo.search.plots import study_plots
-from mrhubo.storage import checksum_tensors, locked
-from mrhubo.tracking import log_all, start_run
 from mrhubo.view import figure_sheet
+from mrhubo.view.pictures import Artist
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient

@@ -1,5 +1,7 @@
-"""Human motion in: AMASS and SMPL-X files."""
+"""Human motion: what it is in memory, how it is read and written."""
 
-from mrhubo.motion.amass import Motion, find_motions, read_folder, read_motion, write_motion
+from mrhubo.motion.load import find_motions, read_folder, read_motion
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.writers.amass import write_motion
 
 __all__ = ["Motion", "find_motions", "read_folder", "read_motion", "write_motion"]

@@ -16,8 +16,8 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.latent import LatentProblem
-from mrhubo.storage import DamagedFile, read_tensors, write_tensors
-from mrhubo.trainer import cosine_schedule
+from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.runtime.trainer import cosine_schedule
 
 _BATCH = 256
 _BLOCK = 32

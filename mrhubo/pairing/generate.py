@@ -17,15 +17,15 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
-from mrhubo.body.inverse import poses_at_once, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
+from mrhubo.body.quasi_newton import poses_at_once, solve_quasi_newton
 from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
-from mrhubo.pairing.inverse import solve_lbfgs
+from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.store import PairStore
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import BodyMap, align_pose
-from mrhubo.threads import use_threads
+from mrhubo.runtime.threads import use_threads
 
 _STARTS = 4
 """Starts of the reference retargeter for a reverse pair: 12 take twice as long, for a cost that is 0.3% lower."""

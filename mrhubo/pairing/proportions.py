@@ -17,12 +17,12 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
-from mrhubo.body.inverse import nearest_samples, poses_at_once, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
+from mrhubo.body.quasi_newton import nearest_samples, poses_at_once, solve_quasi_newton
 from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.config import ManualScaleConfig, PairsConfig
 from mrhubo.robot import BodyMap, ManualScale
-from mrhubo.threads import use_threads
+from mrhubo.runtime.threads import use_threads
 
 _NO_ARM = ("neck", "head", "collar")
 

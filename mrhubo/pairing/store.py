@@ -21,8 +21,8 @@ from torch import Tensor
 from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
+from mrhubo.files.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
 from mrhubo.robot import BodyMap
-from mrhubo.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
 
 MEASURES = ("phi", "cost", "residual_m", "z_norm")
 """One number a pair, of the pose that the inverse kinematics ended with, before alignment: reconstruction error, cost,

@@ -13,10 +13,10 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
+from mrhubo.files.storage import DamagedFile
 from mrhubo.pairing.filter import make_filter
 from mrhubo.pairing.store import MEASURES, PairStore
 from mrhubo.robot import Robot
-from mrhubo.storage import DamagedFile
 
 _TOLERANCE = 1e-4
 SOURCES = {"robot poses": False, "human poses": True}

@@ -22,12 +22,12 @@ from pathlib import Path
 import mrhubo
 from mrhubo.config import Config, to_yaml
 from mrhubo.errors import UserError
+from mrhubo.files.storage import remove_leftovers
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.store import PairStore
 from mrhubo.pairing.worker import make_shard
-from mrhubo.ranks import Ranks
-from mrhubo.storage import remove_leftovers
-from mrhubo.threads import available_cores
+from mrhubo.runtime.ranks import Ranks
+from mrhubo.runtime.threads import available_cores
 
 _WORTH_A_WORKER = 10_000
 """Pairs; fewer are made before a new interpreter has started."""

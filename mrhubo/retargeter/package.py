@@ -25,11 +25,11 @@ from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
+from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
 from mrhubo.reference import DirectionJacobian, DirectionProblem, direction_error
 from mrhubo.retargeter.features import PoseFeatures
 from mrhubo.retargeter.networks import Branch, RetargetNetwork
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
-from mrhubo.storage import atomic_path, read_tensors, write_tensors
 
 SCHEMA = "mrhubo.retargeter/3"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"

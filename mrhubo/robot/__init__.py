@@ -1,10 +1,10 @@
 """The robot: its URDF, batched kinematics, and which link stands for which part of the human body."""
 
 from mrhubo.robot.alignment import align_pose
+from mrhubo.robot.body_map import BodyMap, build_body_map
 from mrhubo.robot.collision import SelfCollision
-from mrhubo.robot.keypoints import BodyMap, build_body_map
+from mrhubo.robot.manual_scale import ManualScale, varied
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.scale import ManualScale, varied
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import link_poses, load_urdf
 

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body.skeleton import JOINT_NAMES, PARENTS
-from mrhubo.robot.keypoints import BodyMap
+from mrhubo.robot.body_map import BodyMap
 from mrhubo.robot.parts import ENDS, joint_of, limb_of, turn_of
 
 _CHEST = JOINT_NAMES.index("spine3")

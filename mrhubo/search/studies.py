@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 
 from mrhubo.errors import UserError
-from mrhubo.storage import locked
+from mrhubo.files.storage import locked
 
 if TYPE_CHECKING:
     import optuna

@@ -9,7 +9,7 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, anatomy, mirror_pose
-from mrhubo.body.dataset import load_training_poses
+from mrhubo.body.prior_training.poses import load_training_poses
 from mrhubo.motion import read_folder
 
 

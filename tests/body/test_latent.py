@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from mrhubo.body import KEYPOINT_NAMES, BodyPrior, inverse
-from mrhubo.body.inverse import nearest_samples, solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
+from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.body.skeleton import Skeleton, keypoint_indices
 from mrhubo.config import load_config
 from mrhubo.pairing import solve_lbfgs, solve_levenberg_marquardt

@@ -10,11 +10,11 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton, mirror_pose
-from mrhubo.body.measures import measure, reconstruction
 from mrhubo.body.prior import SHIPPED_WEIGHTS
+from mrhubo.body.prior_training.measures import measure, reconstruction
 from mrhubo.errors import UserError
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import read_folder
-from mrhubo.storage import read_tensors, write_tensors
 
 
 @pytest.fixture(scope="module")

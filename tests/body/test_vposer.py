@@ -16,8 +16,8 @@ from torch.nn import functional as F
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton, VPoser, open_prior
-from mrhubo.body.inverse import solve_quasi_newton
 from mrhubo.body.latent import LatentProblem
+from mrhubo.body.quasi_newton import solve_quasi_newton
 from mrhubo.config import BodyConfig
 from mrhubo.errors import UserError
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from mrhubo.callbacks import Clip, load_motions, mean_score, predict_clips, score_clip, solve_references
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
+from mrhubo.evaluation import Clip, load_motions, mean_score, predict_clips, score_clip, solve_references
 from mrhubo.motion import Motion
 from mrhubo.retargeter import build_network
 from mrhubo.robot import BodyMap, build_body_map

@@ -14,18 +14,19 @@ import mlflow
 import pytest
 import torch
 
-from mrhubo import pipeline, rotation
+from mrhubo import rotation
 from mrhubo.body import BodyPrior
-from mrhubo.callbacks import Clip
 from mrhubo.callbacks.scale_search import ScaleFactorSearch
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
+from mrhubo.evaluation import Clip
 from mrhubo.fit import main
+from mrhubo.fitting import pipeline
 from mrhubo.motion import Motion
 from mrhubo.pairing import ProportionTest
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap, build_body_map, varied
-from mrhubo.tracking import open_client, start_run
+from mrhubo.runtime.tracking import open_client, start_run
 
 RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 24, poses: 12}"
 

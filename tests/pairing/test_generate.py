@@ -10,11 +10,11 @@ import torch
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.config import Config, load_config
+from mrhubo.files.storage import DamagedFile
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
 from mrhubo.pairing.store import MEASURES
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import build_body_map
-from mrhubo.storage import DamagedFile
 
 SMALL = [
     "pairs.count=250",

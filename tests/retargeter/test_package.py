@@ -13,10 +13,10 @@ from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior,
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
+from mrhubo.files.storage import read_metadata, read_tensors, write_tensors
 from mrhubo.reference import ReferenceRetargeter, direction_error
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
-from mrhubo.storage import read_metadata, read_tensors, write_tensors
 
 
 @pytest.fixture(scope="module")

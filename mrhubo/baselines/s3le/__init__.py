@@ -1,0 +1,1 @@
+"""S3LE (Choi et al., ICRA 2021), the paper's baseline."""

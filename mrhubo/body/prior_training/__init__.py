@@ -1,0 +1,1 @@
+"""How the open body prior is trained and measured."""

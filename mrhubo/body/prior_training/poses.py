@@ -1,0 +1,78 @@
+"""The training poses of the body prior: reading, finding defects, drawing batches.
+
+Legend: F frames, J = 21 joints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.utils.data import Dataset, Sampler
+
+from mrhubo import rotation
+from mrhubo.body import anatomy
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.errors import UserError
+from mrhubo.files.npz import open_npz
+
+
+def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
+    """Poses (F, 21, 6) float32, the frames of each clip, and the clips' names.
+
+    Raises:
+        UserError: the file is missing, damaged, or holds other arrays than expected.
+    """
+    with open_npz(path) as file:
+        poses, starts, names = file.read("poses"), file.read("clip_starts"), file.read("clip_ids", kinds="U")
+    if poses.ndim != 2 or poses.shape[1] != 66 or len(starts) != len(names) + 1 or starts[-1] != len(poses):
+        raise UserError(f"data: {path}: expected poses (F, 66) and clip_starts up to F, found poses {poses.shape}")
+    if not np.isfinite(poses).all():
+        raise UserError(f"data: {path}: poses holds NaN or infinite numbers")
+    sixd = torch.empty(len(poses), len(POSED_JOINT_NAMES), 6)
+    for start in range(0, len(poses), 50_000):
+        block = torch.from_numpy(poses[start : start + 50_000, 3:].astype(np.float32)).unflatten(-1, (-1, 3))
+        sixd[start : start + 50_000] = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(block))
+    return sixd, [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)], [str(n) for n in names]
+
+
+def sound_frames(pose_FJ6: Tensor, max_excess_deg: float) -> Tensor:
+    """Which frames (F,) have no joint further outside its anatomical range: the others are defects of a recording."""
+    chunks = (anatomy.excess(rotation.sixd_to_matrix(chunk)) for chunk in pose_FJ6.split(32_768))
+    return torch.cat([(chunk <= math.radians(max_excess_deg)).flatten(1).all(dim=1) for chunk in chunks])
+
+
+class Rows(Dataset[Tensor]):
+    """A table of poses, indexed by whole batches of row numbers."""
+
+    def __init__(self, rows: Tensor) -> None:
+        self.rows = rows
+
+    def __getitem__(self, index: Tensor) -> Tensor:
+        return self.rows[index]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+class RandomBatches(Sampler[Tensor]):
+    """Batches of random rows; each epoch of the given length draws anew from (seed, epoch)."""
+
+    def __init__(self, rows: int, batch_size: int, length: int, seed: int) -> None:
+        self.rows, self.batch_size, self.length, self.seed, self.epoch = rows, batch_size, length, seed, 0
+
+    def set_epoch(self, epoch: int) -> None:
+        """Called by Lightning before each epoch."""
+        self.epoch = epoch
+
+    def __len__(self) -> int:
+        return self.length
+
+    def __iter__(self) -> Iterator[Tensor]:
+        generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
+        for _ in range(self.length):
+            yield torch.randint(self.rows, (self.batch_size,), generator=generator)

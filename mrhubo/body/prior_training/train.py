@@ -1,0 +1,276 @@
+"""How the shipped body prior is trained: `python -m mrhubo.body.prior_training --config conf/prior.yaml`.
+
+Loss per pose H, decoded as H^ from a latent z drawn from the posterior q, with chordal distances of the 21 rotations
+and distances of all keypoints [m], both rounded off near 0:
+
+    L = sum_j |R_j - R^_j|_F + w_position * sum_k |p_k - p^_k| + w_kl * KL(q(z|H) || N(0, I))
+        + w_latent * SW(z, N(0, I)) + w_anatomy * excess(decode(N(0, I)))^2 + w_columns * defect(raw columns)
+
+SW, the sliced Wasserstein distance of the batch's latents, makes N(0, I) what the poses look like in the latent space,
+so that samples are poses; the excess over anatomical ranges keeps samples possible; the last term keeps Gram-Schmidt
+away from its singularities, which stop second-order solvers. Every batch is mirrored at random; some poses are seen
+with noise and asked for without. Clips are held out whole. Legend: B batch, Z latent, J = 21 joints.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import lightning
+import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
+from torch import Tensor
+from torch.utils.data import DataLoader
+
+from mrhubo import rotation
+from mrhubo.body import anatomy
+from mrhubo.body.prior import ACTIVATIONS, SHIPPED_WEIGHTS, BodyPrior
+from mrhubo.body.prior_training.augmentation import add_missing_motion, add_noise
+from mrhubo.body.prior_training.losses import column_defect, length, sliced_wasserstein
+from mrhubo.body.prior_training.measures import measure, reconstruction
+from mrhubo.body.prior_training.poses import RandomBatches, Rows, load_training_poses, sound_frames
+from mrhubo.body.skeleton import Skeleton, mirror_pose
+from mrhubo.callbacks.progress import TrainingProgress
+from mrhubo.config import (
+    bounded,
+    changed_settings,
+    choice,
+    fingerprint,
+    to_plain,
+    without_paths,
+)
+from mrhubo.errors import UserError
+from mrhubo.runtime.tracking import git_commit, open_logger, resumable_run
+from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
+from mrhubo.runtime.workspace import Workspace
+
+_KNOWN, _UNSEEN = 50_000, 5_000
+"""Poses that the final measures take from the training clips and from those held out."""
+
+_SHOWN = {"val/joint_mm": "held-out joints mm", "val/geodesic_deg": "deg"}
+_EPOCH = 1_000
+"""Steps between validations and checkpoints."""
+_ROTATION_KNEE, _POSITION_KNEE = 0.02, 0.002
+_MARGIN = math.radians(5.0)
+"""Samples are kept this far inside the anatomical ranges [rad]."""
+
+
+@dataclass
+class PriorConfig:
+    """Training of the body prior."""
+
+    data: Path
+    """File of training poses: `poses` (F, 66) axis-angle, root first; `clip_starts`, one more than clips;
+    `clip_ids`."""
+    output: Path = SHIPPED_WEIGHTS
+    """Where the weights go (.safetensors)."""
+    steps: int = bounded(16_000, 1, 100_000_000)
+    """Optimiser steps."""
+    batch_size: int = bounded(1_024, 2, 1_000_000)
+    """Poses per step."""
+    lr: float = bounded(1e-3, 1e-9, 1.0)
+    """Peak learning rate of AdamW; cosine decay to 0."""
+    weight_decay: float = bounded(1e-4, 0.0, 1.0)
+    """Weight decay of AdamW."""
+    hidden: int = bounded(512, 8, 65_536)
+    """Width of the decoder's two hidden layers."""
+    encoder_hidden: int = bounded(1_024, 8, 65_536)
+    """Width of the encoder's two hidden layers."""
+    latent: int = bounded(32, 1, 1_024)
+    """Size of the latent."""
+    activation: str = choice("silu", *ACTIVATIONS)
+    """Activation of the hidden layers; second-order solvers need a smooth one."""
+    w_position: float = bounded(10.0, 0.0)
+    """Weight of the keypoint distances, 1/m."""
+    w_kl: float = bounded(2e-3, 0.0)
+    """Weight of the Kullback-Leibler divergence from N(0, I)."""
+    w_latent: float = bounded(10.0, 0.0)
+    """Weight of the sliced Wasserstein distance between the batch's latents and N(0, I)."""
+    w_anatomy: float = bounded(60.0, 0.0)
+    """Weight of the squared excess [rad^2] over anatomical ranges of poses decoded from N(0, I)."""
+    w_columns: float = bounded(0.2, 0.0)
+    """Weight that keeps the six raw numbers of every joint near two orthogonal unit vectors."""
+    noise_share: float = bounded(0.3, 0.0, 1.0)
+    """Share of the poses that the encoder sees with noise, and the decoder has to give clean."""
+    max_excess_deg: float = bounded(20.0, 0.0)
+    """Frames with a joint further outside its anatomical range than this are dropped."""
+    missing_share: float = bounded(0.5, 0.0, 1.0)
+    """Share of the poses whose wrists (and of those whose collars, toes) get random angles, which the data lacks."""
+    held_out: float = bounded(0.05, 0.001, 0.5)
+    """Share of the clips held out for validation."""
+    seed: int = bounded(0, 0, 2**32 - 1)
+    """Seed of weights, split and draws."""
+    tracking_dir: Path = field(default_factory=lambda: Path("mlruns"))
+    """Folder of the MLflow database."""
+
+
+class PriorTraining(lightning.LightningModule):
+    """Loss, validation and optimiser of the body prior."""
+
+    def __init__(self, config: PriorConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.save_hyperparameters(to_plain(config))
+        self.prior = BodyPrior(config.hidden, config.latent, config.activation, config.encoder_hidden)
+        self.skeleton = Skeleton()
+
+    def on_train_batch_start(self, *_: Any) -> None:
+        """Draws of a step depend on (seed, step) alone, so that a resumed training goes on exactly."""
+        torch.manual_seed(self.config.seed * 1_000_003 + self.trainer.global_step)
+
+    def training_step(self, pose_BJ6: Tensor, _: int) -> Tensor:
+        """One batch of poses (B, 21, 6)."""
+        flip = torch.rand(len(pose_BJ6), 1, 1, device=pose_BJ6.device) < 0.5
+        pose_BJ6 = torch.where(flip, mirror_pose(pose_BJ6), pose_BJ6)
+        pose_BJ6 = add_missing_motion(pose_BJ6, self.config.missing_share)
+        seen_BJ6 = add_noise(pose_BJ6, self.config.noise_share)
+        mean, log_std = self.prior.posterior(seen_BJ6)
+        z_BZ = mean + log_std.exp() * torch.randn_like(mean)
+        raw_BJ6 = self.prior.decode_raw(torch.cat((z_BZ, torch.randn_like(z_BZ[: len(z_BZ) // 4]))))
+        decoded = rotation.sixd_to_matrix(raw_BJ6)
+        matrices, drawn = decoded[: len(z_BZ)], decoded[len(z_BZ) :]
+        anatomy_cost = anatomy.excess(drawn, margin=_MARGIN).square().sum(dim=(1, 2)).mean()
+        columns = column_defect(raw_BJ6).sum(dim=1).mean()
+        latent = sliced_wasserstein(z_BZ)
+        target = rotation.sixd_to_matrix(pose_BJ6)
+        rotations = length((matrices - target).flatten(2), _ROTATION_KNEE).sum(dim=1).mean()
+        distance = self.skeleton.keypoints(matrices) - self.skeleton.keypoints(target)
+        positions = length(distance, _POSITION_KNEE).sum(dim=1).mean()
+        kl = 0.5 * (mean.square() + (2 * log_std).exp() - 1 - 2 * log_std).sum(-1).mean()
+        loss = (
+            rotations
+            + self.config.w_position * positions
+            + self.config.w_kl * kl
+            + self.config.w_latent * latent
+            + self.config.w_anatomy * anatomy_cost
+            + self.config.w_columns * columns
+        )
+        parts = {"rotation": rotations, "position_m": positions, "kl": kl, "latent": latent}
+        parts |= {"loss": loss, "anatomy_rad2": anatomy_cost, "columns": columns}
+        self.log_dict({f"train/{name}": value for name, value in parts.items()})
+        return loss
+
+    def on_train_batch_end(self, *_: Any) -> None:
+        """Stops at the last step, also within an epoch."""
+        if self.trainer.global_step >= self.config.steps:
+            self.trainer.should_stop = True
+
+    def validation_step(self, pose_BJ6: Tensor, _: int) -> None:
+        """Encode, take the mean, decode: distance of the 22 joints and angle of the 21 rotations."""
+        error_mm, angle_deg = reconstruction(self.prior, self.skeleton, pose_BJ6)
+        values = {"val/joint_mm": error_mm.mean(), "val/geodesic_deg": angle_deg.mean()}
+        self.log_dict(values, batch_size=len(pose_BJ6))
+
+    def configure_optimizers(self) -> Any:
+        """AdamW, linear warm-up over 2% of the steps, cosine decay to 0."""
+        optimizer = torch.optim.AdamW(self.prior.parameters(), self.config.lr, weight_decay=self.config.weight_decay)
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": cosine_schedule(optimizer, self.config.steps), "interval": "step"},
+        }
+
+
+@dataclass(frozen=True)
+class Split:
+    """The sound frames of the training clips, (F, 21, 6), and of the clips held out, of which every fourth is used."""
+
+    kept: Tensor
+    held_out: Tensor
+    clips: int
+    held_out_clips: list[str]
+    dropped_share: float
+
+    @classmethod
+    def of(cls, config: PriorConfig, held_out_clips: Collection[str] | None = None) -> Split:
+        """Reads the data and draws the clips to hold out, or holds out those of the given names."""
+        poses, clips, names = load_training_poses(config.data)
+        if held_out_clips is None:
+            order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
+            held = set(order[: max(1, round(config.held_out * len(clips)))])
+        else:
+            held = {i for i, name in enumerate(names) if name in held_out_clips}
+        parts = [[poses[clips[i]] for i in range(len(clips)) if (i in held) == wanted] for wanted in (False, True)]
+        kept, held_out = (pose[sound_frames(pose, config.max_excess_deg)] for pose in map(torch.cat, parts))
+        if not len(kept) or not len(held_out):
+            raise UserError(f"max_excess_deg: {config.max_excess_deg:g} leaves no frame to train or to validate on")
+        share = 1 - (len(kept) + len(held_out)) / len(poses)
+        return cls(kept, held_out[::4], len(clips), [names[i] for i in sorted(held)], share)
+
+    def known(self, seed: int) -> Tensor:
+        """Training poses to measure samples against."""
+        return self.kept[torch.randperm(len(self.kept), generator=torch.Generator().manual_seed(seed))[:_KNOWN]]
+
+    def unseen(self) -> Tensor:
+        """Held-out poses for the measures, evenly spaced."""
+        return self.held_out[:: max(1, len(self.held_out) // _UNSEEN)]
+
+
+def train(config: PriorConfig, quiet: bool = False) -> BodyPrior:
+    """Trains, measures, saves the weights with their card, and returns the prior."""
+    lightning.seed_everything(config.seed, verbose=False)
+    split, module = Split.of(config), PriorTraining(config)
+    settings = to_plain(config)
+    key = fingerprint({k: v for k, v in settings.items() if k not in ("output", "tracking_dir")})
+    with Workspace(config.tracking_dir / "fits", "prior", key) as workspace, quiet_lightning():
+        tags = {"git_commit": git_commit(Path(__file__).parent)}
+        run_id = resumable_run(config.tracking_dir, None, workspace.run_id)
+        name = ", ".join(f"{k}={v}" for k, v in changed_settings(config).items()) or "defaults"
+        logger = open_logger(config.tracking_dir, "body-prior", name, tags, run_id=run_id)
+        workspace.start(str(logger.run_id))
+        epoch = min(_EPOCH, config.steps)
+        trainer = lightning.Trainer(
+            max_epochs=-(-config.steps // epoch),  # max_steps would break exact resumption
+            logger=logger,
+            log_every_n_steps=100,
+            accelerator="auto",
+            devices=1,
+            gradient_clip_val=1.0,
+            enable_model_summary=False,
+            enable_progress_bar=False,
+            num_sanity_val_steps=0,
+            callbacks=[
+                TrainingProgress(config.steps, _SHOWN, quiet),
+                ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
+            ],
+        )
+        batches = RandomBatches(len(split.kept), config.batch_size, epoch, config.seed)
+        in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
+        run_trainer(
+            trainer,
+            module,
+            workspace.last_checkpoint(),
+            DataLoader(Rows(split.kept), sampler=batches, batch_size=None),
+            DataLoader(Rows(split.held_out), sampler=in_order, batch_size=None),
+        )
+        prior = module.prior.cpu().requires_grad_(False).eval()
+        measures = measure(prior, split.unseen(), split.known(config.seed), config.seed)
+        logger.log_metrics({f"held_out/{name}": value for name, value in measures.items()}, config.steps)
+        prior.save(config.output, _card(config, split, measures))
+        workspace.finish()
+    return prior
+
+
+def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict[str, Any]:
+    """What the weights' header says of them."""
+    held = len(split.held_out_clips)
+    return {
+        "name": "mrhubo open body prior",
+        "data": "CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu), mirrored; free for all uses",
+        "credit": "The data used in this project was obtained from mocap.cs.cmu.edu. "
+        "The database was created with funding from NSF EIA-0196217.",
+        "licence": "Apache-2.0",
+        "split": f"by clip: {split.clips - held} for training, {held} held out; the evaluation clips are in neither",
+        "dropped": f"{100 * split.dropped_share:.1f}% of the frames, as a joint was more than "
+        f"{config.max_excess_deg:g} degrees outside its anatomical range (defects of the recording)",
+        "held_out_clips": split.held_out_clips,
+        "measures_on_held_out_clips": {name: round(value, 4) for name, value in measures.items()},
+        "training": without_paths(config),
+        "known_defects": "wrist flexion, collars and toes do not move in the data: plausible angles were added at "
+        "random, so the prior allows them and knows nothing of how they go with the arm or the step; the elbows are "
+        "pure hinges and all twist of the forearm is in the wrists, so poses of other sources, which share these "
+        "turns out differently, have a larger phi",
+    }

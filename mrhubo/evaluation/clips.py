@@ -1,0 +1,113 @@
+"""The human motions that measure a retargeter, each with the reference retargeter's answer.
+
+The answer is kept on disk: it depends on the motions, the robot and the reference's settings alone.
+Legend: T frames, J = 21 human joints, N robot joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from torch import Tensor
+
+from mrhubo.config import Config, fingerprint
+from mrhubo.errors import UserError
+from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.pairing import pose_settings
+from mrhubo.reference import ReferenceRetargeter
+from mrhubo.robot import BodyMap
+
+REFERENCE_SCHEMA = "mrhubo.reference/1"
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A motion, and the joint angles (T, N) [rad] that the reference retargeter gives it."""
+
+    motion: Motion
+    reference_TN: Tensor
+
+    @property
+    def name(self) -> str:
+        """The motion's name."""
+        return self.motion.name
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Motions for validation and for the test, from one folder."""
+
+    folder: Path
+    validation: list[Motion]
+    test: list[Motion]
+
+    @property
+    def all(self) -> list[Motion]:
+        """Those for validation, then those for the test."""
+        return [*self.validation, *self.test]
+
+
+def load_motions(config: Config) -> Motions:
+    """Reads and splits the motions of `evaluation`.
+
+    Raises:
+        UserError: no folder exists, a file cannot be used, or the split leaves validation or test empty.
+    """
+    folder = find_motions(config.evaluation.motions)
+    motions = read_folder(folder)
+    names = set(config.evaluation.validation)
+    validation = [m for m in motions if m.name in names]
+    test = [m for m in motions if m.name not in names]
+    if not validation or not test:
+        found = ", ".join(m.name for m in motions)
+        which = "validation" if not validation else "the test"
+        raise UserError(f"evaluation.validation: leaves no clip for {which}; {folder} holds {found}")
+    return Motions(folder, validation, test)
+
+
+def solve_references(
+    config: Config,
+    body_map: BodyMap,
+    motions: Motions,
+    folder: Path,
+    progress: Callable[[int, int, str], None] = lambda done, total, name: None,
+) -> tuple[list[Clip], list[Clip]]:
+    """Reference joint angles for all clips: validation and test. Answers in `folder` are used again.
+
+    Args:
+        config: the run's config.
+        body_map: the robot, on the CPU.
+        motions: what `load_motions` gave.
+        folder: where answers are kept.
+        progress: called with (clips done, all clips, name of the next).
+    """
+    # Directions are all that the reference sees of a robot, whatever its lengths are made of.
+    directions = {k: v for k, v in pose_settings(config).items() if k not in ("scale", "manual", "search")}
+    common = {
+        "schema": REFERENCE_SCHEMA,
+        "robot": fingerprint(directions),
+        "skeleton": body_map.skeleton.checksum,
+        "kinematics": body_map.robot.description.kinematics,
+        "smoothness": repr(config.evaluation.smoothness),
+    }
+    retargeter = ReferenceRetargeter(body_map, smoothness=config.evaluation.smoothness)
+    everything, clips = motions.all, []
+    for done, motion in enumerate(everything):
+        progress(done, len(everything), motion.name)
+        header = {**common, "motion_xxh3": motion.checksum}
+        path = folder / f"{config.robot.name}-{motion.name}-{fingerprint(header)}.safetensors"
+        try:
+            tensors, found = read_tensors(path)
+            reference = tensors["q"] if found == header else None
+        except (DamagedFile, KeyError):
+            reference = None
+        if reference is None or reference.shape != (len(motion.pose_TJ6), len(body_map.robot.joint_names)):
+            reference = retargeter.retarget(motion.pose_TJ6, motion.frame_rate).q_TN.float()
+            write_tensors(path, {"q": reference}, header)
+        clips.append(Clip(motion, reference))
+    progress(len(everything), len(everything), "")
+    count = len(motions.validation)
+    return clips[:count], clips[count:]

@@ -1,0 +1,71 @@
+"""The training of the networks: teacher-student loss, optimiser.
+
+    L_pre  = d(R, R^)
+    L_post = d(q, post(R)) + d(q, post(R^))              teacher (true R) + student (predicted R^)
+    L      = L_pre + L_post                              MR.HuBo (IROS 2024), section III-C
+
+d is the mean square in the paper. Ours is the mean absolute difference: where several joint angles fit a pose (the
+twist of a straight arm) it learns the usual one, not a mean that fits none.
+
+Legend: B batch, F input features, M robot links, N robot joints.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import lightning
+import torch
+from torch import Tensor
+from torch.nn.functional import l1_loss, mse_loss
+
+from mrhubo.config import TrainerConfig
+from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.runtime.trainer import cosine_schedule
+
+LOG_EVERY = 50
+"""Steps between two entries of the losses; MLflow takes about 20 ms for each."""
+
+
+class RetargetModule(lightning.LightningModule):
+    """Loss and optimiser around a `RetargetNetwork`."""
+
+    def __init__(self, network: RetargetNetwork, settings: TrainerConfig, detach_student: bool = True) -> None:
+        super().__init__()
+        self.network, self.settings, self.detach_student = network, settings, detach_student
+        self._distance = {"l1": l1_loss, "mse": mse_loss}[settings.loss]
+
+    def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor) -> dict[str, Tensor]:
+        """`loss`, and for two stages `loss_pre` (of 6D numbers) and `loss_post` (of rad), squared with `mse`."""
+        network, distance = self.network, self._distance
+
+        def joint_loss(given: Tensor) -> Tensor:
+            return distance(network.limited.unlimited(network.post(given).float()), q_BN)
+
+        if network.pre is None:
+            return {"loss": joint_loss(features_BF)}
+        links = R_BM6.flatten(1)
+        predicted = network.links(features_BF)
+        pre = distance(predicted.float(), links)
+        post = joint_loss(links) + joint_loss(predicted.detach() if self.detach_student else predicted)
+        return {"loss": pre + post, "loss_pre": pre, "loss_post": post}
+
+    def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
+        """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""
+        losses = self.losses(*batch)
+        # Only when it is written anyway: each call costs milliseconds.
+        if (self.trainer.global_step + 1) % LOG_EVERY == 0:
+            self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
+        return losses["loss"]
+
+    def on_train_batch_end(self, *_: Any) -> None:
+        """Stops at the last step, also within an epoch."""
+        if self.trainer.global_step >= self.settings.max_steps:
+            self.trainer.should_stop = True
+
+    def configure_optimizers(self) -> Any:
+        """AdamW with warm-up and cosine decay over `max_steps`."""
+        settings = self.settings
+        optimizer = torch.optim.AdamW(self.network.parameters(), settings.lr, weight_decay=settings.weight_decay)
+        schedule = cosine_schedule(optimizer, settings.max_steps)
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}

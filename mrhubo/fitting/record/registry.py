@@ -1,0 +1,99 @@
+"""A package as a model version in MLflow's registry, with signature, input example and what it was made from."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from torch import Tensor
+
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.retargeter import Retargeter
+from mrhubo.rotation import matrix_to_axis_angle, sixd_to_matrix
+from mrhubo.runtime.tracking import library_versions
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+
+_SCRIPT = Path(__file__).with_name("serving.py")
+
+
+def model_name(robot: str) -> str:
+    """Name of a robot's registered model."""
+    return f"mrhubo-{robot}"
+
+
+def example_input(pose_TJ6: Tensor) -> np.ndarray:
+    """Human poses (T, 21, 6) as the model wants them: axis-angle [rad] (T, 63), float32."""
+    return matrix_to_axis_angle(sixd_to_matrix(pose_TJ6)).flatten(1).numpy().astype(np.float32)
+
+
+def register(
+    client: MlflowClient, run_id: str, package: Path, retargeter: Retargeter, pose_TJ6: Tensor, tags: Mapping[str, str]
+) -> str:
+    """Makes a new version of the robot's model and returns its URI, `models:/mrhubo-nao/3`.
+
+    Only `client` is used, so that MLflow's global tracking URI stays as it is.
+
+    Args:
+        client: of the tracking database or server, whose registry it uses too.
+        run_id: the run that made the package.
+        package: its folder.
+        retargeter: what is in it.
+        pose_TJ6: human poses (T, 21, 6), the input example.
+        tags: of the model version.
+
+    Raises:
+        Exception: whatever MLflow raises where a server has no registry, or one that is too old.
+    """
+    from mlflow.entities import LoggedModelOutput
+
+    run, name = client.get_run(run_id), model_name(retargeter.body_map.robot.name)
+    model = client.create_logged_model(run.info.experiment_id, name, run_id, tags=dict(tags))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model"
+        _save(path, package, retargeter, example_input(pose_TJ6), model.model_id, run_id)
+        client.log_model_artifacts(model.model_id, str(path))
+    client.finalize_logged_model(model.model_id, "READY")
+    client.log_outputs(run_id, [LoggedModelOutput(model.model_id, step=0)])
+    if not client.search_registered_models(f"name = '{name}'"):
+        about = f"Human poses to joint angles of {retargeter.body_map.robot.name}, made by mrhubo"
+        client.create_registered_model(name, description=about)
+    # Not "models:/<id>": the registry would look that up with MLflow's global tracking URI.
+    source = model.artifact_location
+    version = client.create_model_version(
+        name, source, run_id, dict(tags), description=run.info.run_name, model_id=model.model_id
+    ).version
+    # The dashboard's link from the run to the version reads this tag, which MLflow's own register_model writes too.
+    link = json.dumps([{"name": name, "version": version}])
+    client.set_logged_model_tags(model.model_id, {"mlflow.modelVersions": link})
+    return f"models:/{name}/{version}"
+
+
+def _save(
+    path: Path, package: Path, retargeter: Retargeter, example_T63: np.ndarray, model_id: str, run_id: str
+) -> None:
+    """Writes an MLflow model: the script, the package, signature, example and requirements."""
+    import mlflow
+    from mlflow.models import Model, ModelSignature
+    from mlflow.types import ColSpec, Schema, TensorSpec
+
+    columns = [*retargeter.joint_names, "confidence"]
+    signature = ModelSignature(
+        Schema([TensorSpec(np.dtype(np.float32), (-1, 3 * len(POSED_JOINT_NAMES)))]),
+        Schema([ColSpec("float", name) for name in columns]),
+    )
+    mlflow.pyfunc.save_model(
+        path,
+        mlflow_model=Model(run_id=run_id, model_uuid=model_id, model_id=model_id),
+        python_model=str(_SCRIPT),
+        artifacts={"package": str(package)},
+        signature=signature,
+        input_example=example_T63,
+        # Given, as MLflow takes ten seconds to find them. mrhubo itself is on no package index: git_commit names it.
+        pip_requirements=[f"{name}=={number.partition('+')[0]}" for name, number in library_versions().items()],
+    )

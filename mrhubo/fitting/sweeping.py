@@ -1,0 +1,204 @@
+"""One process's share of a sweep: trials of a study, each a training in an MLflow run under the sweep's own.
+
+Pairs are shared by all trials with the same pairing settings: the first that needs them makes them, the others wait.
+A config that some trial has been trained with is never trained again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mrhubo.callbacks.pruning import Pruning
+from mrhubo.config import Config, SweepConfig, fingerprint, load_config, to_plain, to_yaml
+from mrhubo.errors import UserError
+from mrhubo.files.storage import atomic_path, locked
+from mrhubo.fitting import pipeline
+from mrhubo.fitting.record.recording import Recording
+from mrhubo.runtime.locations import project_root
+from mrhubo.runtime.progress import Progress
+from mrhubo.runtime.tables import markdown
+from mrhubo.runtime.tracking import find_run, git_commit, log_all, open_client, run_status, start_run
+from mrhubo.runtime.workspace import Workspace
+from mrhubo.search import open_study, open_trials, override, read_space, remaining, work_on
+
+if TYPE_CHECKING:
+    from optuna.trial import FrozenTrial, Trial
+
+_TAG = "sweep_trial"
+_VALUE = "val/best_link_cm"
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """What a sweep has found so far."""
+
+    table: str
+    """The best trials, best first."""
+    best: Path
+    """The best config, for `mrhubo.fit`."""
+
+
+class Sweep:
+    """A sweep over a config; everything is checked when it is made."""
+
+    def __init__(self, file: Path, overrides: Sequence[str], settings: SweepConfig, quiet: bool = False) -> None:
+        """Checks space, config and files, and opens the study and its MLflow run.
+
+        Raises:
+            UserError: anything is wrong.
+        """
+        self.settings, self.quiet, self.file = settings, quiet, file
+        self.overrides = [*(override(key, value) for key, value in settings.fixed.items()), *overrides]
+        self.base = self._config([])
+        self.space = read_space(settings.space, lambda text: self._config([text]))
+        prepared = pipeline.prepare(self.base)
+        self.folder = Recording.folder(self.base)
+        deciding = {**to_plain(settings), "trials": 0, "minutes": 0, "storage": ""}
+        mark = fingerprint([prepared.fingerprint, deciding])
+        self.name = f"{self.base.robot.name}-{settings.name}-{mark[:8]}"
+        """Of the study; the same settings find it again, with more trials too."""
+        self.study = open_study(
+            self.folder, settings.storage, self.name, settings.sampler, settings.seed, settings.pruner
+        )
+        tracking = self.base.tracking
+        self.client = open_client(self.folder, tracking.experiment, tracking.uri)
+        with locked(self.folder / "studies.lock", wait=True):
+            self.parent = self._open_run()
+
+    def run(self) -> SweepResult:
+        """Trials until there are enough, or the time is up; other processes may do some of them.
+
+        Raises:
+            UserError: three trials in a row failed, or the time was up before any was done.
+            KeyboardInterrupt: the user stopped it; the same call goes on, with the trial that was interrupted.
+        """
+        start, limit = time.monotonic(), self.settings.minutes
+        self.client.update_run(self.parent, status="RUNNING")
+        error: BaseException | None = None
+        try:
+            with Progress("sweep", self.settings.trials, "trials", self.quiet) as self._progress:
+                self._progress.update(self._done())
+                work_on(
+                    self.study,
+                    self._trial,
+                    self.settings.trials,
+                    lambda: limit is not None and time.monotonic() - start > 60 * limit,
+                )
+                self._progress.update(self._done(), self._best_so_far())
+            return self._conclude()
+        except BaseException as raised:
+            error = raised
+            raise
+        finally:
+            if not open_trials(self.study):  # else another process will end it
+                self.client.set_terminated(self.parent, run_status(error))
+
+    def _config(self, texts: Sequence[str]) -> Config:
+        return load_config(self.file, [*self.overrides, *texts])
+
+    def _open_run(self) -> str:
+        """The run that all trials belong to."""
+        tags = {"sweep": self.name}
+        found = find_run(self.client, self.base.tracking.experiment, tags)
+        if found is not None:
+            return found.info.run_id
+        tags |= {"robot": self.base.robot.name, "git_commit": git_commit(project_root())}
+        name = f"{self.base.robot.name} sweep {self.settings.name}"
+        run = start_run(self.client, self.base.tracking.experiment, name, tags).info.run_id
+        described = {f"space/{dimension.key}": dimension.describe() for dimension in self.space}
+        kept = {key: value for key, value in to_plain(self.settings).items() if key not in ("space", "storage")}
+        log_all(self.client, run, {}, {**{f"sweep/{key}": value for key, value in kept.items()}, **described})
+        self.client.log_text(run, to_yaml(self.base), "base.yaml")
+        return run
+
+    def _done(self) -> int:
+        return self.settings.trials - remaining(self.study, self.settings.trials) - len(open_trials(self.study))
+
+    def _trial(self, trial: Trial) -> float:
+        texts = [dimension.draw(trial) for dimension in self.space]
+        config = self._config(texts)
+        shown = " ".join(text.split(".", 1)[1] for text in texts)
+        config.tracking.run_name = f"{self.base.robot.name} {self.settings.name} {trial.number}: {shown}"
+        prepared = pipeline.prepare(config)
+        workspace = Workspace(self.folder / "fits", f"{config.robot.name}-sweep", prepared.fingerprint)
+        watch = Pruning(trial, lambda step, link_cm: self._show(trial, f"step {step:,}: {link_cm:.2f} cm"))
+        with locked(workspace.folder.with_suffix(".lock"), wait=True):  # another process may draw the same config
+            known = find_run(self.client, config.tracking.experiment, {_TAG: prepared.fingerprint}, finished=True)
+            if known is not None:
+                trial.set_user_attr("run_id", known.info.run_id)
+                return known.data.metrics[_VALUE]
+            link_cm = self._train(prepared, workspace, trial, watch)
+        if watch.pruned:
+            import optuna
+
+            raise optuna.TrialPruned
+        return link_cm
+
+    def _train(self, prepared: pipeline.Prepared, workspace: Workspace, trial: Trial, watch: Pruning) -> float:
+        with workspace, Recording.start(prepared, workspace, self.parent) as recording:
+            trial.set_user_attr("run_id", recording.run_id)
+            self._show(trial, "pairs")
+            with locked(prepared.store.folder.with_suffix(".lock"), wait=True):
+                pipeline.make_pairs(prepared, True)
+                validation, _ = pipeline.make_references(prepared, True)
+            training = pipeline.train(
+                prepared, validation, recording.logger, workspace.checkpoints, workspace.last_checkpoint(), True,
+                watchers=[watch],
+            )  # fmt: skip
+            recording.resume_after_training()
+            log_all(self.client, recording.run_id, {_VALUE: training.best_link_cm})
+            tags = {"trial": str(trial.number), "trial_state": "pruned" if watch.pruned else "complete"}
+            if not watch.pruned:
+                tags[_TAG] = prepared.fingerprint
+            for name, value in tags.items():
+                self.client.set_tag(recording.run_id, name, value)
+            workspace.finish()
+        return training.best_link_cm
+
+    def _show(self, trial: Trial, measure: str) -> None:
+        self._progress.update(min(self._done(), self.settings.trials - 1), ", ".join(
+            part for part in (f"trial {trial.number} {measure}", self._best_so_far()) if part))  # fmt: skip
+
+    def _ranking(self) -> list[FrozenTrial]:
+        from optuna.trial import TrialState
+
+        done = self.study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+        return sorted(done, key=lambda trial: trial.value if trial.value is not None else float("inf"))
+
+    def _best_so_far(self) -> str:
+        ranking = self._ranking()
+        return f"best {ranking[0].value:.3f} cm (trial {ranking[0].number})" if ranking else ""
+
+    def _conclude(self) -> SweepResult:
+        """Tables, pictures and the best config, as they are now."""
+        from mrhubo.search.plots import study_plots
+        from mrhubo.view import save_png
+
+        ranking = self._ranking()
+        if not ranking:
+            raise UserError(f"sweep {self.name}: no trial is done yet; give it more time")
+        heads = ["trial", "validation link error [cm]", *(dimension.key for dimension in self.space)]
+        rows = [
+            [str(t.number), f"{t.value:.3f}", *(_short(t.params[dimension.key]) for dimension in self.space)]
+            for t in ranking
+        ]
+        best = self._config([f"{key}={value}" for key, value in ranking[0].params.items()])
+        path = self.folder / "sweeps" / f"{self.name}.yaml"
+        with atomic_path(path) as temporary:
+            temporary.write_text(to_yaml(best), encoding="utf-8")
+        self.client.log_artifact(self.parent, str(path))
+        self.client.log_text(self.parent, markdown(heads, rows) + "\n", "trials.md")
+        log_all(self.client, self.parent, {_VALUE: float(rows[0][1]), "sweep/trials": float(self._done())})
+        for name, image in study_plots(self.study, "validation link error [cm]").items():
+            picture = path.with_name(f"{self.name}-{name}.png")
+            save_png(image, picture)
+            self.client.log_artifact(self.parent, str(picture))
+        return SweepResult(markdown(heads, rows[:5]), path)
+
+
+def _short(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""Files of human motion, one module a format."""

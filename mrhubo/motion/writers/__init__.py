@@ -1,0 +1,1 @@
+"""Human motion to files, one module a format."""

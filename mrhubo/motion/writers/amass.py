@@ -1,0 +1,45 @@
+"""Human motions to .npz files with the keys of AMASS.
+
+Legend: T frames, 63 = 21 joints x 3 axis-angle numbers [rad] of SMPL's joints 1..21.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrhubo.files.storage import atomic_path
+
+
+def write_motion(
+    path: Path,
+    pose_body_T63: np.ndarray,
+    root_orient_T3: np.ndarray,
+    trans_T3: np.ndarray,
+    frame_rate: float,
+    description: str,
+) -> None:
+    """Writes a motion with AMASS's keys, as float32, atomically; the same numbers give the same bytes.
+
+    ``pose_body_T63`` and ``root_orient_T3``: axis-angle [rad] of joints 1..21 and of the pelvis; ``trans_T3``: place of
+    the pelvis [m]; ``frame_rate``: frames per second.
+    """
+    frames = len(pose_body_T63)
+    arrays = {"pose_body": (pose_body_T63, 63), "root_orient": (root_orient_T3, 3), "trans": (trans_T3, 3)}
+    for key, (array, width) in arrays.items():
+        if np.shape(array) != (frames, width) or frames == 0:
+            raise ValueError(f"{key}: expected shape ({frames}, {width}), one frame or more, got {np.shape(array)}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{key}: not finite")
+    content: dict[str, Any] = {key: np.asarray(array, dtype="<f4") for key, (array, _) in arrays.items()}
+    content |= {
+        "mocap_frame_rate": np.asarray(frame_rate, dtype="<f8"),
+        "betas": np.zeros(16, dtype="<f4"),
+        "gender": np.asarray("neutral", dtype="<U7"),
+        "surface_model_type": np.asarray("smplx", dtype="<U5"),
+        "description": np.asarray(description, dtype=f"<U{max(1, len(description))}"),
+    }
+    with atomic_path(Path(path)) as temporary, open(temporary, "wb") as handle:
+        np.savez(handle, **content)

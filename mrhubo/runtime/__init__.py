@@ -1,0 +1,1 @@
+"""What every command stands on: progress, threads and ranks, places, tables, the trainer, MLflow."""

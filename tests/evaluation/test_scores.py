@@ -1,0 +1,151 @@
+"""The protocol's measures on motions whose errors are known, and the command as a user runs it."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+import torch
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.errors import UserError
+from mrhubo.evaluate import main
+from mrhubo.evaluation import Clip, Evaluation, evaluate_clip, latency_us, mean_score, measures, table
+from mrhubo.motion import Motion
+from mrhubo.reference import ReferenceRetargeter
+from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.robot import BodyMap, build_body_map
+
+
+def body_map_of(root: Path, robot: str) -> tuple[BodyMap, list[str]]:
+    config = load_config(root / "conf" / f"{robot}.yaml")
+    return build_body_map(config.robot), config.robot.key_links
+
+
+@pytest.fixture(scope="module")
+def pose_TJ6() -> torch.Tensor:
+    """A smooth motion between poses of the prior."""
+    prior = BodyPrior.open()
+    z = torch.randn(4, prior.latent, generator=torch.Generator().manual_seed(0))
+    path = torch.nn.functional.interpolate(z.T[None], 60, mode="linear", align_corners=True)[0].T
+    return prior.decode(path).detach()
+
+
+@pytest.mark.parametrize("name", ["nao", "reachy"])
+def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: torch.Tensor) -> None:
+    body_map, key_links = body_map_of(root, name)
+    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0)
+    clip = Clip(Motion("a", pose_TJ6, 24.0, ""), reference.q_TN)
+    found = evaluate_clip(clip, reference.q_TN, body_map, key_links)
+    assert found.joint_rad == 0 and found.link_cm == 0 and found.frames == 60
+    assert found.limb_deg == found.reference_limb_deg
+    assert found.at_limit == pytest.approx(reference.at_limit_share)
+    columns = [i for i, part in enumerate(body_map.direction_names) if "hand" not in part and "head" not in part]
+    assert found.limb_deg == pytest.approx(float(reference.residual_deg_TD[:, columns].mean()), rel=1e-4)
+    assert math.isnan(found.hand_deg) == math.isnan(found.head_deg) == (name == "nao")
+
+
+def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: torch.Tensor) -> None:
+    body_map, key_links = body_map_of(root, "nao")
+    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
+    clip = Clip(Motion("a", pose_TJ6, 24.0, ""), reference)
+    turned = reference.clone()
+    turned[:, body_map.robot.joint_names.index("LElbowRoll")] += 0.3
+    good, bad = (evaluate_clip(clip, q, body_map, key_links) for q in (reference, turned))
+    assert bad.joint_rad == pytest.approx(0.3 / 8, rel=1e-3)
+    assert bad.link_cm > 0.3 and bad.limb_deg > good.limb_deg and bad.reference_limb_deg == good.limb_deg
+
+
+def test_a_trembling_robot_has_a_higher_jerk(root: Path, pose_TJ6: torch.Tensor) -> None:
+    body_map, key_links = body_map_of(root, "nao")
+    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
+    clip = Clip(Motion("a", pose_TJ6, 24.0, ""), reference)
+    noise = 0.02 * torch.randn(reference.shape, generator=torch.Generator().manual_seed(0))
+    still, moving, trembling = (
+        evaluate_clip(clip, q, body_map, key_links).jerk_ratio
+        for q in (reference[:1].expand_as(reference), reference, reference + noise)
+    )
+    assert still < 1e-3 < moving < trembling
+
+
+def test_at_a_limit(root: Path) -> None:
+    body_map, key_links = body_map_of(root, "nao")
+    robot = body_map.robot
+    q = ((robot.lower_N + robot.upper_N) / 2).repeat(5, 1)
+    q[:, :2] = robot.upper_N[:2]
+    pose = rotation.matrix_to_sixd(torch.eye(3).expand(5, 21, 3, 3))
+    found = evaluate_clip(Clip(Motion("a", pose, 24.0, ""), q), q, body_map, key_links)
+    assert found.at_limit == pytest.approx(2 / 8)
+
+
+def test_collisions_are_counted_by_frame(root: Path) -> None:
+    body_map, key_links = body_map_of(root, "nao")
+    robot, shapes = body_map.robot, body_map.collision
+    q = robot.sample(400, torch.Generator().manual_seed(0))
+    touching, free = q[shapes.collides(q)][:3], q[~shapes.collides(q)][:9]
+    clip = Clip(Motion("a", torch.eye(3)[:, :2].T.flatten().expand(12, 21, 6), 24.0, ""), q[:12])
+    found = evaluate_clip(clip, torch.cat((free, touching)), body_map, key_links)
+    assert found.collision == pytest.approx(3 / 12)
+    assert found.reference_collision == pytest.approx(float(shapes.collides(q[:12]).float().mean()))
+
+
+def test_means_count_clips_or_frames() -> None:
+    nan = float("nan")
+    clips = [Evaluation(n, f, v, v, v, v, v, nan, v, v, v, v) for n, f, v in (("a", 30, 1.0), ("b", 10, 3.0))]
+    over_clips, over_frames = mean_score(clips), mean_score(clips, over_frames=True)
+    assert over_clips.link_cm == 2 and over_frames.link_cm == 1.5 and over_clips.frames == over_frames.frames == 40
+    assert "head_deg" not in measures(over_clips) and measures(over_clips)["at_limit"] == 2
+    text = table([*clips, over_clips, over_frames])
+    assert "head" not in text and len({len(line) for line in text.splitlines()}) == 1
+    better = Evaluation("mean over clips", 40, *[0.5] * 5, nan, *[0.5] * 4)
+    longer = table([*clips, over_clips, over_frames], [clips[0], better, better]).splitlines()
+    assert [line.split("  ")[0] for line in longer] == [
+        "clip", "a", "b", "-" * len(longer[0]), "mean over clips", "mean over frames", *["mean over clips, retarget"] * 2,
+    ]  # fmt: skip
+    assert "0.500" in longer[-1] and len({len(line) for line in longer}) == 1
+
+
+def test_latency_is_a_time_a_frame() -> None:
+    poses = torch.zeros(3, 21, 6)
+    seen = []
+    assert latency_us(lambda pose: seen.append(len(pose)) or pose, poses, 7, seconds=0.01) > 0
+    assert set(seen) == {7}
+
+
+def test_the_command_measures_a_package_and_refuses_another_robots(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = load_config(root / "conf" / "nao.yaml", ["model.hidden=16"])
+    body_map = build_body_map(config.robot)
+    made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
+    package = made.save(tmp_path / "package", {})
+    for name in ("drinking", "wave"):
+        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path)
+    given = ["--retargeter", str(package), "--quiet", f"pairs.dir={tmp_path}", f"evaluation.motions=[{tmp_path}]"]
+    plain = ""
+    for flags, clip in (([], "wave"), (["--validation"], "drinking")):
+        main(["--config", str(root / "conf" / "nao.yaml"), *given, *flags])
+        output = capsys.readouterr().out
+        plain = output if clip == "wave" else plain
+        assert f"\n{clip} " in output and "mean over frames" in output and "us for one frame" in output
+    main(["--config", str(root / "conf" / "nao.yaml"), *given, "--polish", "2"])
+    polished = capsys.readouterr().out
+
+    def limbs(table: str) -> float:
+        return float(next(line for line in table.splitlines() if line.startswith("wave")).split()[4])
+
+    assert limbs(polished) < 0.7 * limbs(plain)
+    with pytest.raises(UserError, match="--polish must be"):
+        main(["--config", str(root / "conf" / "nao.yaml"), *given, "--polish", "x"])
+    with pytest.raises(UserError, match="another robot or other joints"):
+        main(["--config", str(root / "conf" / "coman.yaml"), *given])
+    with pytest.raises(UserError, match="another robot or other joints"):
+        main(["--config", str(root / "conf" / "nao.yaml"), *given, "robot.joints=[LShoulderPitch, LShoulderRoll]"])
+    with pytest.raises(UserError, match="--retargeter FOLDER is missing"):
+        main(["--config", str(root / "conf" / "nao.yaml")])
+    with pytest.raises(UserError, match="is no package of a retargeter"):
+        main(["--config", str(root / "conf" / "nao.yaml"), "--retargeter", str(tmp_path)])

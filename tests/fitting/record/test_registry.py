@@ -1,0 +1,104 @@
+"""A registered package retargets through MLflow as it does by itself, and says what it was made from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mlflow
+import numpy as np
+import pytest
+import torch
+
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.fitting.record.registry import example_input, register
+from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.robot import build_body_map
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.runtime.tracking import database_uri, open_client, start_run
+
+
+@pytest.fixture(scope="module")
+def pose() -> torch.Tensor:
+    return BodyPrior.open().decode(torch.randn(20, 32, generator=torch.Generator().manual_seed(1)))
+
+
+@pytest.fixture(scope="module")
+def registered(
+    root: Path, pose: torch.Tensor, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Retargeter, str]:
+    """Folder of the tracking database, the retargeter, and the URI of its second version."""
+    folder = tmp_path_factory.mktemp("registry")
+    config = load_config(root / "conf" / "nao.yaml", ["model.hidden=24"])
+    body_map = build_body_map(config.robot)
+    torch.manual_seed(0)
+    made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
+    package = made.save(folder / "package", {"run_id": "abc"})
+    client = open_client(folder, "mrhubo")
+    run = start_run(client, "mrhubo", "a run", {}).info.run_id
+    before = mlflow.get_tracking_uri(), mlflow.get_registry_uri()
+    for number in ("1", "2"):
+        uri = register(client, run, package, made, pose[:4], {"urdf_xxh3": number})
+        assert uri == f"models:/mrhubo-nao/{number}"
+    assert (mlflow.get_tracking_uri(), mlflow.get_registry_uri()) == before and mlflow.active_run() is None
+    for file in package.iterdir():
+        file.unlink()
+    return folder, made, uri
+
+
+@pytest.fixture(scope="module")
+def served(registered: tuple[Path, Retargeter, str]) -> Any:
+    folder, _, uri = registered
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MLFLOW_ALLOW_PICKLE_DESERIALIZATION", "false")
+        before = mlflow.get_tracking_uri()
+        mlflow.set_tracking_uri(database_uri(folder))
+        try:
+            return mlflow.pyfunc.load_model(uri)
+        finally:
+            mlflow.set_tracking_uri(before)
+
+
+def test_it_answers_as_the_package_does(
+    registered: tuple[Path, Retargeter, str], served: Any, pose: torch.Tensor
+) -> None:
+    made = registered[1]
+    pose_T63 = example_input(pose)
+    table = served.predict(pose_T63)
+    assert list(table.columns) == [*made.joint_names, "confidence"]
+    given = matrix_to_sixd(axis_angle_to_matrix(torch.from_numpy(pose_T63).reshape(-1, 21, 3)))
+    torch.testing.assert_close(given, pose, atol=1e-5, rtol=0)
+    expected, robot = made.retarget(given), made.body_map.robot
+    q_TN = torch.tensor(table[list(made.joint_names)].to_numpy())
+    torch.testing.assert_close(q_TN, expected.q_TN)
+    assert bool(((q_TN >= robot.lower_N) & (q_TN <= robot.upper_N)).all())
+    np.testing.assert_allclose(table["confidence"], expected.confidence_T, rtol=1e-4)
+    assert len(served.predict(pose_T63[:0])) == 0
+
+
+def test_signature_example_and_source_are_there(registered: tuple[Path, Retargeter, str], served: Any) -> None:
+    folder, made, _ = registered
+    inputs, outputs = served.metadata.signature.inputs, served.metadata.signature.outputs
+    assert inputs.inputs[0].shape == (-1, 63) and inputs.inputs[0].type == np.float32
+    assert outputs.input_names() == [*made.joint_names, "confidence"]
+    example = served.input_example
+    assert np.shape(example) == (4, 63) and len(served.predict(example.astype(np.float32))) == 4
+    client = open_client(folder, "mrhubo")
+    version = client.get_model_version("mrhubo-nao", "2")
+    assert version.tags["urdf_xxh3"] == "2" and version.status == "READY"
+    run = client.get_run(version.run_id)
+    assert any(output.model_id in version.source for output in run.outputs.model_outputs), "from the run to the model"
+    files = {path.suffix for path in Path(version.source.removeprefix("file://")).rglob("*") if path.is_file()}
+    assert not files & {".pkl", ".pickle", ".pt", ".pth"}
+
+
+def test_bad_poses_are_named(served: Any, pose: torch.Tensor) -> None:
+    pose_T63 = example_input(pose)
+    with pytest.raises(mlflow.MlflowException, match=r"Shape of input \(20, 60\) does not match .*\(-1, 63\)"):
+        served.predict(pose_T63[:, :60])
+    with pytest.raises(mlflow.MlflowException, match=r"shape \(frames, 63\), axis-angle .* found \(60,\)"):
+        served.unwrap_python_model().predict(None, pose_T63[0, :60])
+    pose_T63[7, 5] = np.nan
+    with pytest.raises(mlflow.MlflowException, match="human pose 7 holds NaN"):
+        served.predict(pose_T63)
