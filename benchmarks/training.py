@@ -20,8 +20,9 @@ from common import print_header, print_table, read_options
 from mrhubo.callbacks.progress import TrainingProgress
 from mrhubo.config import load_config
 from mrhubo.fitting.data import PairData, PairTable
+from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.pairing import make_filter
-from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
+from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
 from mrhubo.runtime.tracking import open_logger
 from mrhubo.runtime.trainer import cosine_schedule

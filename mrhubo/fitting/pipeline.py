@@ -21,6 +21,7 @@ from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, Evaluation, Motions, evaluate_clips, load_motions, solve_references
 from mrhubo.fitting.data import PairData, PairTable
+from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.pairing import (
     PairFilter,
     PairGenerator,
@@ -30,7 +31,7 @@ from mrhubo.pairing import (
     make_filter,
     pose_settings,
 )
-from mrhubo.retargeter import LOG_EVERY, RetargetModule, RetargetNetwork, build_network
+from mrhubo.retargeter import RetargetNetwork, build_network
 from mrhubo.runtime.locations import default_motions, default_pairs
 from mrhubo.runtime.progress import Progress
 from mrhubo.runtime.ranks import Ranks

@@ -17,13 +17,12 @@ import torch
 from mrhubo.errors import UserError
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.poses import MAX_TURN
 from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
 
 MAX_FRAMES = 5_000_000
 """Longest motion that is read (eleven hours at 120 frames a second)."""
 _FRAME_RATES = (1.0, 1000.0)
-_MAX_TURN = 8 * math.pi
-"""No axis-angle number is that large [rad]; degrees are."""
 _RATE_KEYS = ("mocap_frame_rate", "mocap_framerate")
 _POSES_WIDTHS = {66: "body", 72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
 _NAME_ENDINGS = ("_stageii", "_poses")
@@ -69,7 +68,7 @@ def _read_pose(file: NpzFile) -> np.ndarray:
     start = 0 if key == "pose_body" else 3
     with np.errstate(over="ignore"):
         pose_T63 = array[:, start : start + 63].astype(np.float64)
-    bad_N2 = np.argwhere(~(np.abs(pose_T63) <= _MAX_TURN))
+    bad_N2 = np.argwhere(~(np.abs(pose_T63) <= MAX_TURN))
     if len(bad_N2):
         frame, column = bad_N2[0].tolist()
         value = float(pose_T63[frame, column])

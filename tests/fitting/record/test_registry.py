@@ -71,9 +71,9 @@ def test_it_answers_as_the_package_does(
     torch.testing.assert_close(given, pose, atol=1e-5, rtol=0)
     expected, robot = made.retarget(given), made.body_map.robot
     q_TN = torch.tensor(table[list(made.joint_names)].to_numpy())
-    torch.testing.assert_close(q_TN, expected.q_TN)
+    torch.testing.assert_close(q_TN, expected.q)
     assert bool(((q_TN >= robot.lower_N) & (q_TN <= robot.upper_N)).all())
-    np.testing.assert_allclose(table["confidence"], expected.confidence_T, rtol=1e-4)
+    np.testing.assert_allclose(table["confidence"], expected.confidence, rtol=1e-4)
     assert len(served.predict(pose_T63[:0])) == 0
 
 
