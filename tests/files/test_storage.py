@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import DamagedFile, atomic_path, read_tensors, write_tensors
+from mrhubo.files.storage import DamagedFile, Locked, atomic_path, locked, read_tensors, write_tensors
 
 TENSORS = {"b": torch.arange(12.0).reshape(3, 4), "a": torch.tensor([True, False]), "none": torch.empty(0, 3)}
 METADATA = {"seed": "7", "robot": "nao", "fingerprint": "abc"}
@@ -103,3 +104,25 @@ def test_a_folder_in_the_way_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     with pytest.raises(UserError, match="taken: cannot be written"), atomic_path(tmp_path / "taken") as temporary:
         temporary.write_bytes(b"x")
+
+
+def test_a_lock_is_held_once_and_ends_with_its_process(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "lock"
+    code = f"""
+import time
+from pathlib import Path
+from mrhubo.files.storage import locked
+with locked(Path({str(path)!r})):
+    print("held", flush=True)
+    time.sleep(600)
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "held\n"
+        with pytest.raises(Locked, match="another process is at work there"), locked(path):
+            pass
+        other.send_signal(signal.SIGKILL)
+    with locked(path):
+        with pytest.raises(Locked), locked(path):
+            pass
+    with locked(path, wait=True):
+        pass
