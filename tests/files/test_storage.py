@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -106,23 +107,66 @@ def test_a_folder_in_the_way_is_a_clear_error(tmp_path: Path) -> None:
         temporary.write_bytes(b"x")
 
 
-def test_a_lock_is_held_once_and_ends_with_its_process(tmp_path: Path) -> None:
-    path = tmp_path / "deep" / "lock"
-    code = f"""
-import time
-from pathlib import Path
-from mrhubo.files.storage import locked
-with locked(Path({str(path)!r})):
-    print("held", flush=True)
-    time.sleep(600)
-"""
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
-        assert other.stdout is not None and other.stdout.readline() == "held\n"
-        with pytest.raises(Locked, match="another process is at work there"), locked(path):
+HOLD = (
+    "import sys, time; from pathlib import Path; from mrhubo.files.storage import locked\n"
+    "with locked(Path(sys.argv[1]), wait=True):\n"
+    "    print('held', flush=True)\n"
+    "    time.sleep(float(sys.argv[2]))\n"
+    "print('given back', flush=True)\n"
+)
+
+
+@contextmanager
+def holder(lock: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
+    """Another process that holds a lock, until it ends or for some seconds."""
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(lock), str(seconds)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout and process.stdout.readline() == "held\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_lock_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
+    lock = tmp_path / "work" / "lock"
+    with holder(lock, 60) as process:
+        with (
+            pytest.raises(Locked, match=r"work: another process is at work there; wait for it or stop it"),
+            locked(lock),
+        ):
             pass
-        other.send_signal(signal.SIGKILL)
-    with locked(path):
-        with pytest.raises(Locked), locked(path):
+        process.kill()  # kill -9: nothing in the process can clean up
+        process.wait()
+        with locked(lock):
             pass
-    with locked(path, wait=True):
+
+
+def test_who_waits_gets_the_lock_after_the_other(tmp_path: Path) -> None:
+    lock = tmp_path / "lock"
+    with holder(lock, 0.5) as process, locked(lock, wait=True):
+        assert process.stdout and process.stdout.readline() == "given back\n"
+
+
+def test_a_lock_is_given_back_when_its_block_fails(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), locked(tmp_path / "lock"):
+        raise RuntimeError
+    with locked(tmp_path / "lock"):
         pass
+
+
+def test_a_lock_that_cannot_be_made_is_a_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(UserError, match="taken: cannot be locked"), locked(tmp_path / "taken"):
+        pass
+
+
+def test_reading_needs_nothing_that_only_posix_has(file: Path) -> None:
+    script = (
+        "import sys\n"
+        "sys.modules.update(dict.fromkeys(('fcntl', 'resource', 'termios', 'psutil')))\n"  # importing them now fails
+        "from pathlib import Path; from mrhubo.files.storage import read_tensors\n"
+        "import mrhubo.files.npz, mrhubo.files.safe_pickle\n"
+        "assert sorted(read_tensors(Path(sys.argv[1]))[0]) == ['a', 'b', 'none']\n"
+    )
+    subprocess.run([sys.executable, "-c", script, str(file)], check=True)
