@@ -10,6 +10,7 @@ import sys
 import torch
 
 from mrhubo.body import BodyPrior, inverse_kinematics
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd, sixd_to_matrix
 from mrhubo.view import figure_sheet, human_figure, save_png
 
 
@@ -19,7 +20,8 @@ def main(out: str = "body_prior.png") -> None:
     generator = torch.Generator().manual_seed(0)
     poses = prior.decode(torch.randn(5, prior.latent, generator=generator))
 
-    spoilt = poses + 0.3 * torch.randn(poses.shape, generator=generator)
+    turns = axis_angle_to_matrix(0.4 * torch.randn(5, 21, 3, generator=generator))  # each joint by some 0.6 rad
+    spoilt = matrix_to_sixd(sixd_to_matrix(poses) @ turns)
     mended = prior.denoise(spoilt)
     for name, some in (("sampled", poses), ("spoilt", spoilt), ("mended", mended)):
         print(f"{name}: reconstruction error {float(prior.reconstruction_error(some).mean()):.4f} on average")
