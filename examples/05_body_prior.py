@@ -1,6 +1,6 @@
 """The body prior without a robot: plausible poses, how plausible a pose is, a pose from a few points.
 
-python examples/05_body_prior.py [OUT.png]
+    python examples/05_body_prior.py [OUT.png]
 """
 
 from __future__ import annotations

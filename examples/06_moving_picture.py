@@ -1,6 +1,6 @@
 """Draws a person and the robot side by side as a GIF.
 
-python examples/06_moving_picture.py PACKAGE [MOTION.npz] [OUT.gif] [FIRST] [SECONDS]
+    python examples/06_moving_picture.py PACKAGE [MOTION.npz] [OUT.gif] [FIRST] [SECONDS]
 
 FIRST is the second of the motion at which the picture starts, by default 0; SECONDS is its length, by default 4.
 The README's picture was made so, of NAO and CMU's clip 13_15 from second 1.5.
