@@ -1,6 +1,8 @@
 """The body prior without a robot: plausible poses, how plausible a pose is, a pose from a few points.
 
     python examples/05_body_prior.py [OUT.png]
+
+OUT is the picture to be drawn, by default body_prior.png.
 """
 
 from __future__ import annotations
