@@ -179,20 +179,6 @@ def test_the_package_retargets(root: Path, fitted: tuple[Path, str], motions: Pa
         torch.testing.assert_close(retargeter.predict(motion.pose_TJ6, polish=1), result.q)
 
 
-def test_the_readmes_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    (package,) = (fitted[0] / "mlruns" / "packages").iterdir()
-    blocks = re.findall(r"```python\n(.*?)```", (root / "README.md").read_text(), re.S)
-    use, reference = [block for block in blocks if "retargeter" in block]
-    monkeypatch.chdir(root)
-    names: dict[str, Any] = {}
-    exec(re.sub(r"mlruns/packages/nao-\w+", str(package), use), names)
-    retargeter, frames = names["retargeter"], len(names["motion"].pose_TJ6)
-    assert names["result"].q.shape == (frames, 8)
-    assert torch.equal(names["result"].collision, retargeter.collision.collides(names["result"].q))
-    exec(reference, names)
-    assert names["q_TN"].shape == (frames, 8) and not bool(retargeter.collision.collides(names["q_TN"]).any())
-
-
 def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "dashboard.md").read_text(), re.S)
     monkeypatch.chdir(root)

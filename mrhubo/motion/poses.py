@@ -54,7 +54,7 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
             frame), or the frame rate is not positive.
     """
     if isinstance(motion, Motion):
-        array, frame_rate = motion.pose_TJ6, motion.frame_rate
+        array, frame_rate = motion.local_TJ33, motion.frame_rate
     else:
         array = _to_tensor(motion)
     if frame_rate is not None and not (math.isfinite(frame_rate) and frame_rate > 0):

@@ -52,7 +52,7 @@ def clip(config: Config, body_map: BodyMap, prior: BodyPrior) -> Clip:
     q_PN = body_map.robot.sample(12, torch.Generator().manual_seed(0))
     assert config.robot.manual is not None
     test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 6), "local")
-    return Clip(Motion("made", test.human_poses([config.robot.manual])[0], 24.0, ""), q_PN)
+    return Clip(Motion("made", rotation.sixd_to_matrix(test.human_poses([config.robot.manual])[0]), 24.0), q_PN)
 
 
 def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip) -> None:
@@ -84,7 +84,7 @@ def test_only_reached_poses_are_measured_on(
     with torch.no_grad():
         reached = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path).pose_PJ6
         q_FN, pose_FJ6 = clip.reference_TN.repeat(2, 1), torch.cat((clip.motion.pose_TJ6, clip.motion.pose_TJ6.flip(0)))
-    both = Clip(Motion("both", pose_FJ6, 24.0, ""), q_FN)
+    both = Clip(Motion("both", rotation.sixd_to_matrix(pose_FJ6), 24.0), q_FN)
     search = ScaleFactorSearch(config, body_map, prior, [both], tmp_path)
     other = ScaleFactorSearch(config, body_map, prior, [Clip(both.motion, q_FN.flip(0))], tmp_path)
     assert other.name != search.name, "another reference set is another study"

@@ -37,9 +37,9 @@ def test_the_three_forms_agree_for_any_leading_axes(turns: np.ndarray, dtype: ty
 
 
 def test_a_motion_is_taken_as_it_is() -> None:
-    pose_TJ6 = matrix_to_sixd(torch.eye(3)).expand(4, 21, 6)
-    found = read_poses(Motion("still", pose_TJ6, 30.0, ""))
-    assert found.frame_rate == 30.0 and found.shape == (4,) and torch.equal(found.pose_TJ6, pose_TJ6)
+    motion = Motion("turn", axis_angle_to_matrix(torch.linspace(0, 3, 4 * 63).reshape(4, 21, 3)), 30.0)
+    found = read_poses(motion)
+    assert found.frame_rate == 30.0 and found.shape == (4,) and torch.equal(found.pose_TJ6, motion.pose_TJ6)
 
 
 def test_views_and_whole_numbers_do_too() -> None:
