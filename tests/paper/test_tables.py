@@ -12,7 +12,7 @@ import pytest
 from mrhubo import reproduce as command
 from mrhubo.config import BaselineConfig
 from mrhubo.errors import UserError
-from mrhubo.fitting.record.predictions import read_predictions
+from mrhubo.fitting.record import read_predictions
 from mrhubo.paper.tables import METHODS, PAPER, Part, chart, parts, tables
 from mrhubo.reproduce import main
 from mrhubo.runtime.tracking import database_uri
