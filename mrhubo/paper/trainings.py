@@ -6,16 +6,23 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from mrhubo.baselines.s3le.experiment import run_baseline
 from mrhubo.config import BaselineConfig, fingerprint, to_plain
 from mrhubo.errors import UserError
+from mrhubo.fitting.fit import fit
+from mrhubo.fitting.preparation import prepare, tracking_dir
+from mrhubo.fitting.record import read_predictions
+from mrhubo.fitting.references import make_references
+from mrhubo.paper.tables import ALL_METHODS, BASELINE, METHODS, OUR_DEFAULT, Part, chart, parts, tables
+from mrhubo.runtime.locations import default_capture, project_root
 from mrhubo.runtime.progress import SILENT, Reporter
+from mrhubo.runtime.tracking import ending, find_run, git_commit, open_client, start_run
+from mrhubo.view.pictures import Artist, liveliness
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Run
     from PIL.Image import Image
-
-    from mrhubo.paper.tables import Part
 
 
 def reproduce(
@@ -41,10 +48,6 @@ def reproduce(
             (before any work).
         KeyboardInterrupt: the user stopped it; the same call goes on.
     """
-    from mrhubo.paper.tables import ALL_METHODS, BASELINE, METHODS, chart, parts, tables
-    from mrhubo.runtime.locations import default_capture
-    from mrhubo.runtime.tracking import ending
-
     capture = default_capture()
     if methods is None and not capture.is_file():
         methods = tuple(METHODS)
@@ -74,10 +77,6 @@ def reproduce(
 
 def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     """The run that all trainings belong to: that of an earlier call with the same settings, or a new one."""
-    from mrhubo.fitting.preparation import tracking_dir
-    from mrhubo.runtime.locations import project_root
-    from mrhubo.runtime.tracking import find_run, git_commit, open_client, start_run
-
     config = work[0].config
     tags = {
         "reproduce": fingerprint([[part.robot, part.method, part.seed, to_plain(part.config)] for part in work]),
@@ -97,12 +96,6 @@ def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], report: R
     """Human, reference, and what the two-stage network and the baseline made of one test clip, as in the paper's
     figure 3; None if no run has kept its answers.
     """
-    from mrhubo.fitting.preparation import prepare
-    from mrhubo.fitting.record import read_predictions
-    from mrhubo.fitting.references import make_references
-    from mrhubo.paper.tables import BASELINE, OUR_DEFAULT
-    from mrhubo.view.pictures import Artist, liveliness
-
     shown = {part.method: run for part, run in runs if part.method in ("proposed", OUR_DEFAULT, BASELINE)}
     found = {method: read_predictions(client, run) for method, run in shown.items()}
     prepared = prepare(runs[0][0].config)
@@ -114,11 +107,6 @@ def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], report: R
 
 def _run_of(part: Part, client: MlflowClient, parent: str, report: Reporter) -> Run:
     """A finished run with the same settings, pairs, prior and motions, or that of a new fit."""
-    from mrhubo.baselines.s3le.experiment import run_baseline
-    from mrhubo.fitting.fit import fit
-    from mrhubo.fitting.preparation import prepare
-    from mrhubo.runtime.tracking import find_run
-
     wanted = {"config_fingerprint": prepare(part.config).fingerprint}
     experiment = part.config.tracking.experiment
     run = find_run(client, experiment, wanted, finished=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import shutil
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import torch
 
 from mrhubo.config import BaselineConfig, Config, load_config
 from mrhubo.errors import UserError
+from mrhubo.fitting import datamodule
 from mrhubo.fitting.datamodule import PairData
 from mrhubo.fitting.fit import fit
 from mrhubo.fitting.measurement import measure_package
@@ -22,6 +24,7 @@ from mrhubo.fitting.training import train
 from mrhubo.retargeter import build_network
 from mrhubo.runtime import locations
 from mrhubo.runtime.progress import SILENT
+from mrhubo.runtime.tracking import open_client
 
 SMALL = [
     "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=20", "pairs.fine_steps=3", "model.hidden=16",
@@ -104,3 +107,29 @@ def test_pairs_wait_for_the_scale_factor(root: Path, home: Path) -> None:
     data.use_config(found)
     assert data.prepared.config is found and len(data.train_dataloader()) == 20
     assert data.prepared.store.missing() == [] and prepared.store.missing() == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("error", "status"), [(KeyboardInterrupt(), "KILLED"), (UserError("the disk is full"), "FAILED")]
+)
+def test_stopped_while_pairs_are_made_it_goes_on(
+    home: Path, config: Config, monkeypatch: pytest.MonkeyPatch, error: BaseException, status: str
+) -> None:
+    """They are made inside Lightning's trainer, which has ways of its own to end."""
+
+    def stop(*_: object) -> None:
+        raise error
+
+    handler = signal.getsignal(signal.SIGINT)
+    with monkeypatch.context() as patch, pytest.raises(type(error)):
+        patch.setattr(datamodule, "make_pairs", stop)
+        fit(config, SILENT)
+    assert signal.getsignal(signal.SIGINT) is handler
+    client = open_client(home / "mlruns", "mrhubo")
+    experiment = client.get_experiment_by_name("mrhubo")
+    assert experiment is not None
+    (stopped,) = client.search_runs([experiment.experiment_id])
+    assert stopped.info.status == status and "ended_by" in stopped.data.tags
+    result = fit(config, SILENT)
+    assert result is not None and result.run_id == stopped.info.run_id
+    assert client.get_run(result.run_id).info.status == "FINISHED"
