@@ -173,10 +173,10 @@ def test_the_package_retargets(root: Path, fitted: tuple[Path, str], motions: Pa
     for motion in load_motions(config).test:
         result = retargeter.retarget(motion.pose_TJ6)
         robot = retargeter.body_map.robot
-        assert bool(((result.q_TN >= robot.lower_N) & (result.q_TN <= robot.upper_N)).all())
-        assert bool(((result.confidence_T >= 0) & (result.confidence_T <= 1)).all())
-        assert result.q_TN.shape == (len(motion.pose_TJ6), 8)
-        torch.testing.assert_close(retargeter.predict(motion.pose_TJ6, polish=1), result.q_TN)
+        assert bool(((result.q >= robot.lower_N) & (result.q <= robot.upper_N)).all())
+        assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
+        assert result.q.shape == (len(motion.pose_TJ6), 8)
+        torch.testing.assert_close(retargeter.predict(motion.pose_TJ6, polish=1), result.q)
 
 
 def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,7 +191,7 @@ def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypa
     (package, *_) = sorted((fitted[0] / "mlruns" / "packages").iterdir(), key=lambda path: path.stat().st_mtime)
     retargeter, pose_TJ6 = Retargeter.load(package), read_motion(root / "data" / "motions" / "wave.npz").pose_TJ6
     q_TN = torch.tensor(names["table"][list(retargeter.joint_names)].to_numpy())
-    torch.testing.assert_close(q_TN, retargeter.retarget(pose_TJ6).q_TN, atol=1e-3, rtol=0)
+    torch.testing.assert_close(q_TN, retargeter.retarget(pose_TJ6).q, atol=1e-3, rtol=0)
 
 
 def final_metrics(folder: Path) -> dict[str, float]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pytorch_kinematics as pk
 import torch
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 from scipy.spatial.transform import Rotation
@@ -20,6 +19,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.errors import UserError
+from mrhubo.robot.chain import build_chain
 from mrhubo.robot.urdf import Description, describe, joint_range
 
 
@@ -85,7 +85,7 @@ class Robot:
 
     def _prepare_chain(self) -> None:
         needed = {joint.name for link in self.links for joint in self.description.joints_above(link)}
-        self._chain = pk.build_chain_from_urdf(_chain_xml(self.description, needed)).to(dtype=torch.float32)
+        self._chain = build_chain(_chain_xml(self.description, needed)).to(dtype=torch.float32)
         angles = self._chain.get_joint_parameter_names()
         self.select_AN = torch.zeros(len(angles), len(self.joint_names))
         self.constant_A = torch.zeros(len(angles))

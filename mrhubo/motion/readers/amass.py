@@ -19,13 +19,12 @@ from torch import Tensor
 from mrhubo.errors import UserError
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.poses import MAX_TURN
 from mrhubo.rotation import axis_angle_to_matrix
 
 MAX_FRAMES = 5_000_000
 """Longest motion that is read (eleven hours at 120 frames a second)."""
 _FRAME_RATES = (1.0, 1000.0)
-_MAX_TURN = 8 * math.pi
-"""No axis-angle number is that large [rad]; degrees are."""
 _RATE_KEYS = ("mocap_frame_rate", "mocap_framerate")
 _POSES_WIDTHS = {66: "body", 72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
 _NAME_ENDINGS = ("_stageii", "_poses")
@@ -94,7 +93,7 @@ def _read_pose(file: NpzFile) -> tuple[np.ndarray, str]:
     start = 0 if key == "pose_body" else 3
     with np.errstate(over="ignore"):
         pose_T63 = array[:, start : start + 63].astype(np.float64)
-    bad_N2 = np.argwhere(~(np.abs(pose_T63) <= _MAX_TURN))
+    bad_N2 = np.argwhere(~(np.abs(pose_T63) <= MAX_TURN))
     if len(bad_N2):
         frame, column = bad_N2[0].tolist()
         value = float(pose_T63[frame, column])
@@ -106,7 +105,7 @@ def _read_pose(file: NpzFile) -> tuple[np.ndarray, str]:
 def _read_root(file: NpzFile, pose_key: str, frames: int, notes: list[str]) -> tuple[Tensor | None, Tensor | None, str]:
     """Rotations (T, 3, 3) and places (T, 3) of the root in a world whose y axis is up, and how the file has it."""
     key = "root_orient" if "root_orient" in file.keys else pose_key if pose_key == "poses" else None
-    root_T3 = None if key is None else _read_rows(file, key, frames, _MAX_TURN, notes)
+    root_T3 = None if key is None else _read_rows(file, key, frames, MAX_TURN, notes)
     if root_T3 is None:
         if "trans" in file.keys:
             notes.append("'trans' is left out: without the root's rotation its up axis is not known")
