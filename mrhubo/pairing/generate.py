@@ -37,14 +37,14 @@ class PairGenerator:
     def __init__(self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig) -> None:
         self.body_map, self.robot, self.prior, self.settings = body_map, body_map.robot, prior, settings
         self.problem = LatentProblem(
-            prior, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
+            prior.decoder, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
         )
         self.amortiser: Amortiser | None = None
 
     @property
     def device(self) -> torch.device:
         """Where the pairs are made."""
-        return self.prior.identity_F.device
+        return self.prior.device
 
     @torch.no_grad()
     def draw_targets(self, count: int, generator: torch.Generator) -> Tensor:

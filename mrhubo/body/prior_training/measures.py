@@ -148,7 +148,7 @@ def latent_ik(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> dict[st
     """
     target = skeleton.keypoints(rotation.sixd_to_matrix(pose_BJ6))
     given = [KEYPOINT_NAMES.index(name) for name in IK_KEYPOINTS]
-    problem = LatentProblem(prior, skeleton, given)
+    problem = LatentProblem(prior.decoder, skeleton, given)
     nothing = torch.zeros(len(pose_BJ6), prior.latent, device=pose_BJ6.device)
     found = []
     for start in (nearest_samples(problem, target[:, given]), nothing):
@@ -177,7 +177,7 @@ def samples(
         seed: of the draw.
     """
     z = torch.randn(count, prior.latent, generator=torch.Generator().manual_seed(seed))
-    drawn = prior.decode(z.to(prior.identity_F.device))
+    drawn = prior.decode(z.to(prior.device))
     values = {"samples_inside": float(anatomy.inside(drawn).float().mean())}
     if known_BJ6 is not None:
         values["samples_nearest_mm"] = float(nearest_mm(skeleton, drawn, known_BJ6).mean())

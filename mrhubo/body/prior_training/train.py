@@ -28,7 +28,8 @@ from torch.utils.data import DataLoader
 
 from mrhubo import rotation
 from mrhubo.body import anatomy
-from mrhubo.body.prior import ACTIVATIONS, SHIPPED_WEIGHTS, BodyPrior
+from mrhubo.body.decoder import ACTIVATIONS
+from mrhubo.body.prior import SHIPPED_WEIGHTS, BodyPrior
 from mrhubo.body.prior_training.augmentation import add_missing_motion, add_noise
 from mrhubo.body.prior_training.losses import column_defect, length, sliced_wasserstein
 from mrhubo.body.prior_training.measures import measure, reconstruction
@@ -130,7 +131,7 @@ class PriorTraining(lightning.LightningModule):
         seen_BJ6 = add_noise(pose_BJ6, self.config.noise_share)
         mean, log_std = self.prior.posterior(seen_BJ6)
         z_BZ = mean + log_std.exp() * torch.randn_like(mean)
-        raw_BJ6 = self.prior.decode_raw(torch.cat((z_BZ, torch.randn_like(z_BZ[: len(z_BZ) // 4]))))
+        raw_BJ6 = self.prior.decoder(torch.cat((z_BZ, torch.randn_like(z_BZ[: len(z_BZ) // 4]))))
         decoded = rotation.sixd_to_matrix(raw_BJ6)
         matrices, drawn = decoded[: len(z_BZ)], decoded[len(z_BZ) :]
         anatomy_cost = anatomy.excess(drawn, margin=_MARGIN).square().sum(dim=(1, 2)).mean()

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from mrhubo.body import BodyPrior, training
+from mrhubo.body import BodyPrior
+from mrhubo.body.prior_training import train as training
 from mrhubo.body.prior_training.__main__ import main
 from mrhubo.body.prior_training.poses import load_training_poses, sound_frames
 from mrhubo.body.prior_training.train import PriorConfig, PriorTraining, train
