@@ -13,7 +13,7 @@ from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior,
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
-from mrhubo.files.storage import read_metadata, read_tensors, write_tensors
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.reference import ReferenceRetargeter, direction_error
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
@@ -109,7 +109,7 @@ def test_a_package_keeps_vposer_and_another_skeleton(root: Path, tmp_path: Path)
 
 
 def test_the_header_tells_joints_limits_and_conventions(made: Retargeter, folder: Path) -> None:
-    header = read_metadata(folder / "retargeter.safetensors")
+    _, header = read_tensors(folder / "retargeter.safetensors")
     assert header["robot"] == "reachy" and "l_elbow_pitch" in header["joint_names"] and header["run_id"] == "abc"
     assert "rad" in header["output"] and "6D" in header["input"] and header["lower_rad"].count(",") == 16
 
