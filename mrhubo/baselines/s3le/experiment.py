@@ -44,7 +44,7 @@ class Baseline:
         import torch
 
         from mrhubo.baselines.s3le.training import make_data
-        from mrhubo.body.prior_training.poses import load_training_poses, sound_frames
+        from mrhubo.body.prior_training.poses import load_training_poses, plausible_frames
         from mrhubo.fitting import pipeline
         from mrhubo.runtime.locations import default_capture
         from mrhubo.runtime.progress import Progress
@@ -56,7 +56,7 @@ class Baseline:
         pose_FJ6 = load_training_poses(path)[0]
         generator = torch.Generator().manual_seed(config.s3le.seed)
         chosen = pose_FJ6[torch.randint(len(pose_FJ6), (2 * config.s3le.glue,), generator=generator)]
-        chosen = chosen[sound_frames(chosen, 10.0)][: config.s3le.glue]
+        chosen = chosen[plausible_frames(chosen, 10.0)][: config.s3le.glue]
         if not len(chosen):
             raise UserError(f"s3le.poses: {path} holds no pose that a human can strike")
         with Progress("glue pairs", len(chosen), quiet=quiet) as progress:
