@@ -20,6 +20,7 @@ from pathlib import Path
 
 import torch
 from common import print_header, print_table, read_options
+from levenberg_marquardt import solve_levenberg_marquardt
 from torch import Tensor
 
 from mrhubo.body.latent import LatentProblem
@@ -27,15 +28,7 @@ from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fitting.preparation import prepare_pairs
-from mrhubo.pairing import (
-    PairGenerator,
-    PairSetup,
-    PairStore,
-    generate_pairs,
-    make_filter,
-    solve_lbfgs,
-    solve_levenberg_marquardt,
-)
+from mrhubo.pairing import PairGenerator, PairSetup, PairStore, generate_pairs, make_filter, solve_lbfgs
 from mrhubo.reference import ReferenceRetargeter
 from mrhubo.robot import align_pose
 from mrhubo.runtime.progress import Progress, Reporter
