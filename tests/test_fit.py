@@ -27,7 +27,7 @@ from mrhubo.errors import UserError
 from mrhubo.evaluation import load_motions
 from mrhubo.files.storage import checksum_file
 from mrhubo.fit import main
-from mrhubo.fitting.record.recording import run_name
+from mrhubo.fitting.record import run_name
 from mrhubo.motion import read_motion
 from mrhubo.retargeter import Retargeter
 from mrhubo.runtime.ranks import Ranks
@@ -150,7 +150,7 @@ def test_a_fit_that_fails_says_why_and_goes_on_when_the_cause_is_gone(
         raise UserError("checkpoints: no space left on device")
 
     with monkeypatch.context() as patch, pytest.raises(UserError):
-        patch.setattr("mrhubo.fitting.pipeline.train", full)
+        patch.setattr("mrhubo.fitting.fit.train", full)
         main(given)
     (failed,) = runs_of(tmp_path)
     assert failed.info.status == "FAILED"

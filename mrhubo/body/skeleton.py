@@ -20,9 +20,10 @@ from mrhubo.files.storage import checksum_tensors
 
 _LONGEST = 2.0
 """No bone is that long [m]; other units than metres are."""
-_SIDES = {"left": 1.0, "right": -1.0}
+_SIDES: dict[str, float] = {"left": 1.0, "right": -1.0}
+"""Sign of x on each side of the body."""
 
-# name: (parent, offset from the parent at rest [m]); "side_" stands for both sides, x mirrored on the right.
+# name: (parent, offset from the parent at rest [m])
 _JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
     "pelvis": (None, (0.0, 0.0, 0.0)),
     "left_hip": ("pelvis", (0.0901, -0.1018, 0.0392)),
@@ -47,14 +48,15 @@ _JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
     "left_wrist": ("left_elbow", (0.26, 0.0, 0.0)),
     "right_wrist": ("right_elbow", (-0.26, 0.0, 0.0)),
 }
+# name: (part that carries it, offset from its joint at rest [m]) on the left; x is mirrored on the right.
 _FIXED_POINTS: dict[str, tuple[str, tuple[float, float, float]]] = {
     "eye": ("head", (0.032, 0.065, 0.090)),
-    "thumb": ("side_wrist", (0.045, -0.015, 0.045)),
-    "index": ("side_wrist", (0.092, -0.003, 0.024)),
-    "middle": ("side_wrist", (0.095, 0.0, 0.0)),
-    "pinky": ("side_wrist", (0.080, -0.006, -0.042)),
-    "toe": ("side_foot", (0.0, -0.015, 0.070)),
-    "heel": ("side_ankle", (0.0, -0.060, -0.050)),
+    "thumb": ("wrist", (0.045, -0.015, 0.045)),
+    "index": ("wrist", (0.092, -0.003, 0.024)),
+    "middle": ("wrist", (0.095, 0.0, 0.0)),
+    "pinky": ("wrist", (0.080, -0.006, -0.042)),
+    "toe": ("foot", (0.0, -0.015, 0.070)),
+    "heel": ("ankle", (0.0, -0.060, -0.050)),
 }
 
 JOINT_NAMES: tuple[str, ...] = tuple(_JOINTS)
@@ -63,13 +65,23 @@ POSED_JOINT_NAMES: tuple[str, ...] = JOINT_NAMES[1:]
 """The 21 joints whose local rotations make a pose H."""
 PARENTS: tuple[int, ...] = tuple(-1 if p is None else JOINT_NAMES.index(p) for p, _ in _JOINTS.values())
 """Index of each joint's parent in JOINT_NAMES; -1 for the pelvis."""
+CENTRAL_PARTS: tuple[str, ...] = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
+"""Joints of which a body has one."""
+PAIRED_PARTS: tuple[str, ...] = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+"""What the joints of which a body has two are called without their side."""
+PART_AND_SIDE: dict[str, tuple[str, str]] = {
+    **{part: (part, "") for part in CENTRAL_PARTS},
+    **{f"{side}_{part}": (part, side) for side in _SIDES for part in PAIRED_PARTS},
+}
+"""Of each joint, by name, its part and its side: "left", "right" or ""."""
 
 
 def _fixed_points() -> dict[str, tuple[int, tuple[float, float, float]]]:
     points = {}
-    for name, (parent, (x, y, z)) in _FIXED_POINTS.items():
+    for name, (part, (x, y, z)) in _FIXED_POINTS.items():
         for side, sign in _SIDES.items():
-            points[f"{side}_{name}"] = (JOINT_NAMES.index(parent.replace("side", side)), (sign * x, y, z))
+            joint = f"{side}_{part}" if part in PAIRED_PARTS else part
+            points[f"{side}_{name}"] = (JOINT_NAMES.index(joint), (sign * x, y, z))
     return points
 
 
@@ -106,10 +118,15 @@ def _levels() -> list[list[int]]:
 
 
 _LEVELS = _levels()
-_MIRROR = [
-    POSED_JOINT_NAMES.index(n.replace("left", "~").replace("right", "left").replace("~", "right"))
-    for n in POSED_JOINT_NAMES
-]
+_OTHER_SIDE = {"left": "right", "right": "left"}
+
+
+def _mirrored(name: str) -> str:
+    part, side = PART_AND_SIDE[name]
+    return f"{_OTHER_SIDE[side]}_{part}" if side else name
+
+
+_MIRROR = [POSED_JOINT_NAMES.index(_mirrored(name)) for name in POSED_JOINT_NAMES]
 
 
 def mirror_pose(pose_BJ6: Tensor) -> Tensor:

@@ -19,7 +19,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import nearest_samples, poses_at_once, solve_quasi_newton
-from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.body.skeleton import JOINT_NAMES, PART_AND_SIDE, POSED_JOINT_NAMES
 from mrhubo.config import ManualScaleConfig, PairsConfig
 from mrhubo.robot import BodyMap, ManualScale
 from mrhubo.runtime.threads import use_threads
@@ -37,7 +37,7 @@ class ProportionTest:
         self.body_map, self.prior, self.settings, self.pose_PJ6 = body_map, prior, settings, pose_PJ6
         self.frame = frame
         self._poses = body_map.robot.forward(q_PN)
-        names = [name for name in body_map.input_joints() if not name.endswith(_NO_ARM)]
+        names = [name for name in body_map.input_joints() if PART_AND_SIDE[name][0] not in _NO_ARM]
         self.arm_joints = [POSED_JOINT_NAMES.index(name) for name in names]
         """Positions of the joints that count."""
 
@@ -51,7 +51,11 @@ class ProportionTest:
             targets.append(scale.targets(self._poses))
         target_BK3 = torch.cat(targets)
         problem = LatentProblem(
-            self.prior, self.body_map.skeleton, scales[0].keypoint_indices, self.settings.w_data, self.settings.w_prior
+            self.prior.decoder,
+            self.body_map.skeleton,
+            scales[0].keypoint_indices,
+            self.settings.w_data,
+            self.settings.w_prior,
         )
         start_BZ = nearest_samples(problem, target_BK3)
         z_BZ = solve_quasi_newton(problem, start_BZ, target_BK3, self.settings.fine_steps)

@@ -22,11 +22,6 @@ def human_to_world(points_P3: np.ndarray) -> np.ndarray:
     return np.asarray(points_P3)[..., [2, 0, 1]]
 
 
-def world_to_human(points_P3: np.ndarray) -> np.ndarray:
-    """Points or directions (..., 3) of the world frame (forward, left, up) in the human frame (left, up, forward)."""
-    return np.asarray(points_P3)[..., [1, 2, 0]]
-
-
 @dataclass
 class Solids:
     """A figure. Row s of every array is one solid, whose axis runs from ``starts_S3[s]`` to ``ends_S3[s]``.

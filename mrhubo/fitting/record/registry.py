@@ -89,6 +89,7 @@ def fetch_package(uri: str) -> Path:
     """
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     import mlflow
+    from mlflow.artifacts import download_artifacts
     from mlflow.models import Model
 
     match = re.fullmatch(r"models:/([^/@]+)(?:/(\d+)|@([^/]+))", uri)
@@ -107,7 +108,7 @@ def fetch_package(uri: str) -> Path:
     client = mlflow.MlflowClient(tracking_uri=registry)
     try:
         version = client.get_model_version(name, number) if number else client.get_model_version_by_alias(name, alias)
-        path = Path(mlflow.artifacts.download_artifacts(version.source, tracking_uri=registry))
+        path = Path(download_artifacts(artifact_uri=version.source, tracking_uri=registry))
         return path / Model.load(path).flavors["python_function"]["artifacts"]["package"]["path"]
     except KeyError as error:
         raise UserError(f"{uri}: is no model of mrhubo") from error
