@@ -23,6 +23,7 @@ from torch import Tensor
 from mrhubo.body.skeleton import KEYPOINT_NAMES, keypoint_indices
 from mrhubo.config import ManualScaleConfig
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.frames import base_to_human
 from mrhubo.robot.entries import read_vector
 from mrhubo.robot.model import LinkPoses, Robot
 
@@ -35,8 +36,6 @@ _NUMBERS = {
     if "low" in field.metadata
 }
 """The numbers that stand alone, with the range that the config allows."""
-HUMAN_FROM_BASE = (1, 2, 0)
-"""The base frame's axes (forward, left, up) that are the human's left, up and forward (REP 103 and SMPL)."""
 
 
 class ManualScale:
@@ -96,7 +95,7 @@ class ManualScale:
                 more_B13 = self.config.forearm * (base_BK3[:, [wrist]] - base_BK3[:, [elbow]])
                 moved_BK3[:, [wrist, *hand]] += more_B13
         scaled_BK3 = (moved_BK3 + self.shift_3) * self.config.factor
-        human_BK3 = scaled_BK3[..., HUMAN_FROM_BASE]
+        human_BK3 = base_to_human(scaled_BK3)
         pelvis = self._place["pelvis"]
         return human_BK3 - human_BK3[:, [pelvis]]
 
