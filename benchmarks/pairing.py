@@ -28,7 +28,7 @@ from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fitting.pipeline import PairSetup, prepare_pairs
 from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import align_pose
 from mrhubo.runtime.threads import available_cores, use_threads
 
@@ -214,7 +214,7 @@ def reverse(setup: PairSetup, maker: PairGenerator, count: int = 5_000) -> None:
         pose, near_pose = (maker.prior.decode(latent.to(device)) for latent in (z, near))
     rows = []
     for starts in (2, 4, 12):
-        reference = ReferenceRetargeter(setup.body_map, starts=starts)
+        reference = OptimizationRetargeter(setup.body_map, starts=starts)
         with use_threads(1):
             start = time.perf_counter()
             q, cost = reference.solve_frames(pose)

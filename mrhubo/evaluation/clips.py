@@ -17,7 +17,7 @@ from mrhubo.errors import UserError
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.pairing import pose_settings
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap
 
 REFERENCE_SCHEMA = "mrhubo.reference/1"
@@ -93,7 +93,7 @@ def solve_references(
         "kinematics": body_map.robot.description.kinematics,
         "smoothness": repr(config.evaluation.smoothness),
     }
-    retargeter = ReferenceRetargeter(body_map, smoothness=config.evaluation.smoothness)
+    retargeter = OptimizationRetargeter(body_map, smoothness=config.evaluation.smoothness)
     everything, clips = motions.all, []
     for done, motion in enumerate(everything):
         progress(done, len(everything), motion.name)

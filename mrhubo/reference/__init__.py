@@ -9,14 +9,14 @@ from mrhubo.reference.metrics import (
     joint_error,
     link_error,
 )
-from mrhubo.reference.retarget import ReferenceResult, ReferenceRetargeter
+from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult
 from mrhubo.reference.solve import DirectionProblem
 
 __all__ = [
     "DirectionJacobian",
     "DirectionProblem",
     "ReferenceResult",
-    "ReferenceRetargeter",
+    "OptimizationRetargeter",
     "angle_between",
     "at_limit_share",
     "direction_error",

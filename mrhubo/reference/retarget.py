@@ -9,12 +9,11 @@ Legend: T frames (or B independent ones), S starts, D directions, N joints, J = 
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
@@ -23,7 +22,7 @@ from mrhubo.reference.metrics import angle_between, at_limit_share
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.trajectory import pick, smooth_motion
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, Robot
 
 _REFERENCE_RATE = 24.0
 
@@ -44,36 +43,33 @@ class ReferenceResult:
     """Frames (T,) that `retarget_collision_free` could not free, which hold the nearest free pose."""
 
 
-class ReferenceRetargeter:
-    """Optimisation-based retargeter of one robot; works on the device of its body map. Deterministic for a seed."""
+class OptimizationRetargeter(nn.Module):
+    """Optimisation-based retargeter of one robot. Deterministic for a seed."""
 
-    def __init__(self, body_map: BodyMap, smoothness: float = 0.02, starts: int = 12, seed: int = 0) -> None:
+    def __init__(self, robot: Robot | BodyMap, smoothness: float = 0.02, starts: int = 12, seed: int = 0) -> None:
         """Prepares the starts.
 
         Args:
-            body_map: the robot and what it shares with a human body.
+            robot: a robot that knows which of its links stand for which body part (`Robot.from_urdf`,
+                `Robot.from_config`), or its body map.
             smoothness: weight of |q_t - q_(t-1)|^2 at 24 frames per second [1/rad^2]; at other rates the same for the
                 same velocity. 0: every frame on its own.
             starts: starting points per frame.
             seed: of the random robot poses that serve as starting points.
+
+        Raises:
+            UserError: the robot knows no body parts, or a number makes no sense.
         """
         if not (math.isfinite(smoothness) and smoothness >= 0):
             raise UserError(f"reference retargeter: smoothness must be 0 or more, found {smoothness}")
         if starts < 2:
             raise UserError(f"reference retargeter: needs at least 2 starts, found {starts}")
-        self.body_map, self.smoothness, self.starts, self.seed = body_map, smoothness, starts, seed
-        self._prepare()
-
-    def _prepare(self) -> None:
+        super().__init__()
+        self.body_map = robot if isinstance(robot, BodyMap) else BodyMap.of(robot)
+        self.smoothness, self.starts = smoothness, starts
         self.problem = DirectionProblem(self.body_map)
-        self._pool = StartPool(self.problem, self.starts, self.seed)
-        self.__dict__.pop("_free_problem", None)
-
-    def to(self, device: torch.device | str) -> ReferenceRetargeter:
-        """Moves the body map, in place, and everything built on it."""
-        self.body_map.to(device)
-        self._prepare()
-        return self
+        self._pool = StartPool(self.problem, starts, seed)
+        self._free: CollisionFreeProblem | None = None
 
     @torch.no_grad()
     def retarget(self, pose_TJ6: Tensor, frame_rate: float) -> ReferenceResult:
@@ -114,9 +110,11 @@ class ReferenceRetargeter:
         q_TN, rests_T = avoid_collisions(self._free_problem, self._pool, q_TN.to(target_TD3), target_TD3, pull)
         return self._result(q_TN, target_TD3, frame_rate, rests_T)
 
-    @functools.cached_property
+    @property
     def _free_problem(self) -> CollisionFreeProblem:
-        return CollisionFreeProblem(self.body_map)
+        if self._free is None:
+            self._free = CollisionFreeProblem(self.body_map)
+        return self._free
 
     def _pull(self, frame_rate: float) -> float:
         """Weight of |q_t - q_(t-1)|^2: that of the squared velocity, with the reference rate as the unit of time."""
@@ -130,12 +128,6 @@ class ReferenceRetargeter:
             UserError: the pose has the wrong shape or a frame that is no pose.
         """
         target_BD3 = self._targets(pose_BJ6)
-        q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
-        return q_BN, cost_BC.sum(dim=1)
-
-    @torch.no_grad()
-    def solve_directions(self, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
-        """`solve_frames` for unit directions (B, D, 3), seen from the chest in human axes, in place of poses."""
         q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
         return q_BN, cost_BC.sum(dim=1)
 
@@ -168,7 +160,7 @@ class ReferenceRetargeter:
 
     def _polish(self, candidates_BSN: Tensor, cost_BSC: Tensor, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
         """Each block's best candidate, converged: angles (B, N) and costs (B, C)."""
-        best_BN = pick(candidates_BSN, cost_BSC.argmin(dim=1), self.problem.joints_NC)
+        best_BN = pick(candidates_BSN, cost_BSC.argmin(dim=1), self.problem.blocks.joints_NC)
         return self.problem.minimise(best_BN, target_BD3)
 
     def _result(
@@ -190,7 +182,7 @@ def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
     Both per 1/24 s, whatever the frame rate; a step is counted once per block.
     """
     scale = frame_rate / _REFERENCE_RATE
-    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.joints_NC).amax(dim=1) * scale
+    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
     human_XD = angle_between(target_TD3[1:], target_TD3[:-1])
-    asked_XC = (human_XD[..., None] * problem.directions_DC).amax(dim=1) * scale
+    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC).amax(dim=1) * scale
     return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())

@@ -150,11 +150,12 @@ class Retargeter:
         """
         q_TN = self.predict(pose_TJ6, polish)
         pose_TJ6 = pose_TJ6.float()
-        error_TD = direction_error(self.body_map, q_TN, pose_TJ6)
+        poses = self.body_map.robot.forward(q_TN)
+        error_TD = direction_error(self.body_map, q_TN, pose_TJ6, poses)
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
         plausible = (self.phi_threshold / phi_T.clamp_min(1e-12)).clamp(max=1.0)
         agreement = torch.exp(-(error_TD.mean(dim=1) / _AGREEMENT_DEG).square())
-        return RetargetResult(q_TN, plausible * agreement, error_TD, phi_T, self.collision.collides(q_TN))
+        return RetargetResult(q_TN, plausible * agreement, error_TD, phi_T, self.collision.collides(q_TN, poses))
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""

@@ -70,12 +70,28 @@ def test_limbs_are_lengthened_and_carry_the_hand(root: Path) -> None:
         torch.testing.assert_close(longer[name], plain[name])
 
 
-def test_factor_scales_and_shift_moves_all_alike(root: Path) -> None:
+def test_factor_scales_all_alike(root: Path) -> None:
     one, two = (targets(body_map_of(root, "reachy", factor=factor)) for factor in (1.0, 2.0))
-    moved = targets(body_map_of(root, "reachy", shift=[0.1, 0.2, 0.3]))
     for name, point in one.items():
         torch.testing.assert_close(two[name], 2 * point)
+
+
+def test_a_shift_moves_nothing_and_says_so(root: Path, recwarn: pytest.WarningsRecorder) -> None:
+    plain = targets(body_map_of(root, "reachy"))
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match=r"robot.manual.shift: \[0.1, 0.2, 0.3\] moves nothing.*pelvis"):
+        moved = targets(body_map_of(root, "reachy", shift=[0.1, 0.2, 0.3]))
+    for name, point in plain.items():
         torch.testing.assert_close(moved[name], point, atol=1e-6, rtol=0)
+
+
+def test_what_the_warning_of_a_shift_advises_does_move(root: Path) -> None:
+    plain = targets(body_map_of(root, "reachy"))
+    config = load_config(root / "conf" / "paper" / "reachy.yaml").robot
+    assert config.manual is not None
+    config.manual.keypoints["pelvis"] = {"offset": [-0.1, -0.2, 0.6 - 0.3]}
+    moved = targets(build_body_map(config))
+    torch.testing.assert_close(moved["neck"], plain["neck"] + base_to_human(torch.tensor([0.1, 0.2, 0.3])))
 
 
 def test_means_offsets_and_constants_are_in_the_base_frame(root: Path) -> None:

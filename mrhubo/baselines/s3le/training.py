@@ -13,7 +13,7 @@ from torch import Tensor
 
 from mrhubo.baselines.s3le.model import S3LE, normality_gap
 from mrhubo.config import S3LEConfig
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, SelfCollision
 from mrhubo.runtime.trainer import cosine_schedule
 
@@ -41,7 +41,7 @@ def make_data(
 ) -> S3LEData:
     """Glue pairs of human poses (G, 21, 6) from motion capture, and random robot poses."""
     robot, collision = body_map.robot, body_map.collision
-    retargeter = ReferenceRetargeter(body_map)
+    retargeter = OptimizationRetargeter(body_map)
     answers = []
     for done, part in enumerate(pose_GJ6.split(2_000)):
         progress(2_000 * done)
