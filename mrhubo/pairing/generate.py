@@ -9,7 +9,6 @@ Legend: B pairs of a shard, N robot joints, K keypoints, J = 21 human joints, Z 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 
 import torch
@@ -25,6 +24,7 @@ from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.store import PairStore
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.threads import use_threads
 
 _STARTS = 4
@@ -51,8 +51,8 @@ class PairGenerator:
         """Target keypoints (count, K, 3) [m] of fresh random robot poses."""
         return self.body_map.targets(self.robot.forward(self.robot.sample(count, generator)))
 
-    def prepare(self, store: PairStore, progress: Callable[[int, float], None] = lambda step, cost: None) -> None:
-        """Reads or trains the amortised solver, if the config's solver uses one; `progress` gets (step, mean cost)."""
+    def prepare(self, store: PairStore, report: Reporter = SILENT) -> None:
+        """Reads or trains the amortised solver, if the config's solver uses one."""
         if self.settings.solver == "paper" or not store.counts["forward"]:
             return
         settings, header = self.settings, {**store.header, "what": "amortiser"}
@@ -64,7 +64,7 @@ class PairGenerator:
                 settings.seed,
                 store.amortiser_path,
                 header,
-                progress,
+                report,
             )
 
     def solve(self, target_BK3: Tensor) -> Tensor:

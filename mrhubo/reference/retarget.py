@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.motion.poses import MotionLike, read_poses
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
-from mrhubo.reference.metrics import angle_between, at_limit_share
+from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
+from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.trajectory import pick, smooth_motion
@@ -70,6 +73,43 @@ class OptimizationRetargeter(nn.Module):
         self.problem = DirectionProblem(self.body_map)
         self._pool = StartPool(self.problem, starts, seed)
         self._free: CollisionFreeProblem | None = None
+
+    if TYPE_CHECKING:
+
+        def __call__(self, motion: MotionLike, frame_rate: float | None = None) -> OptimizationResult:
+            """`forward`."""
+            ...
+
+    @torch.no_grad()
+    def forward(self, motion: MotionLike, frame_rate: float | None = None) -> OptimizationResult:
+        """Joint angles of a human motion.
+
+        Args:
+            motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
+                axis-angle [rad] (..., 63) or 6D (..., 21, 6). The answer has its leading axes, of which the last is the
+                time, and the others are motions of their own; none for a single pose.
+            frame_rate: frames per second of an array; a `Motion` has its own. Without one, every frame is solved on its
+                own.
+
+        Raises:
+            UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
+                frame), or the frame rate is not positive.
+        """
+        poses = read_poses(motion, frame_rate)
+        pose_TJ6, shape = poses.pose_TJ6.to(self.problem.device), poses.shape
+        clips = pose_TJ6.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [pose_TJ6]
+        answers = [self._solve(clip_TJ6, poses.frame_rate) for clip_TJ6 in clips if len(clip_TJ6)]
+        robot = self.body_map.robot
+        q_TN = torch.cat(answers) if answers else pose_TJ6.new_zeros(0, len(robot.joint_names))
+        links = robot.forward(q_TN)
+        error_TD = direction_error(self.body_map, q_TN, pose_TJ6, links)
+        found = (q_TN, error_TD, self.body_map.collision.collides(q_TN, links))
+        q, error, collision = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
+        return OptimizationResult(q, robot.joint_names, error, collision, poses.frame_rate)
+
+    def _solve(self, pose_TJ6: Tensor, frame_rate: float | None) -> Tensor:
+        """Joint angles (T, N) [rad] of one motion, or of frames on their own."""
+        return self.solve_frames(pose_TJ6)[0] if frame_rate is None else self.retarget(pose_TJ6, frame_rate).q_TN
 
     @torch.no_grad()
     def retarget(self, pose_TJ6: Tensor, frame_rate: float) -> ReferenceResult:

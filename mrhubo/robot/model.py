@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytorch_kinematics as pk
 import torch
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 from scipy.spatial.transform import Rotation
@@ -22,7 +21,9 @@ from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.config import load_config
+from mrhubo.config.shipped import shipped_root
 from mrhubo.errors import UserError
+from mrhubo.robot.chain import build_chain
 from mrhubo.robot.keypoints import Keypoints, read_keypoints
 from mrhubo.robot.urdf import Description, describe, joint_range
 
@@ -105,7 +106,7 @@ class Robot(nn.Module):
 
     def _prepare_chain(self) -> None:
         needed = {joint.name for link in self.links for joint in self.description.joints_above(link)}
-        self._chain = pk.build_chain_from_urdf(_chain_xml(self.description, needed)).to(dtype=torch.float32)
+        self._chain = build_chain(_chain_xml(self.description, needed)).to(dtype=torch.float32)
         angles = self._chain.get_joint_parameter_names()
         select_AN, constant_A = torch.zeros(len(angles), len(self.joint_names)), torch.zeros(len(angles))
         for row, joint in enumerate(angles):
@@ -163,12 +164,13 @@ class Robot(nn.Module):
 
     @classmethod
     def from_config(cls, config: Path | str) -> Robot:
-        """The robot of a config: a YAML file.
+        """The robot of a config: a YAML file, or the name of one that ships with mrhubo (`nao`, `paper/nao`).
 
         Raises:
             UserError: the config or what it names cannot be used.
         """
-        robot = load_config(Path(config)).robot
+        shipped = shipped_root() / "conf" / f"{config}.yaml"
+        robot = load_config(shipped if shipped.is_file() and not Path(config).is_file() else Path(config)).robot
         return cls.from_urdf(
             robot.urdf, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name
         )

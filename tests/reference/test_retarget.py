@@ -2,12 +2,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
+from mrhubo import rotation
 from mrhubo.errors import UserError
+from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter, direction_error
 from mrhubo.reference.retarget import count_jumps
 
@@ -136,6 +140,41 @@ def test_bad_input_is_named(retargeters: dict[str, OptimizationRetargeter]) -> N
         OptimizationRetargeter(retargeter.body_map, smoothness=-1.0)
     with pytest.raises(UserError, match="starts"):
         OptimizationRetargeter(retargeter.body_map, starts=1)
+
+
+def test_it_is_called_like_a_retargeter(
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor], tmp_path: Path
+) -> None:
+    retargeter, pose_TJ6 = retargeters["nao"], random_pose(12, 3)
+    wanted = retargeter.retarget(pose_TJ6, 30.0)
+    motion = Motion("made", rotation.sixd_to_matrix(pose_TJ6), 30.0)
+    axis_angle_T63 = rotation.matrix_to_axis_angle(motion.local_TJ33).flatten(1).numpy()
+    for result in (retargeter(motion), retargeter(pose_TJ6, 30.0), retargeter(axis_angle_T63, frame_rate=30.0)):
+        torch.testing.assert_close(result.q, wanted.q_TN, atol=1e-3, rtol=0)
+        torch.testing.assert_close(result.direction_error_deg, wanted.residual_deg_TD, atol=1e-2, rtol=0)
+        assert result.joint_names == retargeter.body_map.robot.joint_names and result.frame_rate == 30.0
+        assert torch.equal(result.collision, retargeter.body_map.collision.collides(result.q))
+    result.save(tmp_path / "motion.npz")
+    with np.load(tmp_path / "motion.npz") as file:
+        np.testing.assert_array_equal(file["q"], result.q)
+        assert float(file["frame_rate"]) == 30.0 and file["direction_error_deg"].shape == (12, 4)
+
+
+def test_leading_axes_are_motions_or_frames_of_their_own(
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
+) -> None:
+    retargeter, pose_TJ6 = retargeters["nao"], random_pose(12, 4)
+    two = retargeter(pose_TJ6.unflatten(0, (2, 6)), 30.0)
+    assert two.q.shape == (2, 6, 8) and two.collision.shape == (2, 6)
+    for found, part_TJ6 in zip(two.q, pose_TJ6.split(6), strict=True):
+        assert torch.equal(found, retargeter.retarget(part_TJ6, 30.0).q_TN)
+    alone = retargeter(pose_TJ6)
+    assert torch.equal(alone.q, retargeter.solve_frames(pose_TJ6)[0]) and alone.frame_rate is None
+    one = retargeter(pose_TJ6[0])
+    assert one.q.shape == (8,) and one.direction_error_deg.shape == (4,)
+    assert retargeter(pose_TJ6[:0], 30.0).q.shape == (0, 8)
+    with pytest.raises(UserError, match="frame rate"):
+        retargeter(pose_TJ6, -1.0)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")

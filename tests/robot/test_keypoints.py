@@ -27,6 +27,11 @@ def test_links_are_those_of_views_points_and_ends(root: Path) -> None:
     assert [d.name for d in turned_round.directions] == table
 
 
+def test_a_config_that_does_not_exist_is_named() -> None:
+    with pytest.raises(UserError, match="reachi"):
+        Robot.from_config("reachi")
+
+
 def test_nothing_to_compare_is_refused() -> None:
     with pytest.raises(UserError, match="names no limb"):
         read_keypoints({"chest": "torso", "left_shoulder": "LShoulder"})
@@ -38,7 +43,8 @@ def test_nothing_to_compare_is_refused() -> None:
 def test_robots_from_config_and_urdf_are_those_of_the_body_map(root: Path, name: str) -> None:
     path = root / "conf" / f"{name}.yaml"
     config = load_config(path).robot
-    made = Robot.from_config(path)
+    made = Robot.from_config(name)
+    assert made.urdf == Robot.from_config(path).urdf == config.urdf
     again = Robot.from_urdf(
         str(config.urdf), config.joints, config.keypoints, config.key_links, config.ranges, config.hold
     )
