@@ -29,7 +29,7 @@ from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.pairing import PairGenerator, PairSetup, PairStore, generate_pairs, make_filter, solve_lbfgs
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import align_pose
 from mrhubo.runtime.progress import Progress, Reporter
 from mrhubo.runtime.threads import available_cores, use_threads
@@ -233,7 +233,7 @@ def reverse(setup: PairSetup, maker: PairGenerator, count: int = 5_000) -> None:
         pose, near_pose = (maker.prior.decode(latent.to(device)) for latent in (z, near))
     rows = []
     for starts in (2, 4, 12):
-        reference = ReferenceRetargeter(setup.body_map, starts=starts)
+        reference = OptimizationRetargeter(setup.body_map, starts=starts)
         with use_threads(1):
             start = time.perf_counter()
             q, cost = reference.solve_frames(pose)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mrhubo.errors import UserError
     from mrhubo.motion import Motion, read_motion
-    from mrhubo.reference import ReferenceRetargeter as OptimizationRetargeter
+    from mrhubo.reference import OptimizationRetargeter
     from mrhubo.retargeter import Retargeter, RetargetResult
     from mrhubo.robot import Robot
 
@@ -38,7 +38,7 @@ __all__ = [
 
 _HOMES = {
     "Motion": "mrhubo.motion",
-    "OptimizationRetargeter": "mrhubo.reference:ReferenceRetargeter",
+    "OptimizationRetargeter": "mrhubo.reference",
     "RetargetResult": "mrhubo.retargeter",
     "Retargeter": "mrhubo.retargeter",
     "Robot": "mrhubo.robot",

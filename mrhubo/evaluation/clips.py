@@ -16,7 +16,7 @@ from mrhubo.errors import UserError
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.pairing import pose_settings
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_motions
 from mrhubo.runtime.progress import SILENT, Reporter
@@ -94,7 +94,7 @@ def solve_references(
         "kinematics": body_map.robot.description.kinematics,
         "smoothness": repr(config.evaluation.smoothness),
     }
-    retargeter = ReferenceRetargeter(body_map, smoothness=config.evaluation.smoothness)
+    retargeter = OptimizationRetargeter(body_map, smoothness=config.evaluation.smoothness)
     everything, clips = motions.all, []
     with report.step("reference", len(everything), "clips") as progress:
         for done, motion in enumerate(everything):

@@ -22,7 +22,7 @@ from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.store import PairStore
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.threads import use_threads
@@ -81,9 +81,9 @@ class PairGenerator:
         return solve_quasi_newton(self.problem, start, target_BK3, steps, metric_ZZ=metric_ZZ)
 
     @cached_property
-    def reference(self) -> ReferenceRetargeter:
+    def reference(self) -> OptimizationRetargeter:
         """Answers the human poses of reverse pairs."""
-        return ReferenceRetargeter(self.body_map, starts=_STARTS)
+        return OptimizationRetargeter(self.body_map, starts=_STARTS)
 
     def shard(self, direction: str, index: int) -> dict[str, Tensor]:
         """The pairs of one shard, `forward` or `reverse`: what `PairStore.read` names, on the CPU.

@@ -140,10 +140,12 @@ class Retargeter(nn.Module):
         """
         q_TN = self.predict(pose_TJ6, polish)
         pose_TJ6 = pose_TJ6.to(self.device, torch.float32)
-        error_deg_TD = direction_error(self.body_map, q_TN, pose_TJ6)
+        poses = self.body_map.robot.forward(q_TN)
+        error_deg_TD = direction_error(self.body_map, q_TN, pose_TJ6, poses)
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
         trust_T = confidence(phi_T, self.phi_threshold, error_deg_TD)
-        return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, self.collision.collides(q_TN))
+        collision_T = self.collision.collides(q_TN, poses)
+        return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, collision_T)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""

@@ -26,7 +26,7 @@ from mrhubo.fitting.preparation import prepare
 from mrhubo.motion import Motion
 from mrhubo.pairing import ProportionTest
 from mrhubo.retargeter import Retargeter
-from mrhubo.robot import BodyMap, build_body_map, varied
+from mrhubo.robot import BodyMap, ManualScale, build_body_map, varied
 from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.tracking import open_client, start_run
 from mrhubo.runtime.trainer import quiet_lightning
@@ -229,7 +229,7 @@ def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
     assert written.robot.scale == "manual" and written.robot.manual is not None
     assert str(written.robot.manual.factor) == run.data.params["scale_factor/factor"]
     (package,) = (tmp_path / "runs" / "packages").iterdir()
-    assert Retargeter.load(package).body_map.manual is not None
+    assert isinstance(Retargeter.load(package).body_map.scale, ManualScale)
     assert prepare(written).store.header["fingerprint"] == run.data.tags["pairs_fingerprint"]
 
 

@@ -16,7 +16,7 @@ from mrhubo.errors import UserError
 from mrhubo.evaluate import main
 from mrhubo.evaluation import Clip, Evaluation, evaluate_clip, latency_us, mean_score, measures, table
 from mrhubo.motion import Motion
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import BodyMap, build_body_map
 
@@ -38,7 +38,7 @@ def pose_TJ6() -> torch.Tensor:
 @pytest.mark.parametrize("name", ["nao", "reachy"])
 def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, name)
-    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0)
+    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0)
     clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference.q_TN)
     found = evaluate_clip(clip, reference.q_TN, body_map, key_links)
     assert found.joint_rad == 0 and found.link_cm == 0 and found.frames == 60
@@ -51,7 +51,7 @@ def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: 
 
 def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, "nao")
-    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
+    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
     clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference)
     turned = reference.clone()
     turned[:, body_map.robot.joint_names.index("LElbowRoll")] += 0.3
@@ -62,7 +62,7 @@ def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: to
 
 def test_a_trembling_robot_has_a_higher_jerk(root: Path, pose_TJ6: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, "nao")
-    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
+    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
     clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference)
     noise = 0.02 * torch.randn(reference.shape, generator=torch.Generator().manual_seed(0))
     still, moving, trembling = (

@@ -16,7 +16,7 @@ from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion
-from mrhubo.reference import ReferenceRetargeter, direction_error
+from mrhubo.reference import OptimizationRetargeter, direction_error
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
@@ -73,7 +73,7 @@ def test_a_head_that_no_joint_turns_is_not_looked_at(root: Path) -> None:
     network = build_network(config, body_map)
     assert {"neck", "head"}.isdisjoint(network.features.input_joints) and "left_wrist" in network.features.input_joints
     pose = human(30)
-    found = ReferenceRetargeter(body_map).retarget(pose, 24.0)
+    found = OptimizationRetargeter(body_map).retarget(pose, 24.0)
     assert found.q_TN.shape == network(pose).shape == (30, 8)
     limbs = [i for i, name in enumerate(body_map.direction_names) if name.endswith(("elbow", "wrist"))]
     still = direction_error(body_map, ((body_map.robot.lower_N + body_map.robot.upper_N) / 2).expand(30, 8), pose)

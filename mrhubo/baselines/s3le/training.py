@@ -12,7 +12,7 @@ from torch import Tensor
 
 from mrhubo.baselines.s3le.model import S3LE, normality_gap
 from mrhubo.config import S3LEConfig
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, SelfCollision
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.trainer import cosine_schedule
@@ -39,7 +39,7 @@ class S3LEData:
 def make_data(body_map: BodyMap, pose_GJ6: Tensor, settings: S3LEConfig, report: Reporter = SILENT) -> S3LEData:
     """Glue pairs of human poses (G, 21, 6) from motion capture, and random robot poses."""
     robot, collision = body_map.robot, body_map.collision
-    retargeter = ReferenceRetargeter(body_map)
+    retargeter = OptimizationRetargeter(body_map)
     answers = []
     with report.step("glue pairs", len(pose_GJ6)) as progress:
         for done, part in enumerate(pose_GJ6.split(2_000)):
