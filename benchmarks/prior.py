@@ -22,7 +22,7 @@ from torch import Tensor
 from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
 from mrhubo.body.prior_training.measures import NOISE_DEG, measure, reconstruction
 from mrhubo.body.prior_training.train import PriorConfig, Split
-from mrhubo.body.skeleton import PART_AND_SIDE
+from mrhubo.body.skeleton import PAIRED_JOINTS, SIDES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
@@ -77,7 +77,8 @@ def by_clip(prior: BodyPrior, motions: list[Motion]) -> tuple[list[list[str]], f
 def by_joint(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
     """Mean rotation error of every joint [deg], left and right together, for each set of poses."""
     errors = [reconstruction(prior, Skeleton(), poses)[1].mean(dim=0) for poses in columns]
-    parts = [PART_AND_SIDE[name][0] for name in POSED_JOINT_NAMES]
+    both = {f"{side}_{name}": name for side in SIDES for name in PAIRED_JOINTS}
+    parts = [both.get(name, name) for name in POSED_JOINT_NAMES]
     rows = []
     for part in dict.fromkeys(parts):
         joints = [i for i, other in enumerate(parts) if other == part]

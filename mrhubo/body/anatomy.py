@@ -17,14 +17,13 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body.skeleton import PART_AND_SIDE, POSED_JOINT_NAMES
+from mrhubo.body.skeleton import PAIRED_JOINTS, POSED_JOINT_NAMES, SIDE_OF, SIDES
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ELBOW_AXIS = (0.0, -0.871, 0.491)
 """Hinge of the left elbow: turning about it by a positive angle flexes."""
 KNEE_AXIS = _X
 """Hinge of the knees: turning about it by a positive angle flexes."""
-_HINGES = {"elbow": ELBOW_AXIS, "knee": KNEE_AXIS}
 
 # part: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
 _Entry = tuple[tuple[float, float, float], tuple[float, float]]
@@ -49,22 +48,23 @@ _RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
 def _table() -> tuple[Tensor, Tensor]:
     """Axes (21, 3, 3), one per row, and limits (21, 3, 2) [rad] of every joint as if it were on the left."""
     axes, limits = [], []
+    ranges = _RANGES | {f"{side}_{name}": _RANGES[name] for side in SIDES for name in PAIRED_JOINTS}
     for name in POSED_JOINT_NAMES:
-        entries = _RANGES[PART_AND_SIDE[name][0]]
+        entries = ranges[name]
         axes.append([axis for axis, _ in entries])
         limits.append([limit for _, limit in entries])
     return torch.nn.functional.normalize(torch.tensor(axes), dim=-1), torch.deg2rad(torch.tensor(limits))
 
 
 _AXES_J33, _LIMITS_J32 = _table()
-_RIGHT = torch.tensor([PART_AND_SIDE[name][1] == "right" for name in POSED_JOINT_NAMES])
+_RIGHT = torch.tensor([SIDE_OF.get(name) == "right" for name in POSED_JOINT_NAMES])
+_HINGES = {f"{side}_{name}": axis for side in SIDES for name, axis in (("elbow", ELBOW_AXIS), ("knee", KNEE_AXIS))}
 
 
 def hinge_axis(name: str) -> tuple[float, float, float]:
     """Axis about which a positive angle flexes the elbow or knee of this name."""
-    part, side = PART_AND_SIDE[name]
-    x, y, z = _HINGES[part]
-    return (x, -y, -z) if side == "right" else (x, y, z)
+    x, y, z = _HINGES[name]
+    return (x, -y, -z) if SIDE_OF[name] == "right" else (x, y, z)
 
 
 def joint_angles(matrix_BJ33: Tensor) -> Tensor:

@@ -20,8 +20,14 @@ from mrhubo.files.storage import checksum_tensors
 
 _LONGEST = 2.0
 """No bone is that long [m]; other units than metres are."""
-_SIDES: dict[str, float] = {"left": 1.0, "right": -1.0}
-"""Sign of x on each side of the body."""
+_SIGNS = {"left": 1.0, "right": -1.0}
+SIDES: tuple[str, ...] = tuple(_SIGNS)
+"""Sides of the body; what there is on both is called `left_` and `right_` and its name."""
+PAIRED_JOINTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+"""Joints that there are on both sides."""
+SIDE_OF: dict[str, str] = {f"{side}_{name}": side for side in SIDES for name in PAIRED_JOINTS}
+"""The side of each joint that there is on both."""
+LEG_JOINTS: tuple[str, ...] = tuple(f"{side}_{name}" for name in ("hip", "knee", "ankle", "foot") for side in SIDES)
 
 # name: (parent, offset from the parent at rest [m])
 _JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
@@ -48,15 +54,15 @@ _JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
     "left_wrist": ("left_elbow", (0.26, 0.0, 0.0)),
     "right_wrist": ("right_elbow", (-0.26, 0.0, 0.0)),
 }
-# name: (part that carries it, offset from its joint at rest [m]) on the left; x is mirrored on the right.
-_FIXED_POINTS: dict[str, tuple[str, tuple[float, float, float]]] = {
-    "eye": ("head", (0.032, 0.065, 0.090)),
-    "thumb": ("wrist", (0.045, -0.015, 0.045)),
-    "index": ("wrist", (0.092, -0.003, 0.024)),
-    "middle": ("wrist", (0.095, 0.0, 0.0)),
-    "pinky": ("wrist", (0.080, -0.006, -0.042)),
-    "toe": ("foot", (0.0, -0.015, 0.070)),
-    "heel": ("ankle", (0.0, -0.060, -0.050)),
+# name: (parent, whether it is on the point's own side, offset from it at rest [m], x mirrored on the right)
+_FIXED_POINTS: dict[str, tuple[str, bool, tuple[float, float, float]]] = {
+    "eye": ("head", False, (0.032, 0.065, 0.090)),
+    "thumb": ("wrist", True, (0.045, -0.015, 0.045)),
+    "index": ("wrist", True, (0.092, -0.003, 0.024)),
+    "middle": ("wrist", True, (0.095, 0.0, 0.0)),
+    "pinky": ("wrist", True, (0.080, -0.006, -0.042)),
+    "toe": ("foot", True, (0.0, -0.015, 0.070)),
+    "heel": ("ankle", True, (0.0, -0.060, -0.050)),
 }
 
 JOINT_NAMES: tuple[str, ...] = tuple(_JOINTS)
@@ -65,23 +71,14 @@ POSED_JOINT_NAMES: tuple[str, ...] = JOINT_NAMES[1:]
 """The 21 joints whose local rotations make a pose H."""
 PARENTS: tuple[int, ...] = tuple(-1 if p is None else JOINT_NAMES.index(p) for p, _ in _JOINTS.values())
 """Index of each joint's parent in JOINT_NAMES; -1 for the pelvis."""
-CENTRAL_PARTS: tuple[str, ...] = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
-"""Joints of which a body has one."""
-PAIRED_PARTS: tuple[str, ...] = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
-"""What the joints of which a body has two are called without their side."""
-PART_AND_SIDE: dict[str, tuple[str, str]] = {
-    **{part: (part, "") for part in CENTRAL_PARTS},
-    **{f"{side}_{part}": (part, side) for side in _SIDES for part in PAIRED_PARTS},
-}
-"""Of each joint, by name, its part and its side: "left", "right" or ""."""
 
 
 def _fixed_points() -> dict[str, tuple[int, tuple[float, float, float]]]:
     points = {}
-    for name, (part, (x, y, z)) in _FIXED_POINTS.items():
-        for side, sign in _SIDES.items():
-            joint = f"{side}_{part}" if part in PAIRED_PARTS else part
-            points[f"{side}_{name}"] = (JOINT_NAMES.index(joint), (sign * x, y, z))
+    for name, (parent, own_side, (x, y, z)) in _FIXED_POINTS.items():
+        for side, sign in _SIGNS.items():
+            carrier = f"{side}_{parent}" if own_side else parent
+            points[f"{side}_{name}"] = (JOINT_NAMES.index(carrier), (sign * x, y, z))
     return points
 
 
@@ -118,15 +115,12 @@ def _levels() -> list[list[int]]:
 
 
 _LEVELS = _levels()
-_OTHER_SIDE = {"left": "right", "right": "left"}
-
-
-def _mirrored(name: str) -> str:
-    part, side = PART_AND_SIDE[name]
-    return f"{_OTHER_SIDE[side]}_{part}" if side else name
-
-
-_MIRROR = [POSED_JOINT_NAMES.index(_mirrored(name)) for name in POSED_JOINT_NAMES]
+_OTHER_SIDE = {
+    f"{side}_{name}": f"{other}_{name}"
+    for side, other in zip(SIDES, SIDES[::-1], strict=True)
+    for name in PAIRED_JOINTS
+}
+_MIRROR = [POSED_JOINT_NAMES.index(_OTHER_SIDE.get(name, name)) for name in POSED_JOINT_NAMES]
 
 
 def mirror_pose(pose_BJ6: Tensor) -> Tensor:

@@ -9,7 +9,6 @@ Legend: B pairs of a shard, N robot joints, K keypoints, J = 21 human joints, Z 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 
 import torch
@@ -23,8 +22,9 @@ from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.store import PairStore
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.threads import use_threads
 
 _STARTS = 4
@@ -51,8 +51,8 @@ class PairGenerator:
         """Target keypoints (count, K, 3) [m] of fresh random robot poses."""
         return self.body_map.targets(self.robot.forward(self.robot.sample(count, generator)))
 
-    def prepare(self, store: PairStore, progress: Callable[[int, float], None] = lambda step, cost: None) -> None:
-        """Reads or trains the amortised solver, if the config's solver uses one; `progress` gets (step, mean cost)."""
+    def prepare(self, store: PairStore, report: Reporter = SILENT) -> None:
+        """Reads or trains the amortised solver, if the config's solver uses one."""
         if self.settings.solver == "paper" or not store.counts["forward"]:
             return
         settings, header = self.settings, {**store.header, "what": "amortiser"}
@@ -64,7 +64,7 @@ class PairGenerator:
                 settings.seed,
                 store.amortiser_path,
                 header,
-                progress,
+                report,
             )
 
     def solve(self, target_BK3: Tensor) -> Tensor:
@@ -81,9 +81,9 @@ class PairGenerator:
         return solve_quasi_newton(self.problem, start, target_BK3, steps, metric_ZZ=metric_ZZ)
 
     @cached_property
-    def reference(self) -> ReferenceRetargeter:
+    def reference(self) -> OptimizationRetargeter:
         """Answers the human poses of reverse pairs."""
-        return ReferenceRetargeter(self.body_map, starts=_STARTS)
+        return OptimizationRetargeter(self.body_map, starts=_STARTS)
 
     def shard(self, direction: str, index: int) -> dict[str, Tensor]:
         """The pairs of one shard, `forward` or `reverse`: what `PairStore.read` names, on the CPU.

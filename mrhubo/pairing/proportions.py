@@ -19,12 +19,10 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import nearest_samples, poses_at_once, solve_quasi_newton
-from mrhubo.body.skeleton import JOINT_NAMES, PART_AND_SIDE, POSED_JOINT_NAMES
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.config import ManualScaleConfig, PairsConfig
 from mrhubo.robot import BodyMap, ManualScale
 from mrhubo.runtime.threads import use_threads
-
-_NO_ARM = ("neck", "head", "collar")
 
 
 class ProportionTest:
@@ -37,7 +35,8 @@ class ProportionTest:
         self.body_map, self.prior, self.settings, self.pose_PJ6 = body_map, prior, settings, pose_PJ6
         self.frame = frame
         self._poses = body_map.robot.forward(q_PN)
-        names = [name for name in body_map.input_joints() if PART_AND_SIDE[name][0] not in _NO_ARM]
+        arms = {part.joint for part in body_map.keypoints.parts if part.region in ("arm", "hand")}
+        names = [name for name in body_map.input_joints() if name in arms]
         self.arm_joints = [POSED_JOINT_NAMES.index(name) for name in names]
         """Positions of the joints that count."""
 

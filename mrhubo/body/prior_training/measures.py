@@ -15,7 +15,7 @@ from mrhubo.body import anatomy
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
-from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PART_AND_SIDE, POSED_JOINT_NAMES, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, LEG_JOINTS, POSED_JOINT_NAMES, Skeleton
 
 IK_KEYPOINTS = (
     *("left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"),
@@ -161,8 +161,7 @@ def latent_ik(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> dict[st
     }
 
 
-_NOT_UPPER_BODY = ("pelvis", "hip", "knee", "ankle", "foot")
-_UPPER_BODY = [i for i, name in enumerate(JOINT_NAMES) if PART_AND_SIDE[name][0] not in _NOT_UPPER_BODY]
+_UPPER_BODY = [i for i, name in enumerate(JOINT_NAMES) if i and name not in LEG_JOINTS]
 
 
 def samples(

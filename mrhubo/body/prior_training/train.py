@@ -46,6 +46,7 @@ from mrhubo.config import (
     without_paths,
 )
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.tracking import git_commit, open_logger, resumable_run
 from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
 from mrhubo.runtime.workspace import Workspace
@@ -214,7 +215,7 @@ class Split:
         return self.held_out[:: max(1, len(self.held_out) // _MEASURED_HELD_OUT)]
 
 
-def train(config: PriorConfig, quiet: bool = False) -> BodyPrior:
+def train(config: PriorConfig, report: Reporter = SILENT) -> BodyPrior:
     """Trains, measures, saves the weights with their card, and returns the prior."""
     lightning.seed_everything(config.seed, verbose=False)
     split, module = Split.of(config), PriorTraining(config)
@@ -238,7 +239,7 @@ def train(config: PriorConfig, quiet: bool = False) -> BodyPrior:
             enable_progress_bar=False,
             num_sanity_val_steps=0,
             callbacks=[
-                TrainingProgress(config.steps, _SHOWN, quiet),
+                TrainingProgress(config.steps, _SHOWN, report),
                 ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
             ],
         )
