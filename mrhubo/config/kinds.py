@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mrhubo.errors import unknown_name
+from mrhubo.errors import nearest, unknown_name
 
 NOUNS: dict[Any, str] = {
     int: "whole number",
@@ -127,25 +126,21 @@ def unknown_key(schema: type, section: type, prefix: str, name: str) -> str:
     """One sentence for a key that `section` (its keys start with `prefix`) of `schema` does not have."""
     here = [key.field.name for key in fields_of(section)]
     leaves = [key for key in walk(schema) if not key.is_section]
-    elsewhere = _close(name, [key.field.name for key in leaves], 0.7)
-    near = (
-        [prefix + match for match in _close(name, here, 0.75)]
-        or [key.name for key in leaves if key.field.name == name]
-        or [prefix + match for match in _close(name, here, 0.5)]
-        or _close(prefix + name, [key.name for key in leaves], 0.7)
-        or [key.name for key in leaves if key.field.name in elsewhere]
-    )
-    if near:
-        return f"key '{prefix}{name}' does not exist; nearest: '{near[0]}'"
+    near = nearest(name, here)
+    if near is not None:
+        return f"key '{prefix}{name}' does not exist; nearest: '{prefix}{near}'"
+    if any(key.name == name for key in leaves):
+        section_name, _, last = name.rpartition(".")
+        return f"key '{name}' has a section of its own: write {last} below {section_name}"
+    near = name if any(key.field.name == name for key in leaves) else nearest(name, {k.field.name for k in leaves})
+    elsewhere = sorted((key.name for key in leaves if key.field.name == near), key=lambda n: n.count("."))
+    if elsewhere:
+        return f"key '{prefix}{name}' does not exist; nearest: '{elsewhere[0]}'"
     return unknown_name("key", prefix + name, [prefix + other for other in here])
 
 
 def _words(choices: Sequence[str]) -> str:
     return f"one of {', '.join(choices)}" if len(choices) > 1 else choices[0]
-
-
-def _close(name: str, names: list[str], cutoff: float) -> list[str]:
-    return difflib.get_close_matches(name, names, n=1, cutoff=cutoff)
 
 
 def optional_kind(hint: Any) -> tuple[Any, bool]:

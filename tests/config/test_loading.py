@@ -238,6 +238,8 @@ def test_aliases_are_copies(tmp_path):
         ("inner: {rat: 1}", "test.yaml, line 3: key 'inner.rat' does not exist; nearest: 'inner.rate'"),
         ("steps: 1", "test.yaml, line 3: key 'steps' does not exist; nearest: 'inner.steps'"),
         ("stepz: 1", "test.yaml, line 3: key 'stepz' does not exist; nearest: 'inner.steps'"),
+        ("inner.rate: 1", "test.yaml, line 3: key 'inner.rate' has a section of its own: write rate below inner"),
+        ("inner: {learning_rate: 1}", "key 'inner.learning_rate' does not exist; available: inner.rate, inner.steps"),
         ("qqq: 1", "test.yaml, line 3: key 'qqq' does not exist; available: inner, loose, maybe, name, names, "),
         ("<<: {on: true}", "test.yaml, line 3: key '<<' does not exist; "),
         ("? {a: b}\n: c", "test.yaml, line 3: a key must be text"),
