@@ -24,8 +24,13 @@ def unknown_name(kind: str, name: str, available: Iterable[str], where: str = ""
     near = nearest(name, names)
     if near is not None:
         return f"{missing}; nearest: '{near}'"
-    shown = ", ".join(names[:30]) + (", ..." if len(names) > 30 else "")
-    return f"{missing}; available: {shown or 'none'}"
+    return f"{missing}; available: {listed(names)}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """The first thirty names in order, with commas; ``none`` if there are none."""
+    names = sorted(names)
+    return (", ".join(names[:30]) + (", ..." if len(names) > 30 else "")) or "none"
 
 
 def nearest(name: str, available: Iterable[str]) -> str | None:

@@ -116,7 +116,7 @@ def test_a_known_config_is_not_trained_again(arguments: list[str], tmp_path: Pat
     ("change", "words"),
     [
         ("name: tiny\nspace: {}\n", "sweep.yaml: space: is empty"),
-        ("name: tiny\nspace: {trainer.lrr: [1, 2]}\n", "sweep.yaml: space: key 'trainer.lrr'"),
+        ("name: tiny\nspace: {trainer.lrr: [1, 2]}\n", "sweep.yaml: space.trainer.lrr: key 'trainer.lrr'"),
         ("name: tiny\nspace: {model.hidden: [8, 9]}\nfixed: {model.stagges: 1}\n", "'model.stagges' .*'model.stages'"),
         ("name: tiny\nspaces: {}\n", "'spaces' .*'space'"),
         ("name: tiny\nspace: {model.hidden: [8, 9]}\nstorage: nonsense\n", "sweep.yaml: storage: .*nonsense"),

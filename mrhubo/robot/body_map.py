@@ -21,13 +21,14 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, keypoint_indices
-from mrhubo.config import RobotConfig
+from mrhubo.config import RobotConfig, with_places
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.collision import SelfCollision
-from mrhubo.robot.entries import End, Point, read_end, read_point
+from mrhubo.robot.entries import End, Point, check_names, read_end, read_point
 from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot
 from mrhubo.robot.parts import ENDS, HAND_POINTS, LIMBS, POINTS, SIDES, human_axes, joint_of, limb_of, turn_of
+from mrhubo.robot.urdf import describe
 
 _PINNED = ("left_knee", "right_knee", "left_ankle", "right_ankle", "neck", "left_shoulder", "right_shoulder")
 """Keypoints held at the upright rest pose: the robot's arms and head are retargeted, the human stands."""
@@ -241,6 +242,7 @@ def _frame(forward_up_23: Tensor) -> Tensor:
     return torch.stack((torch.linalg.cross(up, forward), up, forward), dim=-1)
 
 
+@with_places
 def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> BodyMap:
     """Robot and body map of a config's `robot` section, checked; `skeleton` is the human's, by default the open one.
 
@@ -251,7 +253,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     valid = (*POINTS, *ENDS, "chest")
     for name in entries:
         if name not in valid:
-            raise UserError(f"robot.keypoints: {unknown_name('body part', name, valid)}")
+            raise UserError(f"robot.keypoints.{name}: {unknown_name('body part', name, valid)}")
     if "chest" not in entries:
         raise UserError("robot.keypoints: 'chest' is missing; name the link that carries the arms")
     points = {name: read_point(name, entries[name]) for name in POINTS if name in entries}
@@ -260,12 +262,12 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
         inner = dict((b, a) for a, b in LIMBS).get(part)
         if inner and f"{side}_{inner}" not in points:
             raise UserError(
-                f"robot.keypoints: '{name}' needs '{side}_{inner}' too; a limb is a direction between the two"
+                f"robot.keypoints.{name}: needs '{side}_{inner}' too; a limb is a direction between the two"
             )
     ends = {name: read_end(name, entries[name], ENDS[name]) for name in ENDS if name in entries}
     for name in ends:
         if name != "head" and joint_of(name) not in points:
-            raise UserError(f"robot.keypoints: '{name}' needs '{joint_of(name)}' too")
+            raise UserError(f"robot.keypoints.{name}: needs '{joint_of(name)}' too")
     chest = read_end("chest", entries["chest"], ("forward", "up"))
     if config.scale != "auto" and config.manual is None:
         raise UserError(f"robot.manual: is missing; `scale: {config.scale}` needs its numbers")
@@ -278,6 +280,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     links += manual.links if manual else []
     if not config.key_links:
         raise UserError("robot.key_links: is empty; name the links whose error is measured")
+    check_names(config, describe(config.urdf))
     robot = Robot(config.urdf, config.joints, links, config.ranges, config.hold, config.name)
     body_map = BodyMap(robot, points, ends, chest, skeleton or Skeleton(), manual)
     _check_lengths(body_map)
