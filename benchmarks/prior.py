@@ -21,7 +21,7 @@ from torch import Tensor
 from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
 from mrhubo.body.prior_training.measures import NOISE_DEG, measure, reconstruction
 from mrhubo.body.prior_training.train import PriorConfig, Split
-from mrhubo.config import parse_arguments
+from mrhubo.config import CommandParser, parse_arguments
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.runtime.locations import default_motions
@@ -51,7 +51,7 @@ def training_poses(prior: BodyPrior, config: Path) -> tuple[Tensor, Tensor] | No
     """Held-out and training poses of the prior's card, those of its own measures; None without the data or the card."""
     held_out_clips = json.loads(prior.metadata["card"]).get("held_out_clips", [])
     try:
-        settings, _ = parse_arguments(["--config", str(config)], "benchmarks/prior.py", "", PriorConfig)
+        settings, _ = parse_arguments(CommandParser("benchmarks/prior.py", "", PriorConfig), [str(config)])
         split = Split.of(settings, held_out_clips)
     except UserError:
         return None

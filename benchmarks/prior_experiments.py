@@ -15,7 +15,7 @@ from prior import by_clip
 
 from mrhubo.body import BodyPrior
 from mrhubo.body.prior_training.train import PriorConfig, train
-from mrhubo.config import fingerprint, parse_arguments, without_paths
+from mrhubo.config import CommandParser, fingerprint, parse_arguments, without_paths
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.runtime.locations import default_motions
@@ -67,7 +67,8 @@ def main(argv: list[str]) -> None:
     rows, clips = [], read_folder(find_motions(default_motions()))
     for name in options["--only"].split(","):
         given = ["--config", options["--config"], *argv, *VARIANTS[name]]
-        config, _ = parse_arguments(given, "benchmarks/prior_experiments.py", "Experiments.", PriorConfig)
+        parser = CommandParser("benchmarks/prior_experiments.py", "Experiments.", PriorConfig)
+        config, _ = parse_arguments(parser, given)
         found = measures(config, clips)
         rows.append([name, *(f"{found[key]:.3f}" for key in COLUMNS)])
     print_header()

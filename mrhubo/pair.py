@@ -1,10 +1,10 @@
-"""`python -m mrhubo.pair --config conf/nao.yaml`: makes, checks or shows the pairs of robot and human poses."""
+"""`mrhubo pair nao`: makes, checks or shows the pairs of robot and human poses."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from mrhubo.config import Config, parse_arguments, run_command
+from mrhubo.config import CommandParser, Config, parse_arguments, run_command
 from mrhubo.errors import UserError
 
 DESCRIPTION = (
@@ -12,11 +12,18 @@ DESCRIPTION = (
     " them. Interrupt it at any time: the same command goes on where it stopped. Started by torchrun or SLURM, all"
     " processes share the work (docs/scaling.md)."
 )
-FLAGS = {
-    "verify": "make nothing; read every file again: checksum, shapes, finite numbers, joint limits, kinematics",
-    "inspect": "make nothing; print a summary of the pairs that are there and draw pairs.png beside them",
-    "quiet": "no progress lines",
-}
+
+
+def build_parser() -> CommandParser[Config]:
+    """The command's arguments."""
+    parser = CommandParser("mrhubo pair", DESCRIPTION, Config)
+    instead = parser.add_mutually_exclusive_group()
+    verify = "make nothing; read every file again: checksum, shapes, finite numbers, joint limits, kinematics"
+    instead.add_argument("--verify", action="store_true", help=verify)
+    inspect = "make nothing; print a summary of the pairs that are there and draw pairs.png beside them"
+    instead.add_argument("--inspect", action="store_true", help=inspect)
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
 
 
 def pair(config: Config, quiet: bool = False) -> str:
@@ -92,15 +99,13 @@ def _nothing_there(folder: Path) -> str:
 
 def main(argv: list[str]) -> None:
     """The command."""
-    config, flags = parse_arguments(argv, "mrhubo.pair", DESCRIPTION, flags=FLAGS)
-    if flags["verify"] and flags["inspect"]:
-        raise UserError("command line: --verify and --inspect are two commands; give one of them")
-    if flags["verify"]:
-        text = check(config, flags["quiet"])
-    elif flags["inspect"]:
+    config, options = parse_arguments(build_parser(), argv)
+    if options.verify:
+        text = check(config, options.quiet)
+    elif options.inspect:
         text = inspect(config)
     else:
-        text = pair(config, flags["quiet"])
+        text = pair(config, options.quiet)
     if text:
         print(text)
 

@@ -1,6 +1,7 @@
 """Settings: YAML plus ``key.sub=value`` -> typed dataclasses; every mistake is one sentence."""
 
-from mrhubo.config.command import parse_arguments, run_command, split_arguments
+from mrhubo.config.arguments import CommandParser, nonempty, number, parse_arguments, whole_number
+from mrhubo.config.command import run_command
 from mrhubo.config.entries import (
     ConstantEntry,
     FrameEntry,
@@ -13,7 +14,7 @@ from mrhubo.config.entries import (
     Vector,
 )
 from mrhubo.config.fields import bounded, choice
-from mrhubo.config.help import field_docs, help_text
+from mrhubo.config.help import field_docs
 from mrhubo.config.kinds import keys_of
 from mrhubo.config.loading import load_config
 from mrhubo.config.places import places_named, where, with_places
@@ -32,14 +33,14 @@ from mrhubo.config.schema import (
     TrackingConfig,
     TrainerConfig,
 )
+from mrhubo.config.shipped import find_config, shipped_root
 from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
 from mrhubo.config.typed import typed_value
 
 __all__ = [
-    "split_arguments",
-    "help_text",
     "BaselineConfig",
     "BodyConfig",
+    "CommandParser",
     "Config",
     "ConstantEntry",
     "EvaluationConfig",
@@ -66,16 +67,21 @@ __all__ = [
     "changed_settings",
     "choice",
     "field_docs",
+    "find_config",
     "fingerprint",
     "keys_of",
     "load_config",
+    "number",
     "parse_arguments",
     "places_named",
     "run_command",
+    "shipped_root",
+    "nonempty",
     "to_plain",
     "to_yaml",
     "typed_value",
     "where",
+    "whole_number",
     "with_places",
     "without_paths",
 ]
