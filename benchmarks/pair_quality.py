@@ -20,7 +20,10 @@ from pathlib import Path
 from common import print_header, print_table, read_options
 
 from mrhubo.config import load_config
-from mrhubo.fitting.pipeline import make_pairs, make_references, prepare, train
+from mrhubo.fitting.preparation import prepare
+from mrhubo.fitting.references import make_references
+from mrhubo.fitting.training import train
+from mrhubo.runtime.progress import SILENT
 from mrhubo.runtime.tables import mean_and_spread
 
 COUNTS = (12_500, 50_000, 200_000)
@@ -58,10 +61,9 @@ def link_error(robot: str, settings: list[str], results: Path) -> float:
     for result in done:
         if result["fingerprint"] == prepared.fingerprint:
             return result["link_cm"]
-    make_pairs(prepared, quiet=True)
-    validation, _ = make_references(prepared, quiet=True)
+    validation, _ = make_references(prepared, SILENT)
     with tempfile.TemporaryDirectory() as folder:
-        link = train(prepared, validation, False, Path(folder), None, quiet=True).best_link_cm
+        link = train(prepared, SILENT, validation, Path(folder)).best_link_cm
     with results.open("a") as file:
         file.write(json.dumps({"fingerprint": prepared.fingerprint, "link_cm": link}) + "\n")
     print(f"{robot} {' '.join(settings)}: {link:.3f} cm", file=sys.stderr, flush=True)

@@ -20,16 +20,18 @@ from pathlib import Path
 
 import torch
 from common import print_header, print_table, read_options
+from levenberg_marquardt import solve_levenberg_marquardt
 from torch import Tensor
 
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
-from mrhubo.fitting.pipeline import PairSetup, prepare_pairs
-from mrhubo.pairing import PairGenerator, PairStore, generate_pairs, make_filter, solve_lbfgs, solve_levenberg_marquardt
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.fitting.preparation import prepare_pairs
+from mrhubo.pairing import PairGenerator, PairSetup, PairStore, generate_pairs, make_filter, solve_lbfgs
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import align_pose
+from mrhubo.runtime.progress import Progress, Reporter
 from mrhubo.runtime.threads import available_cores, use_threads
 
 
@@ -179,6 +181,25 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
     print(f"\nfloor: the part's matrix products at the measured rate; {size:.0f} bytes a pair are written\n")
 
 
+class Watch(Reporter):
+    """Notes when how many pairs were there."""
+
+    def __init__(self) -> None:
+        super().__init__(quiet=True)
+        self.marks: list[tuple[int, float]] = []
+
+    def step(self, title: str, total: int, unit: str = "") -> Progress:
+        """A line that is not shown."""
+        marks = self.marks
+
+        class Marks(Progress):
+            def update(self, done: int, measure: str = "") -> None:
+                if title == "pairs":
+                    marks.append((done, time.perf_counter()))
+
+        return Marks(title, total, unit, None)
+
+
 def whole(setup: PairSetup, count: int) -> None:
     """Pairs made and written by all cores, as `mrhubo.pair` does it, the amortised solver's training left out."""
     rows, cores = [], available_cores()
@@ -190,13 +211,11 @@ def whole(setup: PairSetup, count: int) -> None:
             config.pairs.solver = "fast" if name == "fast" else "fine"
             mine = prepare_pairs(config)
             write_amortiser(setup, mine)
-            marks: list[tuple[int, float]] = []
-
-            def mark(done: int, *_: object, marks: list[tuple[int, float]] = marks) -> None:
-                marks.append((done, time.perf_counter()))
+            watch = Watch()
 
             maker = PairGenerator(mine.body_map, mine.prior, config.pairs)
-            generate_pairs(config, maker, mine.store, shard_progress=mark)
+            generate_pairs(config, maker, mine.store, watch)
+            marks = [(done / mine.store.shard_size, seconds) for done, seconds in watch.marks]
             first = next(mark for mark in marks if mark[0] >= cores)  # until then workers are starting
             rate = (marks[-1][0] - first[0]) * mine.store.shard_size / (marks[-1][1] - first[1])
             rows.append([name, f"{rate:,.0f}", f"{first[1] - marks[0][1]:.1f}"])
@@ -214,7 +233,7 @@ def reverse(setup: PairSetup, maker: PairGenerator, count: int = 5_000) -> None:
         pose, near_pose = (maker.prior.decode(latent.to(device)) for latent in (z, near))
     rows = []
     for starts in (2, 4, 12):
-        reference = ReferenceRetargeter(setup.body_map, starts=starts)
+        reference = OptimizationRetargeter(setup.body_map, starts=starts)
         with use_threads(1):
             start = time.perf_counter()
             q, cost = reference.solve_frames(pose)

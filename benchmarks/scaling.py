@@ -21,7 +21,7 @@ from common import print_header, print_table, read_options
 
 from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
-from mrhubo.fitting.pipeline import prepare_pairs
+from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.runtime.threads import available_cores
 
 TORCHRUN = ["-m", "torch.distributed.run", "--nproc-per-node"]

@@ -16,12 +16,14 @@ from pathlib import Path
 import lightning
 import torch
 from common import print_header, print_table, read_options
+from torch.utils.data import DataLoader
 
 from mrhubo.callbacks.progress import TrainingProgress
 from mrhubo.config import load_config
-from mrhubo.fitting.data import PairData, PairTable
+from mrhubo.fitting.datamodule import Batch, PairTable, batches_of
+from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.pairing import make_filter
-from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
+from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
 from mrhubo.runtime.tracking import open_logger
 from mrhubo.runtime.trainer import cosine_schedule
@@ -56,15 +58,15 @@ def main(argv: list[str]) -> None:
         torch.manual_seed(0)
         return RetargetModule(build_network(config, body_map), config.trainer)
 
-    def data() -> PairData:
+    def data() -> DataLoader[Batch]:
         generator = torch.Generator().manual_seed(0)
         size = module().network.features.size
         table = PairTable(*(torch.randn(count, *s, generator=generator) for s in ((size,), (joints, 6), (joints,))))
         chosen = make_filter(torch.rand(count, generator=generator), "linear", 1.0)
-        return PairData(table, chosen, config.trainer.batch_size, steps, 0)
+        return batches_of(table, chosen, config.trainer.batch_size, steps, 0)
 
     def bare() -> float:
-        net, loader = module(), data().train_dataloader()
+        net, loader = module(), data()
         optimizer = torch.optim.AdamW(net.network.parameters(), config.trainer.lr)
         schedule = cosine_schedule(optimizer, steps)
         start = time.perf_counter()
@@ -82,10 +84,10 @@ def main(argv: list[str]) -> None:
             fit = lightning.Trainer(
                 max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=LOG_EVERY, enable_progress_bar=False,
                 enable_model_summary=False, enable_checkpointing=False,
-                callbacks=[TrainingProgress(steps, {}, quiet=True), watch := Stopwatch()],
+                callbacks=[TrainingProgress(steps, {}), watch := Stopwatch()],
             )  # fmt: skip
             net, pairs = module(), data()
-            fit.fit(net, datamodule=pairs)
+            fit.fit(net, pairs)
             return watch.seconds
 
     names = {"bare loop": bare, "Trainer": lambda: trainer(False), "Trainer + MLflow": lambda: trainer(True)}

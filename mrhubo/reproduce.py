@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mrhubo.config import BaselineConfig, CommandParser, nonempty, run_command, whole_number
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Trains everything that the paper's tables compare, on the shipped robots, and prints them with the paper's figures"
@@ -35,7 +36,8 @@ def main(argv: list[str]) -> None:
             raise UserError("command line: the seeds are set by --seeds")
     from mrhubo.paper.trainings import reproduce
 
-    print(reproduce(options.robots, options.seeds, options.overrides, options.quiet, options.paper, options.methods))
+    report = Reporter(options.quiet)
+    print(reproduce(options.robots, options.seeds, options.overrides, report, options.paper, options.methods))
 
 
 def _names(value: str) -> list[str]:

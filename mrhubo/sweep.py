@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 
 from mrhubo.config import (
     CommandParser,
@@ -15,6 +16,7 @@ from mrhubo.config import (
     run_command,
     whole_number,
 )
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Searches for the best settings of a fit: many trainings with settings drawn from the space of the sweep's YAML,"
@@ -46,16 +48,17 @@ def main(argv: list[str]) -> None:
     # others: ten times slower with two processes on two cores. Read when torch is imported, below.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     load_config(options.config, options.overrides)  # a mistake there is told before the slow imports below
-    from mrhubo.fitting.record.recording import dashboard_command
     from mrhubo.fitting.sweeping import Sweep
+    from mrhubo.fitting.trials import FitTrials
     from mrhubo.search import check_fixed
 
+    load, report = partial(load_config, options.config), Reporter(options.quiet)
     with places_named(settings):
-        check_fixed(settings.fixed, lambda text: load_config(options.config, [*options.overrides, text]))
-        sweep = Sweep(options.config, options.overrides, settings, options.quiet)
+        check_fixed(settings.fixed, lambda text: load([*options.overrides, text]))
+        sweep = Sweep(load, options.overrides, settings, FitTrials(), report)
     result = sweep.run()
     print(f"\n{result.table}\n\nbest:      python -m mrhubo.fit --config {result.best}")
-    print(f"dashboard: {dashboard_command(sweep.folder, sweep.base)}")
+    print(f"dashboard: {result.dashboard}")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,8 @@ def find_config(text: str, folder: str = "") -> Path:
     if text in names:
         return root / f"{text}.yaml"
     if text.endswith((".yaml", ".yml")) or os.path.exists(text):
-        near = nearest(text.removesuffix(".yaml").removesuffix(".yml").removeprefix("conf/"), names)
+        words = os.path.splitext(text)[0].removeprefix("conf/"), os.path.splitext(os.path.basename(text))[0]
+        near = next((near for word in words if (near := nearest(word, names)) is not None), None)
         if os.path.exists(text) or os.path.isdir(os.path.dirname(text) or ".") or near is None:
             return Path(text)  # what reads it tells what is wrong with it
         raise UserError(f"config file '{text}' does not exist; '{near}' is one that ships with mrhubo")

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mrhubo.config import Config, bounded, number, parse_arguments, whole_number
+from mrhubo.config import Config, bounded, find_config, number, parse_arguments, whole_number
 from mrhubo.config.arguments import CommandParser
 from mrhubo.config.kinds import walk
 from mrhubo.errors import UserError
@@ -153,6 +153,10 @@ def test_a_shipped_file_that_is_not_here_is_named(tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=r"config file 'conf/nao.yaml' does not exist; 'nao' is one that ships"):
         parse("conf/nao.yaml")
+    with pytest.raises(UserError, match=r"'conf/sweeps/network.yaml' does not exist; 'network' is one that ships"):
+        find_config("conf/sweeps/network.yaml", "sweeps")
+    with pytest.raises(UserError, match=r"config 'netwrok' does not exist; nearest: 'network'"):
+        find_config("netwrok", "sweeps")
 
 
 def test_a_config_is_required_where_keys_are() -> None:

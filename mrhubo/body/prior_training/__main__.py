@@ -5,6 +5,7 @@ from __future__ import annotations
 from mrhubo.body.prior_training.train import PriorConfig, train
 from mrhubo.config import CommandParser, parse_arguments, run_command
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = "Trains the open body prior."
 
@@ -21,7 +22,7 @@ def main(argv: list[str]) -> None:
     config, options = parse_arguments(build_parser(), argv)
     if not config.data.is_file():
         raise UserError(f"data: {config.data} does not exist; name a file of training poses (docs/prior.md says which)")
-    train(config, options.quiet)
+    train(config, Reporter(options.quiet))
     print(f"body prior: {config.output}")
 
 
