@@ -14,7 +14,7 @@ from pathlib import Path
 from common import print_header, print_table, read_options
 
 from mrhubo.config import load_config
-from mrhubo.fitting.pipeline import prepare_pairs
+from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.pairing import PairGenerator
 from mrhubo.view import contact_sheet, distributions, save_png
 from mrhubo.view.pictures import PAIR_MEASURES, PAIR_TITLES, Artist

@@ -18,7 +18,7 @@ from common import print_header, print_table, read_options
 from mrhubo.config import load_config
 from mrhubo.evaluation import load_motions
 from mrhubo.motion import Motion
-from mrhubo.reference import ReferenceResult, ReferenceRetargeter, direction_jerk
+from mrhubo.reference import OptimizationRetargeter, ReferenceResult, direction_jerk
 from mrhubo.robot import build_body_map
 from mrhubo.runtime.locations import default_motions
 
@@ -30,7 +30,7 @@ def main(argv: list[str]) -> None:
     for robot in options["robots"].split(","):
         config = load_config(Path(f"conf/{robot}.yaml"), argv)
         config.evaluation.motions = config.evaluation.motions or default_motions()
-        motions, retargeter = load_motions(config).all, ReferenceRetargeter(build_body_map(config.robot))
+        motions, retargeter = load_motions(config).all, OptimizationRetargeter(build_body_map(config.robot))
         retargeter.retarget(motions[0].pose_TJ6[:50], motions[0].frame_rate)
         start = time.perf_counter()
         plain = [retargeter.retarget(motion.pose_TJ6, motion.frame_rate) for motion in motions]
@@ -40,8 +40,7 @@ def main(argv: list[str]) -> None:
             for motion, found in zip(motions, plain, strict=True)
         ]
         end = time.perf_counter()
-        names = retargeter.body_map.direction_names
-        parts = sorted({name.rsplit("_", 1)[0] if "hand" in name or "head" in name else name for name in names})
+        parts = list(dict.fromkeys(direction.part.name for direction in retargeter.body_map.directions))
         rows = [
             [name, *measures(retargeter, motions, found, parts, seconds)]
             for name, found, seconds in (("q", plain, middle - start), ("q_cf, from q", free, end - middle))
@@ -53,7 +52,7 @@ def main(argv: list[str]) -> None:
 
 
 def measures(
-    retargeter: ReferenceRetargeter,
+    retargeter: OptimizationRetargeter,
     motions: list[Motion],
     found: list[ReferenceResult],
     parts: list[str],
@@ -61,7 +60,7 @@ def measures(
 ) -> list[str]:
     """The cells of a row, means over frames."""
     body_map = retargeter.body_map
-    shapes, names = body_map.collision, body_map.direction_names
+    shapes, names = body_map.collision, [direction.part.name for direction in body_map.directions]
     q_TN, residual_TD = torch.cat([f.q_TN for f in found]), torch.cat([f.residual_deg_TD for f in found])
     jerks = []
     for motion, result in zip(motions, found, strict=True):
@@ -70,7 +69,7 @@ def measures(
         jerks.append([float(direction_jerk(d, motion.frame_rate).sum()) for d in (robot_TD3, human_TD3)])
     robot_jerk, human_jerk = torch.tensor(jerks).sum(0).tolist()
     limits = sum(f.at_limit_share * len(f.q_TN) for f in found) / len(q_TN)
-    columns = [[i for i, name in enumerate(names) if name.startswith(part)] for part in parts]
+    columns = [[i for i, name in enumerate(names) if name == part] for part in parts]
     return [
         f"{len(q_TN) / seconds:,.0f}",
         *(f"{float(residual_TD[:, column].mean()):.2f}" for column in columns),

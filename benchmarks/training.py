@@ -1,6 +1,7 @@
 """What Trainer and MLflow cost over a bare training loop: same network, same batches, in one process.
 
-    python benchmarks/training.py [--config conf/nao.yaml] [--steps 300] [--pairs 50000]
+    python benchmarks/training.py [--config conf/nao.yaml] [--steps 300] [--pairs 50000] [--repeats 4]
+        [key.sub=value ...]
 
 Random numbers stand in for pairs: the time does not depend on their values.
 """
@@ -16,12 +17,14 @@ from pathlib import Path
 import lightning
 import torch
 from common import print_header, print_table, read_options
+from torch.utils.data import DataLoader
 
 from mrhubo.callbacks.progress import TrainingProgress
 from mrhubo.config import load_config
-from mrhubo.fitting.data import PairData, PairTable
+from mrhubo.fitting.datamodule import Batch, PairTable, batches_of
+from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.pairing import make_filter
-from mrhubo.retargeter import LOG_EVERY, RetargetModule, build_network
+from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
 from mrhubo.runtime.tracking import open_logger
 from mrhubo.runtime.trainer import cosine_schedule
@@ -43,7 +46,7 @@ class Stopwatch(lightning.Callback):
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options, argv = read_options(argv, config="conf/nao.yaml", steps="300", pairs="50000")
+    options, argv = read_options(argv, config="conf/nao.yaml", steps="300", pairs="50000", repeats="4")
     print_header()
     logging.getLogger("lightning.pytorch").setLevel(logging.ERROR)
     config = load_config(Path(options["config"]), argv)
@@ -56,15 +59,15 @@ def main(argv: list[str]) -> None:
         torch.manual_seed(0)
         return RetargetModule(build_network(config, body_map), config.trainer)
 
-    def data() -> PairData:
+    def data() -> DataLoader[Batch]:
         generator = torch.Generator().manual_seed(0)
         size = module().network.features.size
         table = PairTable(*(torch.randn(count, *s, generator=generator) for s in ((size,), (joints, 6), (joints,))))
         chosen = make_filter(torch.rand(count, generator=generator), "linear", 1.0)
-        return PairData(table, chosen, config.trainer.batch_size, steps, 0)
+        return batches_of(table, chosen, config.trainer.batch_size, steps, 0)
 
     def bare() -> float:
-        net, loader = module(), data().train_dataloader()
+        net, loader = module(), data()
         optimizer = torch.optim.AdamW(net.network.parameters(), config.trainer.lr)
         schedule = cosine_schedule(optimizer, steps)
         start = time.perf_counter()
@@ -82,22 +85,22 @@ def main(argv: list[str]) -> None:
             fit = lightning.Trainer(
                 max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=LOG_EVERY, enable_progress_bar=False,
                 enable_model_summary=False, enable_checkpointing=False,
-                callbacks=[TrainingProgress(steps, {}, quiet=True), watch := Stopwatch()],
+                callbacks=[TrainingProgress(steps, {}), watch := Stopwatch()],
             )  # fmt: skip
             net, pairs = module(), data()
-            fit.fit(net, datamodule=pairs)
+            fit.fit(net, pairs)
             return watch.seconds
 
     names = {"bare loop": bare, "Trainer": lambda: trainer(False), "Trainer + MLflow": lambda: trainer(True)}
     times: dict[str, list[float]] = {name: [] for name in names}
-    for _ in range(4):  # in turn, so that a drift of the machine's speed meets all alike
+    for _ in range(int(options["repeats"])):  # in turn, so that a drift of the machine's speed meets all alike
         for name, run in names.items():
             times[name].append(run())
     rows = []
     best = [min(t) for t in times.values()]
     for name, seconds in zip(names, best, strict=True):
         rows.append([name, f"{1000 * seconds / steps:.1f}", f"{seconds / best[0] - 1:+.1%}"])
-    print_table(["loop (best of 4)", "ms a step", "over the bare loop"], rows)
+    print_table([f"loop (best of {options['repeats']})", "ms a step", "over the bare loop"], rows)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,98 @@
-"""mrhubo: human-to-humanoid motion retargeting that learns from robot poses (MR.HuBo)."""
+"""mrhubo: human-to-humanoid motion retargeting that learns from robot poses (MR.HuBo).
 
-from importlib.metadata import PackageNotFoundError, version
+    import mrhubo
+    retargeter = mrhubo.load("mlruns/packages/nao-1a2b3c4d")     # the folder that a fit ends with
+    result = retargeter(mrhubo.read_motion("data/motions/wave.npz"))
+    result.q                                                    # joint angles (frames, joints) [rad]
 
-try:
-    __version__ = version("mrhubo")
-except PackageNotFoundError:  # run from a source tree that is not installed
-    __version__ = "0.1.0"
+These names are the public face; each is imported when it is first asked for, so that `import mrhubo` costs nothing.
+Retargeting with a package needs neither Lightning nor MLflow.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mrhubo.errors import UserError
+    from mrhubo.motion import Motion, read_motion
+    from mrhubo.reference import OptimizationRetargeter
+    from mrhubo.retargeter import Retargeter, RetargetResult
+    from mrhubo.robot import Robot
+
+    __version__: str
+
+__all__ = [
+    "Motion",
+    "OptimizationRetargeter",
+    "RetargetResult",
+    "Retargeter",
+    "Robot",
+    "UserError",
+    "__version__",
+    "load",
+    "read_motion",
+]
+
+_HOMES = {
+    "Motion": "mrhubo.motion",
+    "OptimizationRetargeter": "mrhubo.reference",
+    "RetargetResult": "mrhubo.retargeter",
+    "Retargeter": "mrhubo.retargeter",
+    "Robot": "mrhubo.robot",
+    "UserError": "mrhubo.errors",
+    "read_motion": "mrhubo.motion",
+}
+"""Module of each public name, and its name there where that is another."""
+
+
+def load(source: str | os.PathLike[str]) -> Retargeter:
+    """A trained retargeter, on the CPU; `.to("cuda")` moves it.
+
+    Args:
+        source: the folder of a package, or a version in MLflow's registry: `models:/mrhubo-nao/3`, or with an alias
+            `models:/mrhubo-nao@best`. The registry is the one that MLflow is set to (MLFLOW_TRACKING_URI), else that of
+            `mlruns`. Only such a URI imports mlflow.
+
+    Raises:
+        UserError: there is no such folder or version, or it holds no whole package.
+    """
+    from mrhubo.retargeter import Retargeter
+
+    if str(source).startswith("models:"):
+        from mrhubo.fitting.record.registry import fetch_package
+
+        source = fetch_package(str(source))
+    return Retargeter.load(os.fspath(source))
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        value: Any = _version()
+    elif name in _HOMES:
+        module, _, other = _HOMES[name].partition(":")
+        value = getattr(importlib.import_module(module), other or name)
+    else:
+        raise AttributeError(f"module 'mrhubo' has no attribute '{name}'")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    """What pyproject.toml states: as it was installed, or, in a source tree that is not, as it stands there."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("mrhubo")
+    except PackageNotFoundError:
+        import tomllib
+        from pathlib import Path
+
+        project = Path(__file__).resolve().parents[1] / "pyproject.toml"
+        return tomllib.loads(project.read_text())["project"]["version"] if project.is_file() else "unknown"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mrhubo.config import parse_arguments, run_command
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Makes pairs of robot and human poses from a robot's URDF, trains the retargeter on them, measures it on human"
@@ -15,14 +16,12 @@ def main(argv: list[str]) -> None:
     """The command."""
     config, flags = parse_arguments(argv, "mrhubo.fit", DESCRIPTION, flags=FLAGS)
     from mrhubo.fitting.fit import fit
-    from mrhubo.fitting.record.recording import Recording, dashboard_command
 
-    result = fit(config, flags["quiet"])
+    result = fit(config, Reporter(flags["quiet"]))
     if result is None:
         return
-
     print(f"\n{result.table}\n\npackage:   {result.package}\nmodel:     {result.model}")
-    print(f"dashboard: {dashboard_command(Recording.folder(config), config)}")
+    print(f"dashboard: {result.dashboard}")
 
 
 if __name__ == "__main__":

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from mrhubo.config import Config, parse_arguments, run_command
+from mrhubo.config import parse_arguments, run_command
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Makes pairs of robot and human poses from a robot's URDF, and nothing else; a fit with the same settings finds"
@@ -19,90 +18,25 @@ FLAGS = {
 }
 
 
-def pair(config: Config, quiet: bool = False) -> str:
-    """Makes the pairs that are missing; returns the text that sums them up ('' on all ranks but the first).
-
-    Raises:
-        UserError: anything in the config or the files it names is wrong (before any work), or the disk is full.
-        KeyboardInterrupt: the user stopped it; the same call resumes.
-    """
-    from mrhubo.fitting import pipeline
-    from mrhubo.pairing.verify import summarise
-    from mrhubo.runtime.ranks import Ranks
-
-    setup = pipeline.prepare_pairs(config)
-    ranks = Ranks.join(config.trainer.accelerator)
-    report = pipeline.make_pairs(setup, quiet or ranks.rank > 0, ranks)
-    if ranks.rank > 0:
-        return ""
-    summary = summarise(setup.store, config.pairs.filter, config.pairs.filter_k)
-    made = f"made {report.made:,} pairs in {report.seconds:,.1f} s" if report.made else "made nothing: all were there"
-    return f"{summary.table()}\n\n{made}\npairs: {setup.store.folder}"
-
-
-def check(config: Config, quiet: bool = False) -> str:
-    """Reads every shard again; returns what there is to say if all are well.
-
-    Raises:
-        UserError: shards are missing or damaged; it names the first.
-    """
-    from mrhubo.fitting import pipeline
-    from mrhubo.pairing.verify import verify
-    from mrhubo.runtime.progress import Progress
-
-    setup = pipeline.prepare_pairs(config)
-    store = setup.store
-    if not store.folder.is_dir():
-        raise UserError(_nothing_there(store.folder))
-    with Progress("verify", store.shards, "shards", quiet) as progress:
-        problems = verify(store, setup.body_map.robot, lambda done, bad: progress.update(done, f"{bad} bad"))
-    if problems:
-        more = f" (and {len(problems) - 1:,} more shards of {store.shards:,})" if len(problems) > 1 else ""
-        raise UserError(f"{problems[0]}{more}; run the same command without --verify to make them again")
-    return f"all {store.shards:,} shards are whole: {store.folder}"
-
-
-def inspect(config: Config) -> str:
-    """Sums up the pairs that are there and draws `pairs.png` into their folder; returns text and path.
-
-    Raises:
-        UserError: there are no such pairs, or not all of them.
-    """
-    from mrhubo.files.storage import DamagedFile
-    from mrhubo.fitting import pipeline
-    from mrhubo.pairing.verify import summarise
-    from mrhubo.view import save_png
-    from mrhubo.view.pictures import Artist
-
-    setup = pipeline.prepare_pairs(config)
-    store = setup.store
-    try:
-        summary = summarise(store, config.pairs.filter, config.pairs.filter_k)
-        shown = store.read(0)
-    except DamagedFile as error:
-        raise UserError(f"{error}; run the same command without --inspect to make what is missing") from error
-    artist = Artist(setup.body_map.robot, setup.body_map.skeleton)
-    path = save_png(artist.pair_sheet(shown, summary.measures), store.folder / "pairs.png")
-    return f"{summary.table()}\n\npairs:   {store.folder}\npicture: {path}"
-
-
-def _nothing_there(folder: Path) -> str:
-    return f"{folder}: there are no pairs of these settings; run the same command without --verify to make them"
-
-
 def main(argv: list[str]) -> None:
     """The command."""
     config, flags = parse_arguments(argv, "mrhubo.pair", DESCRIPTION, flags=FLAGS)
     if flags["verify"] and flags["inspect"]:
         raise UserError("command line: --verify and --inspect are two commands; give one of them")
+    from mrhubo.fitting.pairs import inspect_pairs, make_pairs, summarise_pairs, verify_pairs
+    from mrhubo.fitting.preparation import prepare_pairs
+    from mrhubo.runtime.ranks import Ranks
+
+    report, setup = Reporter(flags["quiet"]), prepare_pairs(config)
     if flags["verify"]:
-        text = check(config, flags["quiet"])
+        print(verify_pairs(setup, report))
     elif flags["inspect"]:
-        text = inspect(config)
+        print(inspect_pairs(setup))
     else:
-        text = pair(config, flags["quiet"])
-    if text:
-        print(text)
+        ranks = Ranks.join(config.trainer.accelerator)
+        made = make_pairs(setup, report if ranks.rank == 0 else Reporter.silent(), ranks)
+        if ranks.rank == 0:
+            print(f"{summarise_pairs(setup).table()}\n\n{made}\npairs: {setup.store.folder}")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mrhubo.config import BaselineConfig, run_command, split_arguments
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Trains everything that the paper's tables compare, on the shipped robots, and prints them with the paper's figures"
@@ -37,7 +38,7 @@ def main(argv: list[str]) -> None:
     methods = None if given["methods"] is None else _names(given["methods"])
     from mrhubo.paper.trainings import reproduce
 
-    print(reproduce(robots, seeds, overrides, given["quiet"], given["paper"], methods))
+    print(reproduce(robots, seeds, overrides, Reporter(given["quiet"]), given["paper"], methods))
 
 
 def _names(text: str) -> list[str]:

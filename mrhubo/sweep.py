@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
+from functools import partial
 
 from mrhubo.config import Config, SweepConfig, load_config, run_command, split_arguments
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Searches for the best settings of a fit: many trainings with settings drawn from the space of the sweep's YAML,"
@@ -36,17 +37,18 @@ def main(argv: list[str]) -> None:
     # others: ten times slower with two processes on two cores. Read when torch is imported, below.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     load_config(files[0], overrides)  # a mistake there is told before the seconds that the imports below take
-    from mrhubo.fitting.record.recording import dashboard_command
     from mrhubo.fitting.sweeping import Sweep
+    from mrhubo.fitting.trials import FitTrials
 
+    load, report = partial(load_config, files[0]), Reporter(given["quiet"])
     try:
-        sweep = Sweep(Path(files[0]), overrides, settings, given["quiet"])
+        sweep = Sweep(load, overrides, settings, FitTrials(), report)
     except UserError as error:
         where = f"{given['sweep']}: " if str(error).startswith(("space", "storage")) else ""
         raise UserError(f"{where}{error}") from error
     result = sweep.run()
     print(f"\n{result.table}\n\nbest:      python -m mrhubo.fit --config {result.best}")
-    print(f"dashboard: {dashboard_command(sweep.folder, sweep.base)}")
+    print(f"dashboard: {result.dashboard}")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from PIL import Image
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.files.storage import remove_leftovers, write_tensors
-from mrhubo.fitting import pipeline
+from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.pair import main
 from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
@@ -37,7 +37,7 @@ def arguments(root: Path, folder: Path, *more: str) -> list[str]:
 
 def store_of(root: Path, folder: Path, *more: str) -> PairStore:
     given = [a for a in arguments(root, folder, *more) if "=" in a]
-    return pipeline.prepare_pairs(load_config(root / "conf" / "nao.yaml", given)).store
+    return prepare_pairs(load_config(root / "conf" / "nao.yaml", given)).store
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -69,7 +69,7 @@ def server() -> ForkServerContext:
     """Starts processes that have imported everything already."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(
-        ["mrhubo.pair", "mrhubo.fitting.pipeline", "mrhubo.pairing.verify", "mrhubo.runtime.ranks"]
+        ["mrhubo.pair", "mrhubo.fitting.pairs", "mrhubo.fitting.preparation", "mrhubo.runtime.ranks"]
     )
     return context
 
@@ -160,7 +160,7 @@ def test_verify_names_a_bad_shard(root: Path, spoilt: PairStore, tmp_path: Path,
     alter(spoilt, damage)
     with pytest.raises(UserError, match=f"forward-000002.*{DAMAGES[damage]}.*without --verify"):
         main(arguments(root, tmp_path, "--verify"))
-    robot = pipeline.prepare_pairs(load_config(root / "conf" / "nao.yaml", [f"pairs.dir={tmp_path}"])).body_map.robot
+    robot = prepare_pairs(load_config(root / "conf" / "nao.yaml", [f"pairs.dir={tmp_path}"])).body_map.robot
     assert check_shard(spoilt, robot, 1) is None
 
 

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.body.skeleton import PAIRED_JOINTS, POSED_JOINT_NAMES, SIDE_OF, SIDES
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ELBOW_AXIS = (0.0, -0.871, 0.491)
@@ -25,14 +25,17 @@ ELBOW_AXIS = (0.0, -0.871, 0.491)
 KNEE_AXIS = _X
 """Hinge of the knees: turning about it by a positive angle flexes."""
 
-# joint: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
+# part: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
 _Entry = tuple[tuple[float, float, float], tuple[float, float]]
+_SPINE: tuple[_Entry, _Entry, _Entry] = ((_Y, (-25, 25)), (_X, (-30, 40)), (_Z, (-25, 25)))
 _RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
     "hip": ((_Y, (-60, 60)), (_X, (-140, 45)), (_Z, (-40, 70))),
     "knee": ((_X, (-10, 160)), (_Y, (-25, 25)), (_Z, (-25, 25))),
     "ankle": ((_X, (-70, 50)), (_Y, (-45, 50)), (_Z, (-45, 45))),
     "foot": ((_X, (-45, 45)), (_Y, (-15, 15)), (_Z, (-15, 15))),
-    "spine": ((_Y, (-25, 25)), (_X, (-30, 40)), (_Z, (-25, 25))),
+    "spine1": _SPINE,
+    "spine2": _SPINE,
+    "spine3": _SPINE,
     "neck": ((_Y, (-50, 50)), (_X, (-45, 45)), (_Z, (-40, 40))),
     "head": ((_Y, (-60, 60)), (_X, (-60, 80)), (_Z, (-60, 60))),
     "collar": ((_X, (-30, 30)), (_Y, (-30, 30)), (_Z, (-20, 45))),
@@ -45,21 +48,23 @@ _RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
 def _table() -> tuple[Tensor, Tensor]:
     """Axes (21, 3, 3), one per row, and limits (21, 3, 2) [rad] of every joint as if it were on the left."""
     axes, limits = [], []
+    ranges = _RANGES | {f"{side}_{name}": _RANGES[name] for side in SIDES for name in PAIRED_JOINTS}
     for name in POSED_JOINT_NAMES:
-        entries = _RANGES[name.removeprefix("left_").removeprefix("right_").rstrip("123")]
+        entries = ranges[name]
         axes.append([axis for axis, _ in entries])
         limits.append([limit for _, limit in entries])
     return torch.nn.functional.normalize(torch.tensor(axes), dim=-1), torch.deg2rad(torch.tensor(limits))
 
 
 _AXES_J33, _LIMITS_J32 = _table()
-_RIGHT = torch.tensor([name.startswith("right_") for name in POSED_JOINT_NAMES])
+_RIGHT = torch.tensor([SIDE_OF.get(name) == "right" for name in POSED_JOINT_NAMES])
+_HINGES = {f"{side}_{name}": axis for side in SIDES for name, axis in (("elbow", ELBOW_AXIS), ("knee", KNEE_AXIS))}
 
 
 def hinge_axis(name: str) -> tuple[float, float, float]:
     """Axis about which a positive angle flexes the elbow or knee of this name."""
-    x, y, z = ELBOW_AXIS if name.endswith("elbow") else KNEE_AXIS
-    return (x, -y, -z) if name.startswith("right_") else (x, y, z)
+    x, y, z = _HINGES[name]
+    return (x, -y, -z) if SIDE_OF[name] == "right" else (x, y, z)
 
 
 def joint_angles(matrix_BJ33: Tensor) -> Tensor:

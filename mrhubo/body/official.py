@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POINT_NAMES, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, POINT_NAMES, Skeleton
 from mrhubo.errors import UserError
 from mrhubo.files.npz import open_npz
 from mrhubo.files.safe_pickle import check_file, to_array, unpickle
@@ -149,7 +149,7 @@ def _build(arrays: dict[str, np.ndarray], betas: Sequence[float]) -> Skeleton:
     offsets_J3 = rest_J3[1:_BODY] - rest_J3[list(PARENTS[1:])]
     points_E3 = Skeleton().point_offsets_E3.double().numpy().copy()
     for name, joint in _KINDS[joints].points.items():
-        parent = JOINT_NAMES.index("head" if "eye" in name else f"{name.split('_')[0]}_wrist")
+        parent = KEYPOINT_JOINT[KEYPOINT_NAMES.index(name)]
         points_E3[POINT_NAMES.index(name)] = rest_J3[joint] - rest_J3[parent]
     return Skeleton(torch.from_numpy(offsets_J3).float(), torch.from_numpy(points_E3).float())
 

@@ -20,9 +20,16 @@ from mrhubo.files.storage import checksum_tensors
 
 _LONGEST = 2.0
 """No bone is that long [m]; other units than metres are."""
-_SIDES = {"left": 1.0, "right": -1.0}
+_SIGNS = {"left": 1.0, "right": -1.0}
+SIDES: tuple[str, ...] = tuple(_SIGNS)
+"""Sides of the body; what there is on both is called `left_` and `right_` and its name."""
+PAIRED_JOINTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+"""Joints that there are on both sides."""
+SIDE_OF: dict[str, str] = {f"{side}_{name}": side for side in SIDES for name in PAIRED_JOINTS}
+"""The side of each joint that there is on both."""
+LEG_JOINTS: tuple[str, ...] = tuple(f"{side}_{name}" for name in ("hip", "knee", "ankle", "foot") for side in SIDES)
 
-# name: (parent, offset from the parent at rest [m]); "side_" stands for both sides, x mirrored on the right.
+# name: (parent, offset from the parent at rest [m])
 _JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
     "pelvis": (None, (0.0, 0.0, 0.0)),
     "left_hip": ("pelvis", (0.0901, -0.1018, 0.0392)),
@@ -47,14 +54,15 @@ _JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
     "left_wrist": ("left_elbow", (0.26, 0.0, 0.0)),
     "right_wrist": ("right_elbow", (-0.26, 0.0, 0.0)),
 }
-_FIXED_POINTS: dict[str, tuple[str, tuple[float, float, float]]] = {
-    "eye": ("head", (0.032, 0.065, 0.090)),
-    "thumb": ("side_wrist", (0.045, -0.015, 0.045)),
-    "index": ("side_wrist", (0.092, -0.003, 0.024)),
-    "middle": ("side_wrist", (0.095, 0.0, 0.0)),
-    "pinky": ("side_wrist", (0.080, -0.006, -0.042)),
-    "toe": ("side_foot", (0.0, -0.015, 0.070)),
-    "heel": ("side_ankle", (0.0, -0.060, -0.050)),
+# name: (parent, whether it is on the point's own side, offset from it at rest [m], x mirrored on the right)
+_FIXED_POINTS: dict[str, tuple[str, bool, tuple[float, float, float]]] = {
+    "eye": ("head", False, (0.032, 0.065, 0.090)),
+    "thumb": ("wrist", True, (0.045, -0.015, 0.045)),
+    "index": ("wrist", True, (0.092, -0.003, 0.024)),
+    "middle": ("wrist", True, (0.095, 0.0, 0.0)),
+    "pinky": ("wrist", True, (0.080, -0.006, -0.042)),
+    "toe": ("foot", True, (0.0, -0.015, 0.070)),
+    "heel": ("ankle", True, (0.0, -0.060, -0.050)),
 }
 
 JOINT_NAMES: tuple[str, ...] = tuple(_JOINTS)
@@ -67,9 +75,10 @@ PARENTS: tuple[int, ...] = tuple(-1 if p is None else JOINT_NAMES.index(p) for p
 
 def _fixed_points() -> dict[str, tuple[int, tuple[float, float, float]]]:
     points = {}
-    for name, (parent, (x, y, z)) in _FIXED_POINTS.items():
-        for side, sign in _SIDES.items():
-            points[f"{side}_{name}"] = (JOINT_NAMES.index(parent.replace("side", side)), (sign * x, y, z))
+    for name, (parent, own_side, (x, y, z)) in _FIXED_POINTS.items():
+        for side, sign in _SIGNS.items():
+            carrier = f"{side}_{parent}" if own_side else parent
+            points[f"{side}_{name}"] = (JOINT_NAMES.index(carrier), (sign * x, y, z))
     return points
 
 
@@ -106,10 +115,12 @@ def _levels() -> list[list[int]]:
 
 
 _LEVELS = _levels()
-_MIRROR = [
-    POSED_JOINT_NAMES.index(n.replace("left", "~").replace("right", "left").replace("~", "right"))
-    for n in POSED_JOINT_NAMES
-]
+_OTHER_SIDE = {
+    f"{side}_{name}": f"{other}_{name}"
+    for side, other in zip(SIDES, SIDES[::-1], strict=True)
+    for name in PAIRED_JOINTS
+}
+_MIRROR = [POSED_JOINT_NAMES.index(_OTHER_SIDE.get(name, name)) for name in POSED_JOINT_NAMES]
 
 
 def mirror_pose(pose_BJ6: Tensor) -> Tensor:

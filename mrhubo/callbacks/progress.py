@@ -8,7 +8,7 @@ from typing import Any
 import lightning
 from torch import Tensor
 
-from mrhubo.runtime.progress import Progress
+from mrhubo.runtime.progress import SILENT, Progress, Reporter
 
 _EVERY = 10
 
@@ -16,14 +16,14 @@ _EVERY = 10
 class TrainingProgress(lightning.Callback):
     """Steps, rate, time left and the last metrics on one line."""
 
-    def __init__(self, steps: int, shown: Mapping[str, str], quiet: bool = False) -> None:
+    def __init__(self, steps: int, shown: Mapping[str, str], report: Reporter = SILENT) -> None:
         """`steps` is the length of the whole training, `shown` the metrics on the line and what they are called."""
-        self.steps, self.shown, self.quiet = steps, shown, quiet
+        self.steps, self.shown, self.report = steps, shown, report
         self._progress: Progress | None = None
 
     def on_train_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Opens the line."""
-        self._progress = Progress("training", self.steps, "steps", self.quiet)
+        self._progress = self.report.step("training", self.steps, "steps")
         self._progress.update(trainer.global_step)
 
     def on_train_batch_end(

@@ -1,4 +1,4 @@
-"""The search of the robot's scale factor theta, before pairs are made.
+"""The search of the robot's scale factor theta: a Lightning callback that comes before the pairs.
 
 Legend: C scale factors, P pairs of robot and human pose, N robot joints, J = 21 human joints.
 """
@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import lightning
 import numpy as np
@@ -25,6 +25,7 @@ from mrhubo.files.storage import checksum_tensors, locked
 from mrhubo.pairing import ProportionTest, pose_settings
 from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.tracking import log_all, start_run
 from mrhubo.search import open_study, open_trials
 from mrhubo.search.plots import study_plots
@@ -57,20 +58,47 @@ class ScaleResult:
     """The search, and pairs of the best and the worst numbers, by name."""
 
 
+@runtime_checkable
+class SearchedData(Protocol):
+    """A data module whose data depend on the scale factor."""
+
+    def use_config(self, config: Config) -> None:
+        """Takes the run's config with the scale factor that was found."""
+
+
 class ScaleFactorSearch(lightning.Callback):
     """Draws theta from the ranges of `robot.search`, keeps the one whose human poses come nearest to a reference set.
 
     The reference set are frames of the validation clips with the joint angles that the reference retargeter gives
     them, where the robot can do what the human does: elsewhere no theta can be right, and one that distorts the arms
-    would win. The distance is that of `ProportionTest`. Pairs exist before Lightning's trainer starts, so `search` is
-    called first; as a callback it then writes into the training's run what it found. Trials are kept in an Optuna
-    study: a search that was stopped goes on, a finished one is read.
+    would win. The distance is that of `ProportionTest`. Trials are kept in an Optuna study: a search that was stopped
+    goes on, a finished one is read.
+
+    It searches in `setup`, which Lightning calls before anything is trained, and hands the config that it ends with to
+    the data module, `SearchedData`, which makes the pairs only then. Each trial is an MLflow run under the training's.
     """
 
     def __init__(
-        self, config: Config, body_map: BodyMap, prior: BodyPrior, clips: Sequence[Clip], folder: Path
+        self,
+        config: Config,
+        body_map: BodyMap,
+        prior: BodyPrior,
+        clips: Sequence[Clip],
+        folder: Path,
+        report: Reporter = SILENT,
+        found: Callable[[ScaleResult], None] = lambda result: None,
     ) -> None:
-        """`clips` are the validation clips, `folder` is the tracking folder."""
+        """What it searches with.
+
+        Args:
+            config: with `robot.scale: search`.
+            body_map: its robot.
+            prior: its body prior.
+            clips: the validation clips.
+            folder: the tracking folder.
+            report: told of the trials.
+            found: called with the result, before the data module gets it.
+        """
         assert config.robot.search is not None and config.robot.manual is not None
         self.config, self.start, self.settings = config, config.robot.manual, config.robot.search
         pose_FJ6 = torch.cat([clip.motion.pose_TJ6 for clip in clips])
@@ -79,7 +107,7 @@ class ScaleFactorSearch(lightning.Callback):
         self.q_PN, self.pose_PJ6 = reference_FN[chosen], pose_FJ6[chosen]
         self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6, config.model.input_frame)
         self.artist = Artist(body_map.robot, body_map.skeleton)
-        self.folder = folder
+        self.folder, self.report, self.found = folder, report, found
         measured_on = checksum_tensors({"q": self.q_PN, "pose": self.pose_PJ6}, {})
         pairs, robot = config.pairs, pose_settings(config)
         robot["search"] = {**robot["search"], "trials": 0}  # more of them go on where fewer stopped
@@ -91,19 +119,27 @@ class ScaleFactorSearch(lightning.Callback):
         )  # fmt: skip
         self.result: ScaleResult | None = None
 
-    def search(
-        self,
-        client: MlflowClient,
-        experiment: str,
-        parent: str,
-        progress: Callable[[int, str], None] = lambda done, measure: None,
-    ) -> ScaleResult:
-        """Does the trials that are missing, each an MLflow run under `parent`; `progress` gets (done, best so far)."""
+    def setup(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule, stage: str) -> None:
+        """Finds the scale factor, unless it is known already, and hands it to the data module.
+
+        Raises:
+            TypeError: the data module is no `SearchedData`.
+        """
+        data: object = getattr(trainer, "datamodule", None)
+        if not isinstance(data, SearchedData):
+            raise TypeError("ScaleFactorSearch needs a data module that takes what it found: use_config")
+        client, run_id = (getattr(trainer.logger, name, None) for name in ("experiment", "run_id"))
+        result = self.search(client, run_id)
+        self.found(result)
+        data.use_config(result.config)
+
+    def search(self, client: MlflowClient | None = None, parent: str | None = None) -> ScaleResult:
+        """Does the trials that are missing; with a client each is an MLflow run under the run `parent`."""
         # Fits that differ in other settings share the study.
         with locked(self.folder / "fits" / f"{self.name}.lock", wait=True):
             settings = self.settings
             study = open_study(self.folder, None, self.name, settings.sampler, settings.seed, shared=False)
-            ranking = self._do_trials(study, client, experiment, parent, progress)
+            ranking = self._do_trials(study, client, parent)
         (values, distance), (worst, _) = ranking[0], ranking[-1]
         config = copy.deepcopy(self.config)
         config.robot.scale, config.robot.search = "manual", None
@@ -117,23 +153,19 @@ class ScaleFactorSearch(lightning.Callback):
         return self.result
 
     def _do_trials(
-        self,
-        study: Study,
-        client: MlflowClient,
-        experiment: str,
-        parent: str,
-        progress: Callable[[int, str], None],
+        self, study: Study, client: MlflowClient | None, parent: str | None
     ) -> list[tuple[dict[str, float], float]]:
         """Numbers and distances of all trials, the nearest first."""
         if not study.get_trials(deepcopy=False) and (start := self._start_values()):
             study.enqueue_trial(start)  # so that the search ends nowhere worse than where it started
-        while True:
-            done = self._finished(study)
-            best = f"best {math.degrees(done[0][1]):.2f} deg" if done else ""
-            progress(min(len(done), self.settings.trials), best)
-            if len(done) >= self.settings.trials:
-                return done
-            self._measure(study, self._draw(study, len(done)), client, experiment, parent)
+        with self.report.step("scale factor", self.settings.trials, "trials") as progress:
+            while True:
+                done = self._finished(study)
+                best = f"best {math.degrees(done[0][1]):.2f} deg" if done else ""
+                progress.update(min(len(done), self.settings.trials), best)
+                if len(done) >= self.settings.trials:
+                    return done
+                self._measure(study, self._draw(study, len(done)), client, parent)
 
     def on_fit_start(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Writes the distances into the training's run."""
@@ -166,16 +198,20 @@ class ScaleFactorSearch(lightning.Callback):
         return drawn
 
     def _measure(
-        self, study: Study, drawn: dict[int, dict[str, float]], client: MlflowClient, experiment: str, parent: str
+        self, study: Study, drawn: dict[int, dict[str, float]], client: MlflowClient | None, parent: str | None
     ) -> None:
         distances = self.test.measure([varied(self.start, values) for values in drawn.values()]).tolist()
         for (number, values), distance in zip(drawn.items(), distances, strict=True):
-            tags = {"mlflow.parentRunId": parent, "robot": self.config.robot.name, "scale_search": self.name}
-            name = f"{self.config.robot.name} scale {number}"
-            run = start_run(client, experiment, name, tags).info.run_id
-            log_all(client, run, {"scale/distance_rad": distance, **{f"scale/{k}": v for k, v in values.items()}})
-            client.set_terminated(run)
+            if client is not None:
+                self._log_trial(client, parent, number, {"distance_rad": distance, **values})
             study.tell(number, distance)
+
+    def _log_trial(self, client: MlflowClient, parent: str | None, number: int, values: dict[str, float]) -> None:
+        robot = self.config.robot.name
+        tags = {"robot": robot, "scale_search": self.name, **({"mlflow.parentRunId": parent} if parent else {})}
+        run = start_run(client, self.config.tracking.experiment, f"{robot} scale {number}", tags).info.run_id
+        log_all(client, run, {f"scale/{name}": value for name, value in values.items()})
+        client.set_terminated(run)
 
     def _poses(self, best: ManualScaleConfig, worst: ManualScaleConfig, count: int = 5) -> Image:
         """Human poses, the reference's robot poses, and what the best and the worst numbers make of those."""

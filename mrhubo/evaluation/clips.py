@@ -6,7 +6,6 @@ Legend: T frames, J = 21 human joints, N robot joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +16,10 @@ from mrhubo.errors import UserError
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.pairing import pose_settings
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap
+from mrhubo.runtime.locations import default_motions
+from mrhubo.runtime.progress import SILENT, Reporter
 
 REFERENCE_SCHEMA = "mrhubo.reference/1"
 
@@ -51,12 +52,12 @@ class Motions:
 
 
 def load_motions(config: Config) -> Motions:
-    """Reads and splits the motions of `evaluation`.
+    """Reads and splits the motions of `evaluation`, or those that lie where motions lie by default.
 
     Raises:
         UserError: no folder exists, a file cannot be used, or the split leaves validation or test empty.
     """
-    folder = find_motions(config.evaluation.motions)
+    folder = find_motions(config.evaluation.motions or default_motions())
     motions = read_folder(folder)
     names = set(config.evaluation.validation)
     validation = [m for m in motions if m.name in names]
@@ -73,7 +74,7 @@ def solve_references(
     body_map: BodyMap,
     motions: Motions,
     folder: Path,
-    progress: Callable[[int, int, str], None] = lambda done, total, name: None,
+    report: Reporter = SILENT,
 ) -> tuple[list[Clip], list[Clip]]:
     """Reference joint angles for all clips: validation and test. Answers in `folder` are used again.
 
@@ -82,7 +83,7 @@ def solve_references(
         body_map: the robot, on the CPU.
         motions: what `load_motions` gave.
         folder: where answers are kept.
-        progress: called with (clips done, all clips, name of the next).
+        report: told of every clip.
     """
     # Directions are all that the reference sees of a robot, whatever its lengths are made of.
     directions = {k: v for k, v in pose_settings(config).items() if k not in ("scale", "manual", "search")}
@@ -93,21 +94,22 @@ def solve_references(
         "kinematics": body_map.robot.description.kinematics,
         "smoothness": repr(config.evaluation.smoothness),
     }
-    retargeter = ReferenceRetargeter(body_map, smoothness=config.evaluation.smoothness)
+    retargeter = OptimizationRetargeter(body_map, smoothness=config.evaluation.smoothness)
     everything, clips = motions.all, []
-    for done, motion in enumerate(everything):
-        progress(done, len(everything), motion.name)
-        header = {**common, "motion_xxh3": motion.checksum}
-        path = folder / f"{config.robot.name}-{motion.name}-{fingerprint(header)}.safetensors"
-        try:
-            tensors, found = read_tensors(path)
-            reference = tensors["q"] if found == header else None
-        except (DamagedFile, KeyError):
-            reference = None
-        if reference is None or reference.shape != (len(motion.pose_TJ6), len(body_map.robot.joint_names)):
-            reference = retargeter.retarget(motion.pose_TJ6, motion.frame_rate).q_TN.float()
-            write_tensors(path, {"q": reference}, header)
-        clips.append(Clip(motion, reference))
-    progress(len(everything), len(everything), "")
+    with report.step("reference", len(everything), "clips") as progress:
+        for done, motion in enumerate(everything):
+            progress.update(done, motion.name)
+            header = {**common, "motion_xxh3": motion.checksum}
+            path = folder / f"{config.robot.name}-{motion.name}-{fingerprint(header)}.safetensors"
+            try:
+                tensors, found = read_tensors(path)
+                reference = tensors["q"] if found == header else None
+            except (DamagedFile, KeyError):
+                reference = None
+            if reference is None or reference.shape != (len(motion.pose_TJ6), len(body_map.robot.joint_names)):
+                reference = retargeter.retarget(motion.pose_TJ6, motion.frame_rate).q_TN.float()
+                write_tensors(path, {"q": reference}, header)
+            clips.append(Clip(motion, reference))
+        progress.update(len(everything))
     count = len(motions.validation)
     return clips[:count], clips[count:]

@@ -15,8 +15,8 @@ from torch import Tensor
 from mrhubo.evaluation.clips import Clip
 from mrhubo.reference import angle_between, at_limit_share, direction_jerk, joint_error, link_error
 from mrhubo.retargeter import RetargetNetwork
-from mrhubo.robot import BodyMap, Robot
-from mrhubo.robot.parts import ENDS
+from mrhubo.robot import BodyMap, LinkPoses, Robot
+from mrhubo.robot.parts import Region
 
 
 @dataclass(frozen=True)
@@ -88,29 +88,28 @@ class Evaluation(ClipScore):
 def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str]) -> Evaluation:
     """Measures of predicted joint angles (T, N) [rad]."""
     robot, shapes, human_TD3 = body_map.robot, body_map.collision, body_map.human_directions(clip.motion.pose_TJ6)
-    robot_TD3, reference_TD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_TN, clip.reference_TN))
+    poses, reference_poses = (robot.forward(q) for q in (q_TN, clip.reference_TN))
+    robot_TD3, reference_TD3 = (body_map.robot_directions(p) for p in (poses, reference_poses))
     error_TD, reference_TD = (torch.rad2deg(angle_between(d, human_TD3)) for d in (robot_TD3, reference_TD3))
-    names = body_map.direction_names
-    part = {name: next((end for end in ENDS if name.startswith(f"{end}_")), "limb") for name in names}
 
-    def mean(angles_TD: Tensor, *parts: str) -> float:
-        columns = [i for i, name in enumerate(names) if part[name] in parts]
+    def mean(angles_TD: Tensor, region: Region) -> float:
+        columns = [i for i, direction in enumerate(body_map.directions) if direction.part.region == region]
         return float(angles_TD[:, columns].mean())  # NaN where there are none
 
-    def collision_share(q_TN: Tensor) -> float:
-        return float(shapes.collides(q_TN).float().mean()) if shapes.pairs else float("nan")
+    def collision_share(q_TN: Tensor, poses: LinkPoses) -> float:
+        return float(shapes.collides(q_TN, poses).float().mean()) if shapes.pairs else float("nan")
 
     jerk, human_jerk = (float(direction_jerk(d, clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3))
     return Evaluation(
         **vars(score_clip(clip, q_TN, robot, key_links)),
-        limb_deg=mean(error_TD, "limb"),
-        reference_limb_deg=mean(reference_TD, "limb"),
-        hand_deg=mean(error_TD, "left_hand", "right_hand"),
+        limb_deg=mean(error_TD, "arm"),
+        reference_limb_deg=mean(reference_TD, "arm"),
+        hand_deg=mean(error_TD, "hand"),
         head_deg=mean(error_TD, "head"),
         jerk_ratio=jerk / human_jerk if human_jerk else float("nan"),
         at_limit=float(at_limit_share(robot, q_TN).mean()),
-        collision=collision_share(q_TN),
-        reference_collision=collision_share(clip.reference_TN),
+        collision=collision_share(q_TN, poses),
+        reference_collision=collision_share(clip.reference_TN, reference_poses),
     )
 
 

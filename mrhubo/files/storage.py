@@ -6,7 +6,6 @@ data.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import platform
@@ -15,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import psutil
 import torch
 import xxhash
+from filelock import FileLock, Timeout
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
@@ -45,15 +44,22 @@ def atomic_path(path: Path) -> Iterator[Path]:
         with open(temporary, "rb") as handle:
             os.fsync(handle.fileno())
         os.replace(temporary, path)
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        _sync_folder(path.parent)
     except OSError as error:
         raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Makes a renamed file outlast a power cut; Windows does that on its own, and opens no folders."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 class Locked(UserError):
@@ -66,18 +72,26 @@ def locked(path: Path, wait: bool = False) -> Iterator[None]:
 
     Raises:
         Locked: another process has it, and `wait` is False.
+        UserError: the folder refuses the file of the lock.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with open(path, "w") as handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except OSError as error:
-            raise Locked(f"{path.parent}: another process is at work there; wait for it or stop it") from error
+    lock = FileLock(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire(blocking=wait)
+    except Timeout as error:
+        raise Locked(f"{path.parent}: another process is at work there; wait for it or stop it") from error
+    except OSError as error:
+        raise UserError(f"{path}: cannot be locked: {error.strerror or error}") from error
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def remove_leftovers(folder: Path) -> None:
     """Removes the temporary files of `atomic_path` whose process has ended without removing them (kill -9)."""
+    import psutil  # only who writes needs it
+
     for path in folder.glob(f".*.{platform.node()}.*.tmp"):
         process = path.name.split(".")[-2]
         if process.isdecimal() and (int(process) == os.getpid() or not psutil.pid_exists(int(process))):
@@ -119,16 +133,6 @@ def _sorted_header(content: bytes) -> bytes:
     text = json.dumps({"__metadata__": dict(sorted(metadata.items())), **header}, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
     return len(text).to_bytes(8, "little") + text + content[8 + size :]
-
-
-def read_metadata(path: Path) -> dict[str, str]:
-    """The metadata of a safetensors file, unchecked against the checksum.
-
-    Raises:
-        DamagedFile: the file is missing, truncated or no safetensors file.
-    """
-    with _reading(path) as handle:
-        return dict(handle.metadata() or {})
 
 
 def read_some_tensors(path: Path, names: Iterable[str]) -> tuple[dict[str, Tensor], dict[str, str]]:

@@ -1,20 +1,39 @@
-"""A fit from its config to the package: the steps of `mrhubo.fitting` strung together."""
+"""A fit from its config to the package: its steps, one after the other.
+
+prepare        everything that a user can get wrong is checked            preparation
+references     the reference retargeter answers the motions that measure   references
+train          the scale factor if it is to be searched for, the pairs,
+the networks: Lightning's trainer with its hooks            training, datamodule, module
+measure        on the test clips                                           measurement
+package        what a user takes away, and all of it in MLflow             record
+"""
 
 from __future__ import annotations
 
-import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from mrhubo.callbacks import ScaleFactorSearch
 from mrhubo.config import Config
 from mrhubo.errors import UserError
-from mrhubo.evaluation import latencies, measures, table
-from mrhubo.fitting import pipeline
-from mrhubo.fitting.pipeline import Prepared
-from mrhubo.fitting.record.recording import Recording
-from mrhubo.retargeter import POLISH, Retargeter
-from mrhubo.runtime.progress import Progress
+from mrhubo.evaluation import Clip
+from mrhubo.fitting.measurement import measure
+from mrhubo.fitting.preparation import Prepared, prepare
+from mrhubo.fitting.record import (
+    Recording,
+    dashboard_command,
+    log_answers,
+    log_measures,
+    log_pairs,
+    log_scale,
+    register_package,
+    save_package,
+)
+from mrhubo.fitting.references import make_references
+from mrhubo.fitting.training import train
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.ranks import Ranks
 from mrhubo.runtime.workspace import Workspace
 
@@ -29,9 +48,11 @@ class FitResult:
     run_id: str
     table: str
     measures: dict[str, float]
+    dashboard: str
+    """The command that opens MLflow's dashboard."""
 
 
-def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitResult | None:
+def fit(config: Config, report: Reporter = SILENT, parent: str | None = None) -> FitResult | None:
     """Runs all steps; what an earlier, interrupted call finished is not done again. `parent`: the id of the MLflow run
     that this one belongs to.
 
@@ -41,69 +62,62 @@ def fit(config: Config, quiet: bool = False, parent: str | None = None) -> FitRe
         UserError: anything in the config or the files it names is wrong (before any work).
         KeyboardInterrupt: the user stopped it; the same call resumes.
     """
-    prepared = pipeline.prepare(config, search=True)
-    folder = Recording.folder(config)
+    prepared = prepare(config, search=True)
+    ranks = _join_ranks(config)
+    workspace = Workspace(prepared.tracking_dir / "fits", config.robot.name, prepared.fingerprint)
+    if ranks.rank > 0:
+        return _train_with_the_first(prepared, workspace, ranks)
+    with workspace, Recording.start(prepared, workspace, parent) as recording:
+        validation, test = make_references(prepared, report)
+        ranks.wait()
+        training = train(
+            prepared,
+            report,
+            validation,
+            workspace.checkpoints,
+            workspace.last_checkpoint(),
+            recording.logger,
+            ranks,
+            _search(prepared, report, validation, recording),
+        )
+        recording.resume_after_training()
+        log_pairs(recording, training)
+        retargeter = training.retargeter
+        measured = measure(training.prepared, report, retargeter, test)
+        log_measures(recording, measured, training.best_link_cm)
+        log_answers(recording, test, measured.predictions)
+        package = save_package(recording, retargeter, measured.over_clips, training.best_checkpoint)
+        model = register_package(recording, retargeter, measured.over_clips, test[0])
+        workspace.finish()
+    dashboard = dashboard_command(prepared.tracking_dir, config)
+    return FitResult(package, model, recording.run_id, measured.table, measured.measures, dashboard)
+
+
+def _join_ranks(config: Config) -> Ranks:
     ranks = Ranks.join(config.trainer.accelerator)
     if ranks.count > 1 and config.robot.scale == "search":
         raise UserError("robot.scale: 'search' runs in one process; run it once, then train with what it found")
     if config.trainer.batch_size % ranks.count:
         raise UserError(f"trainer.batch_size: must be a multiple of the {ranks.count} processes that share each batch")
-    workspace = Workspace(folder / "fits", config.robot.name, prepared.fingerprint)
-    if ranks.rank > 0:
-        _help(prepared, workspace, ranks)
-        return None
-    with workspace:
-        with Recording.start(prepared, workspace, parent) as recording:
-            watchers = []
-            if config.robot.scale == "search":
-                search = _search_scale(prepared, recording, quiet)
-                prepared, watchers = recording.prepared, [search]
-            report = pipeline.make_pairs(prepared, quiet, ranks)
-            validation, test = pipeline.make_references(prepared, quiet)
-            ranks.wait()
-            resume = workspace.last_checkpoint()
-            training = pipeline.train(
-                prepared, validation, recording.logger, workspace.checkpoints, resume, quiet, ranks, watchers
-            )
-            recording.resume_after_training()
-            recording.pairs(training.pairs, training.filter, report)
-            retargeter = Retargeter(
-                training.network, prepared.body_map, prepared.prior, prepared.config, training.filter.threshold
-            )
-            polished = functools.partial(retargeter.predict, polish=POLISH)
-            predictions, scores = pipeline.score_test(prepared, retargeter.predict, test)
-            _, retarget = pipeline.score_test(prepared, polished, test)
-            recording.scores(
-                scores,
-                latencies(retargeter.predict, test),
-                retarget,
-                latencies(polished, test),
-                training.best_link_cm,
-            )
-            recording.key_poses(test, predictions)
-            recording.animation(test, predictions)
-            over_clips = scores[-2]
-            package = recording.package(retargeter, over_clips, training.best_checkpoint)
-            model = recording.register(retargeter, over_clips, test[0])
-            workspace.finish()
-        return FitResult(package, model, recording.run_id, table(scores, retarget), measures(over_clips))
+    return ranks
 
 
-def _search_scale(prepared: Prepared, recording: Recording, quiet: bool) -> ScaleFactorSearch:
-    """Finds the scale factor, and goes on with a config that has it."""
-    config, settings = prepared.config, prepared.config.robot.search
-    assert settings is not None
-    validation, _ = pipeline.make_references(prepared, quiet)
-    search = ScaleFactorSearch(config, prepared.body_map, prepared.prior, validation, recording.folder(config))
-    with Progress("scale factor", settings.trials, "trials", quiet) as progress:
-        result = search.search(recording.client, config.tracking.experiment, recording.run_id, progress.update)
-    recording.scale(pipeline.prepare(result.config), result)
-    return search
+def _search(
+    prepared: Prepared, report: Reporter, validation: Sequence[Clip], recording: Recording
+) -> list[ScaleFactorSearch]:
+    """The callback that searches for the scale factor, where it is to be searched for."""
+    if prepared.config.robot.scale != "search":
+        return []
+    config, folder = prepared.config, prepared.tracking_dir
+    return [
+        ScaleFactorSearch(
+            config, prepared.body_map, prepared.prior, validation, folder, report, partial(log_scale, recording)
+        )
+    ]
 
 
-def _help(prepared: Prepared, workspace: Workspace, ranks: Ranks) -> None:
-    """What all ranks but the first do: pairs and training, in step with the first."""
-    pipeline.make_pairs(prepared, True, ranks)
+def _train_with_the_first(prepared: Prepared, workspace: Workspace, ranks: Ranks) -> None:
+    """What all ranks but the first do: pairs and training, in step with the first, which tells of them."""
     ranks.wait()  # the first has solved the references and readied the workspace
-    validation, _ = pipeline.make_references(prepared, True)
-    pipeline.train(prepared, validation, False, workspace.checkpoints, workspace.last_checkpoint(), True, ranks)
+    validation, _ = make_references(prepared, SILENT)
+    train(prepared, SILENT, validation, workspace.checkpoints, workspace.last_checkpoint(), ranks=ranks)

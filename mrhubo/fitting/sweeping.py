@@ -1,34 +1,37 @@
 """One process's share of a sweep: trials of a study, each a training in an MLflow run under the sweep's own.
 
-Pairs are shared by all trials with the same pairing settings: the first that needs them makes them, the others wait.
-A config that some trial has been trained with is never trained again.
+The engine knows spaces, studies and runs; what a trial trains is a `Method`: `mrhubo.fitting.trials` for fits, the
+baseline's in its own room. A config that some trial has been trained with is never trained again.
 """
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
-from mrhubo.callbacks.pruning import Pruning
-from mrhubo.config import Config, SweepConfig, fingerprint, load_config, to_plain, to_yaml
+from mrhubo.config import Config, SweepConfig, fingerprint, to_plain, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.files.storage import atomic_path, locked
-from mrhubo.fitting import pipeline
-from mrhubo.fitting.record.recording import Recording
+from mrhubo.fitting.preparation import Prepared, prepare
+from mrhubo.fitting.record import dashboard_command
 from mrhubo.runtime.locations import project_root
-from mrhubo.runtime.progress import Progress
+from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.tables import markdown
 from mrhubo.runtime.tracking import find_run, git_commit, log_all, open_client, run_status, start_run
 from mrhubo.runtime.workspace import Workspace
 from mrhubo.search import open_study, open_trials, override, read_space, remaining, work_on
 
 if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from mlflow.entities import Run
     from optuna.trial import FrozenTrial, Trial
 
 _TAG = "sweep_trial"
+_SETTLED = "settled"
 _VALUE = "val/best_link_cm"
 
 
@@ -39,24 +42,99 @@ class SweepResult:
     table: str
     """The best trials, best first."""
     best: Path
-    """The best config, for `mrhubo.fit`."""
+    """File of the best config."""
+    dashboard: str
+    """The command that opens MLflow's dashboard."""
+
+
+class SweepTrial:
+    """One trial, for the method that trains it."""
+
+    def __init__(
+        self, trial: Trial, client: MlflowClient, parent: str, workspace: Workspace, show: Callable[[str], None]
+    ) -> None:
+        self.trial, self.client = trial, client
+        self.parent, self.workspace = parent, workspace
+        """The sweep's run, and a folder for what a training needs to go on."""
+        self.show = show
+        """Says how the trial is getting on."""
+        self.pruned = False
+
+    def begin(self, run_id: str) -> None:
+        """Notes the trial's run."""
+        self.run_id = run_id
+        self.trial.set_user_attr("run_id", run_id)
+
+    def conclude(
+        self, fingerprint: str, link_cm: float, settled: Mapping[str, str] | None = None, pruned: bool = False
+    ) -> float:
+        """Writes down what the trial has come to, while its run is open.
+
+        Args:
+            fingerprint: `Prepared.fingerprint` of its config.
+            link_cm: validation link error.
+            settled: settings that the trial chose by itself, by key: part of its config from here on.
+            pruned: it was stopped early.
+        """
+        self.pruned, settled = pruned, dict(settled or {})
+        self.trial.set_user_attr(_SETTLED, settled)
+        log_all(self.client, self.run_id, {_VALUE: link_cm})
+        tags = {"trial": str(self.trial.number), "trial_state": "pruned" if pruned else "complete"}
+        if not pruned:
+            tags |= {_TAG: fingerprint, _SETTLED: json.dumps(settled)}
+        for name, value in tags.items():
+            self.client.set_tag(self.run_id, name, value)
+        return link_cm
+
+    def take_over(self, run: Run) -> float:
+        """The result of a trial that another one has had: the same config."""
+        self.trial.set_user_attr("run_id", run.info.run_id)
+        self.trial.set_user_attr(_SETTLED, json.loads(run.data.tags.get(_SETTLED, "{}")))
+        return run.data.metrics[_VALUE]
+
+
+class Method(Protocol):
+    """What the trials of a sweep train."""
+
+    @property
+    def schema(self) -> type[Config]:
+        """Of the configs, and so of the keys that can vary."""
+        ...
+
+    def train(self, prepared: Prepared, trial: SweepTrial) -> float:
+        """Trains with a config in an MLflow run, calls `begin` and `conclude`; returns the validation link error."""
+        ...
 
 
 class Sweep:
     """A sweep over a config; everything is checked when it is made."""
 
-    def __init__(self, file: Path, overrides: Sequence[str], settings: SweepConfig, quiet: bool = False) -> None:
+    def __init__(
+        self,
+        load: Callable[[Sequence[str]], Config],
+        overrides: Sequence[str],
+        settings: SweepConfig,
+        method: Method,
+        report: Reporter,
+    ) -> None:
         """Checks space, config and files, and opens the study and its MLflow run.
+
+        Args:
+            load: gives the config with `key.sub=value` changes.
+            overrides: such changes of all trials; they come after the sweep's `fixed`.
+            settings: the sweep.
+            method: what is trained.
+            report: told of the trials.
 
         Raises:
             UserError: anything is wrong.
         """
-        self.settings, self.quiet, self.file = settings, quiet, file
+        self.load, self.settings, self.method, self.report = load, settings, method, report
         self.overrides = [*(override(key, value) for key, value in settings.fixed.items()), *overrides]
         self.base = self._config([])
-        self.space = read_space(settings.space, lambda text: self._config([text]))
-        prepared = pipeline.prepare(self.base)
-        self.folder = Recording.folder(self.base)
+        self.space = read_space(settings.space, lambda text: self._config([text]), method.schema)
+        prepared = prepare(self.base)
+        self.folder = prepared.tracking_dir
         deciding = {**to_plain(settings), "trials": 0, "minutes": 0, "storage": ""}
         mark = fingerprint([prepared.fingerprint, deciding])
         self.name = f"{self.base.robot.name}-{settings.name}-{mark[:8]}"
@@ -80,7 +158,7 @@ class Sweep:
         self.client.update_run(self.parent, status="RUNNING")
         error: BaseException | None = None
         try:
-            with Progress("sweep", self.settings.trials, "trials", self.quiet) as self._progress:
+            with self.report.step("sweep", self.settings.trials, "trials") as self._progress:
                 self._progress.update(self._done())
                 work_on(
                     self.study,
@@ -98,7 +176,7 @@ class Sweep:
                 self.client.set_terminated(self.parent, run_status(error))
 
     def _config(self, texts: Sequence[str]) -> Config:
-        return load_config(self.file, [*self.overrides, *texts])
+        return self.load([*self.overrides, *texts])
 
     def _open_run(self) -> str:
         """The run that all trials belong to."""
@@ -123,41 +201,19 @@ class Sweep:
         config = self._config(texts)
         shown = " ".join(text.split(".", 1)[1] for text in texts)
         config.tracking.run_name = f"{self.base.robot.name} {self.settings.name} {trial.number}: {shown}"
-        prepared = pipeline.prepare(config)
+        prepared = prepare(config)
         workspace = Workspace(self.folder / "fits", f"{config.robot.name}-sweep", prepared.fingerprint)
-        watch = Pruning(trial, lambda step, link_cm: self._show(trial, f"step {step:,}: {link_cm:.2f} cm"))
+        run = SweepTrial(trial, self.client, self.parent, workspace, lambda measure: self._show(trial, measure))
         with locked(workspace.folder.with_suffix(".lock"), wait=True):  # another process may draw the same config
             known = find_run(self.client, config.tracking.experiment, {_TAG: prepared.fingerprint}, finished=True)
             if known is not None:
-                trial.set_user_attr("run_id", known.info.run_id)
-                return known.data.metrics[_VALUE]
-            link_cm = self._train(prepared, workspace, trial, watch)
-        if watch.pruned:
+                return run.take_over(known)
+            link_cm = self.method.train(prepared, run)
+        if run.pruned:
             import optuna
 
             raise optuna.TrialPruned
         return link_cm
-
-    def _train(self, prepared: pipeline.Prepared, workspace: Workspace, trial: Trial, watch: Pruning) -> float:
-        with workspace, Recording.start(prepared, workspace, self.parent) as recording:
-            trial.set_user_attr("run_id", recording.run_id)
-            self._show(trial, "pairs")
-            with locked(prepared.store.folder.with_suffix(".lock"), wait=True):
-                pipeline.make_pairs(prepared, True)
-                validation, _ = pipeline.make_references(prepared, True)
-            training = pipeline.train(
-                prepared, validation, recording.logger, workspace.checkpoints, workspace.last_checkpoint(), True,
-                watchers=[watch],
-            )  # fmt: skip
-            recording.resume_after_training()
-            log_all(self.client, recording.run_id, {_VALUE: training.best_link_cm})
-            tags = {"trial": str(trial.number), "trial_state": "pruned" if watch.pruned else "complete"}
-            if not watch.pruned:
-                tags[_TAG] = prepared.fingerprint
-            for name, value in tags.items():
-                self.client.set_tag(recording.run_id, name, value)
-            workspace.finish()
-        return training.best_link_cm
 
     def _show(self, trial: Trial, measure: str) -> None:
         self._progress.update(min(self._done(), self.settings.trials - 1), ", ".join(
@@ -181,12 +237,14 @@ class Sweep:
         ranking = self._ranking()
         if not ranking:
             raise UserError(f"sweep {self.name}: no trial is done yet; give it more time")
-        heads = ["trial", "validation link error [cm]", *(dimension.key for dimension in self.space)]
+        chosen = [{**trial.params, **trial.user_attrs.get(_SETTLED, {})} for trial in ranking]
+        keys = list(dict.fromkeys([*(dimension.key for dimension in self.space), *chosen[0]]))
+        heads = ["trial", "validation link error [cm]", *keys]
         rows = [
-            [str(t.number), f"{t.value:.3f}", *(_short(t.params[dimension.key]) for dimension in self.space)]
-            for t in ranking
+            [str(trial.number), f"{trial.value:.3f}", *(_short(values.get(key, "")) for key in keys)]
+            for trial, values in zip(ranking, chosen, strict=True)
         ]
-        best = self._config([f"{key}={value}" for key, value in ranking[0].params.items()])
+        best = self._config([f"{key}={value}" for key, value in chosen[0].items()])
         path = self.folder / "sweeps" / f"{self.name}.yaml"
         with atomic_path(path) as temporary:
             temporary.write_text(to_yaml(best), encoding="utf-8")
@@ -197,7 +255,7 @@ class Sweep:
             picture = path.with_name(f"{self.name}-{name}.png")
             save_png(image, picture)
             self.client.log_artifact(self.parent, str(picture))
-        return SweepResult(markdown(heads, rows[:5]), path)
+        return SweepResult(markdown(heads, rows[:5]), path, dashboard_command(self.folder, self.base))
 
 
 def _short(value: object) -> str:

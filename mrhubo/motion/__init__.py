@@ -2,6 +2,16 @@
 
 from mrhubo.motion.load import find_motions, read_folder, read_motion
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.poses import MotionLike, Poses, read_poses
 from mrhubo.motion.writers.amass import write_motion
 
-__all__ = ["Motion", "find_motions", "read_folder", "read_motion", "write_motion"]
+__all__ = [
+    "Motion",
+    "MotionLike",
+    "Poses",
+    "find_motions",
+    "read_folder",
+    "read_motion",
+    "read_poses",
+    "write_motion",
+]

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from mrhubo.body.latent import LatentProblem
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.trainer import cosine_schedule
 
 _BATCH = 256
@@ -79,7 +80,7 @@ def train_amortiser(
     seed: int,
     path: Path,
     header: dict[str, str],
-    progress: Callable[[int, float], None] = lambda step, cost: None,
+    report: Reporter = SILENT,
 ) -> Amortiser:
     """Reads the trained solver from `path`, or trains it, from the last checkpoint beside it if there is one.
 
@@ -90,9 +91,9 @@ def train_amortiser(
         seed: seed of weights and draws.
         path: file of the result; a checkpoint is kept beside it until it is done.
         header: what the file must have been made for; a file with another header is not used.
-        progress: called with (step, mean cost) now and then.
+        report: told of the steps.
     """
-    device = problem.prior.identity_F.device
+    device = problem.device
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network = Amortiser(len(problem.keypoints), problem.latent)
@@ -105,24 +106,27 @@ def train_amortiser(
     targets: tuple[Tensor, ...] = ()
     first = _restore(checkpoint, header, network=network, optimizer=optimizer)
     schedule = cosine_schedule(optimizer, steps)
-    for step in range(first, steps):
-        # The schedule is a function of the step alone, so it needs no state in the checkpoint.
-        for group, rate in zip(optimizer.param_groups, schedule.base_lrs, strict=True):
-            group["lr"] = rate * schedule.lr_lambdas[0](step)
-        if step % _BLOCK == 0 or step == first:
-            block = torch.Generator().manual_seed((seed + 1) * 1_000_003 + step // _BLOCK)
-            targets = draw(_BLOCK * _BATCH, block).split(_BATCH)
-        target = targets[step % _BLOCK]
-        answer = network(target)
-        cost, gradient = problem.cost_and_gradient(answer.detach().T.contiguous(), target.permute(1, 2, 0).contiguous())
-        optimizer.zero_grad()
-        answer.backward(gradient.T / _BATCH)
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
-        if step % 50 == 0 or step + 1 == steps:
-            progress(step + 1, float(cost.mean()))
-        if (step + 1) % _CHECKPOINT_EVERY == 0 and step + 1 < steps:
-            write_tensors(checkpoint, _state(network, optimizer, step + 1), header)
+    with report.step("amortised solver", steps, "steps") as progress:
+        for step in range(first, steps):
+            # The schedule is a function of the step alone, so it needs no state in the checkpoint.
+            for group, rate in zip(optimizer.param_groups, schedule.base_lrs, strict=True):
+                group["lr"] = rate * schedule.lr_lambdas[0](step)
+            if step % _BLOCK == 0 or step == first:
+                block = torch.Generator().manual_seed((seed + 1) * 1_000_003 + step // _BLOCK)
+                targets = draw(_BLOCK * _BATCH, block).split(_BATCH)
+            target = targets[step % _BLOCK]
+            answer = network(target)
+            cost, gradient = problem.cost_and_gradient(
+                answer.detach().T.contiguous(), target.permute(1, 2, 0).contiguous()
+            )
+            optimizer.zero_grad()
+            answer.backward(gradient.T / _BATCH)
+            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            optimizer.step()
+            if step % 50 == 0 or step + 1 == steps:
+                progress.update(step + 1, f"mean cost {float(cost.mean()):.3f}")
+            if (step + 1) % _CHECKPOINT_EVERY == 0 and step + 1 < steps:
+                write_tensors(checkpoint, _state(network, optimizer, step + 1), header)
     with torch.no_grad():
         network.metric_ZZ.copy_(problem.metric_of(network(draw(1024, torch.Generator().manual_seed(seed)))))
     write_tensors(path, _state(network), header)

@@ -9,7 +9,6 @@ Legend: B pairs of a shard, N robot joints, K keypoints, J = 21 human joints, Z 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 
 import torch
@@ -23,8 +22,9 @@ from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.store import PairStore
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.threads import use_threads
 
 _STARTS = 4
@@ -37,22 +37,22 @@ class PairGenerator:
     def __init__(self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig) -> None:
         self.body_map, self.robot, self.prior, self.settings = body_map, body_map.robot, prior, settings
         self.problem = LatentProblem(
-            prior, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
+            prior.decoder, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
         )
         self.amortiser: Amortiser | None = None
 
     @property
     def device(self) -> torch.device:
         """Where the pairs are made."""
-        return self.prior.identity_F.device
+        return self.prior.device
 
     @torch.no_grad()
     def draw_targets(self, count: int, generator: torch.Generator) -> Tensor:
         """Target keypoints (count, K, 3) [m] of fresh random robot poses."""
         return self.body_map.targets(self.robot.forward(self.robot.sample(count, generator)))
 
-    def prepare(self, store: PairStore, progress: Callable[[int, float], None] = lambda step, cost: None) -> None:
-        """Reads or trains the amortised solver, if the config's solver uses one; `progress` gets (step, mean cost)."""
+    def prepare(self, store: PairStore, report: Reporter = SILENT) -> None:
+        """Reads or trains the amortised solver, if the config's solver uses one."""
         if self.settings.solver == "paper" or not store.counts["forward"]:
             return
         settings, header = self.settings, {**store.header, "what": "amortiser"}
@@ -64,7 +64,7 @@ class PairGenerator:
                 settings.seed,
                 store.amortiser_path,
                 header,
-                progress,
+                report,
             )
 
     def solve(self, target_BK3: Tensor) -> Tensor:
@@ -81,9 +81,9 @@ class PairGenerator:
         return solve_quasi_newton(self.problem, start, target_BK3, steps, metric_ZZ=metric_ZZ)
 
     @cached_property
-    def reference(self) -> ReferenceRetargeter:
+    def reference(self) -> OptimizationRetargeter:
         """Answers the human poses of reverse pairs."""
-        return ReferenceRetargeter(self.body_map, starts=_STARTS)
+        return OptimizationRetargeter(self.body_map, starts=_STARTS)
 
     def shard(self, direction: str, index: int) -> dict[str, Tensor]:
         """The pairs of one shard, `forward` or `reverse`: what `PairStore.read` names, on the CPU.
@@ -103,10 +103,10 @@ class PairGenerator:
                 orientation_BM6 = self.robot.moving_orientations(poses)
             if z_BZ is None:
                 z_BZ = self.solve(target_BK3)
-            chunk = poses_at_once(self.device)
-            aims = self.body_map.robot_directions(poses).split(chunk)
-            cut = zip(z_BZ.split(chunk), target_BK3.split(chunk), aims, strict=True)
-            parts = [self._describe(z, target, aim, direction) for z, target, aim in cut]
+            size = poses_at_once(self.device)
+            directions = self.body_map.robot_directions(poses).split(size)
+            chunks = zip(z_BZ.split(size), target_BK3.split(size), directions, strict=True)
+            parts = [self._measure(z, target, limbs, direction) for z, target, limbs in chunks]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
@@ -122,7 +122,7 @@ class PairGenerator:
         return z_BZ, self.reference.solve_frames(torch.cat(poses))[0]
 
     @torch.no_grad()
-    def _describe(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
+    def _measure(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
         """Human poses of latents, and how good they are; the measures are those of the latents, before alignment."""
         matrices = self.prior.decode_matrices(z_BZ)
         found_BJ6 = pose_BJ6 = rotation.matrix_to_sixd(matrices)

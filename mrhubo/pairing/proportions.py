@@ -24,8 +24,6 @@ from mrhubo.config import ManualScaleConfig, PairsConfig
 from mrhubo.robot import BodyMap, ManualScale
 from mrhubo.runtime.threads import use_threads
 
-_NO_ARM = ("neck", "head", "collar")
-
 
 class ProportionTest:
     """Measures scale factors on a set of pairs, many at once."""
@@ -37,7 +35,8 @@ class ProportionTest:
         self.body_map, self.prior, self.settings, self.pose_PJ6 = body_map, prior, settings, pose_PJ6
         self.frame = frame
         self._poses = body_map.robot.forward(q_PN)
-        names = [name for name in body_map.input_joints() if not name.endswith(_NO_ARM)]
+        arms = {part.joint for part in body_map.keypoints.parts if part.region in ("arm", "hand")}
+        names = [name for name in body_map.input_joints() if name in arms]
         self.arm_joints = [POSED_JOINT_NAMES.index(name) for name in names]
         """Positions of the joints that count."""
 
@@ -51,7 +50,11 @@ class ProportionTest:
             targets.append(scale.targets(self._poses))
         target_BK3 = torch.cat(targets)
         problem = LatentProblem(
-            self.prior, self.body_map.skeleton, scales[0].keypoint_indices, self.settings.w_data, self.settings.w_prior
+            self.prior.decoder,
+            self.body_map.skeleton,
+            scales[0].keypoint_indices,
+            self.settings.w_data,
+            self.settings.w_prior,
         )
         start_BZ = nearest_samples(problem, target_BK3)
         z_BZ = solve_quasi_newton(problem, start_BZ, target_BK3, self.settings.fine_steps)

@@ -21,7 +21,7 @@ class PairSetup:
 
     @classmethod
     def open(cls, config: Config) -> PairSetup:
-        """Opens the files that the config names; `pairs.dir` must be set.
+        """Opens the files that the config names.
 
         Raises:
             UserError: anything in the config, the URDF or the prior is wrong.

@@ -23,6 +23,7 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
 from mrhubo.files.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
 from mrhubo.robot import BodyMap
+from mrhubo.runtime.locations import default_pairs
 
 MEASURES = ("phi", "cost", "residual_m", "z_norm")
 """One number a pair, of the pose that the inverse kinematics ended with, before alignment: reconstruction error, cost,
@@ -74,12 +75,10 @@ class PairStore:
 
     @classmethod
     def of(cls, config: Config, body_map: BodyMap, prior: BodyPrior) -> PairStore:
-        """The store of a config's pairs; `pairs.dir` must be set."""
-        assert config.pairs.dir is not None
+        """The store of a config's pairs, in `pairs.dir` or where pairs lie by default."""
         pairs, header = config.pairs, pairs_header(config, body_map, prior)
-        return cls(
-            config.pairs.dir, header, pairs.count, pairs.reverse_share, pairs.shard_size, len(config.robot.joints)
-        )
+        folder = pairs.dir or default_pairs()
+        return cls(folder, header, pairs.count, pairs.reverse_share, pairs.shard_size, len(config.robot.joints))
 
     @property
     def amortiser_path(self) -> Path:
@@ -97,9 +96,10 @@ class PairStore:
 
     def missing(self, numbers: Iterable[int] | None = None) -> list[int]:
         """Numbers (of the given ones, or of all) of shards to be made: absent, damaged or foreign ones."""
-        return [number for number in (range(self.shards) if numbers is None else numbers) if not self._whole(number)]
+        numbers = range(self.shards) if numbers is None else numbers
+        return [number for number in numbers if not self._is_intact(number)]
 
-    def _whole(self, number: int) -> bool:
+    def _is_intact(self, number: int) -> bool:
         try:
             self.read(number)
         except DamagedFile:

@@ -5,7 +5,6 @@ Legend: P pairs, N robot joints, M robot links.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from mrhubo.files.storage import DamagedFile
 from mrhubo.pairing.filter import make_filter
 from mrhubo.pairing.store import MEASURES, PairStore
 from mrhubo.robot import Robot
+from mrhubo.runtime.progress import SILENT, Reporter
 
 _TOLERANCE = 1e-4
 SOURCES = {"robot poses": False, "human poses": True}
@@ -52,15 +52,16 @@ def check_shard(store: PairStore, robot: Robot, index: int) -> str | None:
     return None
 
 
-def verify(store: PairStore, robot: Robot, progress: Callable[[int, int], None] = lambda done, bad: None) -> list[str]:
-    """What is wrong with the store's shards, a sentence each; `progress` is called with (shards read, bad ones)."""
+def verify(store: PairStore, robot: Robot, report: Reporter = SILENT) -> list[str]:
+    """What is wrong with the store's shards, a sentence each."""
     problems: list[str] = []
-    progress(0, 0)
-    for index in range(store.shards):
-        problem = check_shard(store, robot, index)
-        if problem is not None:
-            problems.append(problem)
-        progress(index + 1, len(problems))
+    with report.step("verify", store.shards, "shards") as progress:
+        progress.update(0, "0 bad")
+        for index in range(store.shards):
+            problem = check_shard(store, robot, index)
+            if problem is not None:
+                problems.append(problem)
+            progress.update(index + 1, f"{len(problems)} bad")
     return problems
 
 

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,11 +26,12 @@ from mrhubo.files.storage import remove_leftovers
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.store import PairStore
 from mrhubo.pairing.worker import make_shard
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.ranks import Ranks
 from mrhubo.runtime.threads import available_cores
 
-_WORTH_A_WORKER = 10_000
-"""Pairs; fewer are made before a new interpreter has started."""
+_MIN_PAIRS_PER_WORKER = 10_000
+"""Fewer are made before a new interpreter has started."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,18 @@ class PairingReport:
     seconds: float
     """Time that took, the amortised solver's training included."""
 
+    def __str__(self) -> str:
+        """For a person: `made 50,000 pairs in 64.2 s`."""
+        if not self.made:
+            return "made nothing: all were there"
+        return f"made {self.made:,} pairs in {self.seconds:,.1f} s"
+
 
 def generate_pairs(
     config: Config,
     generator: PairGenerator,
     store: PairStore,
-    amortiser_progress: Callable[[int, float], None] = lambda step, cost: None,
-    shard_progress: Callable[[int, int, dict[str, float]], None] = lambda done, total, means: None,
+    report: Reporter = SILENT,
     ranks: Ranks | None = None,
 ) -> PairingReport:
     """Makes the shards that are missing, damaged or foreign; those that are whole stay.
@@ -57,9 +63,7 @@ def generate_pairs(
         config: what generator and store were built from; workers build the same.
         generator: makes the pairs.
         store: where they go.
-        amortiser_progress: called with (step, mean cost).
-        shard_progress: called with (shards done, all shards, means of what was made last: `cost`, `residual_m`)
-            before the first and after each shard. With several ranks: the shards of this rank.
+        report: told of the amortised solver's steps, and of the pairs: with several ranks, of those of this rank.
         ranks: the processes that share the work; default: this one alone.
 
     Raises:
@@ -75,33 +79,38 @@ def generate_pairs(
         store.path(index).unlink(missing_ok=True)
     if missing:
         if ranks.rank == 0:
-            generator.prepare(store, amortiser_progress)
+            generator.prepare(store, report)
         ranks.wait()
         if ranks.rank > 0:
             generator.prepare(store)
     there = len(mine) - len(indices) if ranks.count == 1 else 0
     total = there + len(indices)
-    shard_progress(there, total, {})  # only now, so that the rate is that of the pairs
-    for done, means in enumerate(_make(config, generator, store, indices, ranks), start=there + 1):
-        shard_progress(done, total, means)
+    with report.step("pairs", min(total * store.shard_size, store.count)) as progress:
+        progress.update(min(there * store.shard_size, store.count))  # only now, so that the rate is that of the pairs
+        for done, means in enumerate(_make(config, generator, store, indices, ranks), start=there + 1):
+            progress.update(min(done * store.shard_size, store.count), _quality(means))
     ranks.wait()
     return PairingReport(len(missing) * store.shard_size, time.perf_counter() - start)
+
+
+def _quality(means: dict[str, float]) -> str:
+    return f"keypoints {1000 * means['residual_m']:.1f} mm off" if "residual_m" in means else ""
 
 
 def _make(
     config: Config, generator: PairGenerator, store: PairStore, indices: Sequence[int], ranks: Ranks
 ) -> Iterator[dict[str, float]]:
     count = config.pairs.workers or (available_cores() if ranks.count == 1 else 1)
-    count = min(count, len(indices) * store.shard_size // _WORTH_A_WORKER)
+    count = min(count, len(indices) * store.shard_size // _MIN_PAIRS_PER_WORKER)
     if count < 2 or generator.device.type != "cpu":
         for index in indices:
             yield make_shard(generator, store, index)
         return
     with _workers(config, count) as workers:
-        yield from _hand_out(workers, indices)
+        yield from _dispatch(workers, indices)
 
 
-def _hand_out(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) -> Iterator[dict[str, float]]:
+def _dispatch(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) -> Iterator[dict[str, float]]:
     """Every index goes to the next worker that is free; yields the answers."""
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
     answers: queue.SimpleQueue[dict[str, float] | str] = queue.SimpleQueue()
@@ -142,7 +151,8 @@ def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]
     package = str(Path(mrhubo.__file__).parent.parent)
     path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
-    command = [sys.executable, "-c", "from mrhubo.pairing.worker import main; main()"]
+    said_already = "ignore:robot.manual.shift"  # by the process that starts them
+    command = [sys.executable, "-W", said_already, "-c", "from mrhubo.pairing.worker import main; main()"]
     workers: list[subprocess.Popen[str]] = []
     try:
         for _ in range(count):

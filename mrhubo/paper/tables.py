@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from PIL.Image import Image
 
 from mrhubo.config import BaselineConfig, Config, load_config
+from mrhubo.config.shipped import shipped_root
 from mrhubo.errors import UserError, unknown_name
-from mrhubo.runtime.locations import project_root
 from mrhubo.runtime.tables import markdown, mean_and_spread, spread_of
 from mrhubo.view.bars import grouped_bars
 
@@ -102,7 +102,7 @@ def parts(
     for method in methods:
         if method not in ALL_METHODS:
             raise UserError(f"command line: --methods: {unknown_name('method', method, ALL_METHODS)}")
-    folder = project_root() / "conf"
+    folder = shipped_root() / "conf"
     if paper:
         folder = folder / "paper"
     known = sorted(path.stem for path in folder.glob("*.yaml") if path.stem in PAPER)

@@ -6,22 +6,30 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from mrhubo.baselines.s3le.experiment import run_baseline
 from mrhubo.config import BaselineConfig, fingerprint, to_plain
 from mrhubo.errors import UserError
+from mrhubo.fitting.fit import fit
+from mrhubo.fitting.preparation import prepare, tracking_dir
+from mrhubo.fitting.record import read_predictions
+from mrhubo.fitting.references import make_references
+from mrhubo.paper.tables import ALL_METHODS, BASELINE, METHODS, OUR_DEFAULT, Part, chart, parts, tables
+from mrhubo.runtime.locations import default_capture, project_root
+from mrhubo.runtime.progress import SILENT, Reporter
+from mrhubo.runtime.tracking import ending, find_run, git_commit, open_client, start_run
+from mrhubo.view.pictures import Artist, liveliness
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Run
     from PIL.Image import Image
 
-    from mrhubo.paper.tables import Part
-
 
 def reproduce(
     robots: Sequence[str],
     seeds: int,
     overrides: Sequence[str],
-    quiet: bool = False,
+    report: Reporter = SILENT,
     paper: bool = False,
     methods: Sequence[str] | None = None,
 ) -> str:
@@ -31,7 +39,7 @@ def reproduce(
         robots: names of shipped robots.
         seeds: trainings of each kind.
         overrides: `key.sub=value` for all of them.
-        quiet: no progress lines.
+        report: told what is trained, and of its steps.
         paper: with the paper's settings in place of ours.
         methods: columns of the tables; default: all.
 
@@ -40,15 +48,10 @@ def reproduce(
             (before any work).
         KeyboardInterrupt: the user stopped it; the same call goes on.
     """
-    from mrhubo.paper.tables import ALL_METHODS, BASELINE, METHODS, chart, parts, tables
-    from mrhubo.runtime.locations import default_capture
-    from mrhubo.runtime.tracking import ending
-
     capture = default_capture()
     if methods is None and not capture.is_file():
         methods = tuple(METHODS)
-        if not quiet:
-            print(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist", flush=True)
+        report.say(f"S3LE is left out: it learns from human motion capture, and {capture} does not exist")
     work = parts(robots, seeds, overrides, ALL_METHODS if methods is None else methods, paper)
     if not capture.is_file() and any(part.method == BASELINE for part in work):
         raise UserError(f"command line: --methods: S3LE learns from human motion capture, and {capture} does not exist")
@@ -56,7 +59,7 @@ def reproduce(
     start, results, first = time.monotonic(), {}, {}
     with ending(client, parent):
         for part in work:
-            run = _run_of(part, client, parent, quiet)
+            run = _run_of(part, client, parent, report)
             measures = {k.removeprefix("test/"): v for k, v in run.data.metrics.items() if k.startswith("test/")}
             results.setdefault((part.robot, part.method), []).append(measures)
             if part.seed == 0:
@@ -65,7 +68,7 @@ def reproduce(
         client.log_text(parent, text + "\n", "tables.md")
         client.log_image(parent, chart(results), artifact_file="errors.png")
         for robot, runs in first.items():
-            picture = _key_poses(client, runs, quiet)
+            picture = _key_poses(client, runs, report)
             if picture is not None:
                 client.log_image(parent, picture, artifact_file=f"key_poses_{robot}.png")
         client.log_metric(parent, "seconds", time.monotonic() - start)
@@ -74,16 +77,12 @@ def reproduce(
 
 def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     """The run that all trainings belong to: that of an earlier call with the same settings, or a new one."""
-    from mrhubo.fitting.record.recording import Recording
-    from mrhubo.runtime.locations import project_root
-    from mrhubo.runtime.tracking import find_run, git_commit, open_client, start_run
-
     config = work[0].config
     tags = {
         "reproduce": fingerprint([[part.robot, part.method, part.seed, to_plain(part.config)] for part in work]),
         "git_commit": git_commit(project_root()),
     }
-    folder = Recording.folder(config)
+    folder = tracking_dir(config)
     name = f"reproduce {', '.join(dict.fromkeys(part.robot for part in work))}"
     client = open_client(folder, config.tracking.experiment, config.tracking.uri)
     found = find_run(client, config.tracking.experiment, {"reproduce": tags["reproduce"]})
@@ -93,41 +92,30 @@ def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     return client, found.info.run_id
 
 
-def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], quiet: bool) -> Image | None:
+def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], report: Reporter) -> Image | None:
     """Human, reference, and what the two-stage network and the baseline made of one test clip, as in the paper's
     figure 3; None if no run has kept its answers.
     """
-    from mrhubo.fitting import pipeline
-    from mrhubo.fitting.record.predictions import read_predictions
-    from mrhubo.paper.tables import BASELINE, OUR_DEFAULT
-    from mrhubo.view.pictures import Artist, liveliness
-
     shown = {part.method: run for part, run in runs if part.method in ("proposed", OUR_DEFAULT, BASELINE)}
     found = {method: read_predictions(client, run) for method, run in shown.items()}
-    prepared = pipeline.prepare(runs[0][0].config)
-    clip = max(pipeline.make_references(prepared, quiet)[1], key=liveliness)
+    prepared = prepare(runs[0][0].config)
+    clip = max(make_references(prepared, report)[1], key=liveliness)
     answers = {method: answer[clip.name] for method, answer in found.items() if clip.name in answer}
     artist = Artist(prepared.body_map.robot, prepared.body_map.skeleton)
     return artist.key_poses(clip, answers) if answers else None
 
 
-def _run_of(part: Part, client: MlflowClient, parent: str, quiet: bool) -> Run:
+def _run_of(part: Part, client: MlflowClient, parent: str, report: Reporter) -> Run:
     """A finished run with the same settings, pairs, prior and motions, or that of a new fit."""
-    from mrhubo.baselines.s3le.experiment import run_baseline
-    from mrhubo.fitting.fit import fit
-    from mrhubo.fitting.pipeline import prepare
-    from mrhubo.runtime.tracking import find_run
-
     wanted = {"config_fingerprint": prepare(part.config).fingerprint}
     experiment = part.config.tracking.experiment
     run = find_run(client, experiment, wanted, finished=True)
     if run is None:
-        if not quiet:
-            print(f"{part.robot}, {part.method}, seed {part.seed}", flush=True)
+        report.say(f"{part.robot}, {part.method}, seed {part.seed}")
         if isinstance(part.config, BaselineConfig):
-            run_baseline(part.config, quiet, parent)
+            run_baseline(part.config, report, parent)
         else:
-            fit(part.config, quiet, parent)
+            fit(part.config, report, parent)
         run = find_run(client, experiment, wanted, finished=True)
     if run is None:
         raise UserError(f"{part.robot}, {part.method}: the run of this training is not in the tracking database")

@@ -9,14 +9,16 @@ from mrhubo.reference.metrics import (
     joint_error,
     link_error,
 )
-from mrhubo.reference.retarget import ReferenceResult, ReferenceRetargeter
+from mrhubo.reference.result import OptimizationResult
+from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult
 from mrhubo.reference.solve import DirectionProblem
 
 __all__ = [
     "DirectionJacobian",
     "DirectionProblem",
+    "OptimizationResult",
+    "OptimizationRetargeter",
     "ReferenceResult",
-    "ReferenceRetargeter",
     "angle_between",
     "at_limit_share",
     "direction_error",

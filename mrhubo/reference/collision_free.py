@@ -1,13 +1,11 @@
 """A robot motion as near to the human's as it can be without the robot touching itself.
 
-    cost(q) + weight * sum_p max(0, margin - distance_p(q))^2
+The cost of `solve` with one term more, self-collision, the same limits and the same solver, and ten times the
+smoothness. The margin is wider than what the penalty gives way, so the result is free of collision, not nearly so;
+where it still is not (every start of a frame ends in a collision), the motion rests in the free pose that is nearest in
+time.
 
-in place of the cost of `solve`, with the same limits and the same solver, and ten times the smoothness. Both arms can
-meet, so all joints are one block. The margin is wider than what the penalty gives way, so the result is free of
-collision, not nearly so; where it still is not (every start of a frame ends in a collision), the motion rests in the
-free pose that is nearest in time.
-
-Legend: B problems, T frames, S starts, D directions, N joints, C = 1 block, X contacts.
+Legend: B problems, T frames, S starts, D directions, N joints, C = 1 block.
 """
 
 from __future__ import annotations
@@ -16,8 +14,9 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.reference.solve import DirectionProblem, Quadratic
+from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
+from mrhubo.reference.terms import SelfCollisionTerm
 from mrhubo.reference.trajectory import best_path, refine
 from mrhubo.robot import BodyMap
 
@@ -28,25 +27,13 @@ _SMOOTHER = 10.0
 
 
 class CollisionFreeProblem(DirectionProblem):
-    """The cost above for one body map, on the device on which the body map is when this is built."""
+    """The cost above for one body map."""
 
     def __init__(self, body_map: BodyMap, margin: float = _MARGIN) -> None:
-        super().__init__(body_map)
-        self.collision, self.margin, self.weight = body_map.collision, margin, _WEIGHTS[-1]
-        self.block_N = torch.zeros_like(self.block_N)
-        self.joints_NC = torch.ones_like(self.joints_NC[:, :1])
-        self.directions_DC = torch.ones_like(self.directions_DC[:, :1])
-
-    def quadratic(self, q_BN: Tensor, target_BD3: Tensor) -> Quadratic:
-        """Cost, with its penalty, and Gauss-Newton model at joint angles (B, N) [rad] for directions (B, D, 3)."""
-        model = super().quadratic(q_BN, target_BD3)
-        near = self.collision.near(q_BN, self.margin)
-        short_X1 = (self.margin - near.distance_X)[:, None]
-        rows_XN = near.jacobian_XN
-        cost_BC = model.cost_BC.index_add(0, near.row_X, self.weight * short_X1.square())
-        gradient_BN = model.gradient_BN.index_add(0, near.row_X, -self.weight * short_X1 * rows_XN)
-        square_XNN = self.weight * rows_XN[:, :, None] * rows_XN[:, None, :]
-        return Quadratic(cost_BC, gradient_BN, model.hessian_BNN.index_add(0, near.row_X, square_XNN))
+        """`margin` [m] that links keep."""
+        contact = SelfCollisionTerm(body_map.collision, margin, _WEIGHTS[-1])
+        super().__init__(body_map, [contact])
+        self.contact, self.collision = contact, body_map.collision
 
 
 def avoid_collisions(
@@ -67,7 +54,7 @@ def avoid_collisions(
     rests_T = torch.zeros(len(q_TN), dtype=torch.bool, device=q_TN.device)
     # Pushed by many contacts, frames find different ways out; at the pull of free motion the way would change often.
     pull = _SMOOTHER * pull
-    close_T = rests_T.index_fill(0, problem.collision.near(q_TN, problem.margin).row_X, True)
+    close_T = rests_T.index_fill(0, problem.collision.near(q_TN, problem.contact.margin).row_X, True)
     if not bool(close_T.any()):
         return q_TN, rests_T
     free_TN = _refine_around(problem, q_TN, close_T, target_TD3, pull)
@@ -90,7 +77,7 @@ def _refine_around(
     """
     near_T, kept_T = (_widen(close_T, reach) for reach in (_REACH, _REACH + 1))
     part_TN = q_TN[kept_T]
-    for problem.weight in _WEIGHTS:
+    for problem.contact.weight in _WEIGHTS:
         part_TN = refine(problem, part_TN, target_TD3[kept_T], pull, fixed_T=~near_T[kept_T])[0]
     found_TN = q_TN.clone()
     found_TN[kept_T] = part_TN
@@ -117,7 +104,7 @@ def _start_again(
     cost_TSC[around_T, 1:] = cost_YC.unflatten(0, (-1, count))
     # Whatever it costs, a candidate that touches is only taken where there is no other.
     touches_TS = problem.collision.collides(candidates_TSN.flatten(0, 1)).unflatten(0, candidates_TSN.shape[:2])
-    return best_path(candidates_TSN, cost_TSC + 10.0 * touches_TS[..., None], problem.joints_NC, pull)[0]
+    return best_path(candidates_TSN, cost_TSC + 10.0 * touches_TS[..., None], problem.blocks.joints_NC, pull)[0]
 
 
 def _rest(problem: CollisionFreeProblem, q_TN: Tensor, touching_T: Tensor) -> Tensor:

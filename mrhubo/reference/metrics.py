@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError, unknown_name
-from mrhubo.robot import BodyMap, Robot
+from mrhubo.robot import BodyMap, LinkPoses, Robot
 from mrhubo.rotation import wrap_angle
 
 _AT_LIMIT = 1e-3
@@ -38,9 +38,12 @@ def link_error(robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence
     return 100 * (position_TL3 - reference_TL3).norm(dim=-1).mean(dim=-1)
 
 
-def direction_error(body_map: BodyMap, q_TN: Tensor, pose_TJ6: Tensor) -> Tensor:
-    """Angle (T, D) [degrees] between the robot's directions and those of human poses (T, 21, 6), from the chest."""
-    robot_TD3 = body_map.robot_directions(body_map.robot.forward(q_TN))
+def direction_error(body_map: BodyMap, q_TN: Tensor, pose_TJ6: Tensor, poses: LinkPoses | None = None) -> Tensor:
+    """Angle (T, D) [degrees] between the robot's directions and those of human poses (T, 21, 6).
+
+    `poses` are the robot's link poses at q, if they are there already.
+    """
+    robot_TD3 = body_map.robot_directions(poses or body_map.robot.forward(q_TN))
     return torch.rad2deg(angle_between(robot_TD3, body_map.human_directions(pose_TJ6)))
 
 

@@ -9,21 +9,23 @@ Legend: T frames (or B independent ones), S starts, D directions, N joints, J = 
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.motion.poses import MotionLike, read_poses
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
-from mrhubo.reference.metrics import angle_between, at_limit_share
+from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
+from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.trajectory import pick, smooth_motion
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, Robot
 
 _REFERENCE_RATE = 24.0
 
@@ -44,36 +46,70 @@ class ReferenceResult:
     """Frames (T,) that `retarget_collision_free` could not free, which hold the nearest free pose."""
 
 
-class ReferenceRetargeter:
-    """Optimisation-based retargeter of one robot; works on the device of its body map. Deterministic for a seed."""
+class OptimizationRetargeter(nn.Module):
+    """Optimisation-based retargeter of one robot. Deterministic for a seed."""
 
-    def __init__(self, body_map: BodyMap, smoothness: float = 0.02, starts: int = 12, seed: int = 0) -> None:
+    def __init__(self, robot: Robot | BodyMap, smoothness: float = 0.02, starts: int = 12, seed: int = 0) -> None:
         """Prepares the starts.
 
         Args:
-            body_map: the robot and what it shares with a human body.
+            robot: a robot that knows which of its links stand for which body part (`Robot.from_urdf`,
+                `Robot.from_config`), or its body map.
             smoothness: weight of |q_t - q_(t-1)|^2 at 24 frames per second [1/rad^2]; at other rates the same for the
                 same velocity. 0: every frame on its own.
             starts: starting points per frame.
             seed: of the random robot poses that serve as starting points.
+
+        Raises:
+            UserError: the robot knows no body parts, or a number makes no sense.
         """
         if not (math.isfinite(smoothness) and smoothness >= 0):
             raise UserError(f"reference retargeter: smoothness must be 0 or more, found {smoothness}")
         if starts < 2:
             raise UserError(f"reference retargeter: needs at least 2 starts, found {starts}")
-        self.body_map, self.smoothness, self.starts, self.seed = body_map, smoothness, starts, seed
-        self._prepare()
-
-    def _prepare(self) -> None:
+        super().__init__()
+        self.body_map = robot if isinstance(robot, BodyMap) else BodyMap.of(robot)
+        self.smoothness, self.starts = smoothness, starts
         self.problem = DirectionProblem(self.body_map)
-        self._pool = StartPool(self.problem, self.starts, self.seed)
-        self.__dict__.pop("_free_problem", None)
+        self._pool = StartPool(self.problem, starts, seed)
+        self._free: CollisionFreeProblem | None = None
 
-    def to(self, device: torch.device | str) -> ReferenceRetargeter:
-        """Moves the body map, in place, and everything built on it."""
-        self.body_map.to(device)
-        self._prepare()
-        return self
+    if TYPE_CHECKING:
+
+        def __call__(self, motion: MotionLike, frame_rate: float | None = None) -> OptimizationResult:
+            """`forward`."""
+            ...
+
+    @torch.no_grad()
+    def forward(self, motion: MotionLike, frame_rate: float | None = None) -> OptimizationResult:
+        """Joint angles of a human motion.
+
+        Args:
+            motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
+                axis-angle [rad] (..., 63) or 6D (..., 21, 6). The answer has its leading axes, of which the last is the
+                time, and the others are motions of their own; none for a single pose.
+            frame_rate: frames per second of an array; a `Motion` has its own. Without one, every frame is solved on its
+                own.
+
+        Raises:
+            UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
+                frame), or the frame rate is not positive.
+        """
+        poses = read_poses(motion, frame_rate)
+        pose_TJ6, shape = poses.pose_TJ6.to(self.problem.device), poses.shape
+        clips = pose_TJ6.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [pose_TJ6]
+        answers = [self._solve(clip_TJ6, poses.frame_rate) for clip_TJ6 in clips if len(clip_TJ6)]
+        robot = self.body_map.robot
+        q_TN = torch.cat(answers) if answers else pose_TJ6.new_zeros(0, len(robot.joint_names))
+        links = robot.forward(q_TN)
+        error_TD = direction_error(self.body_map, q_TN, pose_TJ6, links)
+        found = (q_TN, error_TD, self.body_map.collision.collides(q_TN, links))
+        q, error, collision = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
+        return OptimizationResult(q, robot.joint_names, error, collision, poses.frame_rate)
+
+    def _solve(self, pose_TJ6: Tensor, frame_rate: float | None) -> Tensor:
+        """Joint angles (T, N) [rad] of one motion, or of frames on their own."""
+        return self.solve_frames(pose_TJ6)[0] if frame_rate is None else self.retarget(pose_TJ6, frame_rate).q_TN
 
     @torch.no_grad()
     def retarget(self, pose_TJ6: Tensor, frame_rate: float) -> ReferenceResult:
@@ -114,9 +150,11 @@ class ReferenceRetargeter:
         q_TN, rests_T = avoid_collisions(self._free_problem, self._pool, q_TN.to(target_TD3), target_TD3, pull)
         return self._result(q_TN, target_TD3, frame_rate, rests_T)
 
-    @functools.cached_property
+    @property
     def _free_problem(self) -> CollisionFreeProblem:
-        return CollisionFreeProblem(self.body_map)
+        if self._free is None:
+            self._free = CollisionFreeProblem(self.body_map)
+        return self._free
 
     def _pull(self, frame_rate: float) -> float:
         """Weight of |q_t - q_(t-1)|^2: that of the squared velocity, with the reference rate as the unit of time."""
@@ -130,12 +168,6 @@ class ReferenceRetargeter:
             UserError: the pose has the wrong shape or a frame that is no pose.
         """
         target_BD3 = self._targets(pose_BJ6)
-        q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
-        return q_BN, cost_BC.sum(dim=1)
-
-    @torch.no_grad()
-    def solve_directions(self, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
-        """`solve_frames` for unit directions (B, D, 3), seen from the chest in human axes, in place of poses."""
         q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
         return q_BN, cost_BC.sum(dim=1)
 
@@ -168,7 +200,7 @@ class ReferenceRetargeter:
 
     def _polish(self, candidates_BSN: Tensor, cost_BSC: Tensor, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
         """Each block's best candidate, converged: angles (B, N) and costs (B, C)."""
-        best_BN = pick(candidates_BSN, cost_BSC.argmin(dim=1), self.problem.joints_NC)
+        best_BN = pick(candidates_BSN, cost_BSC.argmin(dim=1), self.problem.blocks.joints_NC)
         return self.problem.minimise(best_BN, target_BD3)
 
     def _result(
@@ -190,7 +222,7 @@ def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
     Both per 1/24 s, whatever the frame rate; a step is counted once per block.
     """
     scale = frame_rate / _REFERENCE_RATE
-    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.joints_NC).amax(dim=1) * scale
+    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
     human_XD = angle_between(target_TD3[1:], target_TD3[:-1])
-    asked_XC = (human_XD[..., None] * problem.directions_DC).amax(dim=1) * scale
+    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC).amax(dim=1) * scale
     return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())

@@ -1,67 +1,58 @@
 """Joint angles whose directions match a human's, frame by frame: batched, bounded Levenberg-Marquardt.
 
-    cost(q) = sum_d w_d |dir_d(q) - dir_d(H)|^2  +  eps * sum_n ((q_n - mid_n) / half_n)^2,      lower <= q <= upper
+    cost(q) = sum of the terms of `terms`,      lower <= q <= upper
 
-The small second term makes a choice where the directions leave one (redundant joints, the twist of a straight arm), the
-same choice for similar poses. Joints fall into blocks (left arm, right arm, neck) that turn different directions, so
-the cost is a sum over blocks: each block of each problem has its own damping, its own steps, and its own best start.
+Joints fall into blocks (left arm, right arm, neck) that share no summand, so the cost is a sum over blocks: each block
+of each problem has its own damping, its own steps, and its own best start.
 
-Legend: B problems, D directions, R rows of their Jacobian (three per direction), N joints, C blocks.
+Legend: B problems, D directions, N joints, C blocks.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from mrhubo.reference.blocks import Blocks
 from mrhubo.reference.jacobian import DirectionJacobian
+from mrhubo.reference.terms import DirectionTerm, PostureTerm, Quadratic, State, Term
 from mrhubo.robot import BodyMap
 
 _CHUNK = {"cpu": 2048, "cuda": 65_536}
 
 
-@dataclass(frozen=True)
-class Quadratic:
-    """Cost of each block at some q, and the Gauss-Newton model around it: the halves of gradient and Hessian."""
+class DirectionProblem(nn.Module):
+    """The cost of one body map: directions and posture, and any further terms."""
 
-    cost_BC: Tensor
-    gradient_BN: Tensor
-    hessian_BNN: Tensor
-
-    def where(self, better_BC: Tensor, block_N: Tensor, other: Quadratic) -> Quadratic:
-        """`other` in the blocks that are better (B, C) or (C,), this one elsewhere."""
-        better_BN = better_BC[..., block_N]
-        return Quadratic(
-            torch.where(better_BC, other.cost_BC, self.cost_BC),
-            torch.where(better_BN, other.gradient_BN, self.gradient_BN),
-            torch.where(better_BN[..., None], other.hessian_BNN, self.hessian_BNN),
-        )
-
-    def rows(self, keep_B: Tensor) -> Quadratic:
-        """Only the problems to keep (B,)."""
-        return Quadratic(self.cost_BC[keep_B], self.gradient_BN[keep_B], self.hessian_BNN[keep_B])
-
-
-class DirectionProblem:
-    """The cost above for one body map, on the device on which the body map is when this is built."""
-
-    def __init__(self, body_map: BodyMap, regularisation: float = 1e-4, hand_weight: float = 0.5) -> None:
+    def __init__(self, body_map: BodyMap, more: Sequence[Term] = ()) -> None:
+        """`more` are terms besides directions and posture."""
+        super().__init__()
         self.body_map, self.robot = body_map, body_map.robot
         self.kinematics = DirectionJacobian(body_map)
-        self.lower_N, self.upper_N = self.robot.lower_N, self.robot.upper_N
-        self.device = self.lower_N.device
-        self.mid_N, self.half_N = (self.upper_N + self.lower_N) / 2, (self.upper_N - self.lower_N) / 2
-        self.ridge_N = regularisation / self.half_N.square()
-        weights = [hand_weight if "hand" in name else 1.0 for name in body_map.direction_names]
-        self.weight_D = torch.tensor(weights, device=self.device)
-        blocks = self.kinematics.blocks
-        self.block_N = torch.tensor([next(c for c, (_, joints) in enumerate(blocks) if n in joints)
-                                     for n in range(len(self.lower_N))], device=self.device)  # fmt: skip
-        self.joints_NC = torch.stack([self.block_N == c for c in range(len(blocks))], dim=1).float()
-        self.directions_DC = torch.tensor([[float(d in directions) for directions, _ in blocks]
-                                           for d in range(len(weights))], device=self.device)  # fmt: skip
+        self.directions = DirectionTerm(self.kinematics)
+        self.posture = PostureTerm(self.robot.lower_N, self.robot.upper_N)
+        terms = [self.directions, self.posture, *more]
+        self.terms = nn.ModuleList(terms)
+        couplings = [joints for term in terms for joints in term.couplings()]
+        blocks = Blocks(couplings, len(self.robot.joint_names), len(body_map.directions))
+        self.blocks = blocks.to(self.robot.lower_N.device)
+
+    @property
+    def lower_N(self) -> Tensor:
+        """Lower joint limits [rad]."""
+        return self.robot.lower_N
+
+    @property
+    def upper_N(self) -> Tensor:
+        """Upper joint limits [rad]."""
+        return self.robot.upper_N
+
+    @property
+    def device(self) -> torch.device:
+        """Where it works."""
+        return self.robot.lower_N.device
 
     @property
     def chunk(self) -> int:
@@ -70,15 +61,13 @@ class DirectionProblem:
 
     def quadratic(self, q_BN: Tensor, target_BD3: Tensor) -> Quadratic:
         """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
-        directions_BD3, jacobian_BD3N = self.kinematics.forward(q_BN)
-        miss_BD3, root_D = directions_BD3 - target_BD3, self.weight_D.sqrt()
-        from_mid_BN = q_BN - self.mid_N
-        cost_BC = (miss_BD3.square().sum(-1) * self.weight_D) @ self.directions_DC
-        cost_BC = cost_BC + (from_mid_BN.square() * self.ridge_N) @ self.joints_NC
-        rows_BRN = (jacobian_BD3N * root_D[:, None, None]).flatten(1, 2)
-        miss_BR1 = (miss_BD3 * root_D[:, None]).flatten(1)[..., None]
-        gradient_BN = (rows_BRN.mT @ miss_BR1)[..., 0] + from_mid_BN * self.ridge_N
-        return Quadratic(cost_BC, gradient_BN, rows_BRN.mT @ rows_BRN + torch.diag(self.ridge_N))
+        state = State(q_BN, self.robot.forward(q_BN), target_BD3)
+        model: Quadratic | None = None
+        for term in self.terms:
+            assert isinstance(term, Term)
+            model = term.add_to(model, state, self.blocks)
+        assert model is not None
+        return model
 
     def frozen(self, q_BN: Tensor, gradient_BN: Tensor) -> Tensor:
         """Active set (B, N): joints at a limit that the gradient's descent would push beyond it."""
@@ -102,14 +91,14 @@ class DirectionProblem:
         damping_BC = torch.full_like(model.cost_BC, 1e-2)
         row_B = torch.arange(len(q_BN), device=q_BN.device)
         for _ in range(steps):
-            trial_BN = q_BN + self.step(q_BN, model, damping_BC[:, self.block_N])
+            trial_BN = q_BN + self.step(q_BN, model, damping_BC[:, self.blocks.block_N])
             trial_BN = torch.clamp(trial_BN, self.lower_N, self.upper_N)
             trial = self.quadratic(trial_BN, target_BD3)
             better_BC = trial.cost_BC < model.cost_BC
-            moved_BC = ((trial_BN - q_BN).abs()[..., None] * self.joints_NC).amax(dim=1)
+            moved_BC = ((trial_BN - q_BN).abs()[..., None] * self.blocks.joints_NC).amax(dim=1)
             stopped_BC = (moved_BC < tolerance) | (~better_BC & (damping_BC > 1e3))
-            q_BN = torch.where(better_BC[:, self.block_N], trial_BN, q_BN)
-            model = model.where(better_BC, self.block_N, trial)
+            q_BN = torch.where(better_BC[:, self.blocks.block_N], trial_BN, q_BN)
+            model = model.where(better_BC, self.blocks.block_N, trial)
             damping_BC = torch.where(better_BC, damping_BC * 0.1, damping_BC * 10).clamp(1e-7, 1e6)
             found_BN[row_B], found_cost_BC[row_B] = q_BN, model.cost_BC
             going_B = ~stopped_BC.all(dim=1)

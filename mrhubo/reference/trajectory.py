@@ -1,6 +1,6 @@
 """From candidates per frame to one smooth motion: the best path through them, then all frames refined together.
 
-    cost(q_1 .. q_T) = sum_t cost_t(q_t)  +  pull * sum_t |q_t - q_(t-1)|^2
+    cost(q_1 .. q_T) = sum_t cost_t(q_t)  +  pull * sum_t |q_t - q_(t-1)|^2        (`terms.smoothness`)
 
 Blocks of joints (see `solve`) share no term, so each has its own path, its own damping and its own accepted steps.
 
@@ -14,7 +14,8 @@ import torch
 from scipy.linalg import solveh_banded
 from torch import Tensor
 
-from mrhubo.reference.solve import DirectionProblem, Quadratic
+from mrhubo.reference.solve import DirectionProblem
+from mrhubo.reference.terms import Quadratic, add_pull, pull_diagonal
 
 _PART = 512
 _PATIENCE = 5.0
@@ -26,15 +27,15 @@ def smooth_motion(
     problem: DirectionProblem, candidates_TSN: Tensor, cost_TSC: Tensor, target_TD3: Tensor, pull: float
 ) -> Tensor:
     """The cheapest motion (T, N) [rad] that is found from candidates (T, S, N) with their blocks' costs (T, S, C)."""
-    path_TN, path_cost_TC = best_path(candidates_TSN, cost_TSC, problem.joints_NC, pull)
+    path_TN, path_cost_TC = best_path(candidates_TSN, cost_TSC, problem.blocks.joints_NC, pull)
     motion_TN, cost_C = refine(problem, path_TN, target_TD3, pull)
     more_TSN, more_cost_TSC = _bridge(problem, path_TN, path_cost_TC, target_TD3)
     if more_TSN.shape[1]:
         candidates_TSN, cost_TSC = torch.cat((candidates_TSN, more_TSN), 1), torch.cat((cost_TSC, more_cost_TSC), 1)
-        other_TN = best_path(candidates_TSN, cost_TSC, problem.joints_NC, pull)[0]
+        other_TN = best_path(candidates_TSN, cost_TSC, problem.blocks.joints_NC, pull)[0]
         if bool(((other_TN - path_TN).abs() > _JUMP).any()):
             other_TN, other_cost_C = refine(problem, other_TN, target_TD3, pull)
-            motion_TN = torch.where((other_cost_C < cost_C)[problem.block_N], other_TN, motion_TN)
+            motion_TN = torch.where((other_cost_C < cost_C)[problem.blocks.block_N], other_TN, motion_TN)
     return motion_TN
 
 
@@ -109,8 +110,8 @@ def refine(
     damping_TC = torch.full_like(model.cost_BC, 1e-3)
     failures_C = torch.zeros_like(cost_C)
     for _ in range(sweeps):
-        running_N = (failures_C < _PATIENCE)[problem.block_N]
-        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC[:, problem.block_N], pull, fixed_T)
+        running_N = (failures_C < _PATIENCE)[problem.blocks.block_N]
+        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC[:, problem.blocks.block_N], pull, fixed_T)
         trial_TN = torch.where(running_N, torch.clamp(trial_TN, problem.lower_N, problem.upper_N), q_TN)
         trial = _motion_quadratic(problem, trial_TN, target_TD3, pull)
         trial_cost_C = trial.cost_BC.double().sum(0)
@@ -118,9 +119,9 @@ def refine(
         settled_C = better_C & (trial_cost_C > cost_C * (1 - tolerance))
         failures_C = torch.where(better_C, torch.where(settled_C, _PATIENCE, 0), failures_C + 1)
         damping_TC = torch.where(trial.cost_BC > model.cost_BC, damping_TC * 10, damping_TC * 0.1).clamp(1e-3, 1e6)
-        q_TN = torch.where(better_C[problem.block_N], trial_TN, q_TN)
+        q_TN = torch.where(better_C[problem.blocks.block_N], trial_TN, q_TN)
         cost_C = torch.where(better_C, trial_cost_C, cost_C)
-        model = model.where(better_C, problem.block_N, trial)
+        model = model.where(better_C, problem.blocks.block_N, trial)
         if bool((failures_C >= _PATIENCE).all()):
             break
     return q_TN, cost_C
@@ -130,13 +131,12 @@ def _motion_quadratic(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tenso
     """The model of each frame, with the pull in gradients and in costs (half of a step's in each of its two frames)."""
     chunks = zip(q_TN.split(problem.chunk), target_TD3.split(problem.chunk), strict=True)
     parts = [problem.quadratic(*chunk) for chunk in chunks]
-    moved_TN = torch.nn.functional.pad(q_TN.diff(dim=0), (0, 0, 1, 1))
-    pulls_TC = pull / 2 * moved_TN.square() @ problem.joints_NC
-    return Quadratic(
-        torch.cat([part.cost_BC for part in parts]) + pulls_TC[1:] + pulls_TC[:-1],
-        torch.cat([part.gradient_BN for part in parts]) + pull * (moved_TN[:-1] - moved_TN[1:]),
+    model = Quadratic(
+        torch.cat([part.cost_BC for part in parts]),
+        torch.cat([part.gradient_BN for part in parts]),
         torch.cat([part.hessian_BNN for part in parts]),
     )
+    return add_pull(model, q_TN, pull, problem.blocks.joints_NC)
 
 
 def _motion_step(
@@ -150,9 +150,7 @@ def _motion_step(
     both_TNN = free_TN[:, :, None] & free_TN[:, None, :]
     system_TNN = (model.hessian_BNN * both_TNN).double().cpu().numpy()
     diagonal_TN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1)
-    neighbours_T1 = torch.full((frames, 1), 2.0, device=q_TN.device)
-    neighbours_T1[0], neighbours_T1[-1] = 1.0, 1.0
-    diagonal_TN = diagonal_TN + pull * neighbours_T1 + damping_TN * (diagonal_TN + 0.01)
+    diagonal_TN = diagonal_TN + pull_diagonal(frames, pull, diagonal_TN) + damping_TN * (diagonal_TN + 0.01)
     # Lower banded form: row k holds the entries k below the diagonal; the next frame's same joint is `joints` below.
     banded = np.zeros((joints + 1, frames, joints))
     banded[0] = torch.where(free_TN, diagonal_TN, torch.ones_like(diagonal_TN)).cpu().numpy()

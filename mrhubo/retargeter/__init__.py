@@ -1,17 +1,9 @@
-"""The retargeter: networks, their training, and the package that a user takes away."""
+"""The retargeter: networks, and the package that a user takes away."""
 
-from mrhubo.fitting.module import LOG_EVERY, RetargetModule
+from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.features import PoseFeatures
 from mrhubo.retargeter.networks import RetargetNetwork
-from mrhubo.retargeter.package import POLISH, Retargeter, RetargetResult, build_network
+from mrhubo.retargeter.package import POLISH, Retargeter
+from mrhubo.retargeter.result import RetargetResult
 
-__all__ = [
-    "LOG_EVERY",
-    "POLISH",
-    "PoseFeatures",
-    "RetargetModule",
-    "RetargetNetwork",
-    "RetargetResult",
-    "Retargeter",
-    "build_network",
-]
+__all__ = ["POLISH", "PoseFeatures", "RetargetNetwork", "RetargetResult", "Retargeter", "build_network"]

@@ -1,8 +1,8 @@
 """The trained retargeter as a folder that carries all it needs: weights, URDF, settings, joint names, limits, units.
 
     retargeter = Retargeter.load("package")
+    result = retargeter(motion)                     # joint angles, with a confidence for each frame
     q_TN = retargeter.predict(pose_TJ6)             # the two networks alone, microseconds a frame
-    result = retargeter.retarget(pose_TJ6)          # and a step of optimisation, with a confidence for each frame
 
 Legend: T frames, J = 21 human joints, N robot joints, D directions.
 """
@@ -13,12 +13,12 @@ import copy
 import functools
 import json
 import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
@@ -26,82 +26,49 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
-from mrhubo.reference import DirectionJacobian, DirectionProblem, direction_error
-from mrhubo.retargeter.features import PoseFeatures
-from mrhubo.retargeter.networks import Branch, RetargetNetwork
+from mrhubo.motion import MotionLike, read_poses
+from mrhubo.reference import DirectionProblem, direction_error
+from mrhubo.retargeter.architecture import build_network
+from mrhubo.retargeter.confidence import confidence
+from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.retargeter.result import RetargetResult
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 
 SCHEMA = "mrhubo.retargeter/3"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
-_AGREEMENT_DEG = 20.0
 POLISH = 1
 """Steps of optimisation that `retarget` makes after the networks, unless told otherwise."""
 
 
-@dataclass(frozen=True)
-class RetargetResult:
-    """Joint angles and how far to trust them."""
+class Retargeter(nn.Module):
+    """A trained network with its robot, on the CPU unless `to`, `cuda` or `cpu` moves it.
 
-    q_TN: Tensor
-    """Joint angles [rad], inside the limits."""
-    confidence_T: Tensor
-    """0..1: plausibility of the human pose times agreement of the robot's limbs with the human's."""
-    direction_error_deg_TD: Tensor
-    """Angle [deg] between the robot's and the human's limb, hand and head directions."""
-    phi_T: Tensor
-    """Reconstruction error of the human pose under the body prior."""
-    collision_T: Tensor
-    """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it."""
-
-
-def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
-    """An untrained network for a config's robot and `model` section.
-
-    Raises:
-        UserError: an input joint does not exist, or a branch would see none.
+    Not made for training: its weights take no gradients, and its answers have none.
     """
-    model, robot, blocks = config.model, body_map.robot, DirectionJacobian(body_map).blocks
-    turned = [direction for directions, _ in blocks for direction in directions]
-    features = PoseFeatures(model.input_joints or body_map.input_joints(turned), model.input_frame)
-    return RetargetNetwork(
-        features,
-        robot.lower_N,
-        robot.upper_N,
-        model.stages,
-        model.hidden,
-        model.layers,
-        model.bound_output,
-        model.residual,
-        _branches(body_map, blocks, features.input_joints) if model.branches else (),
-    )
 
-
-def _branches(body_map: BodyMap, blocks: Sequence[tuple[set[int], set[int]]], inputs: Sequence[str]) -> list[Branch]:
-    """Of each branch its joints and its human joints; a human joint that belongs to no branch is seen by all."""
-    own = [body_map.input_joints(directions) for directions, _ in blocks]
-    shared = set(inputs).difference(*own)
-    found = []
-    for names, (_, joints) in zip(own, blocks, strict=True):
-        seen = tuple(i for i, name in enumerate(inputs) if name in names or name in shared)
-        if not seen:
-            moved = ", ".join(body_map.robot.joint_names[n] for n in sorted(joints))
-            raise UserError(
-                f"model.input_joints: nothing tells the angles of {moved}; add one of {', '.join(names)}, or set"
-                " model.branches to false"
-            )
-        found.append(Branch(seen, tuple(sorted(joints))))
-    return found
-
-
-class Retargeter:
-    """A trained network with its robot; on the CPU unless `to` moves it."""
+    network: RetargetNetwork
+    prior: BodyPrior
+    body_map: BodyMap
 
     def __init__(
         self, network: RetargetNetwork, body_map: BodyMap, prior: BodyPrior, config: Config, phi_threshold: float
     ) -> None:
+        super().__init__()
         self.network = network.requires_grad_(False).eval()
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
+        """What every move of a module comes down to: the robot, and what is built on it, moves along."""
+        super()._apply(fn, recurse)
+        self.body_map.to(self.device)
+        self.__dict__.pop("directions", None)
+        return self
+
+    @property
+    def device(self) -> torch.device:
+        """Where the networks are, and the answers will be."""
+        return self.network.limited.lower_N.device
 
     @property
     def collision(self) -> SelfCollision:
@@ -117,6 +84,29 @@ class Retargeter:
     def joint_names(self) -> tuple[str, ...]:
         """Joints of the output, in order."""
         return self.body_map.robot.joint_names
+
+    if TYPE_CHECKING:
+
+        def __call__(self, motion: MotionLike, polish: int = POLISH, frame_rate: float | None = None) -> RetargetResult:
+            """`forward`."""
+            ...
+
+    def forward(self, motion: MotionLike, polish: int = POLISH, frame_rate: float | None = None) -> RetargetResult:
+        """Joint angles of a human motion, with a confidence for each frame.
+
+        Args:
+            motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
+                axis-angle [rad] (..., 63) or 6D (..., 21, 6). The answer has its leading axes: none for a single pose.
+                No frames give an empty answer.
+            polish: steps of optimisation after the networks, see `predict`.
+            frame_rate: frames per second of an array; a `Motion` has its own. The angles do not depend on it.
+
+        Raises:
+            UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
+                frame), `polish` is negative, or the frame rate is not positive.
+        """
+        poses = read_poses(motion, frame_rate)
+        return self.retarget(poses.pose_TJ6, polish).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
     def predict(self, pose_TJ6: Tensor, polish: int = 0) -> Tensor:
@@ -137,11 +127,11 @@ class Retargeter:
         finite = torch.isfinite(pose_TJ6).all(dim=2).all(dim=1)
         if not bool(finite.all()):
             raise UserError(f"human pose {int((~finite).nonzero()[0, 0])} holds NaN or infinite numbers")
-        q_TN = self.network(pose_TJ6.float())
+        pose_TJ6 = pose_TJ6.to(self.device, torch.float32)
+        q_TN = self.network(pose_TJ6)
         if not polish or not len(q_TN):
             return q_TN
-        target_TD3 = self.body_map.human_directions(pose_TJ6.float())
-        return self.directions.minimise(q_TN, target_TD3, steps=polish)[0]
+        return self.directions.minimise(q_TN, self.body_map.human_directions(pose_TJ6), steps=polish)[0]
 
     @torch.no_grad()
     def retarget(self, pose_TJ6: Tensor, polish: int = POLISH) -> RetargetResult:
@@ -149,12 +139,13 @@ class Retargeter:
         `predict`.
         """
         q_TN = self.predict(pose_TJ6, polish)
-        pose_TJ6 = pose_TJ6.float()
-        error_TD = direction_error(self.body_map, q_TN, pose_TJ6)
+        pose_TJ6 = pose_TJ6.to(self.device, torch.float32)
+        poses = self.body_map.robot.forward(q_TN)
+        error_deg_TD = direction_error(self.body_map, q_TN, pose_TJ6, poses)
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
-        plausible = (self.phi_threshold / phi_T.clamp_min(1e-12)).clamp(max=1.0)
-        agreement = torch.exp(-(error_TD.mean(dim=1) / _AGREEMENT_DEG).square())
-        return RetargetResult(q_TN, plausible * agreement, error_TD, phi_T, self.collision.collides(q_TN))
+        trust_T = confidence(phi_T, self.phi_threshold, error_deg_TD)
+        collision_T = self.collision.collides(q_TN, poses)
+        return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, collision_T)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""

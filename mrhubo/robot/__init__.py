@@ -3,6 +3,7 @@
 from mrhubo.robot.alignment import align_pose
 from mrhubo.robot.body_map import BodyMap, build_body_map
 from mrhubo.robot.collision import SelfCollision
+from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, varied
 from mrhubo.robot.model import LinkPoses, Robot
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
@@ -10,7 +11,10 @@ from mrhubo.robot.urdf import link_poses, load_urdf
 
 __all__ = [
     "ROBOT_COLOR",
+    "Axis",
     "BodyMap",
+    "Keypoints",
+    "Limb",
     "LinkGeometry",
     "LinkPoses",
     "ManualScale",
@@ -22,5 +26,6 @@ __all__ = [
     "load_urdf",
     "read_collision_geometry",
     "read_geometry",
+    "read_keypoints",
     "varied",
 ]

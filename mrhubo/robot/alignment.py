@@ -2,7 +2,7 @@
 
 Latent inverse kinematics ends where prior and keypoints balance: a pose of Reachy's misses its head by 12 degrees and
 its hands by 14 to 24, and a network trained on that turns robots' heads and hands too far. What is left of the way is
-gone here, by the smallest turn of each joint, from the shoulders outwards; the rest of the pose stays.
+gone here, by the smallest turn of each joint, from the trunk outwards; the rest of the pose stays.
 
 Legend: B batch, D directions, J = 21 human joints.
 """
@@ -13,40 +13,45 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body.skeleton import JOINT_NAMES, PARENTS
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
 from mrhubo.robot.body_map import BodyMap
-from mrhubo.robot.parts import ENDS, joint_of, limb_of, turn_of
-
-_CHEST = JOINT_NAMES.index("spine3")
-_NECK = JOINT_NAMES.index("neck")
+from mrhubo.robot.parts import LimbPart, OrientedPart
 
 
 def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> Tensor:
     """Local rotations (B, 21, 3, 3) of the poses whose `BodyMap.human_directions` are the given ones.
 
-    An upper arm or forearm turns about the axis across its old and new direction, so that no twist is added. A hand
-    turns at the wrist; neck and head share the head's turn.
+    A limb turns about the axis across its old and new direction, so that no twist is added. An oriented part turns at
+    its joint; joints that share its turn (neck and head) do so in equal parts.
 
     Args:
         body_map: the robot's body map.
         local_BJ33: local rotations (B, 21, 3, 3) of the poses to start from.
-        direction_BD3: unit directions (B, D, 3), seen from the chest, in human axes (`BodyMap.robot_directions`).
+        direction_BD3: unit directions (B, D, 3), as of `BodyMap.robot_directions`.
     """
     pose = _Pose(local_BJ33, body_map.skeleton.global_rotations(local_BJ33))
     rest_K3 = body_map.skeleton.rest_K3
-    wanted = dict(zip(body_map.direction_names, (direction_BD3 @ pose.of(_CHEST).mT).unbind(1), strict=True))
-    for d in body_map.directions:
-        if d.axis_3 is None:
-            inner, outer = (JOINT_NAMES.index(name) for name in limb_of(d.name))
-            bone_3 = torch.nn.functional.normalize(rest_K3[outer] - rest_K3[inner], dim=0)
-            pose.turn(inner, _shortest_turn(pose.of(inner) @ bone_3, wanted[d.name]))
-    for end in body_map.ends:
-        joint = JOINT_NAMES.index(joint_of(end))
-        orientation_B33 = turn_of(end, *(wanted[f"{end}_{word}"] for word in ENDS[end]))
-        if end == "head":
-            missing = rotation.matrix_to_axis_angle(orientation_B33 @ pose.of(joint).mT)
-            pose.turn(_NECK, rotation.axis_angle_to_matrix(missing / 2))
-        pose.turn(joint, orientation_B33 @ pose.of(joint).mT)
+    column = {name: i for i, name in enumerate(body_map.direction_names)}
+    view_joint = {part.name: JOINT_NAMES.index(part.joint) for part in body_map.keypoints.parts}
+    from_pelvis: dict[str, Tensor] = {}
+    """All directions, by the part from which they are seen: a part is turned before others are seen from it."""
+    for part in body_map.keypoints.parts:
+        if not part.seen_from:
+            continue
+        if part.seen_from not in from_pelvis:
+            from_pelvis[part.seen_from] = direction_BD3 @ pose.of(view_joint[part.seen_from]).mT
+        wanted = [from_pelvis[part.seen_from][:, column[name]] for name in part.direction_names]
+        joint = JOINT_NAMES.index(part.joint)
+        if isinstance(part, LimbPart):
+            start, end = (KEYPOINT_NAMES.index(name) for name in (part.start, part.end))
+            bone_3 = torch.nn.functional.normalize(rest_K3[end] - rest_K3[start], dim=0)
+            pose.turn(joint, _shortest_turn(pose.of(joint) @ bone_3, wanted[0]))
+        elif isinstance(part, OrientedPart):
+            orientation_B33 = part.turn(*wanted)
+            for shares, name in zip(range(len(part.turned_by), 1, -1), part.turned_by, strict=False):
+                missing = rotation.matrix_to_axis_angle(orientation_B33 @ pose.of(joint).mT)
+                pose.turn(JOINT_NAMES.index(name), rotation.axis_angle_to_matrix(missing / shares))
+            pose.turn(joint, orientation_B33 @ pose.of(joint).mT)
     return pose.local()
 
 
@@ -59,12 +64,14 @@ class _Pose:
 
     def of(self, joint: int) -> Tensor:
         """A joint's rotation (B, 3, 3) relative to the pelvis."""
-        parent = PARENTS[joint]
         if joint in self._turned:
             return self._turned[joint]
-        if parent in self._turned:
-            return self._turned[parent] @ self._local_BJ33[:, joint - 1]
+        if joint > 0 and self._moved(PARENTS[joint]):
+            return self.of(PARENTS[joint]) @ self._local_BJ33[:, joint - 1]
         return self._global_BJ33[:, joint]
+
+    def _moved(self, joint: int) -> bool:
+        return any(above in self._turned for above in ancestors(joint))
 
     def turn(self, joint: int, turn_B33: Tensor) -> None:
         """Turns a joint by rotations (B, 3, 3) in the pelvis's frame."""

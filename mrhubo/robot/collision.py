@@ -19,12 +19,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
-import yourdfpy
-from torch import Tensor
+from torch import Tensor, nn
 
 from mrhubo.robot.model import LinkPoses, Robot
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry
-from mrhubo.robot.urdf import link_poses, load_urdf
+from mrhubo.robot.urdf import link_poses
 
 _SAMPLES = 2_000
 _ALWAYS = 0.5
@@ -52,26 +51,36 @@ class Contacts:
     """
 
 
-class SelfCollision:
-    """Capsule pairs of one robot; built for the device on which the robot is."""
+class SelfCollision(nn.Module):
+    """Capsule pairs of one robot, on the robot's device."""
+
+    _children_A: Tensor
+    _axes_A3: Tensor
+    _rotary_A: Tensor
+    _above_LA: Tensor
+    _body_C: Tensor
+    _ends_C23: Tensor
+    _radius_C: Tensor
+    _reach_C: Tensor
+    _pair_2P: Tensor
 
     def __init__(self, robot: Robot) -> None:
-        """Reads the collision geometry.
-
-        Raises:
-            UserError: the URDF cannot be read.
-        """
-        urdf, device = load_urdf(robot.urdf), robot.lower_N.device
+        """Takes the collision geometry of the URDF that the robot was read from."""
+        super().__init__()
+        self.robot = robot
         joints = [robot.description.joints[name] for name in robot.driven_joints]
-        self.robot = robot.with_links([joint.child for joint in joints])
-        self._children = [self.robot.link_index(joint.child) for joint in joints]
-        self._axes_A3 = torch.tensor(np.array([joint.axis_3 for joint in joints]), dtype=torch.float32, device=device)
-        self._rotary_A = torch.tensor([float(joint.rotary) for joint in joints], device=device)
         self._bodies = [robot.description.root, *(joint.child for joint in joints)]
         above = [{joint.name for joint in robot.description.joints_above(link)} for link in self._bodies]
-        self._above_LA = torch.tensor([[float(j.name in names) for j in joints] for names in above], device=device)
-        self._read_capsules(urdf)
+        self._keep("_children_A", torch.tensor([robot.link_index(joint.child) for joint in joints]))
+        self._keep("_axes_A3", torch.tensor(np.array([joint.axis_3 for joint in joints]), dtype=torch.float32))
+        self._keep("_rotary_A", torch.tensor([float(joint.rotary) for joint in joints]))
+        self._keep("_above_LA", torch.tensor([[float(j.name in names) for j in joints] for names in above]))
+        self._read_capsules()
         self._choose_pairs({frozenset((joint.child, self._body(joint.parent))) for joint in joints})
+
+    def _keep(self, name: str, tensor: Tensor) -> None:
+        """A constant, where the robot is."""
+        self.register_buffer(name, tensor.to(self.robot.lower_N.device), persistent=False)
 
     def _body(self, link: str) -> str:
         """The link that stands for all that move with this one."""
@@ -79,8 +88,9 @@ class SelfCollision:
         found = (joint.child for joint in above if joint.name in self.robot.driven_joints)
         return next(found, self.robot.description.root)
 
-    def _read_capsules(self, urdf: yourdfpy.URDF) -> None:
-        shapes, device = read_collision_geometry(urdf), self._above_LA.device
+    def _read_capsules(self) -> None:
+        urdf = self.robot.description.parsed
+        shapes = read_collision_geometry(urdf)
         shaped = {shape.link for shape in shapes}
         self.uncovered = tuple(x.name for x in urdf.robot.links if x.collisions and x.name not in shaped)
         """Links whose collision geometry is of meshes alone, which are not looked at."""
@@ -94,10 +104,10 @@ class SelfCollision:
                 ends.append((start_3, end_3))
                 radii.append(radius)
         body_C = [self._bodies.index(self._body(link)) for link in self._links]
-        self._body_C = torch.tensor(body_C, dtype=torch.long, device=device)
-        self._ends_C23 = torch.tensor(np.array(ends, dtype=np.float32).reshape(-1, 2, 3), device=device)
-        self._radius_C = torch.tensor(radii, dtype=torch.float32, device=device)
-        self._reach_C = (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C
+        self._keep("_body_C", torch.tensor(body_C, dtype=torch.long))
+        self._keep("_ends_C23", torch.tensor(np.array(ends, dtype=np.float32).reshape(-1, 2, 3)))
+        self._keep("_radius_C", torch.tensor(radii, dtype=torch.float32))
+        self._keep("_reach_C", (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C)
 
     def _choose_pairs(self, neighbours: set[frozenset[str]]) -> None:
         """All pairs of capsules of different bodies that can be kept apart; `neighbours` share a joint."""
@@ -109,7 +119,7 @@ class SelfCollision:
             chosen = [pair for pair, good in zip(every, wanted, strict=True) if good]
             return torch.tensor(chosen, dtype=torch.long, device=self._body_C.device).reshape(-1, 2).T.contiguous()
 
-        self._pair_2P = keep([names not in neighbours for names in both])
+        self._keep("_pair_2P", keep([names not in neighbours for names in both]))
         near = self.near(self.robot.sample(_SAMPLES, torch.Generator().manual_seed(0)), 0.0)
         often_P = torch.bincount(near.pair_X, minlength=self._pair_2P.shape[1]) > _ALWAYS * _SAMPLES
         first = self._pair_2P[:, often_P].T.tolist()
@@ -121,25 +131,34 @@ class SelfCollision:
         """The links (a, b) of each pair."""
         return tuple((self._links[i], self._links[j]) for i, j in self._pair_2P.T.tolist())
 
-    def collides(self, q_BN: Tensor) -> Tensor:
-        """Whether any pair overlaps (B,), at joint angles (B, N) [rad]."""
+    def collides(self, q_BN: Tensor, poses: LinkPoses | None = None) -> Tensor:
+        """Whether any pair overlaps (B,), at joint angles (B, N) [rad]; `poses` as for `near`."""
         found_B = torch.zeros(len(q_BN), dtype=torch.bool, device=q_BN.device)
-        found_B[self.near(q_BN, 0.0).row_X] = True
+        found_B[self.near(q_BN, 0.0, poses).row_X] = True
         return found_B
 
-    def near(self, q_BN: Tensor, margin: float) -> Contacts:
-        """The pairs that are closer than `margin` [m] at joint angles (B, N) [rad]."""
+    def near(self, q_BN: Tensor, margin: float, poses: LinkPoses | None = None) -> Contacts:
+        """The pairs that are closer than `margin` [m] at joint angles (B, N) [rad].
+
+        `poses` are what `Robot.forward` gives for these angles, if they are there already.
+        """
         parts = []
         for first in range(0, max(1, len(q_BN)), _CHUNK):
-            part = self._near(self.robot.forward(q_BN[first : first + _CHUNK]), margin)
+            part = self._near(self._poses(q_BN, poses, slice(first, first + _CHUNK)), margin)
             parts.append(Contacts(part.row_X + first, *(getattr(part, f.name) for f in fields(Contacts)[1:])))
         return Contacts(*(torch.cat([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
 
+    def _poses(self, q_BN: Tensor, poses: LinkPoses | None, rows: slice) -> LinkPoses:
+        if poses is None:
+            return self.robot.forward(q_BN[rows])
+        return LinkPoses(poses.rotation_BL33[rows], poses.position_BL3[rows])
+
     def _near(self, poses: LinkPoses, margin: float) -> Contacts:
-        count = len(poses.position_BL3)
-        eye_B133 = torch.eye(3, device=poses.position_BL3.device).expand(count, 1, 3, 3)
-        rotation_BL33 = torch.cat((eye_B133, poses.rotation_BL33[:, self._children]), dim=1)
-        position_BL3 = torch.cat((eye_B133[..., 0] * 0, poses.position_BL3[:, self._children]), dim=1)
+        rotation_BA33 = poses.rotation_BL33.index_select(1, self._children_A)
+        position_BA3 = poses.position_BL3.index_select(1, self._children_A)
+        eye_B133 = torch.eye(3, dtype=position_BA3.dtype, device=position_BA3.device).expand(len(position_BA3), 1, 3, 3)
+        rotation_BL33 = torch.cat((eye_B133, rotation_BA33), dim=1)
+        position_BL3 = torch.cat((eye_B133[..., 0] * 0, position_BA3), dim=1)
         ends_BC23 = self._ends_C23 @ rotation_BL33[:, self._body_C].mT + position_BL3[:, self._body_C, None]
         # The spheres around the capsules tell cheaply which pairs need a closer look.
         i_P, j_P = self._pair_2P

@@ -3,7 +3,8 @@
 Everything is in the robot's base frame, in metres: a keypoint is a link's position (or a weighted mean of several, or
 none) plus a constant; upper arms and forearms are lengthened along themselves, and what hangs on them moves along; all
 points are shifted, then scaled. The result, turned into human axes, is placed with its pelvis on the human's: the
-body prior moves no root, so a shift of all points is there to hold the authors' numbers and changes nothing.
+body prior moves no root, so a shift of all points is there to hold the authors' numbers and changes nothing; whoever
+gives one is told so.
 
 Figuera, Park, Ahn: MR.HuBo, IROS 2024, section III, and its published code.
 
@@ -14,15 +15,17 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from mrhubo.body.skeleton import KEYPOINT_NAMES, keypoint_indices
 from mrhubo.config import ManualScaleConfig
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.frames import base_to_human
 from mrhubo.robot.entries import read_vector
 from mrhubo.robot.model import LinkPoses, Robot
 
@@ -35,12 +38,14 @@ _NUMBERS = {
     if "low" in field.metadata
 }
 """The numbers that stand alone, with the range that the config allows."""
-HUMAN_FROM_BASE = (1, 2, 0)
-"""The base frame's axes (forward, left, up) that are the human's left, up and forward (REP 103 and SMPL)."""
 
 
-class ManualScale:
+class ManualScale(nn.Module):
     """Target keypoints of one robot by the numbers of `robot.manual`."""
+
+    shift_3: Tensor
+    weight_KL: Tensor
+    offset_K3: Tensor
 
     def __init__(self, config: ManualScaleConfig) -> None:
         """Checks the entries.
@@ -48,6 +53,7 @@ class ManualScale:
         Raises:
             UserError: a keypoint does not exist, or an entry is none of the forms; names it.
         """
+        super().__init__()
         self.config = config
         self._entries: dict[str, tuple[dict[str, float], tuple[float, float, float]]] = {}
         for name, value in config.keypoints.items():
@@ -58,9 +64,17 @@ class ManualScale:
             raise UserError("robot.manual.keypoints: 'pelvis' is missing; the others are placed relative to it")
         if len(self._entries) < 2:
             raise UserError("robot.manual.keypoints: names the pelvis alone; name what is to be matched")
-        self.shift_3 = torch.tensor(read_vector("robot.manual.shift", config.shift))
+        shift_3 = torch.tensor(read_vector("robot.manual.shift", config.shift))
+        self.register_buffer("shift_3", shift_3, persistent=False)
+        if bool(shift_3.any()):
+            warnings.warn(
+                f"robot.manual.shift: {list(config.shift)} moves nothing, because all keypoints are placed relative to "
+                "the pelvis; to move the others, add the opposite to the offset of robot.manual.keypoints.pelvis",
+                stacklevel=2,
+            )
         self.keypoint_names = tuple(self._entries)
         self.keypoint_indices = keypoint_indices(self.keypoint_names)
+        self._place = {name: row for row, name in enumerate(self.keypoint_names)}
 
     @property
     def links(self) -> list[str]:
@@ -69,22 +83,18 @@ class ManualScale:
 
     def prepare(self, robot: Robot) -> None:
         """Looks the links up in a robot that computes the poses of all of them."""
-        self._weight_KL = torch.zeros(len(self._entries), len(robot.links))
+        weight_KL = torch.zeros(len(self._entries), len(robot.links))
         for row, (weights, _) in enumerate(self._entries.values()):
             for link, weight in weights.items():
-                self._weight_KL[row, robot.link_index(link)] = weight / sum(weights.values())
-        self._offset_K3 = torch.tensor([offset for _, offset in self._entries.values()])
-        self._place = {name: row for row, name in enumerate(self.keypoint_names)}
-
-    def to(self, device: torch.device | str) -> ManualScale:
-        """Moves the constants, in place."""
-        for name in ("shift_3", "_weight_KL", "_offset_K3"):
-            setattr(self, name, getattr(self, name).to(device))
-        return self
+                weight_KL[row, robot.link_index(link)] = weight / sum(weights.values())
+        self.register_buffer("weight_KL", weight_KL, persistent=False)
+        offset_K3 = torch.tensor([offset for _, offset in self._entries.values()])
+        self.register_buffer("offset_K3", offset_K3, persistent=False)
+        self.to(robot.lower_N)
 
     def targets(self, poses: LinkPoses) -> Tensor:
         """Target keypoints (B, K, 3) [m], human frame, of robot poses."""
-        base_BK3 = self._weight_KL @ poses.position_BL3 + self._offset_K3
+        base_BK3 = self.weight_KL @ poses.position_BL3 + self.offset_K3
         moved_BK3 = base_BK3.clone()
         for side in _SIDES:
             shoulder, elbow, wrist = (self._place.get(f"{side}_{part}") for part in ("shoulder", "elbow", "wrist"))
@@ -96,7 +106,7 @@ class ManualScale:
                 more_B13 = self.config.forearm * (base_BK3[:, [wrist]] - base_BK3[:, [elbow]])
                 moved_BK3[:, [wrist, *hand]] += more_B13
         scaled_BK3 = (moved_BK3 + self.shift_3) * self.config.factor
-        human_BK3 = scaled_BK3[..., HUMAN_FROM_BASE]
+        human_BK3 = base_to_human(scaled_BK3)
         pelvis = self._place["pelvis"]
         return human_BK3 - human_BK3[:, [pelvis]]
 

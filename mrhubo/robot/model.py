@@ -2,24 +2,29 @@
 
 Frame: the robot's base frame is the root link of its URDF (x forward, y left, z up for a robot that follows REP 103).
 Legend: B batch, N joints that are sampled and predicted (`joint_names`), M = N links that they carry (`moving_links`),
-L links whose pose is computed (`links`), A angles of the kinematic chain (N joints, mimicking and held ones).
+L links whose pose is computed (`links`), A angles of the kinematic chain (N joints, mimicking and held ones), D of them
+driven by the N joints.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pytorch_kinematics as pk
 import torch
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 from scipy.spatial.transform import Rotation
-from torch import Tensor
+from torch import Tensor, nn
 
 from mrhubo import rotation
+from mrhubo.config import load_config
+from mrhubo.config.shipped import shipped_root
 from mrhubo.errors import UserError
+from mrhubo.robot.chain import build_chain
+from mrhubo.robot.keypoints import Keypoints, read_keypoints
 from mrhubo.robot.urdf import Description, describe, joint_range
 
 
@@ -31,12 +36,22 @@ class LinkPoses:
     position_BL3: Tensor
 
 
-class Robot:
-    """Joints, limits and batched forward kinematics of one robot. Tensors live on the device of `to`."""
+class Robot(nn.Module):
+    """Joints, limits and batched forward kinematics of one robot."""
+
+    lower_N: Tensor
+    """Lower joint limits [rad]."""
+    upper_N: Tensor
+    """Upper joint limits [rad]."""
+    select_AN: Tensor
+    constant_A: Tensor
+    _frames: Tensor
+    drive_DN: Tensor
+    """Angles of `driven_joints` per unit of q (1 for a joint itself, the multiplier for one that mimics it)."""
 
     def __init__(
         self,
-        urdf: Path,
+        urdf: Path | Description,
         joints: Sequence[str],
         links: Iterable[str] = (),
         ranges: Mapping[str, list[float]] | None = None,
@@ -46,9 +61,9 @@ class Robot:
         """Reads the URDF and prepares the kinematics of `joints` and of the extra `links`.
 
         Args:
-            urdf: the URDF file.
+            urdf: the URDF file, or what `describe` has read from it.
             joints: joints that are sampled and predicted; their order is the order of q.
-            links: links whose poses are wanted besides those that `joints` carry.
+            links: links whose poses are wanted besides those that `joints` and what mimics them carry.
             ranges: [lower, upper] in rad, narrower than the URDF's limits, by joint.
             hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
             name: short name; default: the URDF file's.
@@ -56,9 +71,15 @@ class Robot:
         Raises:
             UserError: the URDF cannot be used, or a joint or link does not exist (with the nearest name).
         """
+        super().__init__()
         ranges, hold = dict(ranges or {}), dict(hold or {})
-        self.urdf, self.name = Path(urdf), name or Path(urdf).stem
-        self.description = description = describe(self.urdf)
+        description = urdf if isinstance(urdf, Description) else describe(Path(urdf))
+        self.urdf, self.name = description.path, name or description.path.stem
+        self.description = description
+        self.keypoints: Keypoints | None = None
+        """Which links stand for which body parts, where `from_urdf` or `from_config` has been told."""
+        self.key_links: tuple[str, ...] = ()
+        """Links whose position error is the link error."""
         if not joints:
             raise UserError("robot.joints: is empty; name at least one joint")
         repeated = sorted({j for j in joints if list(joints).count(j) > 1})
@@ -74,8 +95,8 @@ class Robot:
             if key in self.joint_names:
                 raise UserError(f"robot.hold.{key}: is among robot.joints, so it cannot be held")
         limits = [joint_range(self.urdf, description.joint(j), ranges.get(j)) for j in self.joint_names]
-        self.lower_N = _inward([low for low, _ in limits], torch.inf)
-        self.upper_N = _inward([high for _, high in limits], -torch.inf)
+        self.register_buffer("lower_N", _inward([low for low, _ in limits], torch.inf), persistent=False)
+        self.register_buffer("upper_N", _inward([high for _, high in limits], -torch.inf), persistent=False)
         self.moving_links = tuple(description.joint(j).child for j in self.joint_names)
         self.links = tuple(dict.fromkeys((*self.moving_links, *(description.check_link(x) for x in links))))
         self.held = {
@@ -85,41 +106,74 @@ class Robot:
 
     def _prepare_chain(self) -> None:
         needed = {joint.name for link in self.links for joint in self.description.joints_above(link)}
-        self._chain = pk.build_chain_from_urdf(_chain_xml(self.description, needed)).to(dtype=torch.float32)
+        self._chain = build_chain(_chain_xml(self.description, needed)).to(dtype=torch.float32)
         angles = self._chain.get_joint_parameter_names()
-        self.select_AN = torch.zeros(len(angles), len(self.joint_names))
-        self.constant_A = torch.zeros(len(angles))
+        select_AN, constant_A = torch.zeros(len(angles), len(self.joint_names)), torch.zeros(len(angles))
         for row, joint in enumerate(angles):
             source, multiplier, offset = _drive(self.description, joint)
             if source in self.joint_names:
-                self.select_AN[row, self.joint_names.index(source)] = multiplier
-                self.constant_A[row] = offset
+                select_AN[row, self.joint_names.index(source)] = multiplier
+                constant_A[row] = offset
             else:
-                self.constant_A[row] = multiplier * self.held.get(source, 0.0) + offset
-        self._frames = self._chain.get_frame_indices(*self.links)
-        driven = [row for row in range(len(angles)) if self.select_AN[row].abs().sum() > 0]
+                constant_A[row] = multiplier * self.held.get(source, 0.0) + offset
+        driven = [row for row in range(len(angles)) if select_AN[row].abs().sum() > 0]
         self.driven_joints = tuple(angles[row] for row in driven)
         """Joints of the chain that q turns: `joint_names` and those that mimic them."""
-        self.drive_DN = self.select_AN[driven]
-        """Angles of `driven_joints` per unit of q (1 for a joint itself, the multiplier for one that mimics it)."""
+        carried = (self.description.joints[name].child for name in self.driven_joints)
+        self.links = tuple(dict.fromkeys((*self.links, *carried)))
+        frames = self._chain.get_frame_indices(*self.links)
+        tensors = {"select_AN": select_AN, "constant_A": constant_A, "drive_DN": select_AN[driven], "_frames": frames}
+        for name, tensor in tensors.items():
+            self.register_buffer(name, tensor, persistent=False)
 
-    def to(self, device: torch.device | str) -> Robot:
-        """Moves every tensor to the device, in place."""
-        self._chain = self._chain.to(device=str(device))
-        self.lower_N, self.upper_N = self.lower_N.to(device), self.upper_N.to(device)
-        self.select_AN, self.constant_A = self.select_AN.to(device), self.constant_A.to(device)
-        self.drive_DN, self._frames = self.drive_DN.to(device), self._frames.to(device)
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Robot:
+        """Moves the chain, which is no module, along with the buffers."""
+        super()._apply(fn, recurse)
+        self._chain = self._chain.to(dtype=self.select_AN.dtype, device=self.select_AN.device)
         return self
 
-    def with_links(self, links: Sequence[str]) -> Robot:
-        """The robot itself if it computes the poses of these links, else its twin that does, its own links first."""
-        if set(links) <= set(self.links):
-            return self
-        hold = {name: angle for name, angle in self.held.items() if name not in self.joint_names}
-        limits = zip(self.joint_names, self.lower_N.tolist(), self.upper_N.tolist(), strict=True)
-        ranges = {name: [lower, upper] for name, lower, upper in limits}
-        twin = Robot(self.urdf, self.joint_names, (*self.links, *links), ranges, hold, self.name)
-        return twin.to(self.lower_N.device)
+    @classmethod
+    def from_urdf(
+        cls,
+        urdf: Path | str,
+        joints: Sequence[str],
+        keypoints: Mapping[str, Any],
+        key_links: Sequence[str] = (),
+        ranges: Mapping[str, list[float]] | None = None,
+        hold: Mapping[str, float] | None = None,
+        name: str | None = None,
+    ) -> Robot:
+        """A robot that knows which of its links stand for which part of a human body.
+
+        Args:
+            urdf: the URDF file.
+            joints: joints that are sampled and predicted; their order is the order of q.
+            keypoints: link by body part, as `robot.keypoints` of a config.
+            key_links: links whose position error is the link error.
+            ranges: [lower, upper] in rad, narrower than the URDF's limits, by joint.
+            hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
+            name: short name; default: the URDF file's.
+
+        Raises:
+            UserError: the URDF cannot be used; a joint, link or body part does not exist (with the nearest name).
+        """
+        parts = read_keypoints(keypoints)
+        robot = cls(Path(urdf), joints, [*parts.links, *key_links], ranges, hold, name)
+        robot.keypoints, robot.key_links = parts, tuple(key_links)
+        return robot
+
+    @classmethod
+    def from_config(cls, config: Path | str) -> Robot:
+        """The robot of a config: a YAML file, or the name of one that ships with mrhubo (`nao`, `paper/nao`).
+
+        Raises:
+            UserError: the config or what it names cannot be used.
+        """
+        shipped = shipped_root() / "conf" / f"{config}.yaml"
+        robot = load_config(shipped if shipped.is_file() and not Path(config).is_file() else Path(config)).robot
+        return cls.from_urdf(
+            robot.urdf, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name
+        )
 
     def link_index(self, link: str) -> int:
         """Position of a link in `links`."""

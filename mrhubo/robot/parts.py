@@ -1,41 +1,125 @@
-"""Parts of a human body that a robot can have: limbs, which have one direction, and oriented ends, which have two."""
+"""The parts of a human body that a robot can have: one table, from which all else follows.
+
+A limb runs from one point to another and has one direction; an oriented part (a hand, the head) is fixed to one link
+and has two. Directions are seen from the part that carries them: those of arms and head from the chest, so that neither
+the way a base faces nor a bent back matters.
+
+A row says everything about a part: no other module knows one by its name. Rows stand in the order of the directions,
+and a part after the one that it hangs on.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from torch import Tensor
 
-SIDES = ("left", "right")
-LIMBS = (("shoulder", "elbow"), ("elbow", "wrist"))
-"""Inner and outer joint of a side's limbs."""
-POINTS = tuple(f"{side}_{part}" for side in SIDES for part in ("shoulder", "elbow", "wrist"))
-ENDS = {"left_hand": ("fingers", "thumb"), "right_hand": ("fingers", "thumb"), "head": ("forward", "up")}
-"""Oriented ends, and what their two directions are called."""
-HAND_POINTS = ("thumb", "index", "middle", "pinky")
+Vector = tuple[float, float, float]
+Region = Literal["trunk", "arm", "hand", "head", "leg", "foot"]
+"""What a part belongs to: measures are means over a region."""
+
+_LEFT, _RIGHT, _UP, _FORWARD = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+"""Directions of the human frame (`mrhubo.frames`)."""
 
 
-def limb_of(end: str) -> tuple[str, str]:
-    """Names of a limb's two joints from its outer one."""
-    side, part = end.split("_")
-    return f"{side}_{dict((b, a) for a, b in LIMBS)[part]}", end
+@dataclass(frozen=True, kw_only=True)
+class BodyPart:
+    """A row of the table."""
+
+    name: str
+    joint: str
+    """The human joint that turns it."""
+    region: Region
+    hangs_on: str | None = None
+    """The part that carries it; None for a part that carries itself."""
+    seen_from: str | None = None
+    """The oriented part from which its directions are seen; None for one that has none of its own, but from which
+    others are seen."""
+    inputs: tuple[str, ...] = ()
+    """The human joints whose rotations tell a network about it."""
+    weight: float = 1.0
+    """Weight of its directions' squared error in the reference retargeter's cost."""
+
+    @property
+    def direction_names(self) -> tuple[str, ...]:
+        """Names of its directions."""
+        raise NotImplementedError
 
 
-def joint_of(end: str) -> str:
-    """The human joint that turns an oriented end."""
-    return end.replace("hand", "wrist")
+@dataclass(frozen=True, kw_only=True)
+class LimbPart(BodyPart):
+    """A part with one direction, from one point to another; points have the names of human keypoints."""
+
+    start: str
+    end: str
+
+    @property
+    def direction_names(self) -> tuple[str, ...]:
+        """Its direction is called after its outer point."""
+        return (self.end,)
 
 
-def human_axes(end: str) -> Tensor:
-    """The two unit directions (2, 3) of an oriented end of the human at rest: fingers and thumb, or forward and up."""
-    if end == "head":
-        return torch.tensor([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-    return torch.tensor([[1.0 if end.startswith("left") else -1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+@dataclass(frozen=True, kw_only=True)
+class OrientedPart(BodyPart):
+    """A part with two directions at right angles, fixed to one link."""
 
+    words: tuple[str, str]
+    """What the two directions are called."""
+    rest: tuple[Vector, Vector]
+    """Where they point on a human at rest, human frame."""
+    turned_by: tuple[str, ...] = ()
+    """The human joints that share its turn in equal parts, from the inner one outwards; `joint` is the last."""
+    points: tuple[str, ...] = ()
+    """The human keypoints that turn with it."""
 
-def turn_of(end: str, first: Tensor, second: Tensor) -> Tensor:
-    """The rotation (..., 3, 3) that takes an end at rest to two directions (..., 3), unit and orthogonal."""
-    return _columns(first, second) @ _columns(*human_axes(end).to(first)).T
+    @property
+    def direction_names(self) -> tuple[str, ...]:
+        """The part's name with each of the words; none if nothing sees it."""
+        return tuple(f"{self.name}_{word}" for word in self.words) if self.seen_from else ()
+
+    def turn(self, first: Tensor, second: Tensor) -> Tensor:
+        """The rotation (..., 3, 3) that takes the part at rest to two directions (..., 3), unit and orthogonal."""
+        return _columns(first, second) @ _columns(*torch.tensor(self.rest).to(first)).T
 
 
 def _columns(first: Tensor, second: Tensor) -> Tensor:
     return torch.stack((first, second, torch.linalg.cross(first, second)), dim=-1)
+
+
+def _arm(side: str) -> tuple[LimbPart, LimbPart]:
+    shoulder, elbow, wrist = (f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist"))
+    upper, collar = f"{side}_upper_arm", f"{side}_collar"
+    return (
+        LimbPart(name=upper, joint=shoulder, region="arm", hangs_on="chest", seen_from="chest",
+                 start=shoulder, end=elbow, inputs=(collar, shoulder)),
+        LimbPart(name=f"{side}_forearm", joint=elbow, region="arm", hangs_on=upper, seen_from="chest",
+                 start=elbow, end=wrist, inputs=(collar, elbow)),
+    )  # fmt: skip
+
+
+def _hand(side: str, outward: Vector) -> OrientedPart:
+    wrist = f"{side}_wrist"
+    return OrientedPart(
+        name=f"{side}_hand", joint=wrist, region="hand", hangs_on=f"{side}_forearm", seen_from="chest",
+        words=("fingers", "thumb"), rest=(outward, _FORWARD), turned_by=(wrist,), inputs=(wrist,), weight=0.5,
+        points=tuple(f"{side}_{point}" for point in ("thumb", "index", "middle", "pinky")),
+    )  # fmt: skip
+
+
+CHEST = OrientedPart(name="chest", joint="spine3", region="trunk", words=("forward", "up"), rest=(_FORWARD, _UP))
+HEAD = OrientedPart(
+    name="head", joint="head", region="head", hangs_on="chest", seen_from="chest", words=("forward", "up"),
+    rest=(_FORWARD, _UP), turned_by=("neck", "head"), inputs=("neck", "head"), points=("left_eye", "right_eye"),
+)  # fmt: skip
+
+PARTS: tuple[BodyPart, ...] = (
+    CHEST,
+    *_arm("left"),
+    *_arm("right"),
+    _hand("left", _LEFT),
+    _hand("right", _RIGHT),
+    HEAD,
+)
+"""The table."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +66,8 @@ class Description:
     joints: dict[str, Joint]
     parent_joint: dict[str, Joint]
     """The joint above each link but the root."""
+    parsed: yourdfpy.URDF = field(repr=False, compare=False)
+    """What yourdfpy has made of the file: its shapes, and poses of all links (`link_poses`)."""
 
     @property
     def kinematics(self) -> str:
@@ -191,11 +193,11 @@ def describe(path: Path) -> Description:
     """Joints, links and the root of a URDF file.
 
     Raises:
-        UserError: the file is missing or no URDF; it has several roots, a loop, or a floating or planar joint
-        anywhere but
-            directly under the root (where it only places the robot in the world, and is taken as fixed).
+        UserError: the file is missing or no URDF; it has several roots, a loop, or a floating or planar joint anywhere
+            but directly under the root (where it only places the robot in the world, and is taken as fixed).
     """
-    robot = load_urdf(path).robot
+    parsed = load_urdf(path)
+    robot = parsed.robot
     children = {joint.child for joint in robot.joints}
     root = next(link.name for link in robot.links if link.name not in children)
     joints = {}
@@ -234,9 +236,8 @@ def describe(path: Path) -> Description:
                 0.0 if mimic.offset is None else float(mimic.offset),
             ),
         )
-    return Description(
-        path, root, tuple(link.name for link in robot.links), joints, {joint.child: joint for joint in joints.values()}
-    )
+    above = {joint.child: joint for joint in joints.values()}
+    return Description(path, root, tuple(link.name for link in robot.links), joints, above, parsed)
 
 
 def joint_range(path: Path, joint: Joint, narrower: list[float] | None) -> tuple[float, float]:

@@ -1,15 +1,19 @@
-"""Where things lie by default: in the checkout, or in the current folder where mrhubo is installed without one."""
+"""Where things lie by default: in the checkout, or, where mrhubo is installed without one, in the current folder.
+
+What comes with mrhubo (its own motions) is in the checkout or in the installed package, see `config.shipped`.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-_CHECKOUT = Path(__file__).resolve().parents[2]
+from mrhubo.config.shipped import shipped_root
 
 
 def project_root() -> Path:
-    """The checkout that this package is part of, else the current folder."""
-    return _CHECKOUT if (_CHECKOUT / "pyproject.toml").is_file() else Path.cwd()
+    """The checkout that this package is part of, else the current folder: what runs leave behind goes there."""
+    root = shipped_root()
+    return root if (root / "pyproject.toml").is_file() else Path.cwd()
 
 
 def default_pairs() -> Path:
@@ -19,8 +23,7 @@ def default_pairs() -> Path:
 
 def default_motions() -> list[Path]:
     """Folders of evaluation motions, best first: the CMU clips of the paper if they are there, else our own motions."""
-    data = project_root() / "data"
-    return [data / "external" / "cmu" / "evaluation", data / "motions"]
+    return [project_root() / "data" / "external" / "cmu" / "evaluation", shipped_root() / "data" / "motions"]
 
 
 def default_capture() -> Path:

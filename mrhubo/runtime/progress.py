@@ -1,5 +1,6 @@
-"""One line that shows how a long step is getting on: in a terminal or a notebook it is redrawn, in a log file it is
-printed now and then.
+"""What a person who waits is told: a line for each long step, and sentences.
+
+In a terminal or a notebook a line is redrawn, in a log file it is printed now and then.
 """
 
 from __future__ import annotations
@@ -13,15 +14,39 @@ _TERMINAL_SECONDS = 0.2
 _LOG_SECONDS = 15.0
 
 
-class Progress:
-    """Progress of one step: `with Progress("pairs", 50_000) as progress: progress.update(2_500, "residual 4.1 mm")`."""
+class Reporter:
+    """Tells whoever started a command how it is getting on; everything below the commands is given one."""
 
-    def __init__(
-        self, title: str, total: int, unit: str = "", quiet: bool = False, stream: TextIO | None = None
-    ) -> None:
-        self.title, self.total, self.unit, self.quiet = title, total, unit, quiet
-        self.stream = stream or sys.stderr
-        self.terminal = self.stream.isatty() or type(self.stream).__module__.startswith("ipykernel.")  # or a notebook
+    def __init__(self, quiet: bool = False, stream: TextIO | None = None) -> None:
+        """`quiet`: it says nothing at all. `stream`: where progress goes; default: standard error."""
+        self.quiet, self.stream = quiet, stream
+
+    @classmethod
+    def silent(cls) -> Reporter:
+        """One that says nothing: for a part whose progress somebody else tells, and for all ranks but the first."""
+        return cls(quiet=True)
+
+    def step(self, title: str, total: int, unit: str = "") -> Progress:
+        """The line of one long step: `with report.step("pairs", 50_000) as progress: progress.update(2_500)`."""
+        return Progress(title, total, unit, None if self.quiet else self.stream or sys.stderr)
+
+    def say(self, text: str) -> None:
+        """A sentence on standard output."""
+        if not self.quiet:
+            print(text, flush=True)
+
+
+SILENT = Reporter.silent()
+"""The default of functions that take a reporter."""
+
+
+class Progress:
+    """The line of one step, of which `total` parts are to be done; `stream` None: it is not shown."""
+
+    def __init__(self, title: str, total: int, unit: str, stream: TextIO | None) -> None:
+        self.title, self.total, self.unit, self.stream = title, total, unit, stream
+        notebook = type(stream).__module__.startswith("ipykernel.")
+        self.terminal = stream is not None and (stream.isatty() or notebook)
         self.start = time.monotonic()
         self._first: int | None = None
         self._shown, self._width, self._last = -float("inf"), 0, ""
@@ -38,7 +63,7 @@ class Progress:
         pause = _TERMINAL_SECONDS if self.terminal else _LOG_SECONDS
         if done >= self.total:
             self._end()
-        elif now - self._shown >= pause and not self.quiet:
+        elif now - self._shown >= pause:
             self._shown = now
             self._show(self._last)
 
@@ -54,6 +79,8 @@ class Progress:
         return ", ".join(parts + ([measure] if measure else []))
 
     def _show(self, line: str) -> None:
+        if self.stream is None:
+            return
         if self.terminal:
             self.stream.write("\r" + line.ljust(self._width))
             self._width = len(line)
@@ -71,9 +98,9 @@ class Progress:
 
     def _end(self) -> None:
         """The last line, once."""
-        if self._last and not self.quiet and not self._ended:
+        if self._last and not self._ended:
             self._show(self._last)
-            if self.terminal:
+            if self.terminal and self.stream is not None:
                 self.stream.write("\n")
                 self.stream.flush()
         self._ended = True

@@ -19,6 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mrhubo.config.shipped import shipped_root
 from mrhubo.errors import UserError, was_interrupted
 from mrhubo.files.storage import locked
 
@@ -191,7 +192,12 @@ def resumable_run(folder: Path, uri: str | None, run_id: str | None) -> str | No
 
 
 def git_commit(folder: Path) -> str:
-    """Commit of the checkout that holds `folder`, with "+changes" if files differ from it; "unknown" outside git."""
+    """Commit of the checkout that holds `folder`, with "+changes" if files differ from it; "unknown" outside git.
+
+    Where mrhubo is installed without its checkout: its version. A commit found there would be that of another project.
+    """
+    if not (shipped_root() / "pyproject.toml").is_file():
+        return f"mrhubo {version('mrhubo')}"
     try:
         commit = subprocess.run(
             ["git", "-C", str(folder), "rev-parse", "HEAD"], capture_output=True, text=True, check=True, timeout=10

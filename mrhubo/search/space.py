@@ -55,19 +55,20 @@ class Dimension:
         return f"{low.split('=')[1]} .. {high.split('=')[1]}{', logarithmic' if self.log else ''}"
 
 
-def read_space(space: Mapping[str, Any], check: Callable[[str], object]) -> list[Dimension]:
+def read_space(space: Mapping[str, Any], check: Callable[[str], object], schema: type = Config) -> list[Dimension]:
     """The dimensions of `space`, as `SweepConfig.space` describes it.
 
     Args:
         space: what is to vary.
         check: loads the config with a `key=value`, and raises UserError if that is impossible.
+        schema: of that config.
 
     Raises:
         UserError: a key does not exist or cannot vary, an entry is none of the forms, or a value is impossible.
     """
     if not space:
         raise UserError("space: is empty; name the keys that are to vary")
-    kinds = keys_of(Config)
+    kinds = keys_of(schema)
     dimensions = []
     for key, entry in space.items():
         section = key.split(".")[0]

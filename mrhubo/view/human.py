@@ -11,8 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mrhubo.frames import human_to_world
 from mrhubo.view.limbs import Points, Row, arm, at, foot, frame, hand, leg, pelvis_frame, unit
-from mrhubo.view.solids import Color, Solids, human_to_world
+from mrhubo.view.solids import Color, Solids
 
 HUMAN_COLOR: Color = (0.33, 0.50, 0.72)
 """Default colour of what a human wears."""

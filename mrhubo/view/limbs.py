@@ -125,7 +125,7 @@ def leg(points: Points, side: str, scale: float) -> list[Row]:
 
 def foot(points: Points, side: str, scale: float) -> list[Row]:
     """Heel, ball and toe of a shoe; toe and heel are guessed where they are missing."""
-    ankle, ball = points.get(f"{side}_ankle"), points.get(f"{side}foot")
+    ankle, ball = points.get(f"{side}_ankle"), points.get(f"{side}_foot")
     if ankle is None:
         return []
     toe, heel = points.get(f"{side}_toe"), points.get(f"{side}_heel")

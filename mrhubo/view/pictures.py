@@ -15,7 +15,7 @@ from torch import Tensor
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.evaluation.clips import Clip
 from mrhubo.pairing import PairFilter
-from mrhubo.robot import Robot, link_poses, load_urdf, read_geometry
+from mrhubo.robot import Robot, link_poses, read_geometry
 from mrhubo.view import (
     Solids,
     contact_sheet,
@@ -40,9 +40,9 @@ class Artist:
     """Draws one robot and the human, both at one height."""
 
     def __init__(self, robot: Robot, skeleton: Skeleton | None = None) -> None:
-        self.robot, self.urdf, self.skeleton = robot, load_urdf(robot.urdf), skeleton or Skeleton()
-        self.geometry = read_geometry(self.urdf)
-        self.parents = {joint.child: joint.parent for joint in self.urdf.robot.joints}
+        self.robot, self.skeleton = robot, skeleton or Skeleton()
+        self.geometry = read_geometry(robot.description.parsed)
+        self.parents = {joint.child: joint.parent for joint in robot.description.parsed.robot.joints}
         height = float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2]))
         self.scale = _FIGURE_HEIGHT_M / max(height, 1e-3)
 
@@ -52,7 +52,7 @@ class Artist:
 
     def robot_figure(self, q_N: Tensor, scaled: bool = True) -> Solids:
         """The robot at joint angles (N,) [rad], scaled to the human's height."""
-        poses = link_poses(self.urdf, self.robot.configuration(q_N.numpy()))
+        poses = link_poses(self.robot.description.parsed, self.robot.configuration(q_N.numpy()))
         solids = robot_solids(self.geometry, poses, self.parents)
         return solids.scaled(self.scale) if scaled else solids
 

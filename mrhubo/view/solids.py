@@ -1,7 +1,7 @@
 """Solids: what a picture is made of. Capsules (also tapered ones and spheres), flat-ended cylinders and boxes.
 
 World frame: x forward, y left, z up, metres (REP 103). Human points come in the human frame (x to the body's left, y
-up, z forward) and are turned by :func:`human_to_world`.
+up, z forward) and are turned by `mrhubo.frames.human_to_world`.
 
 Axes: S solids, P points.
 """
@@ -15,16 +15,6 @@ import numpy as np
 
 Color = tuple[float, float, float]
 _EMPTY = np.zeros(0)
-
-
-def human_to_world(points_P3: np.ndarray) -> np.ndarray:
-    """Points or directions (..., 3) of the human frame (left, up, forward) in the world frame (forward, left, up)."""
-    return np.asarray(points_P3)[..., [2, 0, 1]]
-
-
-def world_to_human(points_P3: np.ndarray) -> np.ndarray:
-    """Points or directions (..., 3) of the world frame (forward, left, up) in the human frame (left, up, forward)."""
-    return np.asarray(points_P3)[..., [1, 2, 0]]
 
 
 @dataclass

@@ -141,7 +141,7 @@ def test_the_config_chooses_it_and_a_saved_one_comes_back(tmp_path: Path) -> Non
 def test_latent_inverse_kinematics_works_with_its_activation(tmp_path: Path) -> None:
     write_snapshot(tmp_path / "V02_05", published())
     prior, skeleton = VPoser.open(tmp_path / "V02_05"), Skeleton()
-    problem = LatentProblem(prior, skeleton, [18, 19, 20, 21, 15])
+    problem = LatentProblem(prior.decoder, skeleton, [18, 19, 20, 21, 15])
     z = torch.randn(4, 32, generator=torch.Generator().manual_seed(0))
     points, jacobian = problem.linearise(z)
     for i in range(len(z)):

@@ -14,6 +14,7 @@ from mrhubo.evaluation import Clip, load_motions, mean_score, predict_clips, sco
 from mrhubo.motion import Motion
 from mrhubo.retargeter import build_network
 from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.rotation import sixd_to_matrix
 
 
 @pytest.fixture
@@ -32,7 +33,7 @@ def test_a_perfect_prediction_scores_zero_and_a_turned_joint_scores_its_angle(ro
     config, body_map = setting(root)
     robot = body_map.robot
     q = robot.sample(40, torch.Generator().manual_seed(0))
-    clip = Clip(Motion("a", torch.zeros(40, 21, 6), 24.0, ""), q)
+    clip = Clip(Motion("a", torch.eye(3).expand(40, 21, 3, 3), 24.0), q)
     score = score_clip(clip, q + 2 * torch.pi, robot, config.robot.key_links)
     assert score.joint_rad == pytest.approx(0, abs=1e-5) and score.link_cm == pytest.approx(0, abs=1e-3)
     off = q.clone()
@@ -47,7 +48,7 @@ def test_the_mean_counts_each_clip_once(root: Path) -> None:
     config, body_map = setting(root)
     robot = body_map.robot
     q = robot.sample(30, torch.Generator().manual_seed(0))
-    clips = [Clip(Motion(n, torch.zeros(c, 21, 6), 24.0, ""), q[:c]) for n, c in (("a", 30), ("b", 10))]
+    clips = [Clip(Motion(n, torch.eye(3).expand(c, 21, 3, 3), 24.0), q[:c]) for n, c in (("a", 30), ("b", 10))]
     found = zip(clips, (q + 0.1, q[:10] + 0.3), strict=True)
     scores = [score_clip(clip, moved, robot, config.robot.key_links) for clip, moved in found]
     assert mean_score(scores).joint_rad == pytest.approx(0.2, rel=1e-4) and mean_score(scores).frames == 40
@@ -58,7 +59,8 @@ def test_predictions_come_back_clip_by_clip(root: Path) -> None:
     config, body_map = setting(root, "model.hidden=16")
     network = build_network(config, body_map)
     poses = torch.randn(25, 21, 6)
-    clips = [Clip(Motion("a", poses[:7], 24.0, ""), poses), Clip(Motion("b", poses[7:], 24.0, ""), poses)]
+    turned = sixd_to_matrix(poses)
+    clips = [Clip(Motion("a", turned[:7], 24.0), poses), Clip(Motion("b", turned[7:], 24.0), poses)]
     predicted = predict_clips(network, clips)
     assert [len(p) for p in predicted] == [7, 18] and network.training
     torch.testing.assert_close(torch.cat(predicted), network(poses).detach(), atol=1e-5, rtol=0)

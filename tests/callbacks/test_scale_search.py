@@ -10,23 +10,26 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import lightning
 import mlflow
 import pytest
 import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
-from mrhubo.callbacks.scale_search import ScaleFactorSearch
+from mrhubo.callbacks.scale_search import ScaleFactorSearch, ScaleResult
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip
 from mrhubo.fit import main
-from mrhubo.fitting import pipeline
+from mrhubo.fitting.preparation import prepare
 from mrhubo.motion import Motion
 from mrhubo.pairing import ProportionTest
 from mrhubo.retargeter import Retargeter
-from mrhubo.robot import BodyMap, build_body_map, varied
+from mrhubo.robot import BodyMap, ManualScale, build_body_map, varied
+from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.trainer import quiet_lightning
 
 RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 24, poses: 12}"
 
@@ -52,7 +55,7 @@ def clip(config: Config, body_map: BodyMap, prior: BodyPrior) -> Clip:
     q_PN = body_map.robot.sample(12, torch.Generator().manual_seed(0))
     assert config.robot.manual is not None
     test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 6), "local")
-    return Clip(Motion("made", test.human_poses([config.robot.manual])[0], 24.0, ""), q_PN)
+    return Clip(Motion("made", rotation.sixd_to_matrix(test.human_poses([config.robot.manual])[0]), 24.0), q_PN)
 
 
 def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip) -> None:
@@ -83,8 +86,9 @@ def test_only_reached_poses_are_measured_on(
     """The reference's answers to half of the frames are spoilt: none of them is taken."""
     with torch.no_grad():
         reached = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path).pose_PJ6
-        q_FN, pose_FJ6 = clip.reference_TN.repeat(2, 1), torch.cat((clip.motion.pose_TJ6, clip.motion.pose_TJ6.flip(0)))
-    both = Clip(Motion("both", pose_FJ6, 24.0, ""), q_FN)
+        local = clip.motion.local_TJ33
+        q_FN, local_FJ33 = clip.reference_TN.repeat(2, 1), torch.cat((local, local.flip(0)))
+    both = Clip(Motion("both", local_FJ33, 24.0), q_FN)
     search = ScaleFactorSearch(config, body_map, prior, [both], tmp_path)
     other = ScaleFactorSearch(config, body_map, prior, [Clip(both.motion, q_FN.flip(0))], tmp_path)
     assert other.name != search.name, "another reference set is another study"
@@ -103,14 +107,15 @@ def test_it_comes_near_the_numbers_that_made_the_poses(
     start = copy.deepcopy(config)
     assert start.robot.manual is not None and config.robot.manual is not None
     start.robot.manual.factor, start.robot.manual.upper_arm = 2.7, 0.7  # far off
-    search = ScaleFactorSearch(start, body_map, prior, [clip], tmp_path)
-    lines = []
-    found = search.search(runs[0], "mrhubo", runs[1], lambda done, measure: lines.append((done, measure)))
+    stream = io.StringIO()
+    search = ScaleFactorSearch(start, body_map, prior, [clip], tmp_path, Reporter(stream=stream))
+    found = search.search(*runs)
     assert found.distance_rad < 0.6 * found.start_distance_rad
     assert found.config.robot.scale == "manual" and found.config.robot.search is None
     manual = found.config.robot.manual
     assert manual is not None and manual.factor == found.values["factor"] and 1.0 <= manual.factor <= 3.0
-    assert set(found.pictures) >= {"history", "poses"} and lines[-1][0] == 24
+    assert set(found.pictures) >= {"history", "poses"}
+    assert stream.getvalue().splitlines()[-1].startswith("scale factor: 24 of 24 trials")
     nested = runs[0].search_runs(
         [runs[0].get_experiment_by_name("mrhubo").experiment_id], f"tags.`mlflow.parentRunId` = '{runs[1]}'"
     )
@@ -121,19 +126,83 @@ def test_it_comes_near_the_numbers_that_made_the_poses(
 
 
 def test_it_goes_on_where_it_stopped(
-    config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip, tmp_path: Path, runs: tuple[Any, str]
+    config: Config,
+    body_map: BodyMap,
+    prior: BodyPrior,
+    clip: Clip,
+    tmp_path: Path,
+    runs: tuple[Any, str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search(runs[0], "mrhubo", runs[1])
-
-    def stop(done: int, measure: str) -> None:
-        if done >= 20:
-            raise KeyboardInterrupt
-
+    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search(*runs)
     stopped = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "stopped")
-    with pytest.raises(KeyboardInterrupt):
-        stopped.search(runs[0], "mrhubo", runs[1], stop)
-    assert stopped.search(runs[0], "mrhubo", runs[1]).values == whole.values
+    measured = []
+
+    def measure(manuals: list[Any]) -> torch.Tensor:
+        measured.append(len(manuals))
+        if sum(measured) > 20:
+            raise KeyboardInterrupt
+        return ProportionTest.measure(stopped.test, manuals)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(stopped.test, "measure", measure)
+        stopped.search()  # without MLflow
+    assert sum(measured) == 24 and measured[0] < 24, "stopped on the way"
+    assert stopped.search(*runs).values == whole.values
     assert whole.distance_rad < 0.01  # it starts from the numbers that made the poses
+
+
+class Searched(lightning.LightningDataModule):
+    """A data module that notes when it gets the config, and needs it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.events: list[Any] = []
+
+    def setup(self, stage: str) -> None:
+        self.events.append("setup")
+
+    def use_config(self, config: Config) -> None:
+        self.events.append(config)
+
+    def train_dataloader(self) -> Any:
+        self.events.append("loader")
+        return torch.utils.data.DataLoader(torch.zeros(2, 1))  # pyright: ignore[reportArgumentType]
+
+
+class OneWeight(lightning.LightningModule):
+    def __init__(self) -> None:
+        super().__init__()
+        self.layer = torch.nn.Linear(1, 1)
+
+    def training_step(self, batch: torch.Tensor, _: int) -> torch.Tensor:
+        return self.layer(batch).sum()
+
+    def configure_optimizers(self) -> Any:
+        return torch.optim.SGD(self.parameters(), 0.1)
+
+
+def test_as_a_callback_it_hands_what_it_finds_to_the_data_module(
+    config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip, tmp_path: Path
+) -> None:
+    """`Trainer.fit` with the callback is all it takes."""
+    seen: list[ScaleResult] = []
+    search = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path, found=seen.append)
+    data = Searched()
+
+    def trainer() -> lightning.Trainer:
+        return lightning.Trainer(
+            max_epochs=1, accelerator="cpu", logger=False, callbacks=[search], enable_checkpointing=False,
+            enable_progress_bar=False, enable_model_summary=False,
+        )  # fmt: skip
+
+    with quiet_lightning():
+        trainer().fit(OneWeight(), datamodule=data)
+        assert search.result is not None and seen == [search.result]
+        assert data.events == ["setup", search.result.config, "loader"]
+        loader = torch.utils.data.DataLoader(torch.zeros(2, 1))  # pyright: ignore[reportArgumentType]
+        with pytest.raises(TypeError, match="use_config"):
+            trainer().fit(OneWeight(), loader)
 
 
 def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
@@ -161,10 +230,10 @@ def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
     assert written.robot.scale == "manual" and written.robot.manual is not None
     assert str(written.robot.manual.factor) == run.data.params["scale_factor/factor"]
     (package,) = (tmp_path / "runs" / "packages").iterdir()
-    assert Retargeter.load(package).body_map.manual is not None
-    assert pipeline.prepare(written).store.header["fingerprint"] == run.data.tags["pairs_fingerprint"]
+    assert isinstance(Retargeter.load(package).body_map.scale, ManualScale)
+    assert prepare(written).store.header["fingerprint"] == run.data.tags["pairs_fingerprint"]
 
 
 def test_other_commands_refuse_it(config: Config) -> None:
     with pytest.raises(UserError, match=r"robot\.scale: 'search' is done by mrhubo\.fit alone"):
-        pipeline.prepare(copy.deepcopy(config))
+        prepare(copy.deepcopy(config))

@@ -16,7 +16,7 @@ from mrhubo.errors import UserError
 from mrhubo.evaluate import main
 from mrhubo.evaluation import Clip, Evaluation, evaluate_clip, latency_us, mean_score, measures, table
 from mrhubo.motion import Motion
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import BodyMap, build_body_map
 
@@ -38,8 +38,8 @@ def pose_TJ6() -> torch.Tensor:
 @pytest.mark.parametrize("name", ["nao", "reachy"])
 def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, name)
-    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0)
-    clip = Clip(Motion("a", pose_TJ6, 24.0, ""), reference.q_TN)
+    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0)
+    clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference.q_TN)
     found = evaluate_clip(clip, reference.q_TN, body_map, key_links)
     assert found.joint_rad == 0 and found.link_cm == 0 and found.frames == 60
     assert found.limb_deg == found.reference_limb_deg
@@ -51,8 +51,8 @@ def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: 
 
 def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, "nao")
-    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
-    clip = Clip(Motion("a", pose_TJ6, 24.0, ""), reference)
+    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
+    clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference)
     turned = reference.clone()
     turned[:, body_map.robot.joint_names.index("LElbowRoll")] += 0.3
     good, bad = (evaluate_clip(clip, q, body_map, key_links) for q in (reference, turned))
@@ -62,8 +62,8 @@ def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: to
 
 def test_a_trembling_robot_has_a_higher_jerk(root: Path, pose_TJ6: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, "nao")
-    reference = ReferenceRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
-    clip = Clip(Motion("a", pose_TJ6, 24.0, ""), reference)
+    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
+    clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference)
     noise = 0.02 * torch.randn(reference.shape, generator=torch.Generator().manual_seed(0))
     still, moving, trembling = (
         evaluate_clip(clip, q, body_map, key_links).jerk_ratio
@@ -77,8 +77,8 @@ def test_at_a_limit(root: Path) -> None:
     robot = body_map.robot
     q = ((robot.lower_N + robot.upper_N) / 2).repeat(5, 1)
     q[:, :2] = robot.upper_N[:2]
-    pose = rotation.matrix_to_sixd(torch.eye(3).expand(5, 21, 3, 3))
-    found = evaluate_clip(Clip(Motion("a", pose, 24.0, ""), q), q, body_map, key_links)
+    pose = torch.eye(3).expand(5, 21, 3, 3)
+    found = evaluate_clip(Clip(Motion("a", pose, 24.0), q), q, body_map, key_links)
     assert found.at_limit == pytest.approx(2 / 8)
 
 
@@ -87,7 +87,7 @@ def test_collisions_are_counted_by_frame(root: Path) -> None:
     robot, shapes = body_map.robot, body_map.collision
     q = robot.sample(400, torch.Generator().manual_seed(0))
     touching, free = q[shapes.collides(q)][:3], q[~shapes.collides(q)][:9]
-    clip = Clip(Motion("a", torch.eye(3)[:, :2].T.flatten().expand(12, 21, 6), 24.0, ""), q[:12])
+    clip = Clip(Motion("a", torch.eye(3).expand(12, 21, 3, 3), 24.0), q[:12])
     found = evaluate_clip(clip, torch.cat((free, touching)), body_map, key_links)
     assert found.collision == pytest.approx(3 / 12)
     assert found.reference_collision == pytest.approx(float(shapes.collides(q[:12]).float().mean()))

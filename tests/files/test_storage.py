@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import DamagedFile, atomic_path, read_tensors, write_tensors
+from mrhubo.files.storage import DamagedFile, Locked, atomic_path, locked, read_tensors, write_tensors
 
 TENSORS = {"b": torch.arange(12.0).reshape(3, 4), "a": torch.tensor([True, False]), "none": torch.empty(0, 3)}
 METADATA = {"seed": "7", "robot": "nao", "fingerprint": "abc"}
@@ -103,3 +105,68 @@ def test_a_folder_in_the_way_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     with pytest.raises(UserError, match="taken: cannot be written"), atomic_path(tmp_path / "taken") as temporary:
         temporary.write_bytes(b"x")
+
+
+HOLD = (
+    "import sys, time; from pathlib import Path; from mrhubo.files.storage import locked\n"
+    "with locked(Path(sys.argv[1]), wait=True):\n"
+    "    print('held', flush=True)\n"
+    "    time.sleep(float(sys.argv[2]))\n"
+    "print('given back', flush=True)\n"
+)
+
+
+@contextmanager
+def holder(lock: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
+    """Another process that holds a lock, until it ends or for some seconds."""
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(lock), str(seconds)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout and process.stdout.readline() == "held\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_lock_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
+    lock = tmp_path / "work" / "lock"
+    with holder(lock, 60) as process:
+        with (
+            pytest.raises(Locked, match=r"work: another process is at work there; wait for it or stop it"),
+            locked(lock),
+        ):
+            pass
+        process.kill()  # kill -9: nothing in the process can clean up
+        process.wait()
+        with locked(lock):
+            pass
+
+
+def test_who_waits_gets_the_lock_after_the_other(tmp_path: Path) -> None:
+    lock = tmp_path / "lock"
+    with holder(lock, 0.5) as process, locked(lock, wait=True):
+        assert process.stdout and process.stdout.readline() == "given back\n"
+
+
+def test_a_lock_is_given_back_when_its_block_fails(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), locked(tmp_path / "lock"):
+        raise RuntimeError
+    with locked(tmp_path / "lock"):
+        pass
+
+
+def test_a_lock_that_cannot_be_made_is_a_clear_error(tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(UserError, match="taken: cannot be locked"), locked(tmp_path / "taken"):
+        pass
+
+
+def test_reading_needs_nothing_that_only_posix_has(file: Path) -> None:
+    script = (
+        "import sys\n"
+        "sys.modules.update(dict.fromkeys(('fcntl', 'resource', 'termios', 'psutil')))\n"  # importing them now fails
+        "from pathlib import Path; from mrhubo.files.storage import read_tensors\n"
+        "import mrhubo.files.npz, mrhubo.files.safe_pickle\n"
+        "assert sorted(read_tensors(Path(sys.argv[1]))[0]) == ['a', 'b', 'none']\n"
+    )
+    subprocess.run([sys.executable, "-c", script, str(file)], check=True)

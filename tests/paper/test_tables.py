@@ -9,12 +9,13 @@ import mlflow
 import numpy as np
 import pytest
 
-from mrhubo import reproduce as command
 from mrhubo.config import BaselineConfig
 from mrhubo.errors import UserError
-from mrhubo.fitting.record.predictions import read_predictions
+from mrhubo.fitting.record import read_predictions
+from mrhubo.paper import trainings
 from mrhubo.paper.tables import METHODS, PAPER, Part, chart, parts, tables
 from mrhubo.reproduce import main
+from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.tracking import database_uri
 
 SMALL = [
@@ -113,7 +114,7 @@ def test_the_command_trains_once_and_finds_what_is_done(
         assert 0 < run.data.metrics["test/latency_1000_us"] < run.data.metrics["test/latency_us"]
     link = np.array([run.data.metrics["test/link_cm"] for run in children])
     assert all(f"{value:.2f} (" in first or f" {value:.2f} " in first for value in link)
-    monkeypatch.setattr("mrhubo.fitting.fit.fit", lambda *a, **k: pytest.fail("trained again"))
+    monkeypatch.setattr("mrhubo.paper.trainings.fit", lambda *a, **k: pytest.fail("trained again"))
     main(given)
     assert capsys.readouterr().out == first
     assert len(client.search_runs([experiment.experiment_id])) == len(runs)
@@ -135,16 +136,16 @@ def test_mistakes_are_named() -> None:
 def test_s3le_is_left_out_aloud_without_motion_capture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("mrhubo.runtime.locations.default_capture", lambda: tmp_path / "none.npz")
+    monkeypatch.setattr("mrhubo.paper.trainings.default_capture", lambda: tmp_path / "none.npz")
     seen: list[Part] = []
 
     def stop(work: list[Part]) -> None:
         seen.extend(work)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "_open_parent", stop)
+    monkeypatch.setattr(trainings, "_open_parent", stop)
     with pytest.raises(KeyboardInterrupt):
-        command.reproduce(["coman"], 1, [])
+        trainings.reproduce(["coman"], 1, [], Reporter())
     assert "S3LE is left out" in capsys.readouterr().out and {p.method for p in seen} == set(METHODS)
     with pytest.raises(UserError, match="S3LE learns from human motion capture"):
-        command.reproduce(["coman"], 1, [], methods=["S3LE"])
+        trainings.reproduce(["coman"], 1, [], methods=["S3LE"])

@@ -13,7 +13,7 @@ from torch import Tensor
 from mrhubo import rotation
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, build_body_map
 
 ROBOTS = ("nao", "coman", "reachy")
@@ -34,8 +34,8 @@ def body_maps(root: Path) -> dict[str, BodyMap]:
 
 
 @pytest.fixture(scope="session")
-def retargeters(body_maps: dict[str, BodyMap]) -> dict[str, ReferenceRetargeter]:
-    return {name: ReferenceRetargeter(body_map) for name, body_map in body_maps.items()}
+def retargeters(body_maps: dict[str, BodyMap]) -> dict[str, OptimizationRetargeter]:
+    return {name: OptimizationRetargeter(body_map) for name, body_map in body_maps.items()}
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 
 
-def test_quadratic_is_the_cost_and_its_derivative(retargeters: dict[str, ReferenceRetargeter]) -> None:
+def test_quadratic_is_the_cost_and_its_derivative(retargeters: dict[str, OptimizationRetargeter]) -> None:
     problem = CollisionFreeProblem(retargeters["nao"].body_map, margin=0.02)
     q_BN = problem.robot.sample(400, torch.Generator().manual_seed(0))
     q_BN = q_BN[problem.collision.collides(q_BN)][:8]
@@ -34,7 +34,7 @@ def test_quadratic_is_the_cost_and_its_derivative(retargeters: dict[str, Referen
 
 @pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
 def test_arms_crossed_through_the_body_come_free(
-    name: str, retargeters: dict[str, ReferenceRetargeter], make_pose: Callable[..., Tensor]
+    name: str, retargeters: dict[str, OptimizationRetargeter], make_pose: Callable[..., Tensor]
 ) -> None:
     """A human who hugs himself from a T pose and lets go: any robot's forearms would go through its chest."""
     half = torch.linspace(0, 1, 30)[:, None]
@@ -56,7 +56,7 @@ def test_arms_crossed_through_the_body_come_free(
 
 
 def test_a_motion_without_contact_stays_as_it_is(
-    retargeters: dict[str, ReferenceRetargeter], make_pose: Callable[..., Tensor]
+    retargeters: dict[str, OptimizationRetargeter], make_pose: Callable[..., Tensor]
 ) -> None:
     angle = torch.linspace(0, 0.4, 20)[:, None] * torch.tensor([0.0, 0.0, 1.0])
     pose = make_pose(left_shoulder=angle)
@@ -65,13 +65,13 @@ def test_a_motion_without_contact_stays_as_it_is(
 
 
 def test_frames_that_cannot_be_freed_rest(
-    retargeters: dict[str, ReferenceRetargeter], monkeypatch: pytest.MonkeyPatch
+    retargeters: dict[str, OptimizationRetargeter], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     retargeter = retargeters["nao"]
     problem = CollisionFreeProblem(retargeter.body_map)
     q_TN = problem.robot.home().expand(6, -1).clone()
     target_TD3 = problem.body_map.robot_directions(problem.robot.forward(q_TN))
-    monkeypatch.setattr(problem, "margin", 10.0)  # something is always near
+    monkeypatch.setattr(problem.contact, "margin", 10.0)  # something is always near
     monkeypatch.setattr("mrhubo.reference.collision_free.refine", lambda p, q, *a, **k: (q, None))
     monkeypatch.setattr("mrhubo.reference.collision_free._start_again", lambda p, pool, q, *a: q)
     touching = torch.tensor([False, True, True, False, False, True])

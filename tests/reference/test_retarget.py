@@ -2,13 +2,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
+from mrhubo import rotation
 from mrhubo.errors import UserError
-from mrhubo.reference import ReferenceRetargeter, direction_error
+from mrhubo.motion import Motion
+from mrhubo.reference import OptimizationRetargeter, direction_error
 from mrhubo.reference.retarget import count_jumps
 
 
@@ -37,7 +41,7 @@ def waving(make_pose: Callable[..., Tensor]) -> Callable[[float], Tensor]:
 
 @pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
 def test_straight_arm_does_not_flip(
-    name: str, retargeters: dict[str, ReferenceRetargeter], waving: Callable[[float], Tensor]
+    name: str, retargeters: dict[str, OptimizationRetargeter], waving: Callable[[float], Tensor]
 ) -> None:
     retargeter = retargeters[name]
     pose_TJ6 = waving(24.0)
@@ -52,7 +56,7 @@ def test_straight_arm_does_not_flip(
 
 
 def test_frame_rate_changes_little(
-    retargeters: dict[str, ReferenceRetargeter], waving: Callable[[float], Tensor]
+    retargeters: dict[str, OptimizationRetargeter], waving: Callable[[float], Tensor]
 ) -> None:
     slow = retargeters["nao"].retarget(waving(24.0), 24.0)
     fast = retargeters["nao"].retarget(waving(48.0), 48.0)
@@ -61,7 +65,7 @@ def test_frame_rate_changes_little(
 
 
 def test_recorded_motion_stays_near_the_best_of_each_frame(
-    retargeters: dict[str, ReferenceRetargeter], cmu_poses: dict[str, Tensor]
+    retargeters: dict[str, OptimizationRetargeter], cmu_poses: dict[str, Tensor]
 ) -> None:
     pose_TJ6 = cmu_poses["13_21"][:200]
     for name, most_jumps in (("nao", 0), ("reachy", 0)):
@@ -77,29 +81,29 @@ def test_recorded_motion_stays_near_the_best_of_each_frame(
 
 
 def test_same_seed_same_result(
-    retargeters: dict[str, ReferenceRetargeter], random_pose: Callable[[int, int], Tensor]
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
 ) -> None:
     retargeter, pose_TJ6 = retargeters["nao"], random_pose(40, 8)
     first = retargeter.retarget(pose_TJ6, 30.0)
-    again = ReferenceRetargeter(retargeter.body_map).retarget(pose_TJ6, 30.0)
+    again = OptimizationRetargeter(retargeter.body_map).retarget(pose_TJ6, 30.0)
     assert torch.equal(first.q_TN, again.q_TN)
-    other = ReferenceRetargeter(retargeter.body_map, seed=1).retarget(pose_TJ6, 30.0)
+    other = OptimizationRetargeter(retargeter.body_map, seed=1).retarget(pose_TJ6, 30.0)
     assert not torch.equal(first.q_TN, other.q_TN)
 
 
 def test_one_frame_and_no_smoothness(
-    retargeters: dict[str, ReferenceRetargeter], random_pose: Callable[[int, int], Tensor]
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
 ) -> None:
     pose_TJ6 = random_pose(20, 9)
     alone_TN, _ = retargeters["nao"].solve_frames(pose_TJ6)
     one = retargeters["nao"].retarget(pose_TJ6[:1], 24.0)
     assert one.q_TN.shape == (1, 8) and one.residual_deg_TD.shape == (1, 4) and one.jumps == 0
     torch.testing.assert_close(one.q_TN, alone_TN[:1], atol=1e-3, rtol=0)
-    rough = ReferenceRetargeter(retargeters["nao"].body_map, smoothness=0.0).retarget(pose_TJ6, 24.0)
+    rough = OptimizationRetargeter(retargeters["nao"].body_map, smoothness=0.0).retarget(pose_TJ6, 24.0)
     torch.testing.assert_close(rough.q_TN, alone_TN, atol=1e-3, rtol=0)
 
 
-def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, ReferenceRetargeter]) -> None:
+def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, OptimizationRetargeter]) -> None:
     problem = retargeters["nao"].problem
     q_TN = torch.zeros(4, 8)
     q_TN[2:, 0] = 0.6
@@ -114,7 +118,7 @@ def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, Ref
     assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 1
 
 
-def test_bad_input_is_named(retargeters: dict[str, ReferenceRetargeter]) -> None:
+def test_bad_input_is_named(retargeters: dict[str, OptimizationRetargeter]) -> None:
     retargeter = retargeters["nao"]
     good_TJ6 = torch.tensor([1.0, 0, 0, 0, 1, 0]).repeat(6, 21, 1)
     for bad, message in ((math.nan, "frame 4, .*NaN"), (math.inf, "frame 4, .*infinite")):
@@ -133,13 +137,48 @@ def test_bad_input_is_named(retargeters: dict[str, ReferenceRetargeter]) -> None
         with pytest.raises(UserError, match="frame rate"):
             retargeter.retarget(good_TJ6, rate)
     with pytest.raises(UserError, match="smoothness"):
-        ReferenceRetargeter(retargeter.body_map, smoothness=-1.0)
+        OptimizationRetargeter(retargeter.body_map, smoothness=-1.0)
     with pytest.raises(UserError, match="starts"):
-        ReferenceRetargeter(retargeter.body_map, starts=1)
+        OptimizationRetargeter(retargeter.body_map, starts=1)
+
+
+def test_it_is_called_like_a_retargeter(
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor], tmp_path: Path
+) -> None:
+    retargeter, pose_TJ6 = retargeters["nao"], random_pose(12, 3)
+    wanted = retargeter.retarget(pose_TJ6, 30.0)
+    motion = Motion("made", rotation.sixd_to_matrix(pose_TJ6), 30.0)
+    axis_angle_T63 = rotation.matrix_to_axis_angle(motion.local_TJ33).flatten(1).numpy()
+    for result in (retargeter(motion), retargeter(pose_TJ6, 30.0), retargeter(axis_angle_T63, frame_rate=30.0)):
+        torch.testing.assert_close(result.q, wanted.q_TN, atol=1e-3, rtol=0)
+        torch.testing.assert_close(result.direction_error_deg, wanted.residual_deg_TD, atol=1e-2, rtol=0)
+        assert result.joint_names == retargeter.body_map.robot.joint_names and result.frame_rate == 30.0
+        assert torch.equal(result.collision, retargeter.body_map.collision.collides(result.q))
+    result.save(tmp_path / "motion.npz")
+    with np.load(tmp_path / "motion.npz") as file:
+        np.testing.assert_array_equal(file["q"], result.q)
+        assert float(file["frame_rate"]) == 30.0 and file["direction_error_deg"].shape == (12, 4)
+
+
+def test_leading_axes_are_motions_or_frames_of_their_own(
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
+) -> None:
+    retargeter, pose_TJ6 = retargeters["nao"], random_pose(12, 4)
+    two = retargeter(pose_TJ6.unflatten(0, (2, 6)), 30.0)
+    assert two.q.shape == (2, 6, 8) and two.collision.shape == (2, 6)
+    for found, part_TJ6 in zip(two.q, pose_TJ6.split(6), strict=True):
+        assert torch.equal(found, retargeter.retarget(part_TJ6, 30.0).q_TN)
+    alone = retargeter(pose_TJ6)
+    assert torch.equal(alone.q, retargeter.solve_frames(pose_TJ6)[0]) and alone.frame_rate is None
+    one = retargeter(pose_TJ6[0])
+    assert one.q.shape == (8,) and one.direction_error_deg.shape == (4,)
+    assert retargeter(pose_TJ6[:0], 30.0).q.shape == (0, 8)
+    with pytest.raises(UserError, match="frame rate"):
+        retargeter(pose_TJ6, -1.0)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
-def test_cuda_gives_the_same(retargeters: dict[str, ReferenceRetargeter], waving: Callable[[float], Tensor]) -> None:
+def test_cuda_gives_the_same(retargeters: dict[str, OptimizationRetargeter], waving: Callable[[float], Tensor]) -> None:
     pose_TJ6 = waving(24.0)
     here = retargeters["nao"].retarget(pose_TJ6, 24.0)
     there = retargeters["nao"].to("cuda").retarget(pose_TJ6.cuda(), 24.0)

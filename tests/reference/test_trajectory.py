@@ -4,7 +4,7 @@ import itertools
 
 import torch
 
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.trajectory import best_path, pick, refine
 
 
@@ -35,7 +35,7 @@ def test_pick_takes_each_block_from_its_own_candidate() -> None:
     assert pick(candidates_TSN, torch.tensor([[2, 0]]), joints_NC).tolist() == [[8.0, 1.0, 10.0, 3.0]]
 
 
-def test_refined_motion_is_a_minimum(retargeters: dict[str, ReferenceRetargeter]) -> None:
+def test_refined_motion_is_a_minimum(retargeters: dict[str, OptimizationRetargeter]) -> None:
     """Few frames, out of reach in part: no small change inside the limits lowers the motion's cost."""
     problem = retargeters["nao"].problem
     generator, pull = torch.Generator().manual_seed(2), 0.05

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrhubo.config import TrainerConfig
-from mrhubo.retargeter import PoseFeatures, RetargetModule, RetargetNetwork
+from mrhubo.fitting.module import RetargetModule
+from mrhubo.retargeter import PoseFeatures, RetargetNetwork
 from mrhubo.retargeter.networks import Branch, Branched, ResidualMLP, mlp
 
 LOWER, UPPER = torch.tensor([-2.08567, 0.0349066, -3.0]), torch.tensor([2.08567, 1.54462, -2.9])

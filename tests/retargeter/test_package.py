@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -13,8 +14,9 @@ from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior,
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
-from mrhubo.files.storage import read_metadata, read_tensors, write_tensors
-from mrhubo.reference import ReferenceRetargeter, direction_error
+from mrhubo.files.storage import read_tensors, write_tensors
+from mrhubo.motion import Motion
+from mrhubo.reference import OptimizationRetargeter, direction_error
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
@@ -43,7 +45,7 @@ def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: 
     assert opened.joint_names == made.joint_names
     pose = human(20)
     torch.testing.assert_close(opened.predict(pose), made.predict(pose))
-    torch.testing.assert_close(opened.retarget(pose).confidence_T, made.retarget(pose).confidence_T)
+    torch.testing.assert_close(opened.retarget(pose).confidence, made.retarget(pose).confidence)
 
 
 def test_arms_and_head_have_networks_of_their_own(made: Retargeter) -> None:
@@ -71,7 +73,7 @@ def test_a_head_that_no_joint_turns_is_not_looked_at(root: Path) -> None:
     network = build_network(config, body_map)
     assert {"neck", "head"}.isdisjoint(network.features.input_joints) and "left_wrist" in network.features.input_joints
     pose = human(30)
-    found = ReferenceRetargeter(body_map).retarget(pose, 24.0)
+    found = OptimizationRetargeter(body_map).retarget(pose, 24.0)
     assert found.q_TN.shape == network(pose).shape == (30, 8)
     limbs = [i for i, name in enumerate(body_map.direction_names) if name.endswith(("elbow", "wrist"))]
     still = direction_error(body_map, ((body_map.robot.lower_N + body_map.robot.upper_N) / 2).expand(30, 8), pose)
@@ -105,11 +107,11 @@ def test_a_package_keeps_vposer_and_another_skeleton(root: Path, tmp_path: Path)
         (tmp_path / f"{name}.safetensors").unlink()
     opened = Retargeter.load(folder)
     assert opened.prior.checksum == prior.checksum and opened.body_map.skeleton.checksum == longer.checksum
-    torch.testing.assert_close(opened.retarget(human(5)).confidence_T, made.retarget(human(5)).confidence_T)
+    torch.testing.assert_close(opened.retarget(human(5)).confidence, made.retarget(human(5)).confidence)
 
 
 def test_the_header_tells_joints_limits_and_conventions(made: Retargeter, folder: Path) -> None:
-    header = read_metadata(folder / "retargeter.safetensors")
+    _, header = read_tensors(folder / "retargeter.safetensors")
     assert header["robot"] == "reachy" and "l_elbow_pitch" in header["joint_names"] and header["run_id"] == "abc"
     assert "rad" in header["output"] and "6D" in header["input"] and header["lower_rad"].count(",") == 16
 
@@ -122,12 +124,12 @@ def test_no_path_of_this_machine_is_in_a_package(folder: Path, root: Path) -> No
 def test_confidence_falls_for_implausible_poses(made: Retargeter) -> None:
     noise = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(2 * torch.randn(50, 21, 3)))
     good, bad = made.retarget(human(50)), made.retarget(noise)
-    assert float(bad.phi_T.min()) > float(good.phi_T.max())
+    assert float(bad.phi.min()) > float(good.phi.max())
     for result in (good, bad):
-        assert bool(((result.confidence_T >= 0) & (result.confidence_T <= 1)).all())
-        plausible = (0.01 / result.phi_T).clamp(max=1)
-        assert bool((result.confidence_T <= plausible + 1e-6).all())
-    assert float(bad.confidence_T.max()) < 0.5
+        assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
+        plausible = (0.01 / result.phi).clamp(max=1)
+        assert bool((result.confidence <= plausible + 1e-6).all())
+    assert float(bad.confidence.max()) < 0.5
 
 
 def test_polish_brings_every_frame_nearer_and_stays_inside_the_limits(made: Retargeter) -> None:
@@ -135,16 +137,79 @@ def test_polish_brings_every_frame_nearer_and_stays_inside_the_limits(made: Reta
     errors = []
     for steps in (0, 1, 3):
         result = made.retarget(pose, polish=steps)
-        assert torch.equal(result.q_TN, made.predict(pose, steps))
-        assert bool(((result.q_TN >= robot.lower_N) & (result.q_TN <= robot.upper_N)).all())
-        assert torch.equal(result.collision_T, made.collision.collides(result.q_TN))
-        errors.append(made.directions.quadratic(result.q_TN, made.body_map.human_directions(pose)).cost_BC)
+        assert torch.equal(result.q, made.predict(pose, steps))
+        assert bool(((result.q >= robot.lower_N) & (result.q <= robot.upper_N)).all())
+        assert torch.equal(result.collision, made.collision.collides(result.q))
+        errors.append(made.directions.quadratic(result.q, made.body_map.human_directions(pose)).cost_BC)
     assert torch.equal(made.predict(pose), made.network(pose))
     assert bool((errors[1] <= errors[0]).all()) and bool((errors[2] <= errors[1]).all())
     assert float(errors[2].sum(1).mean()) < 0.5 * float(errors[0].sum(1).mean())
     assert made.predict(pose[:0], 1).shape == (0, 17)
     with pytest.raises(UserError, match="polish"):
         made.predict(pose, -1)
+
+
+def test_a_call_takes_a_motion_and_arrays_of_any_form(made: Retargeter) -> None:
+    pose = human(6)
+    expected = made.retarget(pose)
+    result = made(Motion("a", rotation.sixd_to_matrix(pose), 30.0))
+    torch.testing.assert_close(result.q, expected.q)
+    torch.testing.assert_close(result.confidence, expected.confidence)
+    assert result.frame_rate == 30.0 and result.joint_names == made.joint_names
+    matrices = rotation.sixd_to_matrix(pose)
+    turns = rotation.matrix_to_axis_angle(matrices).flatten(1)
+    for array in (pose, matrices, turns, turns.double().numpy()):
+        found = made(array, frame_rate=24.0)
+        torch.testing.assert_close(found.q, expected.q, atol=1e-4, rtol=0)
+        assert found.frame_rate == 24.0
+    assert torch.equal(made(pose, polish=0).q, made.predict(pose))
+    with pytest.raises(UserError, match="human pose 2 holds a matrix that is no rotation"):
+        made(matrices * torch.tensor([1.0, 1.0, 1.2, 1.0, 1.0, 1.0])[:, None, None, None])
+
+
+@pytest.mark.parametrize("leading", [(), (1,), (6,), (2, 3), (0,), (3, 0)])
+def test_the_answer_has_the_leading_axes_of_the_question(made: Retargeter, leading: tuple[int, ...]) -> None:
+    pose = human(6)[: int(np.prod(leading))]
+    result, expected = made(pose.reshape(*leading, 21, 6).numpy()), made.retarget(pose)
+    directions = len(made.body_map.direction_names)
+    for name, more in {
+        "q": (17,), "confidence": (), "phi": (), "collision": (), "direction_error_deg": (directions,),
+    }.items():  # fmt: skip
+        found = getattr(result, name)
+        assert found.shape == (*leading, *more), name
+        torch.testing.assert_close(found.flatten(), getattr(expected, name).flatten())
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.csv"])
+def test_an_answer_is_saved_with_names_and_time(made: Retargeter, tmp_path: Path, name: str) -> None:
+    result = made(Motion("a", rotation.sixd_to_matrix(human(6)), 30.0))
+    result.save(tmp_path / name)
+    if name.endswith("npz"):
+        with np.load(tmp_path / name, allow_pickle=False) as file:
+            assert tuple(file["joint_names"]) == made.joint_names and float(file["frame_rate"]) == 30.0
+            for key in ("q", "confidence", "phi", "collision", "direction_error_deg"):
+                np.testing.assert_array_equal(file[key], getattr(result, key))
+    else:
+        header, *rows = (tmp_path / name).read_text().splitlines()
+        assert header == ",".join(["time [s]", *(f"{j} [rad]" for j in made.joint_names), "confidence,phi,collision"])
+        assert len(rows) == 6
+        np.testing.assert_array_equal(np.array(rows[5].split(",")[1:18], np.float32), result.q[5])
+
+
+def test_it_moves_whole(folder: Path) -> None:
+    """Without a second device: to `meta`, where nothing may be left behind, and the robot's cost is made anew."""
+    retargeter = Retargeter.load(folder)
+    before = retargeter.directions
+    assert retargeter.to("cpu") is retargeter and retargeter.directions is not before
+    expected = retargeter.retarget(human(3)).q
+    assert torch.equal(retargeter.to(torch.device("cpu")).retarget(human(3)).q, expected)
+    retargeter.to("meta")
+    tensors = [*retargeter.parameters(), *retargeter.buffers(), retargeter.body_map.robot.lower_N]
+    assert {tensor.device.type for tensor in tensors} == {"meta"}
+    assert "directions" not in vars(retargeter)
+    if torch.cuda.is_available():
+        moved = Retargeter.load(folder).to("cuda")
+        torch.testing.assert_close(moved.retarget(human(3)).q.cpu(), expected, atol=1e-4, rtol=0)
 
 
 @pytest.mark.parametrize("shape", [(5, 20, 6), (21, 6), (5, 21, 3)])

@@ -129,7 +129,7 @@ def test_input_joints_follow_what_the_robot_has(root: Path) -> None:
         ({"left_elbo": "LElbow"}, r"body part 'left_elbo' does not exist; nearest: 'left_elbow'"),
         ({"chest": None}, r"'chest' is missing"),
         ({"chest": "torsoo"}, r"link 'torsoo' does not exist; nearest: 'torso'"),
-        ({"left_elbow": None}, r"'left_wrist' needs 'left_elbow' too"),
+        ({"left_elbow": None}, r"robot.keypoints.left_wrist: needs 'left_elbow' too"),
         ({"left_elbow": {"link": "LElbow", "ofset": [0, 0, 0]}}, r"entry 'ofset' does not exist; nearest: 'offset'"),
         ({"left_elbow": {"link": "LElbow", "offset": [0, 0]}}, r"expected three numbers"),
         ({"left_elbow": {"link": "LElbow", "offset": [0, 0, float("nan")]}}, r"expected three numbers"),

@@ -13,9 +13,10 @@ import torch
 from mrhubo.body import BodyPrior
 from mrhubo.config import ManualScaleConfig, load_config
 from mrhubo.errors import UserError
+from mrhubo.frames import base_to_human
 from mrhubo.pairing import PairGenerator
 from mrhubo.robot import BodyMap, LinkPoses, build_body_map
-from mrhubo.robot.manual_scale import HUMAN_FROM_BASE, check_ranges, varied
+from mrhubo.robot.manual_scale import check_ranges, varied
 
 ROBOTS = ["nao", "coman", "reachy"]
 
@@ -69,12 +70,28 @@ def test_limbs_are_lengthened_and_carry_the_hand(root: Path) -> None:
         torch.testing.assert_close(longer[name], plain[name])
 
 
-def test_factor_scales_and_shift_moves_all_alike(root: Path) -> None:
+def test_factor_scales_all_alike(root: Path) -> None:
     one, two = (targets(body_map_of(root, "reachy", factor=factor)) for factor in (1.0, 2.0))
-    moved = targets(body_map_of(root, "reachy", shift=[0.1, 0.2, 0.3]))
     for name, point in one.items():
         torch.testing.assert_close(two[name], 2 * point)
+
+
+def test_a_shift_moves_nothing_and_says_so(root: Path, recwarn: pytest.WarningsRecorder) -> None:
+    plain = targets(body_map_of(root, "reachy"))
+    assert not recwarn.list
+    with pytest.warns(UserWarning, match=r"robot.manual.shift: \[0.1, 0.2, 0.3\] moves nothing.*pelvis"):
+        moved = targets(body_map_of(root, "reachy", shift=[0.1, 0.2, 0.3]))
+    for name, point in plain.items():
         torch.testing.assert_close(moved[name], point, atol=1e-6, rtol=0)
+
+
+def test_what_the_warning_of_a_shift_advises_does_move(root: Path) -> None:
+    plain = targets(body_map_of(root, "reachy"))
+    config = load_config(root / "conf" / "paper" / "reachy.yaml").robot
+    assert config.manual is not None
+    config.manual.keypoints["pelvis"] = {"offset": [-0.1, -0.2, 0.6 - 0.3]}
+    moved = targets(build_body_map(config))
+    torch.testing.assert_close(moved["neck"], plain["neck"] + base_to_human(torch.tensor([0.1, 0.2, 0.3])))
 
 
 def test_means_offsets_and_constants_are_in_the_base_frame(root: Path) -> None:
@@ -88,7 +105,7 @@ def test_means_offsets_and_constants_are_in_the_base_frame(root: Path) -> None:
     found = body_map.targets(poses)
     left, right = (poses.position_BL3[:, body_map.robot.link_index(f"{s}_wrist")] for s in "lr")
     expected = (3 * left + right) / 4 + torch.tensor([0.1, 0.2, 0.3])
-    torch.testing.assert_close(found[:, 1], expected[:, HUMAN_FROM_BASE])
+    torch.testing.assert_close(found[:, 1], base_to_human(expected))
     torch.testing.assert_close(found[:, 2], torch.tensor([2.0, 3.0, 1.0]).expand(60, 3))
 
 

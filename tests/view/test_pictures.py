@@ -15,6 +15,7 @@ from mrhubo.evaluation import Clip
 from mrhubo.motion import Motion
 from mrhubo.pairing import make_filter
 from mrhubo.robot import Robot, build_body_map
+from mrhubo.rotation import sixd_to_matrix
 from mrhubo.view import save_gif
 from mrhubo.view.pictures import GIF_RATE, Artist, liveliness
 
@@ -38,7 +39,7 @@ def test_key_poses_show_what_differs(root: Path, tmp_path: Path, shapes: bool) -
     artist, prior = Artist(robot), BodyPrior.open()
     pose = prior.decode(torch.randn(3, 32, generator=torch.Generator().manual_seed(0)))
     q = robot.sample(3, torch.Generator().manual_seed(1))
-    clip = Clip(Motion("clip", pose, 24.0, "a motion"), q)
+    clip = Clip(Motion("clip", sixd_to_matrix(pose), 24.0, "a motion"), q)
     same, again = (np.asarray(artist.key_poses(clip, {"mrhubo": q}, count=2), float) for _ in range(2))
     other = np.asarray(
         artist.key_poses(clip, {"mrhubo": robot.sample(3, torch.Generator().manual_seed(2))}, count=2), float
@@ -62,7 +63,7 @@ def test_the_animation_is_short_whole_and_small(root: Path, tmp_path: Path) -> N
     robot = Robot(config.urdf, config.joints)
     share = torch.linspace(0, 1, 120)[:, None]
     q = robot.lower_N + share * (robot.upper_N - robot.lower_N)
-    pose = torch.eye(3)[:, :2].T.reshape(6).expand(120, 21, 6)
+    pose = torch.eye(3).expand(120, 21, 3, 3)
     clip = Clip(Motion("clip", pose, 60.0, "a motion"), q)
     frames = Artist(robot).animation(clip, {"mrhubo": q}, seconds=0.5)
     assert len(frames) == 7, "both ends of half a second at 12 frames a second"

@@ -4,22 +4,12 @@ import numpy as np
 import pytest
 
 from mrhubo.view import Solids, human_solids
-from mrhubo.view.solids import human_to_world, world_to_human
 
 RED = (0.9, 0.2, 0.2)
 
 
 def sphere(centre, radius, color=RED) -> Solids:
     return Solids.capsules([(np.asarray(centre, float), np.asarray(centre, float), radius, radius)], color)
-
-
-def test_human_frame_maps_left_up_forward_to_world_axes():
-    left, up, forward = np.eye(3)
-    assert human_to_world(forward).tolist() == [1, 0, 0]
-    assert human_to_world(left).tolist() == [0, 1, 0]
-    assert human_to_world(up).tolist() == [0, 0, 1]
-    points = np.random.default_rng(0).normal(size=(7, 3))
-    np.testing.assert_array_equal(world_to_human(human_to_world(points)), points)
 
 
 def test_concatenate_translate_bounds():

@@ -5,7 +5,6 @@ Legend: B batch, D directions, N joints, G glue pairs, S self-made pairs, U unpa
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -13,8 +12,9 @@ from torch import Tensor
 
 from mrhubo.baselines.s3le.model import S3LE, normality_gap
 from mrhubo.config import S3LEConfig
-from mrhubo.reference import ReferenceRetargeter
+from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, SelfCollision
+from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.trainer import cosine_schedule
 
 _MIXTURES = 0.5
@@ -36,16 +36,15 @@ class S3LEData:
     collision: SelfCollision
 
 
-def make_data(
-    body_map: BodyMap, pose_GJ6: Tensor, settings: S3LEConfig, progress: Callable[[int], None] = lambda done: None
-) -> S3LEData:
+def make_data(body_map: BodyMap, pose_GJ6: Tensor, settings: S3LEConfig, report: Reporter = SILENT) -> S3LEData:
     """Glue pairs of human poses (G, 21, 6) from motion capture, and random robot poses."""
     robot, collision = body_map.robot, body_map.collision
-    retargeter = ReferenceRetargeter(body_map)
+    retargeter = OptimizationRetargeter(body_map)
     answers = []
-    for done, part in enumerate(pose_GJ6.split(2_000)):
-        progress(2_000 * done)
-        answers.append(retargeter.solve_frames(part)[0])
+    with report.step("glue pairs", len(pose_GJ6)) as progress:
+        for done, part in enumerate(pose_GJ6.split(2_000)):
+            progress.update(2_000 * done)
+            answers.append(retargeter.solve_frames(part)[0])
     generator = torch.Generator().manual_seed(settings.seed)
     random_UN = robot.sample(settings.random_poses, generator)
     random_UN = random_UN[~collision.collides(random_UN)]
@@ -62,16 +61,14 @@ def _directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
     return torch.cat([body_map.robot_directions(body_map.robot.forward(part)) for part in q_BN.split(8_192)])
 
 
-def train_s3le(
-    body_map: BodyMap, data: S3LEData, settings: S3LEConfig, progress: Callable[[int, str], None] = lambda n, s: None
-) -> S3LE:
+def train_s3le(body_map: BodyMap, data: S3LEData, settings: S3LEConfig, report: Reporter = SILENT) -> S3LE:
     """Trains the autoencoders on glue pairs, then with the self-made pairs that they allow to make.
 
     Args:
         body_map: the robot.
         data: what `make_data` gave.
         settings: sizes, weights, steps.
-        progress: called with (step, loss) now and then.
+        report: told of the steps.
     """
     robot = body_map.robot
     with torch.random.fork_rng(devices=[]):
@@ -84,17 +81,18 @@ def train_s3le(
     generator = torch.Generator().manual_seed(settings.seed + 1)
     bootstrap = settings.steps // 2
     pairs: tuple[Tensor, Tensor, Tensor] | None = None
-    for step in range(settings.steps):
-        if step == bootstrap:
-            pairs = _self_made_pairs(model, body_map, data, feasible_FN, settings, generator)
-        loss = _loss(model, data, pairs, settings, generator)
-        optimizer.zero_grad()
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
-        optimizer.step()
-        schedule.step()
-        if step % _LOG_EVERY == 0 or step + 1 == settings.steps:
-            progress(step + 1, f"loss {float(loss.detach()):.4f}")
+    with report.step("S3LE", settings.steps, "steps") as progress:
+        for step in range(settings.steps):
+            if step == bootstrap:
+                pairs = _self_made_pairs(model, body_map, data, feasible_FN, settings, generator)
+            loss = _loss(model, data, pairs, settings, generator)
+            optimizer.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+            optimizer.step()
+            schedule.step()
+            if step % _LOG_EVERY == 0 or step + 1 == settings.steps:
+                progress.update(step + 1, f"loss {float(loss.detach()):.4f}")
     assert pairs is not None
     model.requires_grad_(False).eval()
     model.set_feasible(torch.cat((feasible_FN, pairs[2])))

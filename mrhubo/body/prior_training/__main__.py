@@ -5,6 +5,7 @@ from __future__ import annotations
 from mrhubo.body.prior_training.train import PriorConfig, train
 from mrhubo.config import parse_arguments, run_command
 from mrhubo.errors import UserError
+from mrhubo.runtime.progress import Reporter
 
 
 def main(argv: list[str]) -> None:
@@ -15,7 +16,7 @@ def main(argv: list[str]) -> None:
     )
     if not config.data.is_file():
         raise UserError(f"data: {config.data} does not exist; name a file of training poses (docs/prior.md says which)")
-    train(config, given["quiet"])
+    train(config, Reporter(given["quiet"]))
     print(f"body prior: {config.output}")
 
 

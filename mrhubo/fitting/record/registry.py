@@ -1,8 +1,10 @@
-"""A package as a model version in MLflow's registry, with signature, input example and what it was made from."""
+"""A package as a model version in MLflow's registry, with signature, example and what it was made from; and back."""
 
 from __future__ import annotations
 
 import json
+import os
+import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +14,11 @@ import numpy as np
 from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter
 from mrhubo.rotation import matrix_to_axis_angle, sixd_to_matrix
-from mrhubo.runtime.tracking import library_versions
+from mrhubo.runtime.locations import default_tracking
+from mrhubo.runtime.tracking import database_uri, library_versions
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -72,6 +76,44 @@ def register(
     link = json.dumps([{"name": name, "version": version}])
     client.set_logged_model_tags(model.model_id, {"mlflow.modelVersions": link})
     return f"models:/{name}/{version}"
+
+
+def fetch_package(uri: str) -> Path:
+    """Folder of the package in a model version, `models:/mrhubo-nao/3` or `models:/mrhubo-nao@best`.
+
+    It is where MLflow keeps it, or, where that is another machine, a copy in the folder for temporary files. The
+    registry is the one that MLflow is set to, else that of the project's tracking folder.
+
+    Raises:
+        UserError: the URI is no such URI, the registry or the version does not exist, or it holds no package.
+    """
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    import mlflow
+    from mlflow.artifacts import download_artifacts
+    from mlflow.models import Model
+
+    match = re.fullmatch(r"models:/([^/@]+)(?:/(\d+)|@([^/]+))", uri)
+    if not match:
+        raise UserError(f"'{uri}': expected models:/NAME/VERSION or models:/NAME@ALIAS")
+    name, number, alias = match.groups()
+    folder = default_tracking()
+    if mlflow.is_tracking_uri_set():
+        registry = mlflow.get_tracking_uri()
+    elif (folder / "mlflow.db").is_file():
+        registry = database_uri(folder)
+    else:
+        raise UserError(
+            f"{uri}: there is no registry in {folder}; set MLFLOW_TRACKING_URI to the one that has the model"
+        )
+    client = mlflow.MlflowClient(tracking_uri=registry)
+    try:
+        version = client.get_model_version(name, number) if number else client.get_model_version_by_alias(name, alias)
+        path = Path(download_artifacts(artifact_uri=version.source, tracking_uri=registry))
+        return path / Model.load(path).flavors["python_function"]["artifacts"]["package"]["path"]
+    except KeyError as error:
+        raise UserError(f"{uri}: is no model of mrhubo") from error
+    except Exception as error:  # MLflow's own, the network's, the database's
+        raise UserError(f"{uri}: cannot be had from {registry}: {str(error).splitlines()[0]}") from error
 
 
 def _save(

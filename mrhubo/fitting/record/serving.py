@@ -58,8 +58,8 @@ class ServedRetargeter(PythonModel):
             )
         pose_TJ3 = torch.from_numpy(pose_T63.copy()).unflatten(1, (len(POSED_JOINT_NAMES), 3))
         result = self.retargeter.retarget(matrix_to_sixd(axis_angle_to_matrix(pose_TJ3)))
-        table = pd.DataFrame(result.q_TN.numpy(), columns=list(self.retargeter.joint_names))
-        return table.assign(confidence=result.confidence_T.numpy())
+        table = pd.DataFrame(result.q.numpy(), columns=list(self.retargeter.joint_names))
+        return table.assign(confidence=result.confidence.numpy())
 
 
 set_model(ServedRetargeter())

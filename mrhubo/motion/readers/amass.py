@@ -1,9 +1,10 @@
 """Human motions from .npz files with the keys of AMASS, SMPL-X or SMPL-H.
 
 Such files come from strangers: nothing in them is unpickled, sizes are checked against their headers before anything is
-read, and whatever is wrong with one becomes a UserError that names the file, the key and the frame.
+read, and whatever is wrong with what is needed becomes a UserError that names the file, the key and the frame. What is
+not needed (the root, the body's shape) is left out where it cannot be used, with a note.
 
-Legend: T frames, 63 = 21 joints x 3 axis-angle numbers [rad] of SMPL's joints 1..21, J6 = (21, 6) the same in 6D.
+Legend: T frames, 63 = 21 joints x 3 axis-angle numbers [rad] of SMPL's joints 1..21.
 """
 
 from __future__ import annotations
@@ -13,37 +14,60 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from mrhubo.errors import UserError
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.motion.poses import MAX_TURN
+from mrhubo.rotation import axis_angle_to_matrix
 
 MAX_FRAMES = 5_000_000
 """Longest motion that is read (eleven hours at 120 frames a second)."""
 _FRAME_RATES = (1.0, 1000.0)
-_MAX_TURN = 8 * math.pi
-"""No axis-angle number is that large [rad]; degrees are."""
 _RATE_KEYS = ("mocap_frame_rate", "mocap_framerate")
 _POSES_WIDTHS = {66: "body", 72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
 _NAME_ENDINGS = ("_stageii", "_poses")
+_FARTHEST_M = 1e5
+"""No root is that far from the origin [m]."""
+_Y_UP_FROM_Z_UP = torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""Turns a world whose z axis is up so that y is: a quarter turn about x."""
 
 
 def read_amass(path: Path) -> Motion:
     """Reads `pose_body` (T, 63), or `poses` (T, 66 or more) with the root's three numbers first.
 
+    The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up, other files
+    of this kind y; the one that the body's own up axis follows is taken, and turned to y.
+
     Raises:
         UserError: the file is missing, damaged, hostile, too large, or not a motion.
     """
+    notes: list[str] = []
     with open_npz(path) as file:
-        pose_T63 = _read_pose(file)
+        pose_T63, key = _read_pose(file)
         frame_rate = _read_frame_rate(file)
         description = _read_description(file)
-    pose_TJ3 = torch.from_numpy(pose_T63).unflatten(-1, (21, 3))
-    chunks = (matrix_to_sixd(axis_angle_to_matrix(chunk)).float() for chunk in pose_TJ3.split(65_536))
-    pose_TJ6 = torch.cat(list(chunks))
+        root_rotation_T33, root_position_T3, up = _read_root(file, key, len(pose_T63), notes)
+        betas = _read_betas(file, notes)
     name = motion_name(path)
-    return Motion(name=name, pose_TJ6=pose_TJ6, frame_rate=frame_rate, description=description or name)
+    return Motion(
+        name=name,
+        local_TJ33=_matrices(pose_T63),
+        frame_rate=frame_rate,
+        description=description or name,
+        root_rotation_T33=root_rotation_T33,
+        root_position_T3=root_position_T3,
+        betas=betas,
+        source=f"SMPL-family .npz with '{key}'{up}",
+        notes=tuple(notes),
+    )
+
+
+def _matrices(axis_angle_TX: np.ndarray) -> Tensor:
+    """Axis-angle numbers (T, 3 K) [rad] as rotations (T, K, 3, 3), float32, in pieces that fit into memory."""
+    rotvec_TK3 = torch.from_numpy(axis_angle_TX).unflatten(-1, (-1, 3))
+    return torch.cat([axis_angle_to_matrix(chunk).float() for chunk in rotvec_TK3.split(65_536)])
 
 
 def motion_name(path: Path) -> str:
@@ -54,8 +78,8 @@ def motion_name(path: Path) -> str:
     return name or path.stem
 
 
-def _read_pose(file: NpzFile) -> np.ndarray:
-    """Axis-angle (T, 63) [rad], finite, float64."""
+def _read_pose(file: NpzFile) -> tuple[np.ndarray, str]:
+    """Axis-angle (T, 63) [rad], finite, float64, and the key that holds it."""
     path, keys = file.path, file.keys
     key = next((key for key in ("pose_body", "poses") if key in keys), None)
     if key is None:
@@ -69,13 +93,68 @@ def _read_pose(file: NpzFile) -> np.ndarray:
     start = 0 if key == "pose_body" else 3
     with np.errstate(over="ignore"):
         pose_T63 = array[:, start : start + 63].astype(np.float64)
-    bad_N2 = np.argwhere(~(np.abs(pose_T63) <= _MAX_TURN))
+    bad_N2 = np.argwhere(~(np.abs(pose_T63) <= MAX_TURN))
     if len(bad_N2):
         frame, column = bad_N2[0].tolist()
         value = float(pose_T63[frame, column])
         why = "is not finite" if not math.isfinite(value) else "is no axis-angle number in radians (degrees?)"
         raise UserError(f"{path}: '{key}' {why} in frame {frame}, number {start + column}: {value:g}")
-    return pose_T63
+    return pose_T63, key
+
+
+def _read_root(file: NpzFile, pose_key: str, frames: int, notes: list[str]) -> tuple[Tensor | None, Tensor | None, str]:
+    """Rotations (T, 3, 3) and places (T, 3) of the root in a world whose y axis is up, and how the file has it."""
+    key = "root_orient" if "root_orient" in file.keys else pose_key if pose_key == "poses" else None
+    root_T3 = None if key is None else _read_rows(file, key, frames, MAX_TURN, notes)
+    if root_T3 is None:
+        if "trans" in file.keys:
+            notes.append("'trans' is left out: without the root's rotation its up axis is not known")
+        return None, None, ""
+    rotation_T33 = _matrices(root_T3)[:, 0]
+    # The body's own up axis (y, in the pelvis) in the world: people stand and walk more than they lie.
+    _, along_y, along_z = rotation_T33[:, :, 1].mean(dim=0).tolist()
+    to_world_33 = torch.eye(3) if along_y >= along_z else _Y_UP_FROM_Z_UP
+    position_T3 = _read_rows(file, "trans", frames, _FARTHEST_M, notes) if "trans" in file.keys else None
+    return (
+        to_world_33 @ rotation_T33,
+        None if position_T3 is None else torch.from_numpy(position_T3).float() @ to_world_33.T,
+        ", y up" if along_y >= along_z else ", z up",
+    )
+
+
+def _read_rows(file: NpzFile, key: str, frames: int, largest: float, notes: list[str]) -> np.ndarray | None:
+    """The first three numbers (T, 3), float64, of an array that a motion can do without; None, and a note, where it
+    cannot be used.
+    """
+    try:
+        array = file.read(key, max_rows=MAX_FRAMES)
+    except UserError as error:
+        notes.append(f"'{key}' is left out: {error}")
+        return None
+    if array.ndim != 2 or len(array) != frames or array.shape[1] < 3:
+        notes.append(f"'{key}' is left out: its shape is {array.shape}; expected ({frames}, 3)")
+        return None
+    with np.errstate(over="ignore"):
+        rows_T3 = array[:, :3].astype(np.float64)
+    if not (np.abs(rows_T3) <= largest).all():
+        notes.append(f"'{key}' is left out: it holds NaN, infinite numbers, or some beyond {largest:g}")
+        return None
+    return rows_T3
+
+
+def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
+    """The body's shape, if the file has one."""
+    if "betas" not in file.keys:
+        return None
+    try:
+        array = file.read("betas")
+    except UserError as error:
+        notes.append(f"'betas' is left out: {error}")
+        return None
+    if array.ndim != 1 or len(array) > 400 or not np.isfinite(array).all():
+        notes.append(f"'betas' is left out: expected up to 400 finite numbers, found the shape {array.shape}")
+        return None
+    return tuple(float(number) for number in array)
 
 
 def _read_frame_rate(file: NpzFile) -> float:

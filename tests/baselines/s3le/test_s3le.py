@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
+import mlflow
 import numpy as np
 import pytest
 import torch
 
 from mrhubo.baseline import main
-from mrhubo.baselines.s3le.experiment import draw_settings
+from mrhubo.baselines.s3le import experiment
 from mrhubo.baselines.s3le.model import S3LE, normality_gap
+from mrhubo.baselines.s3le.search import NEIGHBOURS, WIDTHS
 from mrhubo.baselines.s3le.training import make_data, train_s3le
 from mrhubo.body import BodyPrior
-from mrhubo.config import S3LEConfig, load_config
+from mrhubo.config import BaselineConfig, S3LEConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.rotation import matrix_to_axis_angle, sixd_to_matrix
+from mrhubo.runtime.tracking import database_uri
 
 SMALL = S3LEConfig(glue=400, random_poses=3000, self_made=500, latent=8, hidden=64, steps=250, batch_size=128)
 
@@ -95,14 +99,8 @@ def test_the_gap_tells_normal_codes_from_others() -> None:
         assert float(normality_gap(wrong, normal)) > 0.1
 
 
-def test_trials_differ_and_repeat() -> None:
-    drawn = [draw_settings(SMALL, trial) for trial in range(20)]
-    assert drawn == [draw_settings(SMALL, trial) for trial in range(20)]
-    assert len({settings.lr for settings in drawn}) == 20 and SMALL.lr == S3LEConfig().lr
-
-
 def test_the_command_measures_searches_and_resumes(
-    root: Path, tmp_path: Path, poses: torch.Tensor, capsys: pytest.CaptureFixture[str]
+    root: Path, tmp_path: Path, poses: torch.Tensor, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     motions = tmp_path / "motions"
     motions.mkdir()
@@ -121,11 +119,34 @@ def test_the_command_measures_searches_and_resumes(
     main(given)
     output = capsys.readouterr().out
     assert "\nwave " in output and "mean over clips" in output
+    trained: list[int] = []
+
+    def train(*given: Any) -> S3LE:
+        if len(trained) == 1:
+            trained.append(0)
+            raise KeyboardInterrupt
+        trained.append(1)
+        return train_s3le(*given)
+
+    monkeypatch.setattr(experiment, "train_s3le", train)
+    with pytest.raises(KeyboardInterrupt):  # in the second trial
+        main([*given, "--trials", "2"])
     main([*given, "--trials", "2"])
+    assert trained == [1, 0, 1], "the first trial is not trained again"
     first = capsys.readouterr().out
-    assert first.count(" cm  s3le.latent=") == 2
+    rows = [line for line in first.splitlines() if line.startswith("| ") and "trial" not in line]
+    assert len(rows) == 2 and "s3le.neighbours" in first and "| s3le.width |" in first
     main([*given, "--trials", "2"])
-    assert capsys.readouterr().out == first
+    assert trained == [1, 0, 1] and capsys.readouterr().out == first
+    best = load_config(Path(first.split("--config ")[1].split()[0]), schema=BaselineConfig)
+    assert best.s3le.neighbours in NEIGHBOURS and best.s3le.width in WIDTHS and best.s3le.steps == 20
+    client = mlflow.MlflowClient(tracking_uri=database_uri(tmp_path / "mlruns"))
+    runs = client.search_runs([experiment_.experiment_id for experiment_ in client.search_experiments()])
+    (parent,) = [run for run in runs if "sweep" in run.data.tags]
+    trials = [run for run in runs if run.data.tags.get("mlflow.parentRunId") == parent.info.run_id]
+    assert sorted(run.info.status for run in trials) == ["FINISHED", "FINISHED", "KILLED"]
+    values = [run.data.metrics["val/best_link_cm"] for run in trials if run.info.status == "FINISHED"]
+    assert parent.data.metrics["val/best_link_cm"] == pytest.approx(min(values), abs=1e-3)
     with pytest.raises(UserError, match="--trials must be"):
         main([*given, "--trials", "0"])
     with pytest.raises(UserError, match="the baseline learns from human motion capture"):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 
+import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.fitting.record.registry import example_input, register
@@ -71,10 +72,33 @@ def test_it_answers_as_the_package_does(
     torch.testing.assert_close(given, pose, atol=1e-5, rtol=0)
     expected, robot = made.retarget(given), made.body_map.robot
     q_TN = torch.tensor(table[list(made.joint_names)].to_numpy())
-    torch.testing.assert_close(q_TN, expected.q_TN)
+    torch.testing.assert_close(q_TN, expected.q)
     assert bool(((q_TN >= robot.lower_N) & (q_TN <= robot.upper_N)).all())
-    np.testing.assert_allclose(table["confidence"], expected.confidence_T, rtol=1e-4)
+    np.testing.assert_allclose(table["confidence"], expected.confidence, rtol=1e-4)
     assert len(served.predict(pose_T63[:0])) == 0
+
+
+def test_a_version_is_loaded_by_its_uri(
+    registered: tuple[Path, Retargeter, str], pose: torch.Tensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, made, uri = registered
+    before = mlflow.get_tracking_uri()
+    monkeypatch.setattr("mrhubo.fitting.record.registry.default_tracking", lambda: folder)
+    monkeypatch.setattr(mlflow, "is_tracking_uri_set", lambda: False)
+    torch.testing.assert_close(mrhubo.load(uri)(pose).q, made(pose).q)
+    open_client(folder, "mrhubo").set_registered_model_alias("mrhubo-nao", "best", "1")
+    assert mrhubo.load("models:/mrhubo-nao@best").joint_names == made.joint_names
+    for wrong, message in {
+        "models:/mrhubo-nao/9": "cannot be had from sqlite.*not found",
+        "models:/mrhubo-nao@worst": "cannot be had",
+        "models:/mrhubo-nao": "expected models:/NAME/VERSION",
+    }.items():
+        with pytest.raises(mrhubo.UserError, match=message):
+            mrhubo.load(wrong)
+    monkeypatch.setattr("mrhubo.fitting.record.registry.default_tracking", lambda: folder / "nowhere")
+    with pytest.raises(mrhubo.UserError, match="there is no registry in .*nowhere"):
+        mrhubo.load(uri)
+    assert mlflow.get_tracking_uri() == before and not (folder / "nowhere").exists()
 
 
 def test_signature_example_and_source_are_there(registered: tuple[Path, Retargeter, str], served: Any) -> None:

@@ -14,6 +14,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
+from scipy.spatial.transform import Rotation
 
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder, read_motion, write_motion
@@ -73,7 +74,7 @@ def _accepts_or_refuses(content: bytes) -> None:
 def test_round_trip(tmp_path: Path) -> None:
     motion = read_motion(_write(tmp_path / "wave.npz", "waves\n  twice"))
     assert (motion.name, motion.frame_rate, motion.description) == ("wave", 30.0, "waves twice")
-    assert motion.pose_TJ6.dtype == torch.float32 and motion.duration == pytest.approx(7 / 30)
+    assert motion.pose_TJ6.dtype == torch.float32
     torch.testing.assert_close(motion.pose_TJ6, _expected(POSE_T63))
 
 
@@ -326,3 +327,52 @@ def test_evaluation_clips_are_read(external_dir: Path) -> None:
     assert len(motions) == 11
     assert motions["13_28"].pose_TJ6.shape == (824, 21, 6) and motions["13_28"].frame_rate == 24.0
     assert motions["13_28"].description == "direct traffic, wave, point"
+
+
+@pytest.mark.parametrize("z_up", [False, True])
+@pytest.mark.parametrize("key", ["root_orient", "poses"])
+def test_the_root_comes_out_with_y_up(tmp_path: Path, z_up: bool, key: str) -> None:
+    """A person who turns about the vertical and walks up a ramp, in a world whose y or z axis is up."""
+    turns = np.linspace(0, 170, 7)
+    position_T3 = np.stack((np.linspace(0, 2, 7), np.linspace(0.9, 1.1, 7), np.linspace(0, 1, 7)), axis=-1)
+    world = Rotation.from_euler("x", 90 if z_up else 0, degrees=True)  # takes y to z
+    root = [(world * Rotation.from_euler("y", turn, degrees=True)).as_rotvec() for turn in turns]
+    arrays_ = {"pose_body": POSE_T63, "root_orient": np.array(root)}
+    if key == "poses":
+        arrays_ = {"poses": np.concatenate((np.array(root), POSE_T63), axis=1)}
+    motion = read_motion(_save(tmp_path / "a.npz", trans=world.apply(position_T3), **arrays_, **RATE))
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None and not motion.notes
+    expected = Rotation.from_euler("y", turns[:, None], degrees=True).as_matrix()
+    np.testing.assert_allclose(motion.root_rotation_T33, expected, atol=1e-6)
+    np.testing.assert_allclose(motion.root_position_T3, position_T3, atol=1e-6)
+    assert motion.source.endswith("z up" if z_up else "y up") and len(motion) == 7
+
+
+def test_shape_and_root_of_a_shipped_motion(root: Path) -> None:
+    motion = read_motion(root / "data" / "motions" / "bow_and_greet.npz")
+    assert motion.betas == (0.0,) * 16 and motion.confidence_TJ is None
+    assert motion.root_position_T3 is not None and 0.7 < float(motion.root_position_T3[:, 1].min()) < 1.1  # the pelvis
+    assert float(motion.root_position_T3[:, [0, 2]].abs().max()) < 0.5  # who bows stays where they are
+
+
+@pytest.mark.parametrize(
+    ("arrays_", "said"),
+    [
+        ({"root_orient": np.zeros((6, 3)), "trans": np.zeros((7, 3))}, "'root_orient' is left out"),
+        ({"root_orient": np.full((7, 3), np.nan), "trans": np.zeros((7, 3))}, "'root_orient' is left out"),
+        ({"root_orient": np.array([{}]), "trans": np.zeros((7, 3))}, "'root_orient' is left out"),
+        ({"root_orient": np.zeros((7, 3)), "trans": np.full((7, 3), 1e9)}, "'trans' is left out"),
+        ({"root_orient": np.zeros((7, 3)), "trans": np.zeros((7, 3)), "betas": np.array("?")}, "'betas' is left out"),
+        ({"trans": np.zeros((7, 3))}, "'trans' is left out"),
+    ],
+)
+def test_what_arms_do_not_need_is_left_out_with_a_note(tmp_path: Path, arrays_: dict, said: str) -> None:
+    motion = read_motion(_save(tmp_path / "a.npz", pose_body=POSE_T63, **arrays_, **RATE))
+    (note,) = [note for note in motion.notes if said in note]
+    assert len(motion) == 7 and note
+    assert (motion.root_position_T3 is None) == ("betas" not in said)
+
+
+def test_a_file_of_the_body_alone_has_no_root(tmp_path: Path) -> None:
+    motion = read_motion(_save(tmp_path / "a.npz", pose_body=POSE_T63, **RATE))
+    assert motion.root_rotation_T33 is None and motion.root_position_T3 is None and not motion.notes

@@ -1,4 +1,4 @@
-"""A fit's data as MLflow datasets: the pairs, and the motions that choose the checkpoint and measure the result.
+"""What went into a fit, as MLflow's datasets: the pairs, and the motions that choose the checkpoint and measure.
 
 A digest is a checksum, so that the dashboard shows which runs had the same data.
 """
@@ -17,10 +17,10 @@ from mrhubo.motion import Motion
 if TYPE_CHECKING:
     from mlflow.entities import DatasetInput
 
-    from mrhubo.fitting.pipeline import Prepared
+    from mrhubo.fitting.preparation import Prepared
 
 
-def datasets(prepared: Prepared) -> list[DatasetInput]:
+def mlflow_datasets(prepared: Prepared) -> list[DatasetInput]:
     """Pairs (context `training`), clips of `evaluation.validation` (`validation`) and the other clips (`testing`).
 
     The pairs' digest is their fingerprint; their profile tells robot, count of each direction, and the checksums of

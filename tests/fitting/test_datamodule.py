@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from mrhubo.fitting.data import BernoulliBatches, PairData, PairTable
+from mrhubo.fitting.datamodule import BernoulliBatches, PairTable, batches_of
 from mrhubo.pairing import make_filter
 
 
@@ -41,7 +41,7 @@ def test_rows_stay_together() -> None:
     table = PairTable(
         number[:, None].expand(-1, 4), number[:, None, None].expand(-1, 2, 6), number[:, None].expand(-1, 2)
     )
-    loader = PairData(table, make_filter(torch.rand(count), "none", 1.0), 32, 3, 0).train_dataloader()
+    loader = batches_of(table, make_filter(torch.rand(count), "none", 1.0), 32, 3, 0)
     for features, links, joints in loader:
         assert features.shape == (32, 4) and links.shape == (32, 2, 6) and joints.shape == (32, 2)
         assert torch.equal(features[:, 0], joints[:, 1]) and torch.equal(links[:, 1, 5], joints[:, 0])

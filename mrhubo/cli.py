@@ -1,0 +1,65 @@
+"""`mrhubo VERB ...`: every command under one name; `python -m mrhubo` is the same."""
+
+from __future__ import annotations
+
+import importlib
+from typing import NamedTuple, NoReturn
+
+from mrhubo.config import run_command
+from mrhubo.errors import UserError, unknown_name
+
+
+class Verb(NamedTuple):
+    """A command: the module whose `main(argv)` it is, and what it does."""
+
+    module: str
+    meaning: str
+
+
+VERBS = {
+    "fit": Verb("mrhubo.fit", "make pairs for a robot, train a retargeter on them, measure and package it"),
+    "pair": Verb("mrhubo.pair", "make, check or show the pairs alone"),
+    "evaluate": Verb("mrhubo.evaluate", "measure a trained retargeter on human motion"),
+    "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit"),
+    "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE"),
+    "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours"),
+    "prior": Verb("mrhubo.body.prior_training.__main__", "train a body prior on motion capture of your own"),
+}
+
+
+def main() -> NoReturn:
+    """What the `mrhubo` script runs."""
+    run_command(dispatch)
+
+
+def dispatch(argv: list[str]) -> int | None:
+    """Runs the verb that comes first with the arguments that follow it; returns the exit status.
+
+    Raises:
+        UserError: there is no such verb, or whatever is wrong with its arguments.
+    """
+    first = argv[0] if argv else ""
+    if first in ("", "-h", "--help"):
+        print(_help(), end="")
+        return 0 if first else 2
+    if first == "--version":
+        import mrhubo
+
+        print(f"mrhubo {mrhubo.__version__}")
+        return 0
+    if first not in VERBS:
+        kind, known = ("flag", ["--help", "--version"]) if first.startswith("-") else ("command", list(VERBS))
+        raise UserError(f"command line: {unknown_name(kind, first, known)}")
+    return importlib.import_module(VERBS[first].module).main(argv[1:])
+
+
+def _help() -> str:
+    width = max(map(len, VERBS))
+    verbs = "".join(f"  {name:<{width}}  {verb.meaning}\n" for name, verb in VERBS.items())
+    return (
+        "usage: mrhubo COMMAND ...\n\n"
+        "Human-to-humanoid motion retargeting that learns from robot poses.\n\n"
+        f"commands:\n{verbs}\n"
+        "mrhubo COMMAND --help shows its flags, and every key of its config with default, range and meaning.\n"
+        "mrhubo --version tells the version.\n"
+    )

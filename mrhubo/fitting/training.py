@@ -1,0 +1,140 @@
+"""The step of a fit that trains: Lightning's trainer over `RetargetModule` and `PairData`.
+
+The scale factor, where it is to be searched for, and the pairs are found and made on the way: by the callback
+`ScaleFactorSearch` and by `PairData`, in the hooks that Lightning has for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import lightning
+import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
+from lightning.pytorch.loggers import Logger
+from torch import Tensor
+
+from mrhubo.callbacks import ClipMetrics, TrainingProgress
+from mrhubo.config import TrainerConfig
+from mrhubo.evaluation import Clip
+from mrhubo.fitting.datamodule import PairData
+from mrhubo.fitting.module import LOG_EVERY, RetargetModule
+from mrhubo.fitting.preparation import Prepared, device_of
+from mrhubo.pairing import PairFilter, PairingReport
+from mrhubo.retargeter import Retargeter, RetargetNetwork, build_network
+from mrhubo.runtime.progress import Reporter
+from mrhubo.runtime.ranks import Ranks
+from mrhubo.runtime.trainer import quiet_lightning, run_trainer
+
+_SHOWN = {"val/joint_rad": "validation joint rad", "val/link_cm": "link cm"}
+"""Metrics on a training's progress line, and what they are called there."""
+
+
+@dataclass
+class Training:
+    """A trained network and what it was trained on."""
+
+    prepared: Prepared
+    """What the pairs were made from: where the scale factor was searched for, with the one that was found."""
+    network: RetargetNetwork
+    pairs: dict[str, Tensor]
+    filter: PairFilter
+    pairing: PairingReport
+    """How the pairs came about."""
+    best_checkpoint: Path
+    best_link_cm: float
+
+    @property
+    def retargeter(self) -> Retargeter:
+        """The network with its robot."""
+        prepared = self.prepared
+        return Retargeter(self.network, prepared.body_map, prepared.prior, prepared.config, self.filter.threshold)
+
+
+def train(
+    prepared: Prepared,
+    report: Reporter,
+    validation: Sequence[Clip],
+    checkpoints: Path,
+    resume: Path | None = None,
+    logger: Logger | bool = False,
+    ranks: Ranks | None = None,
+    callbacks: Sequence[lightning.Callback] = (),
+) -> Training:
+    """Makes the pairs that are missing, trains on them, and returns the network of the best validation link error.
+
+    Args:
+        prepared: the checked config; with `robot.scale: search` a `ScaleFactorSearch` must be among the callbacks.
+        report: told of the steps.
+        validation: clips that choose the checkpoint.
+        checkpoints: folder for `last.ckpt` and the best one, written at every validation.
+        resume: checkpoint to go on from, or None.
+        logger: Lightning's logger, or False for none.
+        ranks: the processes that train together (DDP), each on its share of every batch; default: this one alone.
+        callbacks: more of them; they stand after the metrics of the validation clips.
+
+    Raises:
+        UserError: a shard cannot be written, or the filter drops every pair.
+        KeyboardInterrupt: the user stopped it; the last checkpoint is there.
+    """
+    ranks = ranks or Ranks()
+    settings = prepared.config.trainer
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(settings.seed)
+        network = build_network(prepared.config, prepared.body_map)
+    data = PairData(prepared, network.features, report, ranks)
+    module = RetargetModule(network, settings, prepared.config.model.detach_student)
+    saver = ModelCheckpoint(
+        dirpath=checkpoints,
+        filename="best",
+        monitor="val/link_cm",
+        mode="min",
+        save_last=True,
+        save_top_k=1,
+        save_on_train_epoch_end=True,
+        enable_version_counter=False,
+    )
+    metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
+    progress = TrainingProgress(settings.max_steps, _SHOWN, report)
+    with quiet_lightning():
+        trainer = _trainer(
+            settings, device_of(prepared.config).type, ranks, logger, [metrics, *callbacks, progress, saver]
+        )
+        run_trainer(trainer, module, resume, datamodule=data)
+    best = torch.load(saver.best_model_path, map_location="cpu", weights_only=True)["state_dict"]
+    network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
+    network.requires_grad_(False).eval()
+    score = saver.best_model_score
+    return Training(
+        data.prepared,
+        network,
+        data.pairs,
+        data.filter,
+        data.pairing,
+        Path(saver.best_model_path),
+        float("nan") if score is None else float(score),
+    )
+
+
+def _trainer(
+    settings: TrainerConfig, device: str, ranks: Ranks, logger: Logger | bool, callbacks: list[lightning.Callback]
+) -> lightning.Trainer:
+    return lightning.Trainer(
+        accelerator=settings.accelerator if settings.accelerator != "auto" else device,
+        devices=ranks.count // ranks.nodes,
+        num_nodes=ranks.nodes,
+        strategy="ddp" if ranks.count > 1 else "auto",
+        use_distributed_sampler=False,
+        precision="bf16-mixed" if settings.precision == "bf16" else "32-true",
+        # Not max_steps: with it Lightning takes a checkpoint of a finished epoch for one within the epoch, and a
+        # resumed run goes on with other batches. The module stops at its last step.
+        max_epochs=-(-settings.max_steps // settings.validate_every),
+        logger=logger,
+        log_every_n_steps=LOG_EVERY,
+        num_sanity_val_steps=0,
+        enable_progress_bar=False,
+        enable_model_summary=False,
+        callbacks=callbacks,
+    )

@@ -1,0 +1,18 @@
+"""The terms of the reference retargeter's cost, one a file."""
+
+from mrhubo.reference.terms.directions import DirectionTerm
+from mrhubo.reference.terms.posture import PostureTerm
+from mrhubo.reference.terms.self_collision import SelfCollisionTerm
+from mrhubo.reference.terms.smoothness import add_pull, pull_diagonal
+from mrhubo.reference.terms.term import Quadratic, State, Term
+
+__all__ = [
+    "DirectionTerm",
+    "PostureTerm",
+    "Quadratic",
+    "SelfCollisionTerm",
+    "State",
+    "Term",
+    "add_pull",
+    "pull_diagonal",
+]

@@ -1,0 +1,50 @@
+"""What a retargeter answers, and how that is saved."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+from torch import Tensor
+
+from mrhubo.files.joint_angles import write_joint_angles
+
+
+@dataclass(frozen=True, eq=False)
+class RetargetResult:
+    """Joint angles and how far to trust them; T stands for the leading axes of the human poses, none for a single pose.
+
+    N robot joints, D directions (limbs, hands, head).
+    """
+
+    q: Tensor
+    """Joint angles (T, N) [rad], inside the limits."""
+    joint_names: tuple[str, ...]
+    """The N joints, by their names in the URDF."""
+    confidence: Tensor
+    """(T,), 0..1: plausibility of the human pose times agreement of the robot's limbs with the human's."""
+    direction_error_deg: Tensor
+    """Angle (T, D) [deg] between the robot's and the human's limb, hand and head directions."""
+    phi: Tensor
+    """Reconstruction error (T,) of the human pose under the body prior."""
+    collision: Tensor
+    """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it."""
+    frame_rate: float | None = None
+    """Frames per second, where the motion told it."""
+
+    def with_leading(self, shape: tuple[int, ...], frame_rate: float | None) -> RetargetResult:
+        """The same with other leading axes, for as many frames, and a frame rate."""
+        names = ("q", "confidence", "direction_error_deg", "phi", "collision")
+        tensors = {name: getattr(self, name).unflatten(0, shape) if shape else getattr(self, name)[0] for name in names}
+        return dataclasses.replace(self, **tensors, frame_rate=frame_rate)
+
+    def save(self, path: Path | str) -> None:
+        """Writes an .npz or a .csv file, by the path's ending; see `write_joint_angles` for what is in it.
+
+        Raises:
+            UserError: the ending is another, the result is no single motion and the ending .csv, or the disk refuses.
+        """
+        names = ("confidence", "direction_error_deg", "phi", "collision")
+        more = {name: getattr(self, name).cpu().numpy() for name in names}
+        write_joint_angles(path, self.q.cpu().numpy(), self.joint_names, self.frame_rate, more)

@@ -1,0 +1,123 @@
+"""Unit directions that a robot and a human share, each seen from the part that its row of the table names.
+
+Directions are in human axes (x left, y up, z forward) of that part, so neither proportions nor the way a base faces
+matter.
+
+Legend: B batch, D directions, E of them limbs, A of them axes, V parts from which they are seen, L robot links.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, Skeleton, keypoint_indices
+from mrhubo.frames import human_axes
+from mrhubo.robot.keypoints import Axis, Keypoints, Limb
+from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.rotation import sixd_to_matrix
+
+
+@dataclass(frozen=True)
+class RobotView:
+    """A robot's directions, and what they were worked out from."""
+
+    direction_BD3: Tensor
+    """Unit directions, each in human axes of the part from which it is seen."""
+    start_BE3: Tensor
+    """Where limbs start [m], base frame."""
+    end_BE3: Tensor
+    """Where they end [m], base frame."""
+    views: list[Tensor]
+    """Rotations (B, 3, 3) of the parts from which directions are seen: columns are their left, up and forward."""
+
+
+class Directions(nn.Module):
+    """The directions of one robot's body parts."""
+
+    limb_links_2E: Tensor
+    limb_offsets_2E3: Tensor
+    axis_links_A: Tensor
+    axes_A3: Tensor
+    rest_A3: Tensor
+    order_D: Tensor
+    view_axes_V33: Tensor
+    view_D: Tensor
+
+    def __init__(self, robot: Robot, keypoints: Keypoints, skeleton: Skeleton) -> None:
+        """Looks links and human joints up."""
+        super().__init__()
+        self.skeleton, self.keypoints = skeleton, keypoints
+        self.all = keypoints.directions
+        self.names = tuple(d.name for d in self.all)
+        limbs = [(i, d) for i, d in enumerate(self.all) if isinstance(d, Limb)]
+        axes = [(i, d) for i, d in enumerate(self.all) if isinstance(d, Axis)]
+        self.limb_columns = [i for i, _ in limbs]
+        """Which of the directions are limbs."""
+        self.views = tuple(dict.fromkeys(d.part.seen_from for d in self.all if d.part.seen_from))
+        """The parts from which directions are seen."""
+        self.view_links = tuple(keypoints.ends[name].link for name in self.views)
+        views = [self.views.index(d.part.seen_from or "") for d in self.all]
+        joint_of = {part.name: JOINT_NAMES.index(part.joint) for part in keypoints.parts}
+        self._view_joints = [joint_of[name] for name in self.views]
+        self._view_rows = [robot.link_index(link) for link in self.view_links]
+        self._bones = [keypoint_indices([d.part.start for _, d in limbs]), keypoint_indices([d.name for _, d in limbs])]
+        self._axis_joints = [joint_of[d.part.name] for _, d in axes]
+        ends = [[d.start for _, d in limbs], [d.end for _, d in limbs]]
+        tensors = {
+            "limb_links_2E": torch.tensor([[robot.link_index(point.link) for point in points] for points in ends]),
+            "limb_offsets_2E3": torch.tensor([[point.offset_3 for point in points] for points in ends]).reshape(
+                2, -1, 3
+            ),
+            "axis_links_A": torch.tensor([robot.link_index(d.link) for _, d in axes], dtype=torch.long),
+            "axes_A3": torch.stack([d.axis_3 for _, d in axes]) if axes else torch.zeros(0, 3),
+            "rest_A3": torch.tensor([d.rest for _, d in axes]).reshape(-1, 3),
+            "order_D": torch.tensor([i for i, _ in (*limbs, *axes)]).argsort(),
+            "view_axes_V33": torch.stack([human_axes(keypoints.ends[name].axes_23) for name in self.views]),
+            "view_D": torch.tensor(views),
+        }
+        for name, tensor in tensors.items():
+            self.register_buffer(name, tensor, persistent=False)
+
+    def view_robot(self, poses: LinkPoses) -> RobotView:
+        """The robot's directions, with what they were worked out from."""
+        start_BE3, end_BE3 = (self._limb_points(poses, which) for which in (0, 1))
+        limbs = torch.nn.functional.normalize(end_BE3 - start_BE3, dim=-1)
+        axes = (poses.rotation_BL33.index_select(1, self.axis_links_A) @ self.axes_A3[..., None])[..., 0]
+        views = [
+            poses.rotation_BL33[:, row] @ axes_33
+            for row, axes_33 in zip(self._view_rows, self.view_axes_V33, strict=True)
+        ]
+        base_BD3 = torch.cat((limbs, axes), dim=1).index_select(1, self.order_D)
+        return RobotView(self.seen(base_BD3, views), start_BE3, end_BE3, views)
+
+    def _limb_points(self, poses: LinkPoses, which: int) -> Tensor:
+        """Start (which=0) or end (which=1) points (B, E, 3) of the limbs, base frame [m]."""
+        links = self.limb_links_2E[which]
+        offset = (poses.rotation_BL33.index_select(1, links) @ self.limb_offsets_2E3[which, :, :, None])[..., 0]
+        return poses.position_BL3.index_select(1, links) + offset
+
+    def seen(self, vectors_BX3: Tensor, views: Sequence[Tensor], limbs: bool = False) -> Tensor:
+        """A vector (B, X, 3) for each direction, or for each limb, in the axes of the part that sees it."""
+        if len(views) == 1:
+            return vectors_BX3 @ views[0]
+        view_X = self.view_D[self.limb_columns] if limbs else self.view_D
+        return (vectors_BX3[..., None, :] @ torch.stack(list(views), dim=1).index_select(1, view_X))[..., 0, :]
+
+    def of_human(self, pose_BJ6: Tensor) -> Tensor:
+        """Unit directions (B, D, 3) of human poses (B, 21, 6), in human axes of the parts from which they are seen."""
+        keypoints, rotations = self.skeleton.keypoints_and_rotations(sixd_to_matrix(pose_BJ6))
+        starts, ends = self._bones
+        limbs = torch.nn.functional.normalize(keypoints[:, ends] - keypoints[:, starts], dim=-1)
+        axes = (rotations[:, self._axis_joints] @ self.rest_A3.to(rotations)[..., None])[..., 0]
+        pelvis_BD3 = torch.cat((limbs, axes), dim=1).index_select(1, self.order_D)
+        return self.seen(pelvis_BD3, [rotations[:, joint] for joint in self._view_joints])
+
+    def input_joints(self, directions: Iterable[int] | None = None) -> tuple[str, ...]:
+        """The human joints that tell about all directions, or about some of them, in SMPL's order."""
+        chosen = self.all if directions is None else [self.all[i] for i in directions]
+        wanted = {name for d in chosen for name in d.part.inputs}
+        return tuple(name for name in POSED_JOINT_NAMES if name in wanted)

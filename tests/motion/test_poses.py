@@ -1,0 +1,95 @@
+"""Every form in which poses come means the same pose, and a bad one is named with its frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from mrhubo.errors import UserError
+from mrhubo.motion import Motion, read_poses
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+
+LEADING = st.lists(st.integers(0, 3), max_size=3).map(tuple)
+
+
+@st.composite
+def axis_angles(draw: st.DrawFn) -> np.ndarray:
+    shape = (*draw(LEADING), 63)
+    return draw(arrays.arrays(np.float64, shape, elements=st.floats(-6.0, 6.0, width=32)))
+
+
+@given(axis_angles(), st.sampled_from([np.float32, np.float64]), st.booleans())
+def test_the_three_forms_agree_for_any_leading_axes(turns: np.ndarray, dtype: type, as_torch: bool) -> None:
+    matrices = axis_angle_to_matrix(torch.from_numpy(turns).unflatten(-1, (21, 3)))
+    forms = [turns, matrices.numpy(), matrix_to_sixd(matrices).numpy()]
+    for array in (form.astype(dtype) for form in forms):
+        found = read_poses(torch.from_numpy(array) if as_torch else array)
+        assert found.shape == turns.shape[:-1] and found.frame_rate is None
+        assert found.pose_TJ6.shape == (math.prod(found.shape), 21, 6) and found.pose_TJ6.dtype == torch.float32
+        expected = matrix_to_sixd(matrices).reshape(-1, 21, 6).float()
+        torch.testing.assert_close(found.pose_TJ6, expected, atol=2e-5, rtol=0)
+
+
+def test_a_motion_is_taken_as_it_is() -> None:
+    motion = Motion("turn", axis_angle_to_matrix(torch.linspace(0, 3, 4 * 63).reshape(4, 21, 3)), 30.0)
+    found = read_poses(motion)
+    assert found.frame_rate == 30.0 and found.shape == (4,) and torch.equal(found.pose_TJ6, motion.pose_TJ6)
+
+
+def test_views_and_whole_numbers_do_too() -> None:
+    turns = np.zeros((5, 63), dtype=np.int64)
+    turns[:, 0] = np.arange(5)
+    turns.flags.writeable = False
+    assert torch.equal(read_poses(turns[::-1]).pose_TJ6, read_poses(turns).pose_TJ6.flip(0))
+
+
+def identity(*leading: int) -> torch.Tensor:
+    return torch.eye(3).expand(*leading, 21, 3, 3).clone()
+
+
+def bad(leading: tuple[int, ...], where: tuple[int, ...], value: torch.Tensor | float) -> torch.Tensor:
+    made = identity(*leading)
+    made[where] = torch.as_tensor(value)
+    return made
+
+
+MIRROR, STRETCH = torch.diag(torch.tensor([1.0, 1.0, -1.0])), 1.1 * torch.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("array", "message"),
+    [
+        (torch.zeros(5, 20, 6), r"\(\.\.\., 21, 3, 3\).*\(\.\.\., 63\).*\(\.\.\., 21, 6\).*found \(5, 20, 6\)"),
+        (torch.zeros(5, 21, 3), r"found \(5, 21, 3\)"),
+        (np.zeros(()), r"found \(\)"),
+        (np.array([["a"] * 63]), "a NumPy or torch array of numbers, found an array of <U1"),
+        (np.array([[None] * 63]), "found an array of object"),
+        (np.zeros((2, 63), dtype=complex), "found an array of complex128"),
+        (torch.zeros(2, 63, dtype=torch.bool), "found an array of torch.bool"),
+        ([[0.0] * 63], "expected a Motion.*found list"),
+        (bad((9,), (4, 3), torch.nan), "human pose 4 holds NaN or infinite numbers"),
+        (bad((2, 9), (1, 7, 3), torch.inf), r"human pose \(1, 7\) holds NaN"),
+        (bad((), (3,), torch.nan), "human pose holds NaN"),
+        (bad((9,), (5, 20), MIRROR), "human pose 5 holds a matrix that is no rotation"),
+        (bad((9,), (6, 20), STRETCH), "human pose 6 holds a matrix that is no rotation"),
+        (bad((9,), (7, 0), torch.zeros(3, 3)), "human pose 7 holds a matrix that is no rotation"),
+        (matrix_to_sixd(bad((9,), (2, 1), 0.0)), "human pose 2 holds six numbers that are no rotation"),
+        (matrix_to_sixd(bad((9,), (3, 1), torch.ones(3, 3))), "human pose 3 holds six numbers that are no rotation"),
+        (np.full((3, 63), 90.0), "human pose 0 holds no axis-angle in radians"),
+    ],
+)
+def test_what_is_no_pose_is_named(array: object, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        read_poses(array)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("rate", [0.0, -24.0, math.nan, math.inf])
+def test_a_frame_rate_is_positive(rate: float) -> None:
+    with pytest.raises(UserError, match="frame rate must be a positive number"):
+        read_poses(identity(2), rate)

@@ -1,0 +1,144 @@
+"""Every term's Jacobian against differences of its residual, and its quadratic model against its residual."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo.reference.blocks import Blocks
+from mrhubo.reference.jacobian import DirectionJacobian
+from mrhubo.reference.terms import (
+    DirectionTerm,
+    PostureTerm,
+    Quadratic,
+    SelfCollisionTerm,
+    State,
+    Term,
+    add_pull,
+    pull_diagonal,
+)
+from mrhubo.robot import BodyMap
+
+ROBOTS = ["nao", "reachy"]
+STEP = 2e-3
+
+
+def state(body_map: BodyMap, q_BN: Tensor, target_BD3: Tensor) -> State:
+    return State(q_BN, body_map.robot.forward(q_BN), target_BD3)
+
+
+def problem(body_map: BodyMap, term: Term, count: int = 24) -> tuple[Blocks, Tensor, Tensor]:
+    """The blocks of a term alone, joint angles away from the limits, and the directions of other angles."""
+    robot = body_map.robot
+    directions: list[set[int]] = DirectionTerm(DirectionJacobian(body_map)).couplings()
+    blocks = Blocks([*directions, *term.couplings()], len(robot.joint_names), len(directions))
+    generator = torch.Generator().manual_seed(5)
+    middle_N = (robot.lower_N + robot.upper_N) / 2
+    q_BN = middle_N + 0.9 * (robot.sample(count, generator) - middle_N)
+    return blocks, q_BN, body_map.robot_directions(robot.forward(robot.sample(count, generator)))
+
+
+def differences(function: Callable[[Tensor], Tensor], q_BN: Tensor, step: float = STEP) -> Tensor:
+    """Central differences of fourth order, the joint as last axis."""
+    found = []
+    for offset_N in step * torch.eye(q_BN.shape[1]):
+        near = function(q_BN + offset_N) - function(q_BN - offset_N)
+        far = function(q_BN + 2 * offset_N) - function(q_BN - 2 * offset_N)
+        found.append((8 * near - far) / (12 * step))
+    return torch.stack(found, dim=-1)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_directions(name: str, body_maps: dict[str, BodyMap]) -> None:
+    body_map = body_maps[name]
+    term = DirectionTerm(DirectionJacobian(body_map))
+    blocks, q_BN, target_BD3 = problem(body_map, term)
+    residual_BD3, jacobian_BD3N = term.residual(state(body_map, q_BN, target_BD3))
+    found = differences(lambda q: term.residual(state(body_map, q, target_BD3))[0], q_BN, 1e-2)
+    torch.testing.assert_close(jacobian_BD3N, found, atol=3e-4, rtol=0)
+    root_D1 = term.weight_D.sqrt()[:, None]
+    check_model(term, blocks, state(body_map, q_BN, target_BD3), (residual_BD3 * root_D1).flatten(1),
+                (jacobian_BD3N * root_D1[..., None]).flatten(1, 2))  # fmt: skip
+
+
+def test_hands_weigh_half(body_maps: dict[str, BodyMap]) -> None:
+    body_map = body_maps["reachy"]
+    weights = DirectionTerm(DirectionJacobian(body_map)).weight_D.tolist()
+    for direction, weight in zip(body_map.directions, weights, strict=True):
+        assert weight == (0.5 if direction.part.region == "hand" else 1.0)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_posture(name: str, body_maps: dict[str, BodyMap]) -> None:
+    body_map = body_maps[name]
+    term = PostureTerm(body_map.robot.lower_N, body_map.robot.upper_N)
+    blocks, q_BN, target_BD3 = problem(body_map, term)
+    residual_BN, jacobian_NN = term.residual(q_BN)
+    found_BNN = differences(lambda q: term.residual(q)[0], q_BN, 0.05)
+    torch.testing.assert_close(jacobian_NN.expand_as(found_BNN), found_BNN, atol=1e-6, rtol=1e-3)
+    assert float(term.residual(body_map.robot.upper_N[None])[0].square().sum()) == pytest.approx(1e-4 * q_BN.shape[1])
+    check_model(term, blocks, state(body_map, q_BN, target_BD3), residual_BN, jacobian_NN.expand_as(found_BNN))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_self_collision(name: str, body_maps: dict[str, BodyMap]) -> None:
+    body_map = body_maps[name]
+    term = SelfCollisionTerm(body_map.collision, margin=0.03, weight=3.0)
+    blocks, q_BN, target_BD3 = problem(body_map, term, 400)
+    assert blocks.joints_NC.shape[1] == 1
+    q_BN = q_BN[body_map.collision.near(q_BN, 0.02).row_X.unique()][:24]
+    target_BD3 = target_BD3[: len(q_BN)]
+    short_X, jacobian_XN, row_X = term.residual(state(body_map, q_BN, target_BD3))
+    assert len(row_X) >= 24 and bool((short_X > 0).all())
+    near = body_map.collision.near(q_BN, term.margin)
+
+    def shortfall(q_BN: Tensor) -> Tensor:
+        every = body_map.collision.near(q_BN, 1.0)
+        table_BP = torch.full((len(q_BN), len(body_map.collision.pairs)), torch.nan)
+        table_BP[every.row_X, every.pair_X] = term.margin - every.distance_X
+        return table_BP[near.row_X, near.pair_X]
+
+    torch.testing.assert_close(shortfall(q_BN), short_X)
+    assert float((jacobian_XN - differences(shortfall, q_BN[:, :])).abs().median()) < 1e-3
+    rows = [(jacobian_XN[row_X == row], short_X[row_X == row]) for row in range(len(q_BN))]
+    model = term.add_to(None, state(body_map, q_BN, target_BD3), blocks)
+    torch.testing.assert_close(model.cost_BC[:, 0], torch.stack([3 * r.square().sum() for _, r in rows]))
+    torch.testing.assert_close(model.gradient_BN, torch.stack([3 * j.T @ r for j, r in rows]), atol=1e-6, rtol=1e-4)
+    torch.testing.assert_close(model.hessian_BNN, torch.stack([3 * j.T @ j for j, _ in rows]), atol=1e-6, rtol=1e-4)
+    twice = term.add_to(model, state(body_map, q_BN, target_BD3), blocks)
+    torch.testing.assert_close(twice.cost_BC, 2 * model.cost_BC)
+    torch.testing.assert_close(twice.hessian_BNN, 2 * model.hessian_BNN)
+
+
+def test_smoothness() -> None:
+    generator, pull = torch.Generator().manual_seed(0), 0.3
+    q_TN = torch.randn(6, 3, generator=generator, dtype=torch.float64)
+    joints_NC = torch.tensor([[1.0, 0], [0, 1], [0, 1]], dtype=torch.float64)
+    nothing = Quadratic(torch.zeros(6, 2).double(), torch.zeros(6, 3).double(), torch.zeros(6, 3, 3).double())
+
+    def cost(q_TN: Tensor) -> Tensor:
+        return pull * q_TN.diff(dim=0).square().sum()
+
+    model = add_pull(nothing, q_TN, pull, joints_NC)
+    torch.testing.assert_close(model.cost_BC.sum(), cost(q_TN))
+    torch.testing.assert_close(model.cost_BC[:, 0].sum(), pull * q_TN[:, 0].diff().square().sum())
+    torch.testing.assert_close(2 * model.gradient_BN, torch.autograd.functional.jacobian(cost, q_TN))  # pyright: ignore
+    hessian_TNTN = torch.autograd.functional.hessian(cost, q_TN)
+    diagonal_TN = torch.stack([hessian_TNTN[:, n, :, n].diagonal() for n in range(3)], dim=1)  # pyright: ignore
+    torch.testing.assert_close(2 * pull_diagonal(6, pull, q_TN).expand(6, 3), diagonal_TN)
+    assert float(hessian_TNTN[2, 1, 3, 1]) == pytest.approx(-2 * pull)  # pyright: ignore
+
+
+def check_model(term: Term, blocks: Blocks, at: State, residual_BR: Tensor, jacobian_BRN: Tensor) -> None:
+    """The quadratic model is that of the sum of squares; added to another it is the sum of both."""
+    model = term.add_to(None, at, blocks)
+    torch.testing.assert_close(model.cost_BC.sum(1), residual_BR.square().sum(1))
+    gradient_BN = (jacobian_BRN.mT @ residual_BR[..., None])[..., 0]
+    torch.testing.assert_close(model.gradient_BN, gradient_BN, atol=1e-6, rtol=1e-4)
+    torch.testing.assert_close(model.hessian_BNN, jacobian_BRN.mT @ jacobian_BRN, atol=1e-6, rtol=1e-4)
+    twice = term.add_to(model, at, blocks)
+    for one, two in zip(vars(model).values(), vars(twice).values(), strict=True):
+        torch.testing.assert_close(two, one + one)

@@ -1,0 +1,246 @@
+"""Legs, feet, a pelvis and a waist are rows of the table of body parts and nothing more: a robot that has them is solved.
+
+The shipped table has no such rows yet. The robot hangs at its pelvis, or at its chest: then the waist's joint is above
+the legs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.errors import UserError
+from mrhubo.reference import DirectionJacobian, OptimizationRetargeter
+from mrhubo.robot import BodyMap, Limb, Robot, align_pose, read_keypoints
+from mrhubo.robot.parts import PARTS, BodyPart, LimbPart, OrientedPart
+
+FORWARD, UP = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
+PELVIS = OrientedPart(name="pelvis", joint="pelvis", region="trunk", words=("forward", "up"), rest=(FORWARD, UP))
+
+
+def leg(side: str) -> tuple[BodyPart, ...]:
+    """Thigh, shin and foot of a side."""
+    hip, knee, ankle = (f"{side}_{name}" for name in ("hip", "knee", "ankle"))
+    return (
+        LimbPart(name=f"{side}_thigh", joint=hip, region="leg", hangs_on="pelvis", seen_from="pelvis",
+                 start=hip, end=knee, inputs=(hip,)),
+        LimbPart(name=f"{side}_shin", joint=knee, region="leg", hangs_on=f"{side}_thigh", seen_from="pelvis",
+                 start=knee, end=ankle, inputs=(knee,)),
+        OrientedPart(name=f"{side}_foot", joint=ankle, region="foot", hangs_on=f"{side}_shin", seen_from="pelvis",
+                     words=("toes", "instep"), rest=(FORWARD, UP), turned_by=(ankle,), inputs=(ankle,), weight=0.5,
+                     points=(f"{side}_foot", f"{side}_toe", f"{side}_heel")),
+    )  # fmt: skip
+
+
+LEGS = (*PARTS, PELVIS, *leg("left"), *leg("right"))
+"""The table with legs, seen from the pelvis; arms are seen from the chest as ever."""
+
+
+def waist(table: tuple[BodyPart, ...]) -> tuple[BodyPart, ...]:
+    """The table with a chest that is seen from the pelvis."""
+    chest = dataclasses.replace(
+        table[0], hangs_on="pelvis", seen_from="pelvis", inputs=("spine1", "spine2", "spine3"),
+        turned_by=("spine1", "spine2", "spine3"), points=("neck", "left_shoulder", "right_shoulder"),
+    )  # fmt: skip
+    assert chest.name == "chest"
+    return (PELVIS, chest, *(part for part in table if part.name not in ("pelvis", "chest")))
+
+
+def write_urdf(path: Path, root: str = "pelvis") -> Path:
+    """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs."""
+    limit = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
+
+    def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float, high: float) -> str:
+        return (f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
+                f'<origin xyz="{xyz}"/><axis xyz="{axis}"/>{limit.format(low, high)}</joint>')  # fmt: skip
+
+    up = root == "pelvis"
+    above, below = ("pelvis", "chest") if up else ("chest", "pelvis")
+    rows = [joint("waist", above, below, f"0 0 {0.2 if up else -0.2}", f"0 0 {1 if up else -1}", -1, 1)]
+    for side, y in (("l", 1), ("r", -1)):
+        rows += [
+            joint(f"{side}_hip_yaw", "pelvis", f"{side}_yaw", f"0 {0.08 * y} -0.1", "0 0 1", -0.6, 0.6),
+            joint(f"{side}_hip_roll", f"{side}_yaw", f"{side}_roll", "0 0 0", "1 0 0", -0.5, 0.5),
+            joint(f"{side}_hip_pitch", f"{side}_roll", f"{side}_thigh", "0 0 0", "0 1 0", -1.6, 0.6),
+            joint(f"{side}_knee", f"{side}_thigh", f"{side}_shin", "0 0 -0.3", "0 1 0", 0.05, 2.2),
+            joint(f"{side}_ankle", f"{side}_shin", f"{side}_foot", "0 0 -0.3", "0 1 0", -0.9, 0.6),
+            joint(f"{side}_shoulder_pitch", "chest", f"{side}_upper", f"0 {0.15 * y} 0.2", "0 1 0", -2, 2),
+            joint(f"{side}_shoulder_roll", f"{side}_upper", f"{side}_arm", "0 0 0", "1 0 0", -1.5, 1.5),
+            joint(f"{side}_elbow", f"{side}_arm", f"{side}_fore", "0 0 -0.25", "0 1 0", -2, -0.05),
+        ]
+    links = ["pelvis", "chest", *(f"{s}_{n}" for s in "lr" for n in ("yaw", "roll", "thigh", "shin", "foot", "upper",
+                                                                     "arm", "fore"))]  # fmt: skip
+    path.write_text(f'<robot name="walker">{"".join(f"<link name={chr(34)}{n}{chr(34)}/>" for n in links)}{"".join(rows)}'
+                    "</robot>")  # fmt: skip
+    return path
+
+
+def entries() -> dict[str, object]:
+    """`robot.keypoints` of the robot."""
+    found: dict[str, object] = {"pelvis": "pelvis", "chest": "chest"}
+    for side, s in (("left", "l"), ("right", "r")):
+        found |= {
+            f"{side}_hip": f"{s}_thigh", f"{side}_knee": f"{s}_shin", f"{side}_ankle": f"{s}_foot",
+            f"{side}_foot": {"link": f"{s}_foot", "toes": [1, 0, 0], "instep": [0, 0, 1]},
+            f"{side}_shoulder": f"{s}_upper", f"{side}_elbow": f"{s}_fore",
+            f"{side}_wrist": {"link": f"{s}_fore", "offset": [0, 0, -0.2]},
+        }  # fmt: skip
+    return found
+
+
+WAIST = waist(LEGS)
+TABLES = {"legs": LEGS, "legs and waist": WAIST}
+ROOTS = ["pelvis", "chest"]
+
+
+def walker(folder: Path, table: tuple[BodyPart, ...] = LEGS, root: str = "pelvis") -> BodyMap:
+    """The body map of the robot; the waist is one of its joints where the table has a waist."""
+    urdf = write_urdf(folder / f"walker_{root}.urdf", root)
+    names = [f"{s}_{n}" for s in "lr" for n in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle", "shoulder_pitch",
+                                                "shoulder_roll", "elbow")]  # fmt: skip
+    has_waist = any(part.name == "chest" and part.seen_from for part in table)
+    keypoints = read_keypoints(entries(), table)
+    robot = Robot(urdf, [*(["waist"] if has_waist else []), *names], keypoints.links)
+    return BodyMap.of(robot, keypoints, Skeleton())
+
+
+@pytest.fixture(params=[(table, root) for table in TABLES for root in ROOTS], ids="-".join)
+def body_map(request: pytest.FixtureRequest, tmp_path: Path) -> BodyMap:
+    table, root = request.param
+    return walker(tmp_path, TABLES[table], root)
+
+
+def robot_directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
+    return body_map.robot_directions(body_map.robot.forward(q_BN))
+
+
+def human_poses(count: int) -> Tensor:
+    return BodyPrior.open().decode(torch.randn(count, 32, generator=torch.Generator().manual_seed(0)))
+
+
+def columns(body_map: BodyMap, *regions: str) -> list[int]:
+    return [i for i, direction in enumerate(body_map.directions) if direction.part.region in regions]
+
+
+def test_home_stands(body_map: BodyMap) -> None:
+    home = dict(zip(body_map.direction_names, robot_directions(body_map, body_map.robot.home()[None])[0], strict=True))
+    for side in ("left", "right"):
+        for name in ("knee", "ankle"):
+            assert float(home[f"{side}_{name}"] @ torch.tensor([0.0, -1.0, 0.0])) > 0.99
+        torch.testing.assert_close(home[f"{side}_foot_toes"], torch.tensor(FORWARD), atol=0.06, rtol=0)
+
+
+def test_legs_are_seen_from_the_pelvis_and_arms_from_the_chest(body_map: BodyMap) -> None:
+    pose_BJ6 = human_poses(20)
+    bowed_BJ6 = pose_BJ6.clone()
+    spine = [POSED_JOINT_NAMES.index(f"spine{number}") for number in (1, 2, 3)]
+    bowed_BJ6[:, spine] = human_poses(40)[20:][:, spine]
+    before, after = (body_map.human_directions(pose) for pose in (pose_BJ6, bowed_BJ6))
+    limbs = columns(body_map, "arm", "leg", "foot")
+    torch.testing.assert_close(after[:, limbs], before[:, limbs], atol=1e-5, rtol=0)
+    if "waist" not in body_map.robot.joint_names:
+        return
+    trunk = columns(body_map, "trunk")
+    assert float((after - before)[:, trunk].abs().max()) > 0.1
+    q_BN = body_map.robot.sample(20, torch.Generator().manual_seed(0))
+    turned_BN = q_BN.clone()
+    turned_BN[:, body_map.robot.joint_names.index("waist")] *= -1
+    before, after = (robot_directions(body_map, q) for q in (q_BN, turned_BN))
+    torch.testing.assert_close(after[:, limbs], before[:, limbs], atol=1e-5, rtol=0)
+    assert float((after - before)[:, trunk].abs().max()) > 0.1
+
+
+def test_the_jacobian_equals_differences(body_map: BodyMap) -> None:
+    q_BN, step = body_map.robot.sample(32, torch.Generator().manual_seed(1)), 0.01
+    found_BD3, jacobian_BD3N = DirectionJacobian(body_map)(q_BN)
+    torch.testing.assert_close(found_BD3, robot_directions(body_map, q_BN))
+    for n, offset_N in enumerate(step * torch.eye(q_BN.shape[1])):
+        near = robot_directions(body_map, q_BN + offset_N) - robot_directions(body_map, q_BN - offset_N)
+        far = robot_directions(body_map, q_BN + 2 * offset_N) - robot_directions(body_map, q_BN - 2 * offset_N)
+        torch.testing.assert_close(jacobian_BD3N[..., n], (8 * near - far) / (12 * step), atol=3e-4, rtol=0)
+
+
+def test_the_reference_recovers_the_robots_own_poses(body_map: BodyMap) -> None:
+    retargeter = OptimizationRetargeter(body_map)
+    blocks = retargeter.problem.blocks.joints_NC
+    assert blocks.shape[1] == 4 + ("waist" in body_map.robot.joint_names), "two arms, two legs, and the waist"
+    q_BN = body_map.robot.sample(100, torch.Generator().manual_seed(4))
+    target_BD3 = robot_directions(body_map, q_BN)
+    start_BSN = retargeter._pool.near(target_BD3)
+    found, cost = retargeter.problem.minimise(start_BSN.flatten(0, 1), target_BD3.repeat_interleave(12, 0))
+    best_BC = cost.unflatten(0, (100, 12)).amin(1)
+    assert float((best_BC < 0.01).float().mean()) > 0.98
+    robot = body_map.robot
+    assert bool(((found >= robot.lower_N) & (found <= robot.upper_N)).all())
+
+
+def test_a_human_who_squats_and_turns_is_followed(body_map: BodyMap) -> None:
+    turn = torch.zeros(24, len(POSED_JOINT_NAMES), 3)
+    bend = 0.9 * torch.sin(torch.linspace(0, torch.pi, 24))
+    for side in ("left", "right"):
+        turn[:, POSED_JOINT_NAMES.index(f"{side}_hip"), 0] = -bend
+        turn[:, POSED_JOINT_NAMES.index(f"{side}_knee"), 0] = 2 * bend
+        turn[:, POSED_JOINT_NAMES.index(f"{side}_ankle"), 0] = -bend
+    turn[:, POSED_JOINT_NAMES.index("spine2"), 1] = 0.5 * bend
+    pose_TJ6 = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(turn))
+    result = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0)
+    assert result.jumps == 0
+    legs = columns(body_map, "leg", "foot", "trunk")
+    assert float(result.residual_deg_TD[:, legs].mean()) < 3
+    knee_T = result.q_TN[:, body_map.robot.joint_names.index("l_knee")]
+    assert float(knee_T[12]) == pytest.approx(1.8, abs=0.15)
+    if "waist" in body_map.robot.joint_names:
+        waist_T = result.q_TN[:, body_map.robot.joint_names.index("waist")]
+        assert float(waist_T[12]) == pytest.approx(0.45, abs=0.05)
+
+
+def test_keypoints_have_the_directions_and_a_humans_lengths(body_map: BodyMap) -> None:
+    found_BD3 = robot_directions(body_map, body_map.robot.sample(30, torch.Generator().manual_seed(0)))
+    rest = dict(zip(KEYPOINT_NAMES, body_map.skeleton.rest_K3, strict=True))
+    at = dict(zip(body_map.keypoint_names, body_map.human_keypoints(found_BD3).unbind(1), strict=True))
+    assert len(at) == len(body_map.keypoint_names), "no keypoint is both pinned and moved"
+    seen = dict(zip(body_map.direction_names, found_BD3.unbind(1), strict=True))
+    for direction in body_map.directions:
+        if isinstance(direction, Limb):
+            start = at.get(direction.part.start, rest[direction.part.start].expand(30, 3))
+            bone_B3 = at[direction.part.end] - start
+            length = (rest[direction.part.end] - rest[direction.part.start]).norm()
+            torch.testing.assert_close(bone_B3.norm(dim=-1), length.expand(30), atol=1e-5, rtol=0)
+            if direction.part.seen_from == "pelvis":
+                torch.testing.assert_close(bone_B3 / length, seen[direction.name], atol=1e-5, rtol=0)
+    if "waist" in body_map.robot.joint_names:
+        across_B3 = torch.nn.functional.normalize(at["left_shoulder"] - at["right_shoulder"], dim=-1)
+        left_B3 = torch.linalg.cross(seen["chest_up"], seen["chest_forward"])
+        torch.testing.assert_close(across_B3, left_B3, atol=1e-5, rtol=0)
+
+
+def test_a_human_is_turned_until_he_points_there(body_map: BodyMap) -> None:
+    pose_BJ6, wanted_BD3 = human_poses(30), robot_directions(
+        body_map, body_map.robot.sample(30, torch.Generator().manual_seed(2))
+    )  # fmt: skip
+    aligned = align_pose(body_map, rotation.sixd_to_matrix(pose_BJ6), wanted_BD3)
+    found_BD3 = body_map.human_directions(rotation.matrix_to_sixd(aligned))
+    torch.testing.assert_close(found_BD3, wanted_BD3, atol=2e-4, rtol=0)
+
+
+def test_input_joints_are_those_of_the_rows(body_map: BodyMap) -> None:
+    legs = {f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")}
+    assert legs <= set(body_map.input_joints()) <= set(JOINT_NAMES)
+    assert set(body_map.input_joints(columns(body_map, "leg"))) == {name for name in legs if "ankle" not in name}
+
+
+def test_a_foot_needs_its_shin_and_a_leg_its_pelvis() -> None:
+    some = entries()
+    with pytest.raises(UserError, match="robot.keypoints.left_foot: needs 'left_ankle' too"):
+        read_keypoints({name: entry for name, entry in some.items() if name != "left_ankle"}, LEGS)
+    with pytest.raises(UserError, match="'pelvis' is missing; name the link that carries 'left_hip'"):
+        read_keypoints({name: entry for name, entry in some.items() if name != "pelvis"}, LEGS)
+    with pytest.raises(UserError, match="body part 'left_hip' does not exist"):
+        read_keypoints({name: some[name] for name in ("chest", "left_hip")})

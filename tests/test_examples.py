@@ -1,0 +1,131 @@
+"""The numbered examples and the Python that README and docs show, run against a package whose networks are untrained."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.robot import build_body_map
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+MAX_LINES = 60
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> str:
+    config = load_config(ROOT / "conf" / "nao.yaml", ["model.hidden=24"])
+    body_map = build_body_map(config.robot)
+    torch.manual_seed(0)
+    retargeter = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
+    return str(retargeter.save(tmp_path_factory.mktemp("packages") / "nao", {}))
+
+
+@pytest.fixture(autouse=True)
+def somewhere_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is written into the checkout; relative paths in `data` are found."""
+    (tmp_path / "data").symlink_to(ROOT / "data")
+    monkeypatch.chdir(tmp_path)
+
+
+def run(name: str, *arguments: Any) -> None:
+    spec = importlib.util.spec_from_file_location("example", ROOT / "examples" / name)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.main(*arguments)
+
+
+def blocks(page: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_are_numbered_short_and_tested(path: Path) -> None:
+    number = EXAMPLES.index(path) + 1
+    assert path.name.startswith(f"{number:02}_")
+    assert len(path.read_text().splitlines()) < MAX_LINES
+    assert f'"{path.name}"' in Path(__file__).read_text(), "no test runs it"
+
+
+@pytest.mark.parametrize("out", ["angles.csv", "angles.npz"])
+def test_retarget_a_file(package: str, tmp_path: Path, out: str) -> None:
+    run("01_retarget_a_file.py", package, str(ROOT / "data" / "motions" / "wave.npz"), out)
+    if out.endswith("npz"):
+        with np.load(tmp_path / out) as file:
+            assert file["q"].shape == (433, 8)
+    else:
+        assert len((tmp_path / out).read_text().splitlines()) == 1 + 433
+
+
+def test_your_own_arrays(package: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run("02_your_own_arrays.py", package)
+    text = capsys.readouterr().out
+    assert "(63,) -> joint angles (8,)" in text and "(2, 2, 63) -> joint angles (2, 2, 8)" in text
+    differences = [float(number) for number in re.findall(r"within (\S+) rad", text)]
+    assert len(differences) == 2 and max(differences) < 1e-3
+
+
+def test_optimization_without_training(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run("03_optimization_without_training.py", "nao")
+    (angle,) = re.findall(r"are (\S+) degrees off", capsys.readouterr().out)
+    assert float(angle) < 10  # NAO can follow a wave
+    with np.load(tmp_path / "wave_on_nao.npz") as file:
+        assert file["q"].shape == (433, 8)
+
+
+@pytest.mark.parametrize("robot", ["nao", "reachy"])
+def test_robot_kinematics(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run("04_robot_kinematics.py", robot)
+    text = capsys.readouterr().out
+    assert text.startswith(f"{robot}: {8 if robot == 'nao' else 17} joints")
+    (touching,) = re.findall(r"touches itself in (\d+)%", text)
+    assert 0 < int(touching) < 100
+
+
+def test_body_prior(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run("05_body_prior.py", "prior.png")
+    sampled, spoilt, mended = (float(e) for e in re.findall(r"error (\S+) on average", capsys.readouterr().out))
+    assert sampled < 0.2 * spoilt and mended < 0.2 * spoilt
+    with Image.open(tmp_path / "prior.png") as picture:
+        assert picture.format == "PNG" and min(picture.size) > 500
+
+
+def test_moving_picture(package: str, tmp_path: Path) -> None:
+    run("06_moving_picture.py", package, str(ROOT / "data" / "motions" / "wave.npz"), "nao.gif", 1.0, 0.5)
+    with Image.open(tmp_path / "nao.gif") as picture:
+        assert getattr(picture, "n_frames", 1) == 6
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/python.md"])
+def test_code_that_retargets_runs(page: str, package: str) -> None:
+    shown = [code for code in blocks(page) if "mrhubo.load" in code]
+    assert shown
+    for code in shown:
+        names: dict[str, Any] = {}
+        exec(re.sub(r"mlruns/packages/nao-\w+|models:/mrhubo-nao/1", package, code), names)
+        result = names["result"]
+        assert tuple(result.q.shape) == (433, 8) and len(result.joint_names) == 8
+        assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
+
+
+def test_the_readme_shows_six_lines() -> None:
+    (code,) = blocks("README.md")
+    assert len([line for line in code.splitlines() if line]) == 6
+
+
+def test_code_that_optimises_runs() -> None:
+    (code,) = [code for code in blocks("docs/python.md") if "OptimizationRetargeter" in code]
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert tuple(names["result"].q.shape) == (433, 8)
