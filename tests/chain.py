@@ -12,14 +12,13 @@ import torch
 from torch import Tensor
 
 import mrhubo
+from mrhubo import Motion, OptimizationRetargeter, Retargeter, read_motion
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fit import main as fit
-from mrhubo.motion import Motion, read_motion
 from mrhubo.pair import main as pair
-from mrhubo.reference import ReferenceRetargeter
-from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -38,25 +37,21 @@ def quietly(command: Callable[[list[str]], object], arguments: Sequence[str]) ->
 
 def load(folder: Path) -> Retargeter:
     """A package's retargeter."""
-    return mrhubo.load(folder) if hasattr(mrhubo, "load") else Retargeter.load(folder)
+    return mrhubo.load(folder)
 
 
 def answer(retargeter: Retargeter, motion: Motion) -> dict[str, Tensor]:
     """Joint angles (T, N) and all that is said about them."""
-    names = {"q": "N", "confidence": "", "direction_error_deg": "D", "phi": "", "collision": ""}
-    if hasattr(retargeter, "__call__"):  # noqa: B004
-        result = retargeter(motion)
-        return {name: getattr(result, name) for name in names}
-    result = retargeter.retarget(motion.pose_TJ6)
-    return {name: getattr(result, f"{name}_T{axis}") for name, axis in names.items()}
+    result = retargeter(motion)
+    return {name: getattr(result, name) for name in ("q", "confidence", "direction_error_deg", "phi", "collision")}
 
 
 def optimise(config: Path, motions: Iterable[Motion], smoothness: Iterable[float]) -> dict[float, list[Tensor]]:
     """The reference retargeter's joint angles (T, N) of each motion, by smoothness; with 0 each frame is on its own."""
     body_map, found = build_body_map(load_config(config).robot), {}
     for weight in smoothness:
-        retargeter = ReferenceRetargeter(body_map, weight)
-        found[weight] = [retargeter.retarget(motion.pose_TJ6, motion.frame_rate).q_TN for motion in motions]
+        retargeter = OptimizationRetargeter(body_map, weight)
+        found[weight] = [retargeter(motion).q for motion in motions]
     return found
 
 
