@@ -16,13 +16,11 @@ from typing import Any
 
 import pytest
 
-from mrhubo.body.prior_training.train import PriorConfig
-from mrhubo.config import BaselineConfig, Config, SweepConfig, load_config
+from mrhubo.config import BaselineConfig, Config, PriorConfig, SweepConfig, load_config
 from mrhubo.errors import UserError
 
 ROOT = Path(__file__).resolve().parent.parent
-MODULES = {name: f"mrhubo.{name}" for name in ("fit", "pair", "evaluate", "sweep", "baseline", "reproduce")}
-MODULES["prior"] = "mrhubo.body.prior_training"
+MODULES = {name: f"mrhubo.{name}" for name in ("fit", "pair", "evaluate", "sweep", "baseline", "reproduce", "prior")}
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
 """Of the config; elsewhere `Config`."""
 HEAVY = {"torch", "lightning", "mlflow", "matplotlib", "optuna", "scipy", "pandas"}
@@ -44,13 +42,7 @@ STARTS = re.compile(
 
 def command(name: str) -> Any:
     """The module of a command."""
-    module = importlib.import_module(MODULES[name])
-    return module if hasattr(module, "main") else importlib.import_module(f"{MODULES[name]}.__main__")
-
-
-def built(name: str) -> bool:
-    """Whether the command has a parser that can be asked."""
-    return hasattr(command(name), "build_parser")
+    return importlib.import_module(MODULES[name])
 
 
 def parse(name: str, arguments: list[str]) -> None:
@@ -59,21 +51,13 @@ def parse(name: str, arguments: list[str]) -> None:
     Raises:
         UserError or SystemExit: an argument is refused.
     """
-    module = command(name)
-    if built(name):
-        module.build_parser().parse_args(arguments)
-        return
-    from mrhubo.config import split_arguments
-
-    split_arguments(arguments, name, "", Config, getattr(module, "FLAGS", {"quiet": ""}))
+    command(name).build_parser().parse_args(arguments)
 
 
 def accepted(name: str) -> set[str]:
     """Every long flag that the command's parser takes."""
-    module = command(name)
-    if built(name):
-        return {flag for action in module.build_parser()._actions for flag in action.option_strings if flag[:2] == "--"}
-    return {"--config", "--help", *(f"--{flag.split()[0]}" for flag in getattr(module, "FLAGS", ["quiet"]))}
+    actions = command(name).build_parser()._actions
+    return {flag for action in actions for flag in action.option_strings if flag.startswith("--")}
 
 
 # What pages show
@@ -200,7 +184,6 @@ def required(text: str) -> list[set[str]]:
     return found
 
 
-UNTIL_ARGPARSE = "shown as it is needed once the commands have argparse parsers"
 COMMANDS = list(MODULES)
 
 
@@ -223,8 +206,6 @@ NEEDED = {"fit": 1, "pair": 1, "evaluate": 2, "sweep": 2, "baseline": 1, "reprod
 @pytest.mark.parametrize("name", COMMANDS)
 def test_usage_shows_what_is_needed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without brackets; and without any one of it the command refuses, and names it."""
-    if not built(name) and name in ("evaluate", "sweep", "reproduce"):
-        pytest.xfail(UNTIL_ARGPARSE)
     monkeypatch.chdir(ROOT)
     needed = required(usage(name))
     assert len(needed) == NEEDED[name], needed
@@ -240,8 +221,6 @@ def test_usage_shows_what_is_needed(name: str, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_reproduce_takes_no_config_and_says_so() -> None:
-    if not built("reproduce"):
-        pytest.xfail(UNTIL_ARGPARSE)
     with pytest.raises((UserError, SystemExit)), contextlib.redirect_stderr(io.StringIO()):
         command("reproduce").main(["--config", str(ROOT / "conf" / "nao.yaml")])
     assert "--config" not in usage("reproduce")
@@ -249,8 +228,6 @@ def test_reproduce_takes_no_config_and_says_so() -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_costs_no_heavy_import(name: str) -> None:
-    if not built(name) and name in ("baseline", "prior"):
-        pytest.xfail("imports its work before it reads the command line")
     module = MODULES[name]
     code = (
         f"import runpy, sys\nsys.argv = ['{module}', '--help']\n"
