@@ -132,7 +132,7 @@ def test_values() -> None:
         (["gone.yaml"], "config file 'gone.yaml' does not exist; "),
         (["nap"], "config 'nap' does not exist; nearest: 'nao'"),
         (["atlas"], "config 'atlas' does not exist; available: coman, nao, paper/coman, "),
-        (["no/nao.yaml"], "config file 'no/nao.yaml' does not exist, nor does its folder"),
+        (["no/mine.yaml"], "config file 'no/mine.yaml' does not exist, nor does its folder"),
         (["gone/conf/nao"], "config 'gone/conf/nao' does not exist"),
         (["steps"], "command line: 'steps' is a key: write steps=VALUE"),
         ([""], "command line: '' is neither a flag nor KEY=VALUE"),
