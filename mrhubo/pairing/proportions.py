@@ -31,7 +31,7 @@ class ProportionTest:
     def __init__(
         self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig, q_PN: Tensor, local_PJ33: Tensor, frame: str
     ) -> None:
-        """Robot poses (P, N) [rad] and the human poses (P, 21, 3, 3) that they imitate; `frame`: `model.input_frame`."""
+        """Robot poses (P, N) [rad], the human poses (P, 21, 3, 3) that they imitate, and `model.input_frame`."""
         self.body_map, self.prior, self.settings, self.local_PJ33 = body_map, prior, settings, local_PJ33
         self.frame = frame
         self._poses = body_map.robot.forward(q_PN)
