@@ -122,7 +122,7 @@ def robot_directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
 
 
 def human_poses(count: int) -> Tensor:
-    return BodyPrior.open().decode(torch.randn(count, 32, generator=torch.Generator().manual_seed(0)))
+    return BodyPrior.open().decode_matrices(torch.randn(count, 32, generator=torch.Generator().manual_seed(0)))
 
 
 def columns(body_map: BodyMap, *regions: str) -> list[int]:
@@ -138,11 +138,11 @@ def test_home_stands(body_map: BodyMap) -> None:
 
 
 def test_legs_are_seen_from_the_pelvis_and_arms_from_the_chest(body_map: BodyMap) -> None:
-    pose_BJ6 = human_poses(20)
-    bowed_BJ6 = pose_BJ6.clone()
+    local_BJ33 = human_poses(20)
+    bowed_BJ33 = local_BJ33.clone()
     spine = [POSED_JOINT_NAMES.index(f"spine{number}") for number in (1, 2, 3)]
-    bowed_BJ6[:, spine] = human_poses(40)[20:][:, spine]
-    before, after = (body_map.human_directions(pose) for pose in (pose_BJ6, bowed_BJ6))
+    bowed_BJ33[:, spine] = human_poses(40)[20:][:, spine]
+    before, after = (body_map.human_directions(pose) for pose in (local_BJ33, bowed_BJ33))
     limbs = columns(body_map, "arm", "leg", "foot")
     torch.testing.assert_close(after[:, limbs], before[:, limbs], atol=1e-5, rtol=0)
     if "waist" not in body_map.robot.joint_names:
@@ -189,8 +189,8 @@ def test_a_human_who_squats_and_turns_is_followed(body_map: BodyMap) -> None:
         turn[:, POSED_JOINT_NAMES.index(f"{side}_knee"), 0] = 2 * bend
         turn[:, POSED_JOINT_NAMES.index(f"{side}_ankle"), 0] = -bend
     turn[:, POSED_JOINT_NAMES.index("spine2"), 1] = 0.5 * bend
-    pose_TJ6 = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(turn))
-    result = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0)
+    local_TJ33 = rotation.axis_angle_to_matrix(turn)
+    result = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0)
     assert result.jumps == 0
     legs = columns(body_map, "leg", "foot", "trunk")
     assert float(result.residual_deg_TD[:, legs].mean()) < 3
@@ -222,11 +222,11 @@ def test_keypoints_have_the_directions_and_a_humans_lengths(body_map: BodyMap) -
 
 
 def test_a_human_is_turned_until_he_points_there(body_map: BodyMap) -> None:
-    pose_BJ6, wanted_BD3 = human_poses(30), robot_directions(
+    local_BJ33, wanted_BD3 = human_poses(30), robot_directions(
         body_map, body_map.robot.sample(30, torch.Generator().manual_seed(2))
     )  # fmt: skip
-    aligned = align_pose(body_map, rotation.sixd_to_matrix(pose_BJ6), wanted_BD3)
-    found_BD3 = body_map.human_directions(rotation.matrix_to_sixd(aligned))
+    aligned = align_pose(body_map, local_BJ33, wanted_BD3)
+    found_BD3 = body_map.human_directions(aligned)
     torch.testing.assert_close(found_BD3, wanted_BD3, atol=2e-4, rtol=0)
 
 
