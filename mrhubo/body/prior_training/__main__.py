@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from mrhubo.body.prior_training.train import PriorConfig, train
-from mrhubo.config import parse_arguments, run_command
+from mrhubo.config import CommandParser, parse_arguments, run_command
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import Reporter
 
+DESCRIPTION = "Trains the open body prior."
+
+
+def build_parser() -> CommandParser[PriorConfig]:
+    """The command's arguments."""
+    parser = CommandParser("mrhubo prior", DESCRIPTION, PriorConfig)
+    parser.add_argument("--quiet", action="store_true", help="no progress line")
+    return parser
+
 
 def main(argv: list[str]) -> None:
-    """`python -m mrhubo.body.prior_training --config conf/prior.yaml [key=value ...]`."""
-    flags = {"quiet": "no progress line"}
-    config, given = parse_arguments(
-        argv, "mrhubo.body.prior_training", "Trains the open body prior.", PriorConfig, flags
-    )
+    """The command."""
+    config, options = parse_arguments(build_parser(), argv)
     if not config.data.is_file():
         raise UserError(f"data: {config.data} does not exist; name a file of training poses (docs/prior.md says which)")
-    train(config, Reporter(given["quiet"]))
+    train(config, Reporter(options.quiet))
     print(f"body prior: {config.output}")
 
 
