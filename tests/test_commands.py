@@ -151,7 +151,8 @@ def shipped(text: str, instead: str = "nao") -> Path:
     """The file that a command line names; one of the reader's own is stood in for."""
     if OWN_FILE.fullmatch(text):
         return ROOT / "conf" / f"{instead}.yaml"
-    found = [path for path in (ROOT / text, ROOT / "conf" / f"{text}.yaml") if path.is_file()]
+    names = (ROOT / text, *(ROOT / "conf" / folder / f"{text}.yaml" for folder in ("", "sweeps")))
+    found = [path for path in names if path.is_file()]
     assert found, f"{text} does not exist"
     return found[0]
 
