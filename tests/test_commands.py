@@ -48,32 +48,10 @@ def command(name: str) -> Any:
     return module if hasattr(module, "main") else importlib.import_module(f"{MODULES[name]}.__main__")
 
 
-def built(name: str) -> bool:
-    """Whether the command has a parser that can be asked."""
-    return hasattr(command(name), "build_parser")
-
-
-def parse(name: str, arguments: list[str]) -> None:
-    """Refuses what the command's parser refuses, before any work.
-
-    Raises:
-        UserError or SystemExit: an argument is refused.
-    """
-    module = command(name)
-    if built(name):
-        module.build_parser().parse_args(arguments)
-        return
-    from mrhubo.config import split_arguments
-
-    split_arguments(arguments, name, "", Config, getattr(module, "FLAGS", {"quiet": ""}))
-
-
 def accepted(name: str) -> set[str]:
     """Every long flag that the command's parser takes."""
-    module = command(name)
-    if built(name):
-        return {flag for action in module.build_parser()._actions for flag in action.option_strings if flag[:2] == "--"}
-    return {"--config", "--help", *(f"--{flag.split()[0]}" for flag in getattr(module, "FLAGS", ["quiet"]))}
+    actions = command(name).build_parser()._actions
+    return {flag for action in actions for flag in action.option_strings if flag.startswith("--")}
 
 
 # What pages show
@@ -136,7 +114,7 @@ def test_what_pages_show_is_accepted(path: Path, name: str, arguments: list[str]
     arguments = [text for text in arguments if text != "--help"]
     if not arguments:
         return  # only named
-    parse(name, arguments)
+    command(name).build_parser().parse_args(arguments)
     settings = [text for text in arguments if re.match(r"[a-z][\w.]*=", text)]
     rest = [text for text in arguments if text not in settings]
     file = rest[rest.index("--config") + 1] if "--config" in rest else "" if not rest else rest[0]
@@ -176,11 +154,16 @@ def test_the_test_finds_them(tmp_path: Path, text: str, expected: list[tuple[str
 # What --help tells
 
 
-def usage(name: str) -> str:
-    """The first paragraph of a command's help."""
+def help_of(name: str) -> str:
+    """What a command's --help prints."""
     with contextlib.redirect_stdout(io.StringIO()) as output, contextlib.suppress(SystemExit):
         command(name).main(["--help"])
-    return output.getvalue().split("\n\n")[0]
+    return output.getvalue()
+
+
+def usage(name: str) -> str:
+    """Its first paragraph."""
+    return help_of(name).split("\n\n")[0]
 
 
 def required(text: str) -> list[set[str]]:
@@ -200,14 +183,15 @@ def required(text: str) -> list[set[str]]:
     return found
 
 
-UNTIL_ARGPARSE = "shown as it is needed once the commands have argparse parsers"
 COMMANDS = list(MODULES)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_usage_shows_every_flag_and_no_other(name: str) -> None:
-    shown = set(re.findall(r"--[\w-]+", usage(name)))
-    assert shown - {"--help"} == accepted(name) - {"--help"}
+    """But --help, and --config FILE, the other way to give CONFIG, which the options tell of."""
+    shown, taken = set(re.findall(r"--[\w-]+", usage(name))), accepted(name)
+    assert shown - {"--help"} == taken - {"--help", "--config"}
+    assert ("CONFIG" in usage(name)) is ("--config" in taken) is ("--config" in help_of(name))
 
 
 GIVEN = {
@@ -223,8 +207,6 @@ NEEDED = {"fit": 1, "pair": 1, "evaluate": 2, "sweep": 2, "baseline": 1, "reprod
 @pytest.mark.parametrize("name", COMMANDS)
 def test_usage_shows_what_is_needed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without brackets; and without any one of it the command refuses, and names it."""
-    if not built(name) and name in ("evaluate", "sweep", "reproduce"):
-        pytest.xfail(UNTIL_ARGPARSE)
     monkeypatch.chdir(ROOT)
     needed = required(usage(name))
     assert len(needed) == NEEDED[name], needed
@@ -240,17 +222,16 @@ def test_usage_shows_what_is_needed(name: str, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_reproduce_takes_no_config_and_says_so() -> None:
-    if not built("reproduce"):
-        pytest.xfail(UNTIL_ARGPARSE)
     with pytest.raises((UserError, SystemExit)), contextlib.redirect_stderr(io.StringIO()):
         command("reproduce").main(["--config", str(ROOT / "conf" / "nao.yaml")])
     assert "--config" not in usage("reproduce")
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+INSIDE_BODY = pytest.mark.xfail(reason="lies in mrhubo.body, and importing that loads torch; so does its schema")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[INSIDE_BODY] if n == "prior" else []) for n in COMMANDS])
 def test_help_costs_no_heavy_import(name: str) -> None:
-    if not built(name) and name in ("baseline", "prior"):
-        pytest.xfail("imports its work before it reads the command line")
     module = MODULES[name]
     code = (
         f"import runpy, sys\nsys.argv = ['{module}', '--help']\n"
