@@ -21,9 +21,9 @@ from torch import Tensor
 
 from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
 from mrhubo.body.prior_training.measures import NOISE_DEG, measure, reconstruction
-from mrhubo.body.prior_training.train import PriorConfig, Split
+from mrhubo.body.prior_training.train import Split
 from mrhubo.body.skeleton import PAIRED_JOINTS, SIDES
-from mrhubo.config import load_config
+from mrhubo.config import PriorConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.runtime.locations import default_motions

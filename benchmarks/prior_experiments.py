@@ -16,8 +16,8 @@ from common import print_header, print_table, read_options
 from prior import by_clip
 
 from mrhubo.body import BodyPrior
-from mrhubo.body.prior_training.train import PriorConfig, train
-from mrhubo.config import fingerprint, load_config, without_paths
+from mrhubo.body.prior_training.train import train
+from mrhubo.config import PriorConfig, fingerprint, load_config, without_paths
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.runtime.locations import default_motions

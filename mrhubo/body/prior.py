@@ -20,10 +20,10 @@ from torch import Tensor, nn
 from mrhubo import rotation
 from mrhubo.body.decoder import Decoder, mlp_layers
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config import SHIPPED_PRIOR
 from mrhubo.errors import UserError
 from mrhubo.files.storage import checksum_tensors, read_tensors, write_tensors
 
-SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "open_prior.safetensors"
 _JOINTS = len(POSED_JOINT_NAMES)
 
 
@@ -51,7 +51,7 @@ class BodyPrior(nn.Module):
         Raises:
             UserError: the file is missing, damaged, or no body prior of mrhubo.
         """
-        path = Path(path) if path is not None else SHIPPED_WEIGHTS
+        path = Path(path) if path is not None else SHIPPED_PRIOR
         tensors, metadata = read_tensors(path)
         if metadata.get("schema") != cls.schema:
             raise UserError(

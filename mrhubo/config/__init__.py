@@ -19,6 +19,7 @@ from mrhubo.config.kinds import keys_of
 from mrhubo.config.loading import load_config
 from mrhubo.config.places import places_named, where, with_places
 from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
+from mrhubo.config.prior import SHIPPED_PRIOR, PriorConfig
 from mrhubo.config.schema import (
     BaselineConfig,
     BodyConfig,
@@ -38,6 +39,7 @@ from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
 from mrhubo.config.typed import typed_value
 
 __all__ = [
+    "SHIPPED_PRIOR",
     "BaselineConfig",
     "BodyConfig",
     "CommandParser",
@@ -53,6 +55,7 @@ __all__ = [
     "ModelConfig",
     "PairsConfig",
     "PointEntry",
+    "PriorConfig",
     "Range",
     "RobotConfig",
     "S3LEConfig",

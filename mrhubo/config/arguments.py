@@ -75,7 +75,8 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
 
     def format_usage(self) -> str:
         """The flags, the config, the overrides; what may be left out in brackets."""
-        config = argparse.Action([], "CONFIG", nargs=None if self.needs_config else "?", metavar="CONFIG")
+        either = "CONFIG | --config CONFIG"
+        config = argparse.Action([], "config", None, metavar=f"({either})" if self.needs_config else f"[{either}]")
         overrides = argparse.Action([], "overrides", nargs="*", metavar="KEY=VALUE")
         formatter = argparse.HelpFormatter(self.prog, width=WIDTH)
         shown = [*self._flags(), *([config] if self.takes_config else []), overrides]

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from mrhubo.body import BodyPrior, VPoser
 from mrhubo.body.decoder import ACTIVATIONS, Decoder, JointDecoder
-from mrhubo.body.prior import SHIPPED_WEIGHTS
+from mrhubo.config import SHIPPED_PRIOR
 from mrhubo.files.storage import read_tensors
 
 JOINTS = [3, 9, 16, 18, 20]
@@ -62,7 +62,7 @@ def test_all_zero_weights_decode_to_the_identity() -> None:
 
 def test_weights_are_kept_under_the_names_of_the_shipped_file() -> None:
     names = {f"decoder.{layer}.{part}" for layer in (0, 2, 4) for part in ("weight", "bias")}
-    tensors, _ = read_tensors(SHIPPED_WEIGHTS)
+    tensors, _ = read_tensors(SHIPPED_PRIOR)
     for kept in (tensors, BodyPrior().state_dict(), VPoser().state_dict()):
         assert {name for name in kept if name.startswith("decoder")} == names
     assert BodyPrior.open().checksum == "053c0c54bfd6697c"

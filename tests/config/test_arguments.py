@@ -132,7 +132,7 @@ def test_values() -> None:
         (["gone.yaml"], "config file 'gone.yaml' does not exist; "),
         (["nap"], "config 'nap' does not exist; nearest: 'nao'"),
         (["atlas"], "config 'atlas' does not exist; available: coman, nao, paper/coman, "),
-        (["no/nao.yaml"], "config file 'no/nao.yaml' does not exist, nor does its folder"),
+        (["no/mine.yaml"], "config file 'no/mine.yaml' does not exist, nor does its folder"),
         (["gone/conf/nao"], "config 'gone/conf/nao' does not exist"),
         (["steps"], "command line: 'steps' is a key: write steps=VALUE"),
         ([""], "command line: '' is neither a flag nor KEY=VALUE"),
@@ -249,7 +249,7 @@ def test_help_of_a_small_schema() -> None:
     small.add_argument("--quiet", action="store_true", help="say less")
     assert small.format_help() == (
         """\
-usage: mrhubo small [--quiet] [CONFIG] [KEY=VALUE ...]
+usage: mrhubo small [--quiet] [CONFIG | --config CONFIG] [KEY=VALUE ...]
 
 Does little.
 
@@ -284,12 +284,12 @@ def test_every_command_has_a_parser_and_loads_no_torch_for_its_help(command: str
     assert done.stdout.startswith(f"usage: mrhubo {command} ") and done.stdout == found.format_help()
 
 
-@pytest.mark.parametrize("command", [*COMMANDS, "body.prior_training.__main__"])
+@pytest.mark.parametrize("command", [*COMMANDS, "prior"])
 def test_the_usage_line_tells_what_is_needed(command: str) -> None:
     found = importlib.import_module(f"mrhubo.{command}").build_parser()
     usage = " ".join(found.format_usage().split())
     needed = [action.option_strings[0] for action in found._flags() if action.required]
-    assert (" CONFIG " in usage) == found.needs_config
+    assert ("(CONFIG | --config CONFIG)" in usage) == found.needs_config
     for action in found._flags():
         flag = action.option_strings[0]
         assert (f"[{flag}" in usage or f"| {flag}" in usage) == (flag not in needed) and flag in usage

@@ -12,11 +12,12 @@ import torch
 
 from mrhubo.body import BodyPrior
 from mrhubo.body.prior_training import train as training
-from mrhubo.body.prior_training.__main__ import main
 from mrhubo.body.prior_training.poses import load_training_poses, plausible_frames
-from mrhubo.body.prior_training.train import PriorConfig, PriorTraining, train
+from mrhubo.body.prior_training.train import PriorTraining, train
+from mrhubo.config import PriorConfig
 from mrhubo.errors import UserError
 from mrhubo.files.storage import read_tensors
+from mrhubo.prior import main
 
 
 @pytest.fixture

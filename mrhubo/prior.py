@@ -1,9 +1,8 @@
-"""`python -m mrhubo.body.prior_training --config conf/prior.yaml`: trains the open body prior."""
+"""`mrhubo prior --config conf/prior.yaml`: trains the open body prior."""
 
 from __future__ import annotations
 
-from mrhubo.body.prior_training.train import PriorConfig, train
-from mrhubo.config import CommandParser, parse_arguments, run_command
+from mrhubo.config import CommandParser, PriorConfig, parse_arguments, run_command
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import Reporter
 
@@ -22,6 +21,8 @@ def main(argv: list[str]) -> None:
     config, options = parse_arguments(build_parser(), argv)
     if not config.data.is_file():
         raise UserError(f"data: {config.data} does not exist; name a file of training poses (docs/prior.md says which)")
+    from mrhubo.body.prior_training.train import train
+
     train(config, Reporter(options.quiet))
     print(f"body prior: {config.output}")
 
