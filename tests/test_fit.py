@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import lightning
 import mlflow
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from mrhubo.fitting.record import run_name
 from mrhubo.motion import read_motion
 from mrhubo.retargeter import Retargeter
 from mrhubo.runtime.ranks import Ranks
+from mrhubo.view import pictures
 
 SMALL = [
     "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=40", "pairs.fine_steps=3", "model.hidden=64",
@@ -70,7 +72,7 @@ def runs_of(folder: Path) -> list[Any]:
 def few_frames() -> Iterator[None]:
     """Short animations: a whole one takes four seconds a fit."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mrhubo.view.pictures.GIF_RATE", 1.0)
+        patch.setattr(pictures, "GIF_RATE", 1.0)
         yield
 
 
@@ -150,7 +152,7 @@ def test_a_fit_that_fails_says_why_and_goes_on_when_the_cause_is_gone(
         raise UserError("checkpoints: no space left on device")
 
     with monkeypatch.context() as patch, pytest.raises(UserError):
-        patch.setattr("mrhubo.fitting.fit.train", full)
+        patch.setattr(lightning.Trainer, "fit", full)
         main(given)
     (failed,) = runs_of(tmp_path)
     assert failed.info.status == "FAILED"

@@ -114,7 +114,7 @@ def test_the_command_trains_once_and_finds_what_is_done(
         assert 0 < run.data.metrics["test/latency_1000_us"] < run.data.metrics["test/latency_us"]
     link = np.array([run.data.metrics["test/link_cm"] for run in children])
     assert all(f"{value:.2f} (" in first or f" {value:.2f} " in first for value in link)
-    monkeypatch.setattr("mrhubo.paper.trainings.fit", lambda *a, **k: pytest.fail("trained again"))
+    monkeypatch.setattr(trainings, "fit", lambda *a, **k: pytest.fail("trained again"))
     main(given)
     assert capsys.readouterr().out == first
     assert len(client.search_runs([experiment.experiment_id])) == len(runs)
@@ -136,7 +136,7 @@ def test_mistakes_are_named() -> None:
 def test_s3le_is_left_out_aloud_without_motion_capture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("mrhubo.paper.trainings.default_capture", lambda: tmp_path / "none.npz")
+    monkeypatch.setattr(trainings, "default_capture", lambda: tmp_path / "none.npz")
     seen: list[Part] = []
 
     def stop(work: list[Part]) -> None:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.reference import OptimizationRetargeter
+from mrhubo.reference import OptimizationRetargeter, collision_free
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 
 
@@ -72,8 +72,8 @@ def test_frames_that_cannot_be_freed_rest(
     q_TN = problem.robot.home().expand(6, -1).clone()
     target_TD3 = problem.body_map.robot_directions(problem.robot.forward(q_TN))
     monkeypatch.setattr(problem.contact, "margin", 10.0)  # something is always near
-    monkeypatch.setattr("mrhubo.reference.collision_free.refine", lambda p, q, *a, **k: (q, None))
-    monkeypatch.setattr("mrhubo.reference.collision_free._start_again", lambda p, pool, q, *a: q)
+    monkeypatch.setattr(collision_free, "refine", lambda p, q, *a, **k: (q, None))
+    monkeypatch.setattr(collision_free, "_start_again", lambda p, pool, q, *a: q)
     touching = torch.tensor([False, True, True, False, False, True])
     q_TN += torch.arange(6.0)[:, None] * 0.01
     monkeypatch.setattr(problem.collision, "collides", lambda q: touching)

@@ -13,6 +13,7 @@ import torch
 import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
+from mrhubo.fitting.record import registry
 from mrhubo.fitting.record.registry import example_input, register
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
@@ -83,7 +84,7 @@ def test_a_version_is_loaded_by_its_uri(
 ) -> None:
     folder, made, uri = registered
     before = mlflow.get_tracking_uri()
-    monkeypatch.setattr("mrhubo.fitting.record.registry.default_tracking", lambda: folder)
+    monkeypatch.setattr(registry, "default_tracking", lambda: folder)
     monkeypatch.setattr(mlflow, "is_tracking_uri_set", lambda: False)
     torch.testing.assert_close(mrhubo.load(uri)(pose).q, made(pose).q)
     open_client(folder, "mrhubo").set_registered_model_alias("mrhubo-nao", "best", "1")
@@ -95,7 +96,7 @@ def test_a_version_is_loaded_by_its_uri(
     }.items():
         with pytest.raises(mrhubo.UserError, match=message):
             mrhubo.load(wrong)
-    monkeypatch.setattr("mrhubo.fitting.record.registry.default_tracking", lambda: folder / "nowhere")
+    monkeypatch.setattr(registry, "default_tracking", lambda: folder / "nowhere")
     with pytest.raises(mrhubo.UserError, match="there is no registry in .*nowhere"):
         mrhubo.load(uri)
     assert mlflow.get_tracking_uri() == before and not (folder / "nowhere").exists()
