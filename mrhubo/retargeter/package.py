@@ -10,12 +10,10 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 from __future__ import annotations
 
 import copy
-import functools
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
@@ -57,13 +55,7 @@ class Retargeter(nn.Module):
         super().__init__()
         self.network = network.requires_grad_(False).eval()
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
-
-    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
-        """What every move of a module comes down to: the robot, and what is built on it, moves along."""
-        super()._apply(fn, recurse)
-        self.body_map.to(self.device)
-        self.__dict__.pop("directions", None)
-        return self
+        self._directions: DirectionProblem | None = None
 
     @property
     def device(self) -> torch.device:
@@ -75,10 +67,12 @@ class Retargeter(nn.Module):
         """The robot's collision shapes."""
         return self.body_map.collision
 
-    @functools.cached_property
+    @property
     def directions(self) -> DirectionProblem:
         """The reference retargeter's cost."""
-        return DirectionProblem(self.body_map)
+        if self._directions is None:
+            self._directions = DirectionProblem(self.body_map)
+        return self._directions
 
     @property
     def joint_names(self) -> tuple[str, ...]:

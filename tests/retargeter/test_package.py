@@ -197,16 +197,15 @@ def test_an_answer_is_saved_with_names_and_time(made: Retargeter, tmp_path: Path
 
 
 def test_it_moves_whole(folder: Path) -> None:
-    """Without a second device: to `meta`, where nothing may be left behind, and the robot's cost is made anew."""
+    """Without a second device: to `meta`, where nothing may be left behind, the robot's cost and shapes included."""
     retargeter = Retargeter.load(folder)
-    before = retargeter.directions
-    assert retargeter.to("cpu") is retargeter and retargeter.directions is not before
+    assert retargeter.to("cpu") is retargeter
     expected = retargeter.retarget(human(3)).q
     assert torch.equal(retargeter.to(torch.device("cpu")).retarget(human(3)).q, expected)
     retargeter.to("meta")
     tensors = [*retargeter.parameters(), *retargeter.buffers(), retargeter.body_map.robot.lower_N]
+    tensors += [*retargeter.directions.buffers(), *retargeter.collision.buffers()]
     assert {tensor.device.type for tensor in tensors} == {"meta"}
-    assert "directions" not in vars(retargeter)
     if torch.cuda.is_available():
         moved = Retargeter.load(folder).to("cuda")
         torch.testing.assert_close(moved.retarget(human(3)).q.cpu(), expected, atol=1e-4, rtol=0)
