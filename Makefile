@@ -19,7 +19,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make fit [CONFIG=conf/nao.yaml] [ARGS='trainer.max_steps=1000']   learn to retarget to a robot"
-	@echo "make test [PYTEST_ARGS='-k config']                               lint, types and tests"
+	@echo "make test [PYTEST_ARGS='-k config']                               lint, types, tests and docs"
 	@echo "make dashboard                                                    the runs so far, in a browser"
 	@echo "PYTHON=python3.12 chooses the interpreter of a new .venv, PIP_ARGS=... goes to pip."
 
@@ -31,6 +31,7 @@ test: .venv/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
+	$(BIN)/mkdocs build --strict --quiet
 
 dashboard: export MLFLOW_SERVER_ENABLE_JOB_EXECUTION = false
 dashboard: export MLFLOW_DISABLE_TELEMETRY = true
@@ -43,7 +44,7 @@ dashboard: .venv/.core
 	@touch $@
 
 .venv/.test: pyproject.toml .venv/.created
-	$(PIP_INSTALL) -e '.[test]'
+	$(PIP_INSTALL) -e '.[dev]'
 	@touch .venv/.core $@
 
 # An environment that is already there and works is kept.

@@ -1,10 +1,10 @@
 """How the link error on the validation clips depends on the pairs: number, solver, filter, weight of the prior,
 and how many of them start from a human pose.
 
-    python benchmarks/pair_quality.py [--robots nao,coman,reachy] [--only WORD] [--seeds 1] [--results FILE]
-        [key.sub=value ...]
+    python benchmarks/pair_quality.py [--robots nao,coman,reachy] [--only WORD] [--seeds 1]
+        [--counts 12500,50000,200000] [--results FILE] [key.sub=value ...]
 
-`--only reverse` makes the rows whose name holds that word.
+`--only reverse` makes the rows whose name holds that word; all rows but those by count have the second of the counts.
 
 Trains a network for every row, with all other settings as shipped. Trainings whose result is in FILE (JSON lines) are
 not done again, so an interrupted table goes on where it stopped.
@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from common import print_header, print_table, read_options
@@ -26,7 +27,6 @@ from mrhubo.fitting.training import train
 from mrhubo.runtime.progress import SILENT
 from mrhubo.runtime.tables import mean_and_spread
 
-COUNTS = (12_500, 50_000, 200_000)
 FILTERS = {
     "linear, k 0.5": ["pairs.filter_k=0.5"],
     "linear, k 1": [],
@@ -38,20 +38,21 @@ WEIGHTS = (0.003, 0.01)
 REVERSE_SHARES = (0.25, 0.5, 0.75, 1.0)
 
 
-def rows() -> list[tuple[str, list[str]]]:
+def rows(counts: Sequence[int]) -> list[tuple[str, list[str]]]:
     """Name and settings of every row: solver by count, solver by filter, weights of the prior, reverse pairs."""
-    table = []
+    table, middle = [], counts[1]
     for solver in ("fine", "fast"):
-        for count in COUNTS:
-            for name, change in FILTERS.items() if count == 50_000 else [("linear, k 1", FILTERS["linear, k 1"])]:
+        for count in counts:
+            for name, change in FILTERS.items() if count == middle else [("linear, k 1", FILTERS["linear, k 1"])]:
                 settings = [f"pairs.solver={solver}", f"pairs.count={count}", "pairs.reverse_share=0", *change]
                 table.append((f"{solver}, {count:,}, {name}", settings))
-    base = "fine, 50,000, linear, k 1"
-    table += [(f"{base}, w_prior {w}", [f"pairs.w_prior={w}", "pairs.reverse_share=0"]) for w in WEIGHTS]
-    table.append((f"{base}, not aligned", ["pairs.align=false", "pairs.reverse_share=0"]))
-    return table + [
-        (f"{base}, {share:.0%} of them reverse", [f"pairs.reverse_share={share}"]) for share in REVERSE_SHARES
-    ]
+    changes = {
+        **{f"w_prior {w}": [f"pairs.w_prior={w}", "pairs.reverse_share=0"] for w in WEIGHTS},
+        "not aligned": ["pairs.align=false", "pairs.reverse_share=0"],
+        **{f"{share:.0%} of them reverse": [f"pairs.reverse_share={share}"] for share in REVERSE_SHARES},
+    }
+    base = f"fine, {middle:,}, linear, k 1"
+    return table + [(f"{base}, {name}", [f"pairs.count={middle}", *change]) for name, change in changes.items()]
 
 
 def link_error(robot: str, settings: list[str], results: Path) -> float:
@@ -73,12 +74,17 @@ def link_error(robot: str, settings: list[str], results: Path) -> float:
 def main(argv: list[str]) -> None:
     """Prints the table."""
     options, argv = read_options(
-        argv, robots="nao,coman,reachy", only="", seeds="1", results="mlruns/pair_quality.jsonl"
+        argv,
+        robots="nao,coman,reachy",
+        only="",
+        seeds="1",
+        counts="12500,50000,200000",
+        results="mlruns/pair_quality.jsonl",
     )
     robots, results = options["robots"].split(","), Path(options["results"])
     results.parent.mkdir(parents=True, exist_ok=True)
     table = []
-    for name, change in rows():
+    for name, change in rows([int(count) for count in options["counts"].split(",")]):
         if options["only"] not in name:
             continue
         cells = []

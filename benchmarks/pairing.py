@@ -1,6 +1,7 @@
 """Pairs: our solvers against the paper's on the same robot poses, where the time goes, and how near the floor it is.
 
-    python benchmarks/pairing.py [--robots nao,coman,reachy] [--poses 1000] [--pairs 40000] [key.sub=value ...]
+    python benchmarks/pairing.py [--robots nao,coman,reachy] [--poses 1000] [--parts 2500] [--reverse 5000]
+        [--exhaustive 1000] [--pairs 40000] [key.sub=value ...]
 
 The amortised solver is trained first, or read where a pairing with these settings has left it. Every method runs in
 this one process, with one thread and then with one a core; `mrhubo.pair` uses one process a core instead, which scales
@@ -20,6 +21,7 @@ from pathlib import Path
 
 import torch
 from common import print_header, print_table, read_options
+from levenberg_marquardt import solve_levenberg_marquardt
 from torch import Tensor
 
 from mrhubo.body.latent import LatentProblem
@@ -27,15 +29,7 @@ from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.config import load_config
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fitting.preparation import prepare_pairs
-from mrhubo.pairing import (
-    PairGenerator,
-    PairSetup,
-    PairStore,
-    generate_pairs,
-    make_filter,
-    solve_lbfgs,
-    solve_levenberg_marquardt,
-)
+from mrhubo.pairing import PairGenerator, PairSetup, PairStore, generate_pairs, make_filter, solve_lbfgs
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import align_pose
 from mrhubo.runtime.progress import Progress, Reporter
@@ -44,7 +38,9 @@ from mrhubo.runtime.threads import available_cores, use_threads
 
 def main(argv: list[str]) -> None:
     """Prints the tables of every robot."""
-    options, argv = read_options(argv, robots="nao,coman,reachy", poses="1000", pairs="40000")
+    options, argv = read_options(
+        argv, robots="nao,coman,reachy", poses="1000", parts="2500", reverse="5000", exhaustive="1000", pairs="40000"
+    )
     print_header()
     gemm = gemm_rate()
     print(f"matrix products: {gemm / 1e9:.0f} GFLOP/s a core (float32, 512 x 512 by 512)\n")
@@ -57,14 +53,16 @@ def main(argv: list[str]) -> None:
         seconds = time.perf_counter() - start
         trained = f"{config.pairs.amortiser_steps:,} steps in {seconds:.1f} s" if seconds > 2 else "was there already"
         print(f"## {robot}\n\namortised solver: {trained}\n")
-        compare(setup, maker, int(options["poses"]))
-        parts(setup, maker, gemm)
-        reverse(setup, maker)
+        compare(setup, maker, int(options["poses"]), int(options["exhaustive"]))
+        parts(setup, maker, gemm, int(options["parts"]))
+        reverse(setup, maker, int(options["reverse"]))
         whole(setup, int(options["pairs"]))
 
 
-def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
-    """Rate, cost and accuracy of every method."""
+def compare(setup: PairSetup, maker: PairGenerator, count: int, exhaustive: int) -> None:
+    """Rate, cost and accuracy of every method; the last two, which show what is possible, take `exhaustive` steps of
+    quasi-Newton and a fifth as many of Levenberg-Marquardt.
+    """
     problem = maker.problem
     target = maker.draw_targets(count, torch.Generator().manual_seed(1234))
     zero, random = torch.zeros(count, problem.latent), torch.randn(count, problem.latent)
@@ -87,12 +85,12 @@ def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
             lambda: solve_quasi_newton(problem, amortised, target, steps, metric_ZZ=metric_ZZ),
             True,
         ),
-        "LM, 200 steps, best of 3 starts": (
-            lambda: best_of(lambda z: solve_levenberg_marquardt(problem, z, target, 200, tolerance=1e-7)),
+        f"LM, {exhaustive // 5} steps, best of 3 starts": (
+            lambda: best_of(lambda z: solve_levenberg_marquardt(problem, z, target, exhaustive // 5, tolerance=1e-7)),
             False,
         ),
-        "quasi-Newton, 1,000 steps, best of 3": (
-            lambda: best_of(lambda z: solve_quasi_newton(problem, z, target, 1_000, tolerance=1e-6)),
+        f"quasi-Newton, {exhaustive:,} steps, best of 3": (
+            lambda: best_of(lambda z: solve_quasi_newton(problem, z, target, exhaustive, tolerance=1e-6)),
             False,
         ),
     }
@@ -129,7 +127,7 @@ def compare(setup: PairSetup, maker: PairGenerator, count: int) -> None:
     print(f"\nof the lowest costs found, {norm:.3f} is the prior's part, w_prior |z|^2\n")
 
 
-def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_500) -> None:
+def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int) -> None:
     """Where the time of a `fast` pair goes on one core, a `fine` one's search beside it, and each part's floor."""
     problem, prior, robot = maker.problem, setup.prior, setup.body_map.robot
     assert maker.amortiser is not None
@@ -178,7 +176,8 @@ def parts(setup: PairSetup, maker: PairGenerator, gemm: float, count: int = 2_50
         near = f"{times[name] / floor:.1f}" if floor else ""
         rows.append([name, f"{times[name]:.1f}", f"{times[name] / total:.0%}", f"{floor:.1f}" if floor else "", near])
     rows.append(["all of `fast`", f"{total:.1f}", "100%", "", ""])
-    one = macs(prior.decoder[:-1]) + prior.hidden * 6 * len(problem.tree.joints)
+    *hidden, _ = prior.decoder.linear_layers
+    one = sum(map(macs, hidden)) + prior.hidden * 6 * len(problem.tree.joints)
     floor = 2e6 * 2 * one * evaluations / gemm
     time_us = seconds * 1e6 / count
     name = f"quasi-Newton search: {evaluations:.1f} evaluations"
@@ -223,7 +222,8 @@ def whole(setup: PairSetup, count: int) -> None:
             maker = PairGenerator(mine.body_map, mine.prior, config.pairs)
             generate_pairs(config, maker, mine.store, watch)
             marks = [(done / mine.store.shard_size, seconds) for done, seconds in watch.marks]
-            first = next(mark for mark in marks if mark[0] >= cores)  # until then workers are starting
+            # Until every worker has made a shard, some are still starting.
+            first = next(mark for mark in marks if mark[0] >= min(cores, mine.store.shards - 1))
             rate = (marks[-1][0] - first[0]) * mine.store.shard_size / (marks[-1][1] - first[1])
             rows.append([name, f"{rate:,.0f}", f"{first[1] - marks[0][1]:.1f}"])
     worker, own = (resource.getrusage(who).ru_maxrss / 1e6 for who in (resource.RUSAGE_CHILDREN, resource.RUSAGE_SELF))
@@ -231,7 +231,7 @@ def whole(setup: PairSetup, count: int) -> None:
     print(f"\nmemory: {own:.2f} GB here at most (all methods), {worker:.2f} GB a worker\n")
 
 
-def reverse(setup: PairSetup, maker: PairGenerator, count: int = 5_000) -> None:
+def reverse(setup: PairSetup, maker: PairGenerator, count: int) -> None:
     """Pairs from human poses: how fast and how well they are retargeted, and whether alike poses get alike angles."""
     generator, device = torch.Generator().manual_seed(7), maker.device
     z = maker.settings.reverse_spread * torch.randn(count, maker.prior.latent, generator=generator)

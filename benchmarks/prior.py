@@ -1,6 +1,7 @@
 """The measures of the body prior: the shipped one, another of ours, or VPoser.
 
     python benchmarks/prior.py [--motions FOLDER] [--prior FILE | --vposer V02_05] [--config conf/prior.yaml]
+        [--seconds 3]
 
 The first table is on the clips held out of training (needs the training data that the config names), and on the motions
 of a folder, by default the evaluation clips; the second is by clip, the third by joint; then the speed of decoding.
@@ -20,8 +21,9 @@ from torch import Tensor
 
 from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, VPoser
 from mrhubo.body.prior_training.measures import NOISE_DEG, measure, reconstruction
-from mrhubo.body.prior_training.train import PriorConfig, Split
-from mrhubo.config import parse_arguments
+from mrhubo.body.prior_training.train import Split
+from mrhubo.body.skeleton import PAIRED_JOINTS, SIDES
+from mrhubo.config import PriorConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.runtime.locations import default_motions
@@ -51,11 +53,11 @@ def training_poses(prior: BodyPrior, config: Path) -> tuple[Tensor, Tensor] | No
     """Held-out and training poses of the prior's card, those of its own measures; None without the data or the card."""
     held_out_clips = json.loads(prior.metadata["card"]).get("held_out_clips", [])
     try:
-        settings, _ = parse_arguments(["--config", str(config)], "benchmarks/prior.py", "", PriorConfig)
+        settings = load_config(config, (), PriorConfig)
         split = Split.of(settings, held_out_clips)
     except UserError:
         return None
-    return split.unseen(), split.known(settings.seed)
+    return split.held_out_sample(), split.training_sample(settings.seed)
 
 
 @torch.no_grad()
@@ -75,16 +77,17 @@ def by_clip(prior: BodyPrior, motions: list[Motion]) -> tuple[list[list[str]], f
 def by_joint(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
     """Mean rotation error of every joint [deg], left and right together, for each set of poses."""
     errors = [reconstruction(prior, Skeleton(), poses)[1].mean(dim=0) for poses in columns]
-    names = [name.removeprefix("left_") for name in POSED_JOINT_NAMES if not name.startswith("right_")]
+    both = {f"{side}_{name}": name for side in SIDES for name in PAIRED_JOINTS}
+    parts = [both.get(name, name) for name in POSED_JOINT_NAMES]
     rows = []
-    for name in names:
-        joints = [i for i, n in enumerate(POSED_JOINT_NAMES) if n in (name, f"left_{name}", f"right_{name}")]
-        rows.append([name, *(f"{float(error[joints].mean()):.2f}" for error in errors)])
+    for part in dict.fromkeys(parts):
+        joints = [i for i, other in enumerate(parts) if other == part]
+        rows.append([part, *(f"{float(error[joints].mean()):.2f}" for error in errors)])
     return rows
 
 
 @torch.no_grad()
-def poses_per_second(prior: BodyPrior, batch: int = 2_000, seconds: float = 3.0) -> tuple[float, float]:
+def poses_per_second(prior: BodyPrior, seconds: float, batch: int = 2_000) -> tuple[float, float]:
     """Poses decoded, and decoded with all keypoints, per second on one thread: medians."""
     skeleton, z = Skeleton(), torch.randn(batch, prior.latent)
     threads = torch.get_num_threads()
@@ -109,6 +112,7 @@ def main(argv: list[str]) -> None:
     parser.add_argument("--prior", type=Path)
     parser.add_argument("--vposer", type=Path)
     parser.add_argument("--config", type=Path, default=Path("conf/prior.yaml"))
+    parser.add_argument("--seconds", type=float, default=3.0, help="for which each speed is measured")
     given = parser.parse_args(argv)
     print_header()
     prior = VPoser.open(given.vposer) if given.vposer else BodyPrior.open(given.prior)
@@ -131,7 +135,7 @@ def main(argv: list[str]) -> None:
     sets = [*([training[0]] if training else []), everything]
     names = [*(["held-out clips [deg]"] if training else []), f"{folder.name} [deg]"]
     print_table(["joint", *names], by_joint(prior, sets))
-    decoded, with_keypoints = poses_per_second(prior)
+    decoded, with_keypoints = poses_per_second(prior, given.seconds)
     print(f"\none thread, batch 2000: {decoded:,.0f} poses/s decoded, {with_keypoints:,.0f} decoded with 36 keypoints")
 
 

@@ -1,6 +1,7 @@
 """The experiments that chose the body prior's settings: one change at a time, each a tracked training.
 
-    python benchmarks/prior_experiments.py [--config conf/prior.yaml] [--only NAME,NAME] [steps=3000 batch_size=256 ...]
+    python benchmarks/prior_experiments.py [--config conf/prior.yaml] [--only NAME,NAME] [--motions FOLDER]
+        [steps=3000 batch_size=256 ...]
 
 Weights go to `prior_experiments` in the tracking folder; a variant whose weights are there is not trained again.
 """
@@ -9,13 +10,14 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
-from common import print_header, print_table
+from common import print_header, print_table, read_options
 from prior import by_clip
 
 from mrhubo.body import BodyPrior
-from mrhubo.body.prior_training.train import PriorConfig, train
-from mrhubo.config import fingerprint, parse_arguments, without_paths
+from mrhubo.body.prior_training.train import train
+from mrhubo.config import PriorConfig, fingerprint, load_config, without_paths
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.runtime.locations import default_motions
@@ -61,15 +63,13 @@ def measures(config: PriorConfig, clips: list[Motion]) -> dict[str, float]:
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options = {"--config": "conf/prior.yaml", "--only": ",".join(VARIANTS)}
-    while argv and argv[0] in options:
-        options[argv[0]], argv = argv[1], argv[2:]
-    rows, clips = [], read_folder(find_motions(default_motions()))
-    for name in options["--only"].split(","):
-        given = ["--config", options["--config"], *argv, *VARIANTS[name]]
-        config, _ = parse_arguments(given, "benchmarks/prior_experiments.py", "Experiments.", PriorConfig)
+    options, argv = read_options(argv, config="conf/prior.yaml", only=",".join(VARIANTS), motions="")
+    folders = [Path(options["motions"])] if options["motions"] else default_motions()
+    rows, clips = [], read_folder(find_motions(folders))
+    for name in options["only"].split(","):
+        config = load_config(Path(options["config"]), [*argv, *VARIANTS[name]], PriorConfig)
         found = measures(config, clips)
-        rows.append([name, *(f"{found[key]:.3f}" for key in COLUMNS)])
+        rows.append([name, *(f"{found[key]:.3f}" if key in found else "" for key in COLUMNS)])
     print_header()
     print_table(["variant", *COLUMNS.values()], rows)
 

@@ -1,9 +1,11 @@
 """How making pairs, and training on them, gain from a second process.
 
-    python benchmarks/scaling.py [--config conf/nao.yaml] [--pairs 100000] [--steps 1000] [key.sub=value ...]
+    python benchmarks/scaling.py [--config conf/nao.yaml] [--pairs 100000] [--steps 1000] [--torchrun 2,4]
+        [key.sub=value ...]
 
 Every row starts commands as a user would; the amortised solver is trained before, and the time to start is in the
-figures. That all rows made the same bytes is checked.
+figures. That all rows made the same bytes is checked. `--torchrun` lists numbers of processes (by default 2 and one a
+core; "" leaves torchrun out), `--steps 0` leaves training out.
 """
 
 from __future__ import annotations
@@ -29,9 +31,11 @@ TORCHRUN = ["-m", "torch.distributed.run", "--nproc-per-node"]
 
 def main(argv: list[str]) -> None:
     """Prints both tables."""
-    options, argv = read_options(argv, config="conf/nao.yaml", pairs="100000", steps="1000")
+    options, argv = read_options(
+        argv, config="conf/nao.yaml", pairs="100000", steps="1000", torchrun=f"2,{available_cores()}"
+    )
     print_header()
-    cores = available_cores()
+    cores, counts = available_cores(), sorted({int(n) for n in options["torchrun"].split(",") if n})
     with tempfile.TemporaryDirectory() as folder:
         first = Path(folder) / "amortiser"
         given = ["--config", options["config"], "--quiet", "trainer.accelerator=cpu", *argv]
@@ -39,7 +43,7 @@ def main(argv: list[str]) -> None:
         ways = {
             "one process": ["-m", "mrhubo.pair", "pairs.workers=1"],
             f"one command, {cores} worker processes": ["-m", "mrhubo.pair"],
-            **{f"torchrun, {n} processes": [*TORCHRUN, str(n), "-m", "mrhubo.pair"] for n in sorted({2, cores})},
+            **{f"torchrun, {n} processes": [*TORCHRUN, str(n), "-m", "mrhubo.pair"] for n in counts},
         }
         rows, made = [], set()
         for index, (name, command) in enumerate(ways.items()):
@@ -52,6 +56,8 @@ def main(argv: list[str]) -> None:
         show("pairs", "pairs/s", rows)
         print(f"\nthe same bytes: {'yes' if len(made) == 1 else 'NO'}\n")
         rows, steps = [], int(options["steps"])
+        if not steps:
+            return
         fit = ["-m", "mrhubo.fit", *given, f"pairs.count={options['pairs']}", f"pairs.dir={Path(folder) / '1'}"]
         run([*fit, "trainer.max_steps=1", f"tracking.dir={Path(folder) / 'references'}"])  # makes the clips' references
         for name, command in {"one process": [], "torchrun, 2 processes": [*TORCHRUN, "2"]}.items():

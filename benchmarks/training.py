@@ -1,6 +1,7 @@
 """What Trainer and MLflow cost over a bare training loop: same network, same batches, in one process.
 
-    python benchmarks/training.py [--config conf/nao.yaml] [--steps 300] [--pairs 50000]
+    python benchmarks/training.py [--config conf/nao.yaml] [--steps 300] [--pairs 50000] [--repeats 4]
+        [key.sub=value ...]
 
 Random numbers stand in for pairs: the time does not depend on their values.
 """
@@ -45,7 +46,7 @@ class Stopwatch(lightning.Callback):
 
 def main(argv: list[str]) -> None:
     """Prints the table."""
-    options, argv = read_options(argv, config="conf/nao.yaml", steps="300", pairs="50000")
+    options, argv = read_options(argv, config="conf/nao.yaml", steps="300", pairs="50000", repeats="4")
     print_header()
     logging.getLogger("lightning.pytorch").setLevel(logging.ERROR)
     config = load_config(Path(options["config"]), argv)
@@ -92,14 +93,14 @@ def main(argv: list[str]) -> None:
 
     names = {"bare loop": bare, "Trainer": lambda: trainer(False), "Trainer + MLflow": lambda: trainer(True)}
     times: dict[str, list[float]] = {name: [] for name in names}
-    for _ in range(4):  # in turn, so that a drift of the machine's speed meets all alike
+    for _ in range(int(options["repeats"])):  # in turn, so that a drift of the machine's speed meets all alike
         for name, run in names.items():
             times[name].append(run())
     rows = []
     best = [min(t) for t in times.values()]
     for name, seconds in zip(names, best, strict=True):
         rows.append([name, f"{1000 * seconds / steps:.1f}", f"{seconds / best[0] - 1:+.1%}"])
-    print_table(["loop (best of 4)", "ms a step", "over the bare loop"], rows)
+    print_table([f"loop (best of {options['repeats']})", "ms a step", "over the bare loop"], rows)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ VERBS = {
     "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit"),
     "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE"),
     "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours"),
-    "prior": Verb("mrhubo.body.prior_training.__main__", "train a body prior on motion capture of your own"),
+    "prior": Verb("mrhubo.prior", "train a body prior on motion capture of your own"),
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -10,16 +9,75 @@ class UserError(Exception):
     """A mistake in a config, a file or a command line: what is wrong, where, and what to do about it."""
 
 
-def unknown_name(kind: str, name: str, available: Iterable[str]) -> str:
-    """One sentence that names the nearest available name, for instance ``link 'Hed' does not exist; nearest:
-    'Head'``.
+def unknown_name(kind: str, name: str, available: Iterable[str], where: str = "") -> str:
+    """One sentence: ``link 'Hed' does not exist in nao.urdf; nearest: 'Head'``, or what is available where no name is
+    near.
+
+    Args:
+        kind: what is named, for instance ``link``.
+        name: the name that does not exist.
+        available: those that do.
+        where: what was searched, if that has to be said, for instance ``nao.urdf``.
     """
     names = sorted(available)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    if near:
-        return f"{kind} '{name}' does not exist; nearest: '{near[0]}'"
-    shown = ", ".join(names[:30]) + (", ..." if len(names) > 30 else "")
-    return f"{kind} '{name}' does not exist; available: {shown or 'none'}"
+    missing = f"{kind} '{name}' does not exist" + (f" in {where}" if where else "")
+    near = nearest(name, names)
+    if near is not None:
+        return f"{missing}; nearest: '{near}'"
+    return f"{missing}; available: {listed(names)}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """The first thirty names in order, with commas; ``none`` if there are none."""
+    names = sorted(names)
+    return (", ".join(names[:30]) + (", ..." if len(names) > 30 else "")) or "none"
+
+
+def nearest(name: str, available: Iterable[str]) -> str | None:
+    """The name that was most likely meant; None where no name is so near that it is more than a guess.
+
+    Near is: the same but for capitals, hyphens and underscores; one letter (in long names two or three) that is wrong,
+    missing, too many, or swapped with the next; the beginning or a word of one name and of no other; or the name and
+    more behind it.
+    """
+    names, wanted = list(available), _bare(name)
+    distances = {other: _edits(wanted, _bare(other)) for other in names if abs(len(other) - len(name)) <= 6}
+    allowed = min(1 + len(wanted) // 6, 3)
+    close = [other for other, distance in distances.items() if distance <= allowed]
+    if close:
+        return min(close, key=lambda other: (distances[other], other))
+    if len(wanted) < 3:
+        return None
+    words = name.lower().replace("-", "_")
+    for test in (
+        lambda other: _bare(other).startswith(wanted),
+        lambda other: f"_{words}_" in f"_{other.lower()}_",
+        lambda other: len(other) >= 3 and words.startswith(f"{other.lower()}_"),
+    ):
+        found = [other for other in names if test(other)]
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
+def _bare(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter not in "-_ ")
+
+
+def _edits(a: str, b: str) -> int:
+    """Letters to replace, add or take away, or neighbours to swap, until one text is the other (optimal string
+    alignment distance).
+    """
+    before: list[int] = []
+    row = list(range(len(b) + 1))
+    for i, x in enumerate(a, start=1):
+        before, last, row = row, before, [i]
+        for j, y in enumerate(b, start=1):
+            cost = min(before[j] + 1, row[-1] + 1, before[j - 1] + (x != y))
+            if i > 1 and j > 1 and x == b[j - 2] and a[i - 2] == y:
+                cost = min(cost, last[j - 2] + 1)
+            row.append(cost)
+    return row[-1]
 
 
 def was_interrupted(error: BaseException | None) -> bool:

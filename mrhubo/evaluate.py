@@ -1,11 +1,10 @@
-"""`python -m mrhubo.evaluate --config conf/nao.yaml --retargeter FOLDER`: how good a trained retargeter is."""
+"""`mrhubo evaluate nao --retargeter FOLDER`: how good a trained retargeter is."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from mrhubo.config import parse_arguments, run_command
-from mrhubo.errors import UserError
+from mrhubo.config import CommandParser, Config, parse_arguments, run_command, whole_number
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
@@ -13,27 +12,29 @@ DESCRIPTION = (
     " human (directions of limbs, hands, head, jerk), and in time. The motions, and what is a key link, are those of"
     " the config; the robot is the retargeter's own and must be the config's."
 )
-FLAGS = {
-    "retargeter FOLDER": "the package that a fit ended with",
-    "polish NUMBER": "steps of optimisation after the networks (default: 0, the networks alone; `retarget` makes 1)",
-    "validation": "the validation clips, for choosing between retargeters; else the test clips",
-    "quiet": "no progress line",
-}
+
+
+def build_parser() -> CommandParser[Config]:
+    """The command's arguments."""
+    parser = CommandParser("mrhubo evaluate", DESCRIPTION, Config)
+    package = "the package that a fit ended with"
+    parser.add_argument("--retargeter", metavar="FOLDER", required=True, help=package)
+    polish = "steps of optimisation after the networks (default: 0, the networks alone; `retarget` makes 1)"
+    parser.add_argument("--polish", metavar="NUMBER", type=whole_number(0, 1_000), default=0, help=polish)
+    clips = "the validation clips, for choosing between retargeters; else the test clips"
+    parser.add_argument("--validation", action="store_true", help=clips)
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
 
 
 def main(argv: list[str]) -> None:
     """The command."""
-    config, flags = parse_arguments(argv, "mrhubo.evaluate", DESCRIPTION, flags=FLAGS)
-    if flags["retargeter"] is None:
-        raise UserError("command line: --retargeter FOLDER is missing; a fit ends with the folder's name")
-    polish = flags["polish"] or "0"
-    if not polish.isdigit() or int(polish) > 1_000:
-        raise UserError(f"command line: --polish must be 0 .. 1000 steps, found '{polish}'")
+    config, options = parse_arguments(build_parser(), argv)
     from mrhubo.fitting.measurement import measure_package
     from mrhubo.fitting.preparation import prepare
 
-    report, package = Reporter(flags["quiet"]), Path(flags["retargeter"])
-    print(measure_package(prepare(config), report, package, flags["validation"], int(polish)))
+    report, package = Reporter(options.quiet), Path(options.retargeter)
+    print(measure_package(prepare(config), report, package, options.validation, options.polish))
 
 
 if __name__ == "__main__":

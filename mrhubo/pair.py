@@ -1,9 +1,8 @@
-"""`python -m mrhubo.pair --config conf/nao.yaml`: makes, checks or shows the pairs of robot and human poses."""
+"""`mrhubo pair nao`: makes, checks or shows the pairs of robot and human poses."""
 
 from __future__ import annotations
 
-from mrhubo.config import parse_arguments, run_command
-from mrhubo.errors import UserError
+from mrhubo.config import CommandParser, Config, parse_arguments, run_command
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
@@ -11,26 +10,31 @@ DESCRIPTION = (
     " them. Interrupt it at any time: the same command goes on where it stopped. Started by torchrun or SLURM, all"
     " processes share the work (docs/scaling.md)."
 )
-FLAGS = {
-    "verify": "make nothing; read every file again: checksum, shapes, finite numbers, joint limits, kinematics",
-    "inspect": "make nothing; print a summary of the pairs that are there and draw pairs.png beside them",
-    "quiet": "no progress lines",
-}
+
+
+def build_parser() -> CommandParser[Config]:
+    """The command's arguments."""
+    parser = CommandParser("mrhubo pair", DESCRIPTION, Config)
+    instead = parser.add_mutually_exclusive_group()
+    verify = "make nothing; read every file again: checksum, shapes, finite numbers, joint limits, kinematics"
+    instead.add_argument("--verify", action="store_true", help=verify)
+    inspect = "make nothing; print a summary of the pairs that are there and draw pairs.png beside them"
+    instead.add_argument("--inspect", action="store_true", help=inspect)
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
 
 
 def main(argv: list[str]) -> None:
     """The command."""
-    config, flags = parse_arguments(argv, "mrhubo.pair", DESCRIPTION, flags=FLAGS)
-    if flags["verify"] and flags["inspect"]:
-        raise UserError("command line: --verify and --inspect are two commands; give one of them")
+    config, options = parse_arguments(build_parser(), argv)
     from mrhubo.fitting.pairs import inspect_pairs, make_pairs, summarise_pairs, verify_pairs
     from mrhubo.fitting.preparation import prepare_pairs
     from mrhubo.runtime.ranks import Ranks
 
-    report, setup = Reporter(flags["quiet"]), prepare_pairs(config)
-    if flags["verify"]:
+    report, setup = Reporter(options.quiet), prepare_pairs(config)
+    if options.verify:
         print(verify_pairs(setup, report))
-    elif flags["inspect"]:
+    elif options.inspect:
         print(inspect_pairs(setup))
     else:
         ranks = Ranks.join(config.trainer.accelerator)

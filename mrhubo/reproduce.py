@@ -1,8 +1,8 @@
-"""`python -m mrhubo.reproduce`: the paper's tables, the paper's figures beside ours."""
+"""`mrhubo reproduce`: the paper's tables, the paper's figures beside ours."""
 
 from __future__ import annotations
 
-from mrhubo.config import BaselineConfig, run_command, split_arguments
+from mrhubo.config import BaselineConfig, CommandParser, nonempty, run_command, whole_number
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import Reporter
 
@@ -11,38 +11,37 @@ DESCRIPTION = (
     " beside ours. Every training is a tracked fit under one parent run; what is finished is not done again."
     " key.sub=value changes a setting of every training."
 )
-FLAGS = {
-    "robots NAMES": "comma-separated: nao,coman,reachy (default: all)",
-    "methods NAMES": "comma-separated: proposed,without filter,one stage,our default,S3LE (default: all)",
-    "seeds NUMBER": "trainings of each kind, seeds 0, 1, ... (default: 3)",
-    "paper": "the paper's settings to the letter, conf/paper, in place of ours",
-    "quiet": "no progress lines",
-}
+
+
+def build_parser() -> CommandParser[BaselineConfig]:
+    """The command's arguments."""
+    parser = CommandParser("mrhubo reproduce", DESCRIPTION, BaselineConfig, takes_config=False)
+    robots = "comma-separated: nao,coman,reachy (default: all)"
+    parser.add_argument("--robots", metavar="NAMES", type=_names, default=["nao", "coman", "reachy"], help=robots)
+    methods = "comma-separated: proposed,without filter,one stage,our default,S3LE (default: all)"
+    parser.add_argument("--methods", metavar="NAMES", type=_names, help=methods)
+    seeds = "trainings of each kind, seeds 0, 1, ... (default: 3)"
+    parser.add_argument("--seeds", metavar="NUMBER", type=whole_number(1, 100), default=3, help=seeds)
+    paper = "the paper's settings to the letter, conf/paper, in place of ours"
+    parser.add_argument("--paper", action="store_true", help=paper)
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
 
 
 def main(argv: list[str]) -> None:
     """The command."""
-    files, overrides, given = split_arguments(argv, "mrhubo.reproduce", DESCRIPTION, BaselineConfig, FLAGS)
-    if files:
-        raise UserError("command line: mrhubo.reproduce has its own configs; choose among them with --robots")
-    for override in overrides:
+    options = build_parser().parse_args(argv)
+    for override in options.overrides:
         if override.startswith(("trainer.seed", "s3le.seed")):
             raise UserError("command line: the seeds are set by --seeds")
-    try:
-        seeds = int(given["seeds"] or 3)
-    except ValueError:
-        seeds = 0
-    if not 1 <= seeds <= 100:
-        raise UserError(f"command line: --seeds must be 1 .. 100, found '{given['seeds']}'")
-    robots = _names(given["robots"] or "nao,coman,reachy")
-    methods = None if given["methods"] is None else _names(given["methods"])
     from mrhubo.paper.trainings import reproduce
 
-    print(reproduce(robots, seeds, overrides, Reporter(given["quiet"]), given["paper"], methods))
+    report = Reporter(options.quiet)
+    print(reproduce(options.robots, options.seeds, options.overrides, report, options.paper, options.methods))
 
 
-def _names(text: str) -> list[str]:
-    return list(dict.fromkeys(name.strip() for name in text.split(",")))
+def _names(value: str) -> list[str]:
+    return list(dict.fromkeys(name.strip() for name in nonempty(value).split(",")))
 
 
 if __name__ == "__main__":

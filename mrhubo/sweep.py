@@ -1,12 +1,21 @@
-"""`python -m mrhubo.sweep --config conf/nao.yaml --sweep conf/sweeps/network.yaml`: the best settings for a robot."""
+"""`mrhubo sweep nao --sweep network`: the best settings for a robot."""
 
 from __future__ import annotations
 
 import os
 from functools import partial
 
-from mrhubo.config import Config, SweepConfig, load_config, run_command, split_arguments
-from mrhubo.errors import UserError
+from mrhubo.config import (
+    CommandParser,
+    Config,
+    SweepConfig,
+    find_config,
+    load_config,
+    number,
+    places_named,
+    run_command,
+    whole_number,
+)
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
@@ -15,37 +24,38 @@ DESCRIPTION = (
     " all processes work on the same study; start it again to go on where it stopped, or with more trials."
     " key.sub=value changes a setting of all trials."
 )
-FLAGS = {
-    "sweep FILE": "YAML file of the sweep, see conf/sweeps",
-    "trials NUMBER": "trials in place of the file's `trials`",
-    "minutes NUMBER": "time limit in place of the file's `minutes`",
-    "quiet": "no progress line",
-}
+
+
+def build_parser() -> CommandParser[Config]:
+    """The command's arguments."""
+    parser = CommandParser("mrhubo sweep", DESCRIPTION, Config)
+    sweep = "YAML file of the sweep, or the name of one that ships with mrhubo: filter, network, scale_factor"
+    parser.add_argument("--sweep", metavar="SWEEP", required=True, help=sweep)
+    trials, minutes = "trials in place of the file's `trials`", "time limit in place of the file's `minutes`"
+    parser.add_argument("--trials", metavar="NUMBER", type=whole_number(1, 1_000_000), help=trials)
+    parser.add_argument("--minutes", metavar="NUMBER", type=number(0.0), help=minutes)
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
 
 
 def main(argv: list[str]) -> None:
     """The command."""
-    files, overrides, given = split_arguments(argv, "mrhubo.sweep", DESCRIPTION, Config, FLAGS)
-    if not files or given["sweep"] is None:
-        raise UserError(
-            "command line: mrhubo.sweep needs --config FILE, a robot's config, and --sweep FILE, for instance"
-            " --config conf/nao.yaml --sweep conf/sweeps/network.yaml"
-        )
-    changes = [f"{name}={given[name]}" for name in ("trials", "minutes") if given[name] is not None]
-    settings = load_config(given["sweep"], changes, SweepConfig)
+    options = build_parser().parse_args(argv)
+    given = {"trials": options.trials, "minutes": options.minutes}
+    changes = [f"{name}={value}" for name, value in given.items() if value is not None]
+    settings = load_config(find_config(options.sweep, "sweeps"), changes, SweepConfig)
     # Several processes on one machine is what a sweep is for, and waiting threads that spin take the cores from the
     # others: ten times slower with two processes on two cores. Read when torch is imported, below.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-    load_config(files[0], overrides)  # a mistake there is told before the seconds that the imports below take
+    load_config(options.config, options.overrides)  # a mistake there is told before the slow imports below
     from mrhubo.fitting.sweeping import Sweep
     from mrhubo.fitting.trials import FitTrials
+    from mrhubo.search import check_fixed
 
-    load, report = partial(load_config, files[0]), Reporter(given["quiet"])
-    try:
-        sweep = Sweep(load, overrides, settings, FitTrials(), report)
-    except UserError as error:
-        where = f"{given['sweep']}: " if str(error).startswith(("space", "storage")) else ""
-        raise UserError(f"{where}{error}") from error
+    load, report = partial(load_config, options.config), Reporter(options.quiet)
+    with places_named(settings):
+        check_fixed(settings.fixed, lambda text: load([*options.overrides, text]))
+        sweep = Sweep(load, options.overrides, settings, FitTrials(), report)
     result = sweep.run()
     print(f"\n{result.table}\n\nbest:      python -m mrhubo.fit --config {result.best}")
     print(f"dashboard: {result.dashboard}")

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from mrhubo.body.latent import LatentProblem
 
 # Tests share the cores with each other and with the processes that they start. Threads that spin while they wait make
 # all of them many times slower; read when torch is imported, after this.
@@ -30,3 +37,25 @@ def external_dir() -> Path:
             pytest.fail(message + ", and MRHUBO_REQUIRE_EXTERNAL=1 asks for it")
         pytest.skip(message)
     return path
+
+
+@pytest.fixture(scope="session")
+def latent_problem() -> Callable[..., tuple[LatentProblem, Tensor]]:
+    """Makes a robot's problem of latent inverse kinematics, and keypoints (200, K, 3) [m] that random poses of the
+    robot ask for: `latent_problem("nao", w_prior=0.01)`.
+    """
+    import torch
+
+    from mrhubo.body import BodyPrior
+    from mrhubo.body.latent import LatentProblem
+    from mrhubo.config import load_config
+    from mrhubo.robot import build_body_map
+
+    def make(robot: str, w_prior: float = 0.01) -> tuple[LatentProblem, Tensor]:
+        body_map = build_body_map(load_config(ROOT / "conf" / f"{robot}.yaml").robot)
+        decoder = BodyPrior.open().decoder
+        problem = LatentProblem(decoder, body_map.skeleton, body_map.keypoint_indices, w_prior=w_prior)
+        q = body_map.robot.sample(200, torch.Generator().manual_seed(3))
+        return problem, body_map.targets(body_map.robot.forward(q))
+
+    return make

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mrhubo.body.prior_training.train import PriorConfig
-from mrhubo.config import load_config
+from mrhubo.config import PriorConfig, load_config
 from mrhubo.robot import build_body_map
 
 ROOT = Path(__file__).resolve().parent.parent

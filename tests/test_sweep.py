@@ -115,16 +115,28 @@ def test_a_known_config_is_not_trained_again(arguments: list[str], tmp_path: Pat
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("name: tiny\nspace: {}\n", "sweep.yaml: space: is empty"),
-        ("name: tiny\nspace: {trainer.lrr: [1, 2]}\n", "sweep.yaml: space: key 'trainer.lrr'"),
-        ("name: tiny\nspace: {model.hidden: [8, 9]}\nfixed: {model.stagges: 1}\n", "'model.stagges' .*'model.stages'"),
+        ("name: tiny\nspace: {}\n", "sweep.yaml, line 2: space: is empty"),
+        ("name: tiny\nspace: {trainer.lrr: [1, 2]}\n", "sweep.yaml, line 2: space.trainer.lrr: key 'trainer.lrr'"),
+        (
+            "name: tiny\nspace: {model.hidden: [8, 9]}\nfixed: {model.stagges: 1}\n",
+            "sweep.yaml, line 3: fixed.model.stagges: key 'model.stagges' .*'model.stages'",
+        ),
+        (
+            "name: tiny\nspace:\n  model.hidden: [8, 9]\n  model.layers: {low: 1, hihg: 2}\n",
+            "sweep.yaml, line 4: key .*layers.high'",
+        ),
+        (
+            "name: tiny\nspace:\n  model.hidden: [8, 9]\n  model.layers: {low: 0, high: 2}\n",
+            "line 4: space.model.layers: ",
+        ),
+        ("name: tiny\nspace: {model.hidden: [8, 9]}\nfixed:\n  model.stages: 3\n", "line 4: fixed.model.stages: "),
         ("name: tiny\nspaces: {}\n", "'spaces' .*'space'"),
-        ("name: tiny\nspace: {model.hidden: [8, 9]}\nstorage: nonsense\n", "sweep.yaml: storage: .*nonsense"),
+        ("name: tiny\nspace: {model.hidden: [8, 9]}\nstorage: nonsense\n", "sweep.yaml, line 3: storage: .*nonsense"),
     ],
 )
 def test_mistakes(arguments: list[str], tmp_path: Path, change: str, words: str) -> None:
     (tmp_path / "sweep.yaml").write_text(change)
     with pytest.raises(UserError, match=words):
         main(arguments)
-    with pytest.raises(UserError, match="needs --config FILE"):
+    with pytest.raises(UserError, match="--sweep SWEEP is missing"):
         main([a for a in arguments if not a.endswith("sweep.yaml") and a != "--sweep"])

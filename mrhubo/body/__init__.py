@@ -1,6 +1,7 @@
-"""The human: skeleton, body prior, how the prior is trained and measured, and the official files."""
+"""The human: skeleton, body prior, inverse kinematics, how the prior is trained and measured, the official files."""
 
 from mrhubo.body.human import build_skeleton, open_prior
+from mrhubo.body.latent_ik import inverse_kinematics
 from mrhubo.body.official import open_skeleton, save_skeleton
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, mirror_pose
@@ -14,6 +15,7 @@ __all__ = [
     "Skeleton",
     "VPoser",
     "build_skeleton",
+    "inverse_kinematics",
     "mirror_pose",
     "open_prior",
     "open_skeleton",

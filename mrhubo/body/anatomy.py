@@ -25,14 +25,17 @@ ELBOW_AXIS = (0.0, -0.871, 0.491)
 KNEE_AXIS = _X
 """Hinge of the knees: turning about it by a positive angle flexes."""
 
-# joint: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
+# part: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
 _Entry = tuple[tuple[float, float, float], tuple[float, float]]
+_SPINE: tuple[_Entry, _Entry, _Entry] = ((_Y, (-25, 25)), (_X, (-30, 40)), (_Z, (-25, 25)))
 _RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
     "hip": ((_Y, (-60, 60)), (_X, (-140, 45)), (_Z, (-40, 70))),
     "knee": ((_X, (-10, 160)), (_Y, (-25, 25)), (_Z, (-25, 25))),
     "ankle": ((_X, (-70, 50)), (_Y, (-45, 50)), (_Z, (-45, 45))),
     "foot": ((_X, (-45, 45)), (_Y, (-15, 15)), (_Z, (-15, 15))),
-    "spine": ((_Y, (-25, 25)), (_X, (-30, 40)), (_Z, (-25, 25))),
+    "spine1": _SPINE,
+    "spine2": _SPINE,
+    "spine3": _SPINE,
     "neck": ((_Y, (-50, 50)), (_X, (-45, 45)), (_Z, (-40, 40))),
     "head": ((_Y, (-60, 60)), (_X, (-60, 80)), (_Z, (-60, 60))),
     "collar": ((_X, (-30, 30)), (_Y, (-30, 30)), (_Z, (-20, 45))),
@@ -45,8 +48,7 @@ _RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
 def _table() -> tuple[Tensor, Tensor]:
     """Axes (21, 3, 3), one per row, and limits (21, 3, 2) [rad] of every joint as if it were on the left."""
     axes, limits = [], []
-    ranges = {**_RANGES, **{f"spine{number}": _RANGES["spine"] for number in (1, 2, 3)}}
-    ranges |= {f"{side}_{name}": _RANGES[name] for side in SIDES for name in PAIRED_JOINTS}
+    ranges = _RANGES | {f"{side}_{name}": _RANGES[name] for side in SIDES for name in PAIRED_JOINTS}
     for name in POSED_JOINT_NAMES:
         entries = ranges[name]
         axes.append([axis for axis, _ in entries])

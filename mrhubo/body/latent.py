@@ -1,29 +1,26 @@
-"""The latent inverse kinematics problem and its derivatives.
+"""The problem of inverse kinematics in the latent space of a decoder, and its derivatives.
 
     minimise over z   w_data * sum_k |P_k(z) - P_k|^2 + w_prior * |z|^2        (VPoser's IK, weights 100 and 0.01)
 
 `cost` is differentiated by autograd; `cost_and_gradient` gives the same numbers several times faster, and
 `linearise` the Jacobian of the keypoints.
 
-Legend: B batch, K used keypoints, Z latent numbers, U human joints that move a used keypoint, E hidden units. A shape
-that ends in B has the batch last: 3x3 products are then a few vector operations over the whole batch.
+Legend: B batch, K used keypoints, Z latent numbers, U human joints that move a used keypoint. A shape that ends in B
+has the batch last: 3x3 products are then a few vector operations over the whole batch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from mrhubo import rotation
+from mrhubo.body.decoder import Decoder, JointDecoder
 from mrhubo.body.skeleton import Skeleton
 from mrhubo.body.tree import KeypointTree
-
-if TYPE_CHECKING:
-    from mrhubo.body.prior import BodyPrior
 
 _CHUNK = 256
 """Poses whose Jacobians are made at once: larger ones leave the cache, smaller ones leave the cores idle."""
@@ -32,28 +29,30 @@ _METRIC_DAMPING = 0.05
 
 
 class LatentProblem:
-    """Cost, keypoints and Jacobian of latents for one prior, one skeleton and one set of used keypoints."""
+    """Cost, keypoints and Jacobian of latents for one decoder, one skeleton and one set of used keypoints."""
 
     def __init__(
         self,
-        prior: BodyPrior,
+        decoder: Decoder,
         skeleton: Skeleton,
         keypoints: Sequence[int],
         w_data: float = 100.0,
         w_prior: float = 0.01,
     ) -> None:
-        self.prior, self.skeleton, self.keypoints = prior, skeleton, list(keypoints)
-        self.w_data, self.w_prior, self.latent = w_data, w_prior, prior.latent
+        """`keypoints` are indices in KEYPOINT_NAMES; the decoder's weights are those of now."""
+        self.decoder, self.skeleton, self.keypoints = decoder, skeleton, list(keypoints)
+        self.w_data, self.w_prior, self.latent = w_data, w_prior, decoder.latent
         self.tree = KeypointTree(skeleton, keypoints)
-        self._first, self._second, self._last = [m for m in prior.decoder if isinstance(m, nn.Linear)]
-        self._activation = _ACTIVATIONS[prior.activation]
-        rows = [6 * (joint - 1) + i for i in range(6) for joint in self.tree.joints]
-        self._rows_bias = (self._last.bias[rows] + prior.identity_F[rows])[:, None].contiguous()
-        self._rows = self._last.weight[rows].contiguous()
+        self._joints = JointDecoder(decoder, self.tree.joints)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the decoder is."""
+        return self.decoder.identity_F.device
 
     def keypoints_of(self, z_BZ: Tensor) -> Tensor:
         """Used keypoints (B, K, 3) [m] of the decoded poses; differentiable."""
-        return self.skeleton.keypoints(self.prior.decode_matrices(z_BZ))[:, self.keypoints]
+        return self.skeleton.keypoints(rotation.sixd_to_matrix(self.decoder(z_BZ)))[:, self.keypoints]
 
     def cost(self, z_BZ: Tensor, target_BK3: Tensor) -> Tensor:
         """Cost (B,) of latents; differentiable."""
@@ -63,20 +62,18 @@ class LatentProblem:
     @torch.no_grad()
     def cost_and_gradient(self, z_ZB: Tensor, target_K3B: Tensor) -> tuple[Tensor, Tensor]:
         """Cost (B,) and its gradient (Z, B), for latents (Z, B) and targets (K, 3, B) [m]."""
-        y1_EB, d1_EB = self._activation(torch.addmm(self._first.bias[:, None], self._first.weight, z_ZB))
-        y2_EB, d2_EB = self._activation(torch.addmm(self._second.bias[:, None], self._second.weight, y1_EB))
-        state = self.tree.forward(torch.addmm(self._rows_bias, self._rows, y2_EB).unflatten(0, (6, -1)))
+        raw_6UB, slopes = self._joints.value_and_slopes(z_ZB)
+        state = self.tree.forward(raw_6UB)
         residual_K3B = state.points_K3B - target_K3B
         cost_B = self.w_data * residual_K3B.square().sum((0, 1)) + self.w_prior * z_ZB.square().sum(0)
-        rate_6UB = self.tree.pullback(state, residual_K3B.mul_(2 * self.w_data))
-        rate_EB = (self._rows.T @ rate_6UB.flatten(0, 1)).mul_(d2_EB)
-        rate_EB = (self._second.weight.T @ rate_EB).mul_(d1_EB)
-        return cost_B, torch.addmm(z_ZB, self._first.weight.T, rate_EB, beta=2 * self.w_prior)
+        gradient_6UB = self.tree.pullback(state, residual_K3B.mul_(2 * self.w_data))
+        return cost_B, self._joints.pullback(slopes, gradient_6UB, z_ZB, 2 * self.w_prior)
 
     @cached_property
     def metric(self) -> Tensor:
         """`metric_of` 256 latents of N(0, I), always the same."""
-        return self.metric_of(torch.randn(256, self.latent, generator=torch.Generator().manual_seed(0)).to(self._rows))
+        z_BZ = torch.randn(256, self.latent, generator=torch.Generator().manual_seed(0))
+        return self.metric_of(z_BZ.to(self.decoder.identity_F))
 
     def metric_of(self, z_BZ: Tensor) -> Tensor:
         """Mean inverse (Z, Z) of the cost's Gauss-Newton matrix over some latents (B, Z): a first guess of the inverse
@@ -110,14 +107,7 @@ class LatentProblem:
         Forward through the decoder as matrix products over all Z columns at once; then each joint's angular velocity
         from the derivative of Gram-Schmidt; then v_k = sum of omega_j x (p_k - p_j) over the joints that move k.
         """
-        batch = len(z_BZ)
-        y1_BE, d1_BE = self._activation(self._first(z_BZ))
-        y2_BE, d2_BE = self._activation(self._second(y1_BE))
-        raw_BJ6 = (self._last(y2_BE) + self.prior.identity_F).unflatten(-1, (-1, 6))
-        columns_BZE = d1_BE[:, None, :] * self._first.weight.T
-        columns_BZE = (columns_BZE.flatten(0, 1) @ self._second.weight.T).unflatten(0, (batch, self.latent))
-        columns_BZE = columns_BZE.mul_(d2_BE[:, None, :])
-        columns_BZ6U = (columns_BZE.flatten(0, 1) @ self._rows.T).view(batch, self.latent, 6, -1)
+        raw_BJ6, columns_BZ6U = self._joints.value_and_jacobian(z_BZ)
         matrices = rotation.sixd_to_matrix(raw_BJ6)
         points, global_B33 = self.skeleton.keypoints_and_rotations(matrices)
         joints = self.tree.joints
@@ -131,30 +121,6 @@ class LatentProblem:
         used_points = points[:, self.keypoints]
         velocity = torch.linalg.cross(omega_BK3Z, used_points[..., None].expand_as(omega_BK3Z), dim=2) - moment_BK3Z
         return used_points, velocity.flatten(1, 2)
-
-
-def _silu(x: Tensor) -> tuple[Tensor, Tensor]:
-    s = torch.sigmoid(x)
-    y = x * s
-    return y, torch.addcmul(s, y, 1 - s)
-
-
-def _leaky_relu(x: Tensor) -> tuple[Tensor, Tensor]:
-    slope = torch.where(x > 0, 1.0, 0.01)
-    return x * slope, slope
-
-
-def _tanh(x: Tensor) -> tuple[Tensor, Tensor]:
-    y = torch.tanh(x)
-    return y, 1 - y.square()
-
-
-_ACTIVATIONS: dict[str, Callable[[Tensor], tuple[Tensor, Tensor]]] = {
-    "silu": _silu,
-    "leaky_relu": _leaky_relu,
-    "tanh": _tanh,
-}
-"""Value and derivative of the activations a prior may have."""
 
 
 def _gram_schmidt_rate(raw_BU6: Tensor, matrix_BU33: Tensor) -> Tensor:

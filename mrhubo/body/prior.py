@@ -11,7 +11,6 @@ Legend: B batch, J = 21 joints, Z = 32 latent numbers. Poses are 6D (two columns
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,13 +18,12 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.latent import LatentProblem
-from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
-from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton, keypoint_indices
+from mrhubo.body.decoder import Decoder, mlp_layers
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config import SHIPPED_PRIOR
 from mrhubo.errors import UserError
 from mrhubo.files.storage import checksum_tensors, read_tensors, write_tensors
 
-SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "open_prior.safetensors"
 _JOINTS = len(POSED_JOINT_NAMES)
 
 
@@ -35,7 +33,6 @@ class BodyPrior(nn.Module):
     schema = "mrhubo.body_prior/1"
     """Of the files that `save` writes and `open` reads."""
     metadata: dict[str, str]
-    identity_F: Tensor
 
     def __init__(
         self, hidden: int = 512, latent: int = 32, activation: str = "silu", encoder_hidden: int | None = None
@@ -43,10 +40,8 @@ class BodyPrior(nn.Module):
         super().__init__()
         self.hidden, self.latent, self.activation = hidden, latent, activation
         self.encoder_hidden = encoder_hidden or hidden
-        self.encoder = _mlp(_JOINTS * 6, self.encoder_hidden, 2 * latent, activation)
-        self.decoder = _mlp(latent, hidden, _JOINTS * 6, activation)
-        identity = torch.tensor([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]).repeat(_JOINTS)
-        self.register_buffer("identity_F", identity, persistent=False)
+        self.encoder = nn.Sequential(*mlp_layers(_JOINTS * 6, self.encoder_hidden, 2 * latent, activation))
+        self.decoder = Decoder(latent, hidden, activation)
         self.metadata = {}
 
     @classmethod
@@ -56,7 +51,7 @@ class BodyPrior(nn.Module):
         Raises:
             UserError: the file is missing, damaged, or no body prior of mrhubo.
         """
-        path = Path(path) if path is not None else SHIPPED_WEIGHTS
+        path = Path(path) if path is not None else SHIPPED_PRIOR
         tensors, metadata = read_tensors(path)
         if metadata.get("schema") != cls.schema:
             raise UserError(
@@ -89,22 +84,23 @@ class BodyPrior(nn.Module):
         """xxh3 of kind and weights, 16 hex digits: the same prior, whatever file it came from."""
         return checksum_tensors(self.state_dict(), {"schema": self.schema, "activation": self.activation})
 
+    @property
+    def device(self) -> torch.device:
+        """Where its weights are."""
+        return self.decoder.identity_F.device
+
     def posterior(self, pose_BJ6: Tensor) -> tuple[Tensor, Tensor]:
         """Mean (B, Z) and logarithm of the standard deviation (B, Z) of the latent, for poses (B, 21, 6)."""
-        mean_BZ, log_std_BZ = self.encoder(pose_BJ6.flatten(1) - self.identity_F).chunk(2, dim=-1)
+        mean_BZ, log_std_BZ = self.encoder(pose_BJ6.flatten(1) - self.decoder.identity_F).chunk(2, dim=-1)
         return mean_BZ, log_std_BZ.clamp(-8.0, 4.0)
 
     def encode(self, pose_BJ6: Tensor) -> Tensor:
         """Mean latent (B, Z) of poses (B, 21, 6)."""
         return self.posterior(pose_BJ6)[0]
 
-    def decode_raw(self, z_BZ: Tensor) -> Tensor:
-        """What Gram-Schmidt makes orthonormal: six numbers per joint (B, 21, 6) of latents (B, Z)."""
-        return (self.decoder(z_BZ) + self.identity_F).unflatten(-1, (_JOINTS, 6))
-
     def decode_matrices(self, z_BZ: Tensor) -> Tensor:
         """Local rotation matrices (B, 21, 3, 3) of latents (B, Z)."""
-        return rotation.sixd_to_matrix(self.decode_raw(z_BZ))
+        return rotation.sixd_to_matrix(self.decoder(z_BZ))
 
     def decode(self, z_BZ: Tensor) -> Tensor:
         """Poses (B, 21, 6), proper rotations, of latents (B, Z)."""
@@ -117,52 +113,3 @@ class BodyPrior(nn.Module):
     def reconstruction_error(self, pose_BJ6: Tensor) -> Tensor:
         """phi (B,): mean squared error of the 126 6D numbers between H and H~."""
         return (self.denoise(pose_BJ6) - pose_BJ6).square().mean(dim=(1, 2))
-
-    def inverse_kinematics(
-        self,
-        targets: Mapping[str, Tensor],
-        skeleton: Skeleton | None = None,
-        w_data: float = 100.0,
-        w_prior: float = 0.01,
-        steps: int = 150,
-    ) -> Tensor:
-        """The most plausible poses (B, 21, 6) whose keypoints lie where they should: VPoser's latent IK.
-
-            minimise over z   w_data * sum_k |P_k(z) - P_k|^2 + w_prior * |z|^2
-
-        Every pose is solved on its own by a quasi-Newton search, from the nearest of 4,096 samples of the prior.
-
-        Args:
-            targets: positions (B, 3) [m] by name of keypoint (`KEYPOINT_NAMES`), in the pelvis's frame: x to the
-                body's left, y up, z forward, the pelvis at the origin.
-            skeleton: whose keypoints they are; default: the open skeleton.
-            w_data: weight of the squared distances, 1/m^2.
-            w_prior: weight of the squared norm of the latent.
-            steps: most iterations; a converged pose stops earlier.
-
-        Raises:
-            UserError: a name is unknown, no target is given, shapes differ, or a number is not finite.
-        """
-        if not targets:
-            raise UserError("inverse kinematics: no keypoint is given")
-        indices = keypoint_indices(list(targets))
-        shapes = {name: tuple(target.shape) for name, target in targets.items()}
-        if len(set(shapes.values())) > 1 or any(len(s) != 2 or s[1] != 3 for s in shapes.values()):
-            raise UserError(f"inverse kinematics: targets must all have one shape (poses, 3), found {shapes}")
-        target_BK3 = torch.stack([target.to(self.identity_F) for target in targets.values()], dim=1)
-        if not bool(torch.isfinite(target_BK3).all()):
-            raise UserError("inverse kinematics: a target holds NaN or infinite numbers")
-        skeleton = (skeleton or Skeleton()).to(self.identity_F.device)
-        problem = LatentProblem(self, skeleton, indices, w_data, w_prior)
-        start = nearest_samples(problem, target_BK3)
-        return self.decode(solve_quasi_newton(problem, start, target_BK3, steps, tolerance=1e-4))
-
-
-ACTIVATIONS: dict[str, type[nn.Module]] = {"silu": nn.SiLU, "leaky_relu": nn.LeakyReLU, "tanh": nn.Tanh}
-
-
-def _mlp(inputs: int, hidden: int, outputs: int, activation: str) -> nn.Sequential:
-    layer = ACTIVATIONS[activation]
-    return nn.Sequential(
-        nn.Linear(inputs, hidden), layer(), nn.Linear(hidden, hidden), layer(), nn.Linear(hidden, outputs)
-    )

@@ -150,6 +150,6 @@ def _convert(checkpoint: dict[str, Any], storages: dict[str, bytes], settings: d
                 f"VPoser v2 with {hidden} neurons and {latent} latent numbers has {tuple(expected[name].shape)}"
             )
     weights["decoder.4.weight"] = weights["decoder.4.weight"][_ROWS_TO_COLUMNS]
-    weights["decoder.4.bias"] = weights["decoder.4.bias"][_ROWS_TO_COLUMNS] - prior.identity_F
+    weights["decoder.4.bias"] = weights["decoder.4.bias"][_ROWS_TO_COLUMNS] - prior.decoder.identity_F
     prior.load_state_dict({**expected, **weights})
     return prior

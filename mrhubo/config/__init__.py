@@ -1,10 +1,25 @@
 """Settings: YAML plus ``key.sub=value`` -> typed dataclasses; every mistake is one sentence."""
 
-from mrhubo.config.command import parse_arguments, run_command, split_arguments
-from mrhubo.config.help import field_docs, help_text
+from mrhubo.config.arguments import CommandParser, nonempty, number, parse_arguments, whole_number
+from mrhubo.config.command import run_command
+from mrhubo.config.entries import (
+    ConstantEntry,
+    FrameEntry,
+    HandEntry,
+    KeypointEntry,
+    ManualEntry,
+    MeanEntry,
+    PointEntry,
+    Range,
+    Vector,
+)
+from mrhubo.config.fields import bounded, choice
+from mrhubo.config.help import field_docs
 from mrhubo.config.kinds import keys_of
 from mrhubo.config.loading import load_config
+from mrhubo.config.places import places_named, where, with_places
 from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
+from mrhubo.config.prior import SHIPPED_PRIOR, PriorConfig
 from mrhubo.config.schema import (
     BaselineConfig,
     BodyConfig,
@@ -18,37 +33,58 @@ from mrhubo.config.schema import (
     ScaleSearchConfig,
     TrackingConfig,
     TrainerConfig,
-    bounded,
-    choice,
 )
-from mrhubo.config.sweeps import SweepConfig
+from mrhubo.config.shipped import find_config, shipped_root
+from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
+from mrhubo.config.typed import typed_value
 
 __all__ = [
+    "SHIPPED_PRIOR",
     "BaselineConfig",
     "BodyConfig",
+    "CommandParser",
     "Config",
+    "ConstantEntry",
     "EvaluationConfig",
+    "FrameEntry",
+    "HandEntry",
+    "KeypointEntry",
+    "ManualEntry",
     "ManualScaleConfig",
+    "MeanEntry",
     "ModelConfig",
     "PairsConfig",
+    "PointEntry",
+    "PriorConfig",
+    "Range",
     "RobotConfig",
     "S3LEConfig",
     "ScaleSearchConfig",
+    "SpaceEntry",
+    "SpaceRange",
     "SweepConfig",
     "TrackingConfig",
     "TrainerConfig",
+    "Vector",
     "bounded",
     "changed_settings",
     "choice",
     "field_docs",
+    "find_config",
     "fingerprint",
-    "help_text",
     "keys_of",
     "load_config",
+    "number",
     "parse_arguments",
-    "split_arguments",
+    "places_named",
     "run_command",
+    "shipped_root",
+    "nonempty",
     "to_plain",
     "to_yaml",
+    "typed_value",
+    "where",
+    "whole_number",
+    "with_places",
     "without_paths",
 ]

@@ -1,80 +1,14 @@
-"""What all ``python -m mrhubo.X`` commands share: their arguments, and how they end."""
+"""How all commands end."""
 
 from __future__ import annotations
 
 import os
 import select
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from collections.abc import Callable
+from typing import NoReturn
 
-from mrhubo.config.help import help_text
-from mrhubo.config.kinds import example, requires_anything, walk
-from mrhubo.config.loading import load_config
-from mrhubo.config.schema import Config
-from mrhubo.errors import UserError, unknown_name, was_interrupted
-
-T = TypeVar("T")
-
-
-def parse_arguments(
-    argv: Sequence[str],
-    prog: str,
-    description: str,
-    schema: type[T] = Config,
-    flags: Mapping[str, str] | None = None,
-) -> tuple[T, dict[str, Any]]:
-    """``--config FILE``, ``--help``, the given flags and ``key.sub=value`` -> (config, {flag: given?})."""
-    files, overrides, given = split_arguments(argv, prog, description, schema, flags)
-    if not files and requires_anything(schema):
-        raise UserError(f"command line: --config FILE is missing; {prog} --help lists the keys of that file")
-    return load_config(Path(files[0]) if files else None, overrides, schema), given
-
-
-def split_arguments(
-    argv: Sequence[str], prog: str, description: str, schema: type, flags: Mapping[str, str] | None = None
-) -> tuple[list[str], list[str], dict[str, Any]]:
-    """The file of ``--config`` if it is given, the overrides, and {flag: given?}, for a command that loads by itself.
-
-    `flags` maps a name (``quiet`` for ``--quiet``) to its meaning. One with a word for its value (``out FILE`` for
-    ``--out FILE``) gives that value, or None if it is not given. ``--help`` prints `help_text` and exits with 0.
-    """
-    meanings = {name.lstrip("-"): text for name, text in (flags or {}).items()}
-    if "--help" in argv or "-h" in argv:
-        print(help_text(schema, prog, description, meanings), end="")
-        raise SystemExit(0)
-    with_value = {name.split()[0]: name.split()[1] for name in meanings if " " in name}
-    given: dict[str, Any] = {name.split()[0]: None if " " in name else False for name in meanings}
-    files: list[str] = []
-    overrides: list[str] = []
-    rest = iter(argv)
-    for argument in rest:
-        name, equals, value = argument.partition("=")
-        if name == "--config":
-            file = value if equals else next(rest, "")
-            if not file or file.startswith("-"):
-                raise UserError("command line: --config needs a file name")
-            files.append(file)
-        elif name[2:] in with_value and name.startswith("--"):
-            text = value if equals else next(rest, "")
-            if not text or text.startswith("-"):
-                raise UserError(f"command line: {name} needs a value: {name} {with_value[name[2:]]}")
-            if given[name[2:]] is not None:
-                raise UserError(f"command line: {name} is given twice")
-            given[name[2:]] = text
-        elif argument.startswith("--") and argument[2:] in given:
-            given[argument[2:]] = True
-        elif argument.startswith("-"):
-            raise UserError(_unknown_flag(argument, schema, list(given)))
-        elif equals:
-            overrides.append(argument)
-        else:
-            raise UserError(_stray(argument, schema))
-    if len(files) > 1:
-        raise UserError(f"command line: --config is given {len(files)} times; one file is read")
-    return files, overrides, given
-
+from mrhubo.errors import UserError, was_interrupted
 
 _INTERRUPTED = "interrupted; the same command resumes"
 
@@ -136,18 +70,3 @@ def _reader_is_gone() -> bool:
         if stream is not None:
             poll.register(stream.fileno(), 0)
     return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
-
-
-def _unknown_flag(argument: str, schema: type, flags: list[str]) -> str:
-    name, equals, _ = argument.partition("=")
-    if equals and name[2:] in flags:
-        return f"command line: flag '{argument}' takes no value"
-    if any(key.name == name.lstrip("-") for key in walk(schema)):
-        return f"command line: '{argument}' is a key, not a flag: write {name.lstrip('-')}=VALUE"
-    return "command line: " + unknown_name("flag", name, ["--config", "--help", *(f"--{flag}" for flag in flags)])
-
-
-def _stray(argument: str, schema: type) -> str:
-    if argument.endswith((".yaml", ".yml")):
-        return f"command line: '{argument}' stands alone: write --config {argument}"
-    return f"command line: '{argument}' is neither a flag nor KEY=VALUE, for instance {example(schema)}"

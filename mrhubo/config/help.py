@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mrhubo.config.kinds import Key, allowed, example, fields_of, noun, requires_anything, walk
+from mrhubo.config.kinds import Key, allowed, example, fields_of, noun, walk
 
 WIDTH = 100
 
@@ -33,26 +33,21 @@ def field_docs(cls: type) -> dict[str, str]:
     return docs
 
 
-def help_text(schema: type, prog: str, description: str, flags: Mapping[str, str] | None = None) -> str:
-    """Usage, options and every key with type, range or choices, default and meaning; at most 100 columns wide."""
-    config = "--config FILE" if requires_anything(schema) else "[--config FILE]"
-    options = {
-        "--config FILE": "YAML file with the keys below.",
-        **{f"--{name.lstrip('-')}": text for name, text in (flags or {}).items()},
-        "-h, --help": "Print this text.",
-    }
-    usage = f"usage: {prog} {config} " + "".join(f"[--{name.lstrip('-')}] " for name in flags or {}) + "[KEY=VALUE ...]"
-    column = max(len(key) for key in options) + 4
-    lines = [*textwrap.wrap(usage, WIDTH, subsequent_indent="       "), ""]
-    lines += [*textwrap.wrap(" ".join(description.split()), WIDTH), "", "Options:"]
-    lines += [line for name, text in options.items() for line in _row(name, [text], column)]
-    lines += ["", *textwrap.wrap(_KEYS_NOTE.format(example=example(schema)), WIDTH)]
+def help_text(schema: type, usage: str, description: str, options: Mapping[str, str], in_file: bool = True) -> str:
+    """Usage, options and every key with type, range or choices, default and meaning; at most 100 columns wide.
+
+    `in_file` says whether the user's file can hold the keys, or the command line alone.
+    """
+    column = max(map(len, options)) + 4
+    lines = [*usage.splitlines(), "", *textwrap.wrap(" ".join(description.split()), WIDTH), "", "Options:"]
+    lines += [line for name, meaning in options.items() for line in _row(name, [meaning], column)]
+    lines += ["", *textwrap.wrap(_KEYS_NOTE.format(where="in the file or " * in_file, example=example(schema)), WIDTH)]
     lines += _section(schema, "", 4 + max((len(key.name) for key in walk(schema) if not key.is_section), default=0))
     return "\n".join(lines) + "\n"
 
 
 _KEYS_NOTE = (
-    "Keys, in the file or as KEY=VALUE on the command line, for instance {example}, which replaces what the file"
+    "Keys, {where}as KEY=VALUE on the command line, for instance {example}, which replaces what the file"
     " says. A value is taken literally unless it starts with a bracket or a quote, then it is YAML: a.b='[x, y]'. A"
     " relative path is relative to the file that holds it; on the command line, to the current directory."
 )

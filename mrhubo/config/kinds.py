@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mrhubo.errors import unknown_name
+from mrhubo.errors import listed, nearest
 
 NOUNS: dict[Any, str] = {
     int: "whole number",
@@ -21,6 +20,27 @@ NOUNS: dict[Any, str] = {
     Path: "path",
     Any: "any value",
 }
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a value must be beyond its type: ``Annotated[list[float], Rule("two numbers", length=2)]``."""
+
+    noun: str = ""
+    """The type in words, article included, in place of our own."""
+    low: float | None = None
+    """Least number, also of those in a list or mapping."""
+    high: float | None = None
+    """Greatest number."""
+    length: int | None = None
+    """Items that a list must have."""
+    rising: bool = False
+    """Whether each number of a list must be above the one before."""
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """As a field's metadata hold it."""
+        return {"low": self.low, "high": self.high, "length": self.length, "rising": self.rising}
 
 
 @dataclass(frozen=True)
@@ -50,7 +70,7 @@ class Key:
 
 def fields_of(schema: type, prefix: str = "") -> list[Key]:
     """The fields of one dataclass, in order."""
-    hints = typing.get_type_hints(schema)
+    hints = typing.get_type_hints(schema, include_extras=True)
     found = []
     for field in dataclasses.fields(schema):
         kind, optional = optional_kind(hints[field.name])
@@ -86,10 +106,18 @@ def example(schema: type) -> str:
 
 
 def noun(kind: Any) -> str:
-    """The type in words: ``whole number``, ``list of text``."""
+    """The type in words: ``whole number``, ``list of text``, ``text or {link, offset}``."""
+    kind, rule = without_rule(kind)
+    if rule is not None and rule.noun:
+        return rule.noun
     if dataclasses.is_dataclass(kind):
-        return "section"
+        return form(kind)
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if kind == int | float:
+        return "number"
+    if members := union_of(kind):
+        nouns = list(dict.fromkeys(noun(member) for member in members))
+        return ", ".join(nouns[:-1]) + f" or {nouns[-1]}"
     if origin is list:
         return f"list of {_plural(arguments[0])}"
     if origin is dict:
@@ -99,13 +127,19 @@ def noun(kind: Any) -> str:
     raise TypeError(f"a schema cannot hold the type {kind!r}")
 
 
+def form(section: Any) -> str:
+    """The keys of a section in braces, for messages: ``{link, offset}``."""
+    return "{" + ", ".join(field.name for field in dataclasses.fields(section)) + "}"
+
+
 def expected(kind: Any, metadata: Mapping[str, Any]) -> str:
     """What a value must be, to follow the word "must be"."""
     if "choices" in metadata and kind is str:
         return _words(metadata["choices"])
-    name = noun(kind)
-    article = "" if name in ("text", "true or false", "any value") else "a "
-    limits = allowed(metadata) if kind in (int, float) else ""
+    name, (base, rule) = noun(kind), without_rule(kind)
+    bare = name in ("text", "true or false", "any value") or dataclasses.is_dataclass(base) or union_of(base)
+    article = "" if (bare and base != int | float) or (rule is not None and rule.noun) else "a "
+    limits = allowed(metadata) if base in (int, float) or base == int | float else ""
     return article + name + (f" {limits}" if limits else "")
 
 
@@ -123,41 +157,57 @@ def allowed(metadata: Mapping[str, Any]) -> str:
     return ""
 
 
-def unknown_key(schema: type, section: type, prefix: str, name: str) -> str:
-    """One sentence for a key that `section` (its keys start with `prefix`) of `schema` does not have."""
+def unknown_key(schema: type, section: type, prefix: str, name: str, base: str = "") -> str:
+    """One sentence for a key that `section` (its keys start with `prefix`) of `schema` (with `base`) does not have."""
     here = [key.field.name for key in fields_of(section)]
-    leaves = [key for key in walk(schema) if not key.is_section]
-    elsewhere = _close(name, [key.field.name for key in leaves], 0.7)
-    near = (
-        [prefix + match for match in _close(name, here, 0.75)]
-        or [key.name for key in leaves if key.field.name == name]
-        or [prefix + match for match in _close(name, here, 0.5)]
-        or _close(prefix + name, [key.name for key in leaves], 0.7)
-        or [key.name for key in leaves if key.field.name in elsewhere]
-    )
-    if near:
-        return f"key '{prefix}{name}' does not exist; nearest: '{near[0]}'"
-    return unknown_name("key", prefix + name, [prefix + other for other in here])
+    leaves = [key for key in walk(schema, base) if not key.is_section]
+    if nearest(name, here) is not None:
+        return unknown_among(here, prefix, name)
+    if any(key.name == name for key in leaves):
+        section_name, _, last = name.rpartition(".")
+        return f"key '{name}' has a section of its own: write {last} below {section_name}"
+    near = name if any(key.field.name == name for key in leaves) else nearest(name, {k.field.name for k in leaves})
+    elsewhere = sorted((key.name for key in leaves if key.field.name == near), key=lambda n: n.count("."))
+    if elsewhere:
+        return f"key '{prefix}{name}' does not exist; nearest: '{elsewhere[0]}'"
+    return unknown_among(here, prefix, name)
+
+
+def unknown_among(here: Sequence[str], prefix: str, name: str) -> str:
+    """One sentence for a key that is none of those `here`; all of them start with `prefix`, which tells nothing."""
+    near = nearest(name, here)
+    known = f"available: {listed(prefix + other for other in here)}" if near is None else f"nearest: '{prefix}{near}'"
+    return f"key '{prefix}{name}' does not exist; {known}"
 
 
 def _words(choices: Sequence[str]) -> str:
     return f"one of {', '.join(choices)}" if len(choices) > 1 else choices[0]
 
 
-def _close(name: str, names: list[str], cutoff: float) -> list[str]:
-    return difflib.get_close_matches(name, names, n=1, cutoff=cutoff)
-
-
 def optional_kind(hint: Any) -> tuple[Any, bool]:
     """A type without ``| None``, and whether that was there."""
-    if typing.get_origin(hint) not in (typing.Union, types.UnionType):
+    members = union_of(hint)
+    rest = tuple(member for member in members if member is not type(None))
+    if not members or len(rest) == len(members):
         return hint, hint is Any
-    members = [member for member in typing.get_args(hint) if member is not type(None)]
-    if len(members) != 1:
-        raise TypeError(f"a schema cannot hold the type {hint!r}")
-    return members[0], True
+    return typing.Union[rest], True  # noqa: UP007 (the members are only known here)
+
+
+def union_of(kind: Any) -> tuple[Any, ...]:
+    """The members of ``A | B``; empty for any other type."""
+    return typing.get_args(kind) if typing.get_origin(kind) in (typing.Union, types.UnionType) else ()
+
+
+def without_rule(kind: Any) -> tuple[Any, Rule | None]:
+    """A type without ``Annotated``, and the rule in that."""
+    if typing.get_origin(kind) is not typing.Annotated:
+        return kind, None
+    base, *extras = typing.get_args(kind)
+    return base, next((extra for extra in extras if isinstance(extra, Rule)), None)
 
 
 def _plural(kind: Any) -> str:
-    word = noun(optional_kind(kind)[0])
-    return word if word in ("text", "true or false", "any value") or " of " in word else word + "s"
+    kind = optional_kind(kind)[0]
+    word = noun(kind)
+    counted = without_rule(kind)[0] in (int, float, Path) or kind == int | float
+    return word + "s" if counted else word

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from mrhubo.config.kinds import example
+from mrhubo.config.places import keep_places
 from mrhubo.config.schema import Config
 from mrhubo.config.tree import Node, command_line, describe, parse_typed, read_file
 from mrhubo.config.typed import build
@@ -20,13 +21,15 @@ def load_config(file: Path | str | None, overrides: Sequence[str] = (), schema: 
     """Read, override, resolve ``${key}`` interpolations, check, build; raises `UserError` and nothing else.
 
     A relative path in the file is relative to the file, in an override to the current directory; both come out
-    absolute. An override replaces what the file says under its key.
+    absolute. An override replaces what the file says under its key. `where` tells the place of every value.
     """
     root = Node({}, command_line()) if file is None else read_file(Path(file))
     for override in overrides:
         _replace(root, override, schema)
     _interpolate(root)
-    return build(schema, root)
+    config = build(schema, root)
+    keep_places(config, root)
+    return config
 
 
 def _replace(root: Node, override: str, schema: type) -> None:

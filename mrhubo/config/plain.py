@@ -12,13 +12,14 @@ from typing import Any
 
 import yaml
 
-from mrhubo.config.tree import scalar
+from mrhubo.config.tree import is_given, scalar
 
 
 def to_plain(value: Any) -> Any:
     """Dicts, lists, text, numbers, truth values and None only: safe for YAML, MLflow, Lightning's hyperparameters."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        given = [field for field in dataclasses.fields(value) if is_given(value, field)]
+        return {field.name: to_plain(getattr(value, field.name)) for field in given}
     if isinstance(value, dict):
         for key in value:
             if not isinstance(key, str):

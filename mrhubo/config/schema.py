@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-
-def bounded(default: Any, low: float | None = None, high: float | None = None) -> Any:
-    """A field whose number must lie in [low, high]; None leaves that side open."""
-    return field(default=default, metadata={"low": low, "high": high})
-
-
-def choice(default: str, *choices: str) -> Any:
-    """A field that takes one of the given words."""
-    return field(default=default, metadata={"choices": choices})
+from mrhubo.config.entries import KeypointEntry, ManualEntry, Range, Vector
+from mrhubo.config.fields import bounded, choice
 
 
 @dataclass
 class ManualScaleConfig:
     """The numbers of `robot.scale: manual`, in the robot's base frame (x forward, y left, z up)."""
 
-    keypoints: dict[str, Any]
+    keypoints: dict[str, ManualEntry]
     """Where each human keypoint is: a link name, {link: NAME, offset: [x, y, z]} (m), {links: {NAME: WEIGHT, ...},
     offset: ...} for a weighted mean, or {offset: ...} for a constant. Names: SMPL's body joints, and `left_` and
     `right_` `eye`, `thumb`, `index`, `middle`, `pinky`, `toe`, `heel`. `pelvis` is needed."""
@@ -29,7 +21,7 @@ class ManualScaleConfig:
     """Extra length of the upper arm, as a share of the robot's."""
     forearm: float = bounded(0.0, -0.9, 100.0)
     """Extra length of the forearm, as a share of the robot's."""
-    shift: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    shift: Vector = field(default_factory=lambda: [0.0, 0.0, 0.0])
     """Added to every keypoint, [x, y, z], m."""
     factor: float = bounded(1.0, 1e-3, 1e3)
     """Everything is multiplied by it, after the shift."""
@@ -39,7 +31,7 @@ class ManualScaleConfig:
 class ScaleSearchConfig:
     """The search of `robot.scale: search`: which numbers of `manual` vary."""
 
-    ranges: dict[str, list[float]]
+    ranges: dict[str, Range]
     """What varies, [low, high]: `factor`, `upper_arm`, `forearm`, and in m `KEYPOINT.x`, `.y` or `.z`, added to the
     offset of a keypoint of `manual`; `shoulder.z` without a side moves both, `.y` apart from each other. `pelvis.z`
     is the height of all others (the paper's shift)."""
@@ -63,7 +55,7 @@ class RobotConfig:
     """URDF file; a relative path is relative to the YAML that names it."""
     joints: list[str]
     """Joints that are sampled and predicted, by URDF name; their order is the order of the output."""
-    keypoints: dict[str, Any]
+    keypoints: dict[str, KeypointEntry]
     """Which link stands for which part of the human body. Points: `left_` and `right_` `shoulder`, `elbow`, `wrist`,
     each a link name or {link: NAME, offset: [x, y, z]} (m, in that link's frame). `chest`: the link that carries the
     arms, with optional `forward` and `up` (default [1, 0, 0] and [0, 0, 1]). Optional `left_hand` and `right_hand`:
@@ -71,7 +63,7 @@ class RobotConfig:
     frame. Optional `head`: a link name or {link: NAME, forward: ..., up: ...}."""
     key_links: list[str]
     """Links whose position error is the link error."""
-    ranges: dict[str, list[float]] = field(default_factory=dict)
+    ranges: dict[str, Range] = field(default_factory=dict)
     """Ranges narrower than the URDF's limits, [lower, upper] in rad, by joint name."""
     hold: dict[str, float] = field(default_factory=dict)
     """Angles in rad at which joints outside `joints` are held; default 0, clamped to the joint's limits."""

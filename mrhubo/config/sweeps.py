@@ -5,7 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from mrhubo.config.schema import bounded, choice
+from mrhubo.config.fields import bounded, choice, left_out
+
+
+@dataclass
+class SpaceRange:
+    """A range of numbers that a sweep draws from."""
+
+    low: int | float
+    """Least value."""
+    high: int | float
+    """Greatest value."""
+    log: bool = left_out(False)
+    """Whether values are drawn on a logarithmic scale."""
+
+
+SpaceEntry = list[Any] | SpaceRange
+"""An entry of `space`: a list of choices, or a range."""
 
 
 @dataclass
@@ -14,7 +30,7 @@ class SweepConfig:
 
     name: str
     """Short name of the sweep; the study and its runs are named after it."""
-    space: dict[str, Any]
+    space: dict[str, SpaceEntry]
     """What varies, by key of the config: `trainer.lr: {low: 0.0003, high: 0.01, log: true}` for a range,
     `model.layers: {low: 1, high: 4}` for whole numbers, `pairs.filter: [linear, hard, none]` for a choice."""
     fixed: dict[str, Any] = field(default_factory=dict)

@@ -6,8 +6,10 @@ YAML 1.1 (PyYAML, and OmegaConf on top of it) reads ``13_28`` as the number 1328
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,6 +52,10 @@ class Node:
     def where(self) -> str:
         """The place for messages, for instance ``conf/nao.yaml, line 3``."""
         return self.source.name if self.line is None else f"{self.source.name}, line {self.line}"
+
+    def error(self, sentence: str) -> UserError:
+        """A sentence about this value, with its place in front if it has one."""
+        return UserError(f"{self.where}: {sentence}" if self.where else sentence)
 
     def plain(self) -> Any:
         """The value without its origin."""
@@ -130,6 +136,37 @@ def parse_typed(text: str) -> Node:
     return Node(scalar(text), source, text=text)
 
 
+def from_plain(value: Any) -> Node:
+    """The tree of values that Python code gives: dataclasses, mappings, sequences, anything with `tolist`, scalars.
+
+    Raises:
+        UserError: a value or a key is of another type.
+    """
+    source = Source("", Path.cwd())
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        given = {
+            field.name: getattr(value, field.name) for field in dataclasses.fields(value) if is_given(value, field)
+        }
+        return from_plain(given)
+    value = getattr(value, "tolist", lambda: value)()
+    if isinstance(value, Mapping):
+        if not all(isinstance(key, str) for key in value):
+            raise UserError(f"a key must be text, found {next(key for key in value if not isinstance(key, str))!r}")
+        return Node({key: from_plain(item) for key, item in value.items()}, source)
+    if isinstance(value, list | tuple):
+        return Node([from_plain(item) for item in value], source)
+    if isinstance(value, Path):
+        value = str(value)
+    if value is not None and not isinstance(value, bool | int | float | str):
+        raise UserError(f"a value must be text, a number, true or false, a list or a mapping, found {value!r}")
+    return Node(value, source)
+
+
+def is_given(section: Any, field: dataclasses.Field[Any]) -> bool:
+    """Whether YAML shows this field of a dataclass: all of them, but defaults of those that are `left_out`."""
+    return not field.metadata.get("left_out") or getattr(section, field.name) != field.default
+
+
 def describe(node: Node) -> str:
     """What was found, short enough for a sentence."""
     content = node.content
@@ -141,6 +178,15 @@ def describe(node: Node) -> str:
         return "nothing"
     shown = repr(content) if isinstance(content, str) else node.text or str(content)
     return shown if len(shown) <= 60 else shown[:57] + "..."
+
+
+def shown(node: Node) -> str:
+    """As `describe`, but a short list of single values in full."""
+    if isinstance(node.content, list) and not any(isinstance(item.content, dict | list) for item in node.content):
+        text = f"[{', '.join(map(describe, node.content))}]"
+        if len(text) <= 60:
+            return text
+    return describe(node)
 
 
 class _Loader(yaml.SafeLoader):
@@ -170,6 +216,8 @@ class _Converter:
             node.content = {}
             for key, value in found.value:
                 name = self.key(key)
+                if name == "<<" and isinstance(key, yaml.ScalarNode) and key.style is None:
+                    raise UserError(f"{self.where(key)}: merge keys ('<<') are not supported; write the keys out")
                 if name in node.content:
                     raise UserError(f"{self.where(key)}: key '{name}' is given twice")
                 node.content[name] = self.convert(value, depth + 1)

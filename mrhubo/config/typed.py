@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import math
 import os
 import re
@@ -11,8 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from mrhubo.config.help import field_docs
-from mrhubo.config.kinds import Key, expected, fields_of, optional_kind, unknown_key
-from mrhubo.config.tree import Node, describe
+from mrhubo.config.kinds import Key, expected, fields_of, optional_kind, union_of, unknown_key, without_rule
+from mrhubo.config.tree import Node, describe, from_plain, shown
+from mrhubo.config.unions import chosen
 from mrhubo.errors import UserError
 
 T = TypeVar("T")
@@ -26,30 +29,43 @@ def build(schema: type[T], root: Node) -> T:
     return _Builder(schema, root).build()
 
 
+def typed_value(hint: Any, value: Any, name: str) -> Any:
+    """A value that Python code gives, checked as one in a YAML file is and made what the type `hint` says.
+
+    Raises:
+        UserError: it is something else; the sentence begins with `name`.
+    """
+    try:
+        node = from_plain(value)
+    except UserError as error:
+        raise UserError(f"{name}: {error}") from None
+    return _Builder(None, node, name).value(hint, node, name, {})
+
+
 class _Builder:
     """Recursion over the fields of a schema; collects the required keys that are missing, to name all of them."""
 
-    def __init__(self, schema: type[Any], root: Node):
-        self.schema = schema
-        self.root = root
+    def __init__(self, schema: type[Any] | None, root: Node, base: str = ""):
+        self.schema, self.root, self.base = schema, root, base
         self.missing: list[Key] = []
 
     def build(self) -> Any:
+        assert self.schema is not None
         config = self.section(self.schema, self.root, "")
         if self.missing:
-            named = "; ".join(f"{key.name} ({_meaning(key)})" for key in self.missing)
-            raise UserError(f"{self.root.source.name}: {_count(self.missing)} missing: {named}")
+            raise UserError(f"{self.root.source.name}: {_missing(self.missing)}")
         return config
 
     def section(self, schema: type[Any], node: Node, prefix: str) -> Any:
+        """A dataclass whose place in the schema is fixed; what is missing is told at the end."""
         content = {} if node.content is None else node.content
         if not isinstance(content, dict):
             name = prefix.rstrip(".") or "a config"
-            raise UserError(f"{node.where}: {name} must be a section of `key: value` lines, found {describe(node)}")
+            raise node.error(f"{name} must be a section of `key: value` lines, found {describe(node)}")
         keys = {key.field.name: key for key in fields_of(schema, prefix)}
         for name, child in content.items():
             if name not in keys:
-                raise UserError(f"{child.where}: {unknown_key(self.schema, schema, prefix, name)}")
+                raise child.error(unknown_key(self.schema or schema, schema, prefix, name, self.base))
         values: dict[str, Any] = {}
         for name, key in keys.items():
             if name in content:
@@ -60,34 +76,82 @@ class _Builder:
                 self.missing.append(key)
         return None if self.missing else schema(**values)
 
+    def entry(self, sections: list[type[Any]], node: Node, name: str) -> Any:
+        """A dataclass in a list, a mapping or a union: of several, the one that the keys that are there fit."""
+        section = sections[0] if len(sections) == 1 else chosen(sections, node, name)
+        builder = _Builder(section, node, f"{name}.")
+        found = builder.section(section, node, f"{name}.")
+        if builder.missing:
+            raise node.error(_missing(builder.missing))
+        return found
+
     def field(self, key: Key, node: Node) -> Any:
         if key.optional and node.content is None:
             return None
         if key.is_section:
             return self.section(key.kind, node, f"{key.name}.")
-        return convert(key.kind, node, key.name, key.field.metadata)
+        return self.value(key.kind, node, key.name, key.field.metadata)
 
+    def value(self, hint: Any, node: Node, name: str, metadata: Mapping[str, Any]) -> Any:
+        """One value of the given type; `metadata` holds its range or choices, which are also those of its items."""
+        kind, optional = optional_kind(hint)
+        if optional and node.content is None:
+            return None
+        base, rule = without_rule(kind)
+        if rule is not None:
+            metadata = rule.metadata
+        if node.text == "???" or node.content == "???":
+            raise node.error(f"{name} has no value yet: replace '???' by {expected(kind, metadata)}")
+        content, origin, arguments = node.content, typing.get_origin(base), typing.get_args(base)
 
-def convert(kind: Any, node: Node, name: str, metadata: Mapping[str, Any]) -> Any:
-    """One value of the given type; `metadata` holds its range or choices."""
-    if node.text == "???" or node.content == "???":
-        raise UserError(f"{node.where}: {name} has no value yet: replace '???' by {expected(kind, metadata)}")
-    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if kind is Any:
-        return _any(node, name)
-    if origin is list and isinstance(node.content, list):
-        return [_element(arguments[0], child, f"{name}[{i}]", metadata) for i, child in enumerate(node.content)]
-    if origin is dict and isinstance(node.content, dict):
-        return {k: _element(arguments[1], child, f"{name}.{k}", metadata) for k, child in node.content.items()}
-    value = _path(node, name) if kind is Path else _SCALARS[kind](node) if kind in _SCALARS else None
-    if value is None or not _within(value, metadata):
-        raise UserError(f"{node.where}: {name} must be {expected(kind, metadata)}, found {describe(node)}")
-    return value
+        def wrong(describe: Callable[[Node], str] = describe) -> UserError:
+            return node.error(f"{name} must be {expected(kind, metadata)}, found {describe(node)}")
 
+        if base is Any:
+            return _any(node, name)
+        if members := union_of(base):
+            return self.union(members, node, name, metadata, wrong)
+        if dataclasses.is_dataclass(base) and isinstance(base, type):
+            if not isinstance(content, dict):
+                raise wrong()
+            return self.entry([base], node, name)
+        if origin is list and isinstance(content, list):
+            if metadata.get("length") not in (None, len(content)):
+                raise wrong(shown)
+            items = [self.value(arguments[0], child, f"{name}[{i}]", metadata) for i, child in enumerate(content)]
+            if metadata.get("rising") and any(b <= a for a, b in itertools.pairwise(items)):
+                raise wrong(shown)
+            return items
+        if origin is dict and isinstance(content, dict):
+            return {k: self.value(arguments[1], child, f"{name}.{k}", metadata) for k, child in content.items()}
+        found = _path(node, name) if base is Path else _SCALARS[base](node) if base in _SCALARS else None
+        if found is None or not _within(found, metadata):
+            raise wrong()
+        return found
 
-def _element(hint: Any, node: Node, name: str, metadata: Mapping[str, Any]) -> Any:
-    kind, optional = optional_kind(hint)
-    return None if optional and node.content is None else convert(kind, node, name, metadata)
+    def union(
+        self,
+        members: tuple[Any, ...],
+        node: Node,
+        name: str,
+        metadata: Mapping[str, Any],
+        wrong: Callable[[], UserError],
+    ) -> Any:
+        """The member of the value's kind (scalar, list, mapping); of several dataclasses, the one that the keys fit."""
+        bases = [(member, without_rule(member)[0]) for member in members]
+        if isinstance(node.content, dict):
+            sections = [base for _, base in bases if dataclasses.is_dataclass(base) and isinstance(base, type)]
+            if sections and node.content:
+                return self.entry(sections, node, name)
+        kind = dict if isinstance(node.content, dict) else list if isinstance(node.content, list) else None
+        for member, base in bases:
+            if kind is not None and typing.get_origin(base) is kind:
+                return self.value(member, node, name, metadata)
+            if kind is None and base in _SCALARS:
+                found = _SCALARS[base](node)
+                if found is not None and _within(found, metadata):
+                    return found
+        raise wrong()
 
 
 def _within(value: Any, metadata: Mapping[str, Any]) -> bool:
@@ -98,12 +162,14 @@ def _within(value: Any, metadata: Mapping[str, Any]) -> bool:
 
 
 def _any(node: Node, name: str) -> Any:
+    if node.text == "???" or node.content == "???":
+        raise node.error(f"{name} has no value yet: replace '???' by any value")
     if isinstance(node.content, dict):
-        return {key: convert(Any, child, f"{name}.{key}", {}) for key, child in node.content.items()}
+        return {key: _any(child, f"{name}.{key}") for key, child in node.content.items()}
     if isinstance(node.content, list):
-        return [convert(Any, child, f"{name}[{i}]", {}) for i, child in enumerate(node.content)]
+        return [_any(child, f"{name}[{i}]") for i, child in enumerate(node.content)]
     if isinstance(node.content, float) and not math.isfinite(node.content):
-        raise UserError(f"{node.where}: {name} must be finite, found {describe(node)}")
+        raise node.error(f"{name} must be finite, found {describe(node)}")
     return node.content
 
 
@@ -146,11 +212,11 @@ def _path(node: Node, name: str) -> Path | None:
     if not text:
         return None
     if "\0" in text:
-        raise UserError(f"{node.where}: {name} must be a path, found {describe(node)}")
+        raise node.error(f"{name} must be a path, found {describe(node)}")
     try:
         path = Path(text).expanduser()
     except RuntimeError:
-        raise UserError(f"{node.where}: {name} names the home folder of an unknown user, {describe(node)}") from None
+        raise node.error(f"{name} names the home folder of an unknown user, {describe(node)}") from None
     return Path(os.path.abspath(node.source.folder / path))
 
 
@@ -163,5 +229,6 @@ def _meaning(key: Key) -> str:
     return first or expected(key.kind, key.field.metadata)
 
 
-def _count(missing: list[Key]) -> str:
-    return "a required key is" if len(missing) == 1 else f"{len(missing)} required keys are"
+def _missing(keys: list[Key]) -> str:
+    count = "a required key is" if len(keys) == 1 else f"{len(keys)} required keys are"
+    return f"{count} missing: " + "; ".join(f"{key.name} ({_meaning(key)})" for key in keys)

@@ -1,7 +1,7 @@
 """Reading pickles of strangers without executing anything.
 
-A pickle names functions and classes and has them called. Here no name is ever imported: each becomes an inert class of
-our own that notes what it was called with, and arrays are put together afterwards from those notes, with their sizes
+A pickle names functions and classes and has them called. Here no name is ever imported: each becomes a class of our
+own that records what it was called with, and arrays are put together afterwards from those records, with their sizes
 checked. Names from modules that the kind of file has no business with are refused.
 """
 
@@ -38,7 +38,7 @@ _TORCH_TYPES = {
 }
 
 
-class Inert:
+class RecordedObject:
     """What a pickled object was called, made with, and given as its state; it does nothing."""
 
     __slots__ = ("args", "state")
@@ -46,8 +46,8 @@ class Inert:
     args: tuple[Any, ...]
     state: Any
 
-    def __new__(cls, *args: Any, **_: Any) -> Inert:
-        """Notes what the pickle calls the class with."""
+    def __new__(cls, *args: Any, **_: Any) -> RecordedObject:
+        """Records what the pickle calls the class with."""
         self = object.__new__(cls)
         self.args, self.state = args, None
         return self
@@ -69,8 +69,8 @@ class Inert:
         return f"{self.module}.{type(self).__name__}"
 
 
-class _Unpickler(pickle.Unpickler):
-    """Python's unpickler, whose every name becomes an inert class made for this one file."""
+class _RestrictedUnpickler(pickle.Unpickler):
+    """Python's unpickler, that imports nothing: every name becomes a `RecordedObject` made for this one file."""
 
     def __init__(self, file: io.BufferedIOBase, modules: Iterable[str]) -> None:
         super().__init__(file, encoding="latin1")
@@ -82,7 +82,7 @@ class _Unpickler(pickle.Unpickler):
         if (module, name) == ("collections", "OrderedDict"):
             return OrderedDict
         if (module, name) not in self.names:
-            self.names[module, name] = type(name, (Inert,), {"module": module, "__slots__": ()})
+            self.names[module, name] = type(name, (RecordedObject,), {"module": module, "__slots__": ()})
         return self.names[module, name]
 
     def persistent_load(self, pid: Any) -> Any:
@@ -91,7 +91,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 def unpickle(file: io.BufferedIOBase, modules: Iterable[str]) -> Any:
-    """What a pickle holds, with `Inert` in place of every object that is not plain Python.
+    """What a pickle holds, with `RecordedObject` in place of every object that is not plain Python.
 
     Args:
         file: an open binary file.
@@ -101,7 +101,7 @@ def unpickle(file: io.BufferedIOBase, modules: Iterable[str]) -> Any:
         UserError: it is no pickle, is truncated, or mentions another module.
     """
     try:
-        return _Unpickler(file, modules).load()
+        return _RestrictedUnpickler(file, modules).load()
     except UserError:
         raise
     except Exception as error:  # whatever the unpickler makes of a stranger's bytes
@@ -118,12 +118,12 @@ def to_array(value: Any) -> np.ndarray:
         return _to_array(value)
     except UserError:
         raise
-    except Exception as error:  # notes that do not fit together
+    except Exception as error:  # records that do not fit together
         raise UserError(f"its parts do not make an array: {error or type(error).__name__}") from error
 
 
 def _to_array(value: Any) -> np.ndarray:
-    if not isinstance(value, Inert):
+    if not isinstance(value, RecordedObject):
         raise UserError(f"expected an array, found {type(value).__name__}")
     made, root = type(value).__name__, value.module.partition(".")[0]
     if root == "copy_reg" or root == "copyreg":  # object.__reduce__ of protocol 0 and 1
@@ -137,19 +137,20 @@ def _to_array(value: Any) -> np.ndarray:
     raise UserError(f"expected an array, found a {value.kind}")
 
 
-def _dense(value: Inert) -> np.ndarray:
+def _dense(value: RecordedObject) -> np.ndarray:
     if type(value).__name__ == "_frombuffer":
         content, dtype, shape, order = value.args
     else:
         _, shape, dtype, is_fortran, content = value.state
         order = "F" if is_fortran else "C"
-    if isinstance(content, Inert):  # Python 3 writes bytes in old protocols as _codecs.encode(text, "latin1"), bytes()
+    # In old protocols Python 3 writes bytes as _codecs.encode(text, "latin1"), or as bytes().
+    if isinstance(content, RecordedObject):
         content = content.args[0] if content.args else b""
     content = content.encode("latin1") if isinstance(content, str) else bytes(content)
     return np.frombuffer(content, dtype=_dtype(dtype)).reshape(tuple(int(n) for n in shape), order=order)
 
 
-def _dtype(value: Inert) -> np.dtype:
+def _dtype(value: RecordedObject) -> np.dtype:
     name, order = str(value.args[0]), "<"
     if value.state is not None and value.state[1] == ">":
         order = ">"
@@ -189,7 +190,7 @@ _STORAGE_PARTS = 5
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """A PyTorch checkpoint (`torch.save`, since 1.6): nested dictionaries whose tensors are inert, and their storages.
+    """A PyTorch checkpoint (`torch.save`, since 1.6): nested dictionaries with records of tensors, and their storages.
 
     Unlike `torch.load(weights_only=True)` it reads files that hold other objects too, such as Lightning's callbacks,
     since those are neither imported nor made. `to_tensor` makes a tensor of both.
@@ -227,10 +228,11 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
     Raises:
         UserError: it stands for something else, or reaches beyond its storage.
     """
-    if isinstance(value, Inert) and type(value).__name__ == "_rebuild_parameter":
+    if isinstance(value, RecordedObject) and type(value).__name__ == "_rebuild_parameter":
         value = value.args[0]
-    if not isinstance(value, Inert) or type(value).__name__ != "_rebuild_tensor_v2":
-        raise UserError(f"expected a tensor, found {value.kind if isinstance(value, Inert) else type(value).__name__}")
+    if not isinstance(value, RecordedObject) or type(value).__name__ != "_rebuild_tensor_v2":
+        kind = value.kind if isinstance(value, RecordedObject) else type(value).__name__
+        raise UserError(f"expected a tensor, found {kind}")
     try:
         reference, offset, shape, stride = value.args[:4]
         kind, key = reference[1].__name__, str(reference[2])
@@ -243,7 +245,7 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
         return torch.from_numpy(numbers.astype(np.float32)).as_strided(tuple(shape), tuple(stride), offset).clone()
     except UserError:
         raise
-    except Exception as error:  # notes that do not fit together
+    except Exception as error:  # records that do not fit together
         raise UserError(f"its parts do not make a tensor: {error or type(error).__name__}") from error
 
 

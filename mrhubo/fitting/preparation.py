@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 
-from mrhubo.config import Config, fingerprint, to_plain
+from mrhubo.config import Config, fingerprint, to_plain, with_places
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Motions, load_motions
 from mrhubo.pairing import PairSetup, pose_settings
@@ -42,6 +42,7 @@ class Prepared(PairSetup):
         return fingerprint([plain, self.store.header, clips, evaluation])
 
 
+@with_places
 def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
     """Opens everything that making pairs needs; the config stays as it is. `search`: the caller can do `robot.scale:
     search`.
@@ -60,6 +61,7 @@ def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
     return setup
 
 
+@with_places
 def prepare(config: Config, search: bool = False) -> Prepared:
     """Opens everything that a fit will need; the config stays as it is. `search` as for `prepare_pairs`.
 

@@ -2,7 +2,7 @@
 
 from mrhubo.pairing.filter import PairFilter, make_filter
 from mrhubo.pairing.generate import PairGenerator
-from mrhubo.pairing.lbfgs import solve_lbfgs, solve_levenberg_marquardt
+from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.proportions import ProportionTest
 from mrhubo.pairing.setup import PairSetup
 from mrhubo.pairing.store import PairStore, pose_settings
@@ -19,5 +19,4 @@ __all__ = [
     "make_filter",
     "pose_settings",
     "solve_lbfgs",
-    "solve_levenberg_marquardt",
 ]

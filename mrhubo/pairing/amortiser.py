@@ -93,7 +93,7 @@ def train_amortiser(
         header: what the file must have been made for; a file with another header is not used.
         report: told of the steps.
     """
-    device = problem.prior.identity_F.device
+    device = problem.device
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         network = Amortiser(len(problem.keypoints), problem.latent)

@@ -37,14 +37,14 @@ class PairGenerator:
     def __init__(self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig) -> None:
         self.body_map, self.robot, self.prior, self.settings = body_map, body_map.robot, prior, settings
         self.problem = LatentProblem(
-            prior, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
+            prior.decoder, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
         )
         self.amortiser: Amortiser | None = None
 
     @property
     def device(self) -> torch.device:
         """Where the pairs are made."""
-        return self.prior.identity_F.device
+        return self.prior.device
 
     @torch.no_grad()
     def draw_targets(self, count: int, generator: torch.Generator) -> Tensor:
@@ -103,10 +103,10 @@ class PairGenerator:
                 orientation_BM6 = self.robot.moving_orientations(poses)
             if z_BZ is None:
                 z_BZ = self.solve(target_BK3)
-            chunk = poses_at_once(self.device)
-            aims = self.body_map.robot_directions(poses).split(chunk)
-            cut = zip(z_BZ.split(chunk), target_BK3.split(chunk), aims, strict=True)
-            parts = [self._describe(z, target, aim, direction) for z, target, aim in cut]
+            size = poses_at_once(self.device)
+            directions = self.body_map.robot_directions(poses).split(size)
+            chunks = zip(z_BZ.split(size), target_BK3.split(size), directions, strict=True)
+            parts = [self._measure(z, target, limbs, direction) for z, target, limbs in chunks]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
@@ -122,7 +122,7 @@ class PairGenerator:
         return z_BZ, self.reference.solve_frames(torch.cat(poses))[0]
 
     @torch.no_grad()
-    def _describe(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
+    def _measure(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
         """Human poses of latents, and how good they are; the measures are those of the latents, before alignment."""
         matrices = self.prior.decode_matrices(z_BZ)
         found_BJ6 = pose_BJ6 = rotation.matrix_to_sixd(matrices)

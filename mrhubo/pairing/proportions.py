@@ -50,7 +50,11 @@ class ProportionTest:
             targets.append(scale.targets(self._poses))
         target_BK3 = torch.cat(targets)
         problem = LatentProblem(
-            self.prior, self.body_map.skeleton, scales[0].keypoint_indices, self.settings.w_data, self.settings.w_prior
+            self.prior.decoder,
+            self.body_map.skeleton,
+            scales[0].keypoint_indices,
+            self.settings.w_data,
+            self.settings.w_prior,
         )
         start_BZ = nearest_samples(problem, target_BK3)
         z_BZ = solve_quasi_newton(problem, start_BZ, target_BK3, self.settings.fine_steps)

@@ -96,9 +96,10 @@ class PairStore:
 
     def missing(self, numbers: Iterable[int] | None = None) -> list[int]:
         """Numbers (of the given ones, or of all) of shards to be made: absent, damaged or foreign ones."""
-        return [number for number in (range(self.shards) if numbers is None else numbers) if not self._whole(number)]
+        numbers = range(self.shards) if numbers is None else numbers
+        return [number for number in numbers if not self._is_intact(number)]
 
-    def _whole(self, number: int) -> bool:
+    def _is_intact(self, number: int) -> bool:
         try:
             self.read(number)
         except DamagedFile:

@@ -30,8 +30,8 @@ from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.ranks import Ranks
 from mrhubo.runtime.threads import available_cores
 
-_WORTH_A_WORKER = 10_000
-"""Pairs; fewer are made before a new interpreter has started."""
+_MIN_PAIRS_PER_WORKER = 10_000
+"""Fewer are made before a new interpreter has started."""
 
 
 @dataclass(frozen=True)
@@ -101,16 +101,16 @@ def _make(
     config: Config, generator: PairGenerator, store: PairStore, indices: Sequence[int], ranks: Ranks
 ) -> Iterator[dict[str, float]]:
     count = config.pairs.workers or (available_cores() if ranks.count == 1 else 1)
-    count = min(count, len(indices) * store.shard_size // _WORTH_A_WORKER)
+    count = min(count, len(indices) * store.shard_size // _MIN_PAIRS_PER_WORKER)
     if count < 2 or generator.device.type != "cpu":
         for index in indices:
             yield make_shard(generator, store, index)
         return
     with _workers(config, count) as workers:
-        yield from _hand_out(workers, indices)
+        yield from _dispatch(workers, indices)
 
 
-def _hand_out(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) -> Iterator[dict[str, float]]:
+def _dispatch(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) -> Iterator[dict[str, float]]:
     """Every index goes to the next worker that is free; yields the answers."""
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
     answers: queue.SimpleQueue[dict[str, float] | str] = queue.SimpleQueue()

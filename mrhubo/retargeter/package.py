@@ -55,7 +55,8 @@ class Retargeter(nn.Module):
         super().__init__()
         self.network = network.requires_grad_(False).eval()
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
-        self._directions: DirectionProblem | None = None
+        self.directions = DirectionProblem(body_map)
+        """The optimiser's cost, for `polish`."""
 
     @property
     def device(self) -> torch.device:
@@ -66,13 +67,6 @@ class Retargeter(nn.Module):
     def collision(self) -> SelfCollision:
         """The robot's collision shapes."""
         return self.body_map.collision
-
-    @property
-    def directions(self) -> DirectionProblem:
-        """The reference retargeter's cost."""
-        if self._directions is None:
-            self._directions = DirectionProblem(self.body_map)
-        return self._directions
 
     @property
     def joint_names(self) -> tuple[str, ...]:

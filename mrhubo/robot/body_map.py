@@ -11,11 +11,12 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.skeleton import Skeleton
-from mrhubo.config import RobotConfig
+from mrhubo.config import RobotConfig, with_places
 from mrhubo.errors import UserError
 from mrhubo.robot.auto_scale import AutoScale
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.directions import Directions
+from mrhubo.robot.entries import check_names
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot
@@ -159,6 +160,7 @@ class BodyMap(nn.Module):
                 )
 
 
+@with_places
 def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> BodyMap:
     """Robot and body map of a config's `robot` section, checked; `skeleton` is the human's, by default the open one.
 
@@ -176,5 +178,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     if not config.key_links:
         raise UserError("robot.key_links: is empty; name the links whose error is measured")
     links = [*keypoints.links, *config.key_links, *(manual.links if manual else [])]
-    robot = Robot(describe(config.urdf), config.joints, links, config.ranges, config.hold, config.name)
+    description = describe(config.urdf)
+    check_names(config, description)
+    robot = Robot(description, config.joints, links, config.ranges, config.hold, config.name)
     return BodyMap.of(robot, keypoints, skeleton, manual)

@@ -17,16 +17,15 @@ import copy
 import dataclasses
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from mrhubo.body.skeleton import KEYPOINT_NAMES, keypoint_indices
-from mrhubo.config import ManualScaleConfig
+from mrhubo.config import ConstantEntry, ManualScaleConfig, MeanEntry, Range, typed_value
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.frames import base_to_human
-from mrhubo.robot.entries import read_vector
+from mrhubo.robot.entries import read_mean, read_vector
 from mrhubo.robot.model import LinkPoses, Robot
 
 _SIDES = ("left", "right")
@@ -58,8 +57,8 @@ class ManualScale(nn.Module):
         self._entries: dict[str, tuple[dict[str, float], tuple[float, float, float]]] = {}
         for name, value in config.keypoints.items():
             if name not in KEYPOINT_NAMES:
-                raise UserError(f"robot.manual.keypoints: {unknown_name('keypoint', name, KEYPOINT_NAMES)}")
-            self._entries[name] = _read_entry(name, value)
+                raise UserError(f"robot.manual.keypoints.{name}: {unknown_name('keypoint', name, KEYPOINT_NAMES)}")
+            self._entries[name] = read_mean(name, value)
         if "pelvis" not in self._entries:
             raise UserError("robot.manual.keypoints: 'pelvis' is missing; the others are placed relative to it")
         if len(self._entries) < 2:
@@ -122,10 +121,10 @@ def varied(config: ManualScaleConfig, values: Mapping[str, float]) -> ManualScal
             continue
         part, axis = name.split(".")
         for keypoint, sign in _keypoints_of(part, config):
-            links, offset = _read_entry(keypoint, config.keypoints[keypoint])
-            moved = list(offset)
+            links, offset = read_mean(keypoint, config.keypoints[keypoint])
+            moved: list[int | float] = list(offset)
             moved[_AXES.index(axis)] += value * (sign if axis == "y" else 1)
-            config.keypoints[keypoint] = {**({"links": links} if links else {}), "offset": moved}
+            config.keypoints[keypoint] = MeanEntry({**links}, moved) if links else ConstantEntry(moved)
     return config
 
 
@@ -143,9 +142,8 @@ def check_ranges(config: ManualScaleConfig, ranges: Mapping[str, Sequence[float]
         if not dot and name not in _NUMBERS or dot and (axis not in _AXES or not _keypoints_of(part, config)):
             known = [f"{keypoint}.z" for keypoint in config.keypoints]
             known += [f"{keypoint.removeprefix('left_')}.z" for keypoint in config.keypoints if "left_" in keypoint]
-            raise UserError(f"robot.search.ranges: {unknown_name('number', name, [*_NUMBERS, *known])}")
-        if len(range_2) != 2 or not range_2[0] < range_2[1]:
-            raise UserError(f"{key}: expected [low, high] with low below high, found {list(range_2)}")
+            raise UserError(f"{key}: {unknown_name('number', name, [*_NUMBERS, *known])}")
+        range_2 = typed_value(Range, range_2, key)
         low, high = _NUMBERS[name] if not dot else (-1e3, 1e3)
         if range_2[0] < low or range_2[1] > high:
             raise UserError(f"{key}: must lie within [{low}, {high}], found {list(range_2)}")
@@ -157,26 +155,3 @@ def _keypoints_of(part: str, config: ManualScaleConfig) -> list[tuple[str, int]]
         return [(part, 1)]
     sides = [(f"{side}_{part}", sign) for side, sign in zip(_SIDES, (1, -1), strict=True)]
     return [(name, sign) for name, sign in sides if name in config.keypoints]
-
-
-def _read_entry(name: str, value: Any) -> tuple[dict[str, float], tuple[float, float, float]]:
-    """A link name, {link: NAME, offset: [x, y, z]}, {links: {NAME: WEIGHT, ...}, offset: ...} or {offset: ...}."""
-    key = f"robot.manual.keypoints.{name}"
-    if isinstance(value, str):
-        return {value: 1.0}, (0.0, 0.0, 0.0)
-    if not isinstance(value, Mapping) or not value:
-        raise UserError(f"{key}: expected a link name, {{link: NAME, offset: [x, y, z]}}, {{links: {{NAME: WEIGHT}}}} "
-                        f"or {{offset: [x, y, z]}}, found {value!r}")  # fmt: skip
-    for word in value:
-        if word not in ("link", "links", "offset"):
-            raise UserError(f"{key}: {unknown_name('entry', str(word), ('link', 'links', 'offset'))}")
-    if "link" in value and "links" in value:
-        raise UserError(f"{key}: has both 'link' and 'links'; give one of them")
-    weights = value.get("links", {value["link"]: 1.0} if "link" in value else {})
-    good = isinstance(weights, Mapping) and all(
-        isinstance(link, str) and isinstance(weight, int | float) and not isinstance(weight, bool) and 0 < weight < 1e6
-        for link, weight in weights.items()
-    )
-    if not good:
-        raise UserError(f"{key}: expected links with weights above 0, found {weights!r}")
-    return dict(weights), read_vector(f"{key}.offset", value.get("offset", [0, 0, 0]))

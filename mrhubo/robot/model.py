@@ -20,10 +20,10 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.config import load_config
-from mrhubo.config.shipped import shipped_root
+from mrhubo.config import find_config, load_config, places_named
 from mrhubo.errors import UserError
 from mrhubo.robot.chain import build_chain
+from mrhubo.robot.entries import check_names
 from mrhubo.robot.keypoints import Keypoints, read_keypoints
 from mrhubo.robot.urdf import Description, describe, joint_range
 
@@ -135,7 +135,7 @@ class Robot(nn.Module):
     @classmethod
     def from_urdf(
         cls,
-        urdf: Path | str,
+        urdf: Path | str | Description,
         joints: Sequence[str],
         keypoints: Mapping[str, Any],
         key_links: Sequence[str] = (),
@@ -146,7 +146,7 @@ class Robot(nn.Module):
         """A robot that knows which of its links stand for which part of a human body.
 
         Args:
-            urdf: the URDF file.
+            urdf: the URDF file, or what `describe` has read from it.
             joints: joints that are sampled and predicted; their order is the order of q.
             keypoints: link by body part, as `robot.keypoints` of a config.
             key_links: links whose position error is the link error.
@@ -158,7 +158,8 @@ class Robot(nn.Module):
             UserError: the URDF cannot be used; a joint, link or body part does not exist (with the nearest name).
         """
         parts = read_keypoints(keypoints)
-        robot = cls(Path(urdf), joints, [*parts.links, *key_links], ranges, hold, name)
+        known = urdf if isinstance(urdf, Description) else Path(urdf)
+        robot = cls(known, joints, [*parts.links, *key_links], ranges, hold, name)
         robot.keypoints, robot.key_links = parts, tuple(key_links)
         return robot
 
@@ -169,11 +170,13 @@ class Robot(nn.Module):
         Raises:
             UserError: the config or what it names cannot be used.
         """
-        shipped = shipped_root() / "conf" / f"{config}.yaml"
-        robot = load_config(shipped if shipped.is_file() and not Path(config).is_file() else Path(config)).robot
-        return cls.from_urdf(
-            robot.urdf, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name
-        )
+        robot = load_config(find_config(str(config))).robot
+        with places_named(robot):
+            description = describe(robot.urdf)
+            check_names(robot, description)
+            return cls.from_urdf(
+                description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name
+            )
 
     def link_index(self, link: str) -> int:
         """Position of a link in `links`."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mrhubo.config import Config, keys_of
+from mrhubo.config import Config, SpaceEntry, SpaceRange, keys_of, typed_value
 from mrhubo.errors import UserError, unknown_name
 
 if TYPE_CHECKING:
@@ -64,7 +64,8 @@ def read_space(space: Mapping[str, Any], check: Callable[[str], object], schema:
         schema: of that config.
 
     Raises:
-        UserError: a key does not exist or cannot vary, an entry is none of the forms, or a value is impossible.
+        UserError: a key does not exist or cannot vary, an entry is none of the forms, or a value is impossible; the
+            sentence begins with the entry's key.
     """
     if not space:
         raise UserError("space: is empty; name the keys that are to vary")
@@ -73,17 +74,31 @@ def read_space(space: Mapping[str, Any], check: Callable[[str], object], schema:
     for key, entry in space.items():
         section = key.split(".")[0]
         if section in _FIXED_SECTIONS:
-            raise UserError(f"space: '{key}' cannot vary: {_FIXED_SECTIONS[section]}")
+            raise UserError(f"space.{key}: cannot vary: {_FIXED_SECTIONS[section]}")
         if key not in kinds:
-            raise UserError(f"space: {unknown_name('key', key, kinds)}")
-        dimension = _read_entry(key, entry, kinds[key])
+            raise UserError(f"space.{key}: {unknown_name('key', key, kinds)}")
+        dimension = _read_entry(key, typed_value(SpaceEntry, entry, f"space.{key}"), kinds[key])
         for text in dimension.extremes:
-            try:
-                check(text)
-            except UserError as error:
-                raise UserError(f"space.{key}: {str(error).removeprefix('command line: ')}") from error
+            _check(f"space.{key}", text, check)
         dimensions.append(dimension)
     return dimensions
+
+
+def check_fixed(fixed: Mapping[str, Any], check: Callable[[str], object]) -> None:
+    """Refuses settings of `SweepConfig.fixed` that the config cannot have; `check` as for `read_space`.
+
+    Raises:
+        UserError: a key does not exist or its value is impossible; the sentence begins with the entry's key.
+    """
+    for key, value in fixed.items():
+        _check(f"fixed.{key}", override(key, value), check)
+
+
+def _check(name: str, text: str, check: Callable[[str], object]) -> None:
+    try:
+        check(text)
+    except UserError as error:
+        raise UserError(f"{name}: {str(error).removeprefix('command line: ')}") from error
 
 
 def override(key: str, value: Any) -> str:
@@ -91,26 +106,17 @@ def override(key: str, value: Any) -> str:
     return f"{key}={value if isinstance(value, str) else json.dumps(value)}"
 
 
-def _read_entry(key: str, entry: Any, kind: Any) -> Dimension:
+def _read_entry(key: str, entry: list[Any] | SpaceRange, kind: Any) -> Dimension:
     if isinstance(entry, list):
         choices = tuple(dict.fromkeys(override(key, value).partition("=")[2] for value in entry))
         if len(choices) < 2:
             raise UserError(f"space.{key}: a choice needs two values or more")
         return Dimension(key, choices)
-    forms = "a list of choices or {low: NUMBER, high: NUMBER, log: true}"
-    if not isinstance(entry, Mapping) or not {"low", "high"} <= set(entry):
-        raise UserError(f"space.{key}: must be {forms}, found {entry!r}")
-    for word in entry:
-        if word not in ("low", "high", "log"):
-            raise UserError(f"space.{key}: {unknown_name('entry', str(word), ('low', 'high', 'log'))}")
-    low, high, log = entry["low"], entry["high"], entry.get("log", False)
+    low, high, log = entry.low, entry.high, entry.log
     if kind not in (int, float):
         raise UserError(f"space.{key}: is no number, so it has no range; give a list of choices")
-    right = int if kind is int else int | float
-    if not isinstance(low, right) or not isinstance(high, right) or isinstance(low, bool) or isinstance(high, bool):
-        raise UserError(f"space.{key}: low and high must be {'whole ' * (kind is int)}numbers, found {low!r}, {high!r}")
-    if not isinstance(log, bool):
-        raise UserError(f"space.{key}: log must be true or false, found {log!r}")
+    if kind is int and not (isinstance(low, int) and isinstance(high, int)):
+        raise UserError(f"space.{key}: low and high must be whole numbers, found {low!r}, {high!r}")
     if not low < high:
         raise UserError(f"space.{key}: low must be below high, found {low} and {high}")
     if log and low <= 0:

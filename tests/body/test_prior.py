@@ -10,8 +10,8 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton, mirror_pose
-from mrhubo.body.prior import SHIPPED_WEIGHTS
 from mrhubo.body.prior_training.measures import measure, reconstruction
+from mrhubo.config import SHIPPED_PRIOR
 from mrhubo.errors import UserError
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import read_folder
@@ -73,7 +73,7 @@ def test_the_card_says_data_licence_and_split(prior: BodyPrior) -> None:
 
 
 def test_files_that_are_no_prior_are_refused(tmp_path: Path) -> None:
-    tensors, metadata = read_tensors(SHIPPED_WEIGHTS)
+    tensors, metadata = read_tensors(SHIPPED_PRIOR)
     path = tmp_path / "prior.safetensors"
     with pytest.raises(UserError, match="cannot be read"):
         BodyPrior.open(path)

@@ -18,7 +18,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton, VPoser, open_prior
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import solve_quasi_newton
-from mrhubo.config import BodyConfig
+from mrhubo.config import SHIPPED_PRIOR, BodyConfig
 from mrhubo.errors import UserError
 
 
@@ -135,13 +135,13 @@ def test_the_config_chooses_it_and_a_saved_one_comes_back(tmp_path: Path) -> Non
     with pytest.raises(UserError, match="schema is 'mrhubo.vposer/1'"):
         BodyPrior.open(tmp_path / "prior.safetensors")
     with pytest.raises(UserError, match="schema is 'mrhubo.body_prior/1'"):
-        open_prior(BodyConfig(prior="vposer", prior_path=Path(BodyPrior.open.__func__.__globals__["SHIPPED_WEIGHTS"])))
+        open_prior(BodyConfig(prior="vposer", prior_path=SHIPPED_PRIOR))
 
 
 def test_latent_inverse_kinematics_works_with_its_activation(tmp_path: Path) -> None:
     write_snapshot(tmp_path / "V02_05", published())
     prior, skeleton = VPoser.open(tmp_path / "V02_05"), Skeleton()
-    problem = LatentProblem(prior, skeleton, [18, 19, 20, 21, 15])
+    problem = LatentProblem(prior.decoder, skeleton, [18, 19, 20, 21, 15])
     z = torch.randn(4, 32, generator=torch.Generator().manual_seed(0))
     points, jacobian = problem.linearise(z)
     for i in range(len(z)):

@@ -86,8 +86,9 @@ def test_only_reached_poses_are_measured_on(
     """The reference's answers to half of the frames are spoilt: none of them is taken."""
     with torch.no_grad():
         reached = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path).pose_PJ6
-        q_FN, pose_FJ6 = clip.reference_TN.repeat(2, 1), torch.cat((clip.motion.pose_TJ6, clip.motion.pose_TJ6.flip(0)))
-    both = Clip(Motion("both", rotation.sixd_to_matrix(pose_FJ6), 24.0), q_FN)
+        local = clip.motion.local_TJ33
+        q_FN, local_FJ33 = clip.reference_TN.repeat(2, 1), torch.cat((local, local.flip(0)))
+    both = Clip(Motion("both", local_FJ33, 24.0), q_FN)
     search = ScaleFactorSearch(config, body_map, prior, [both], tmp_path)
     other = ScaleFactorSearch(config, body_map, prior, [Clip(both.motion, q_FN.flip(0))], tmp_path)
     assert other.name != search.name, "another reference set is another study"

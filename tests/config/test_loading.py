@@ -7,17 +7,32 @@ import math
 import os
 import subprocess
 import sys
+import textwrap
 import typing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mrhubo.config import Config, bounded, choice, field_docs, fingerprint, load_config, to_plain, to_yaml
-from mrhubo.config.kinds import Key, fields_of, walk
+from mrhubo.config import (
+    Config,
+    SweepConfig,
+    bounded,
+    choice,
+    field_docs,
+    fingerprint,
+    load_config,
+    to_plain,
+    to_yaml,
+    typed_value,
+)
+from mrhubo.config.entries import FrameEntry
+from mrhubo.config.fields import left_out
+from mrhubo.config.kinds import Key, Rule, fields_of, optional_kind, union_of, walk, without_rule
 from mrhubo.errors import UserError
 
 
@@ -32,6 +47,51 @@ class Inner:
     """Steps."""
     word: str = choice("a", "a", "b", "32")
     """A word."""
+
+
+Word = Annotated[str, Rule("a word")]
+Vector = Annotated[list[int | float], Rule("three numbers [x, y, z]", low=-10.0, high=10.0, length=3)]
+Span = Annotated[list[float], Rule("two numbers [low, high], low below high", length=2, rising=True)]
+
+
+@dataclass
+class Point:
+    """A point."""
+
+    link: str
+    """Its link."""
+    offset: Vector | None = left_out()
+    """Its offset."""
+
+
+@dataclass
+class Frame:
+    """A frame."""
+
+    link: str
+    """Its link."""
+    up: Vector
+    """Where up is."""
+    flipped: bool = left_out(False)
+    """Whether it is turned."""
+
+
+@dataclass
+class Mean:
+    """A mean."""
+
+    links: dict[str, float]
+    """Weights."""
+    offset: Vector | None = left_out()
+    """Its offset."""
+
+
+@dataclass
+class Fixed:
+    """A constant."""
+
+    offset: Vector
+    """Where."""
 
 
 @dataclass
@@ -52,6 +112,12 @@ class Outer:
     numbers: list[float] = bounded(None, 0.0, 10.0)
     loose: Any = None
     maybe: Inner | None = None
+    entry: str | Point | Frame | None = None
+    entries: dict[str, Word | Point | Mean | Fixed] = field(default_factory=dict)
+    sections: list[Inner] = field(default_factory=list)
+    vector: Vector | None = None
+    spans: dict[str, Span] = field(default_factory=dict)
+    either: list[Any] | Inner | None = None
 
 
 REQUIRED = "name: n\nsource: s\n"
@@ -170,6 +236,68 @@ def test_interpolation(tmp_path, monkeypatch):
     assert load(tmp_path, REQUIRED + "inner: {steps: 32, word: '${inner.steps}'}").inner.word == "32"
 
 
+def test_unions_choose_by_kind_and_by_keys(tmp_path):
+    text = """
+        entry: {link: a, up: [0, 0, 1.0]}
+        entries: {a: 13_28, b: {link: l}, c: {links: {x: 1}}, d: {offset: [1, 2, .5]}, e: {link: l, offset: [0, 0, 0]}}
+        sections: [{rate: 1}, {}, {steps: 3, word: b}]
+        vector: [0, 1, -2.5]
+        spans: {a.b: [0, 1]}
+        either: {steps: 3}
+    """
+    config = load(tmp_path, REQUIRED + textwrap.dedent(text))
+    assert config.entry == Frame("a", [0, 0, 1.0])
+    assert config.entries == {
+        "a": "13_28", "b": Point("l"), "c": Mean({"x": 1.0}), "d": Fixed([1, 2, 0.5]), "e": Point("l", [0, 0, 0])
+    }  # fmt: skip
+    assert config.sections == [Inner(1.0), Inner(), Inner(steps=3, word="b")]
+    assert [type(number) for number in config.vector] == [int, int, float]
+    assert config.spans == {"a.b": [0.0, 1.0]} and type(config.spans["a.b"][0]) is float
+    assert config.either == Inner(steps=3) and load(tmp_path, REQUIRED + "either: [a, 1]").either == ["a", 1]
+    assert load(tmp_path, REQUIRED, "entry={link: a, up: [1, 0, 0]}").entry == Frame("a", [1, 0, 0])
+    assert load(tmp_path, REQUIRED + "entry: {link: a}", "entry.offset=[1, 2, 3]").entry == Point("a", [1, 2, 3])
+    assert load(tmp_path, REQUIRED + "entry: {link: a}", "entry=null").entry is None
+
+
+def test_entries_show_what_was_given_alone(tmp_path):
+    config = load(tmp_path, REQUIRED + "entry: {link: a}\nentries: {b: {link: b, offset: [0, 0, 0.5]}}\n")
+    assert to_plain(config.entry) == {"link": "a"}
+    assert to_plain(config.entries) == {"b": {"link": "b", "offset": [0, 0, 0.5]}}
+    assert to_plain(Frame("a", [0, 0, 1])) == {"link": "a", "up": [0, 0, 1]}
+    assert to_plain(Frame("a", [0, 0, 1], flipped=True))["flipped"] is True
+    assert fingerprint(config.entries) == fingerprint({"b": {"link": "b", "offset": [0, 0, 0.5]}})
+    assert fingerprint(Point("a", [0, 0, 1])) != fingerprint(Point("a", [0.0, 0.0, 1.0]))
+
+
+def test_interpolation_in_entries(tmp_path):
+    text = REQUIRED + "loose: {x: 1, v: [1, 2.5, 3]}\nvector: ['${loose.x}', 0, '${loose.x}']\n"
+    text += "entry: ${entries.a}\nentries: {a: {link: '${name}', offset: '${loose.v}'}, b: '${name}'}\n"
+    config = load(tmp_path, text)
+    assert config.vector == [1, 0, 1]
+    assert config.entry == Point("n", [1, 2.5, 3]) and config.entries == {"a": Point("n", [1, 2.5, 3]), "b": "n"}
+    sentence = "test.yaml, line 3: vector[1] must be a number from -10.0 to 10.0, found 'n'"
+    assert refusal(tmp_path, REQUIRED + "vector: [0, '${name}', 0]") == sentence
+    assert "entry.nope" in refusal(tmp_path, REQUIRED + "entry: ${entry.nope}")
+
+
+def test_plain_values_are_typed_like_those_of_a_file():
+    assert typed_value(str | Point | Frame, {"link": "a", "offset": (1, 2, 3)}, "e") == Point("a", [1, 2, 3])
+    assert typed_value(str | Point, Point("a", [1, 2, 3]), "e") == Point("a", [1, 2, 3])
+    assert typed_value(str | Point, "a", "e") == "a"
+    assert typed_value(Vector, np.array([1.0, 2.0, 3.0]), "v") == [1.0, 2.0, 3.0]
+    for value, sentence in (
+        ([1, 2], "v must be three numbers [x, y, z], found [1, 2]"),
+        ([1, 2, math.nan], "v[2] must be a number from -10.0 to 10.0, found nan"),
+        (object, "v: a value must be text, a number, true or false, a list or a mapping, found <class 'object'>"),
+        ({1: 2}, "v: a key must be text, found 1"),
+    ):
+        with pytest.raises(UserError) as caught:
+            typed_value(Vector, value, "v")
+        assert str(caught.value) == sentence
+    with pytest.raises(UserError, match=r"^key 'e.ofset' does not exist; nearest: 'e.offset'"):
+        typed_value(str | Point, Point("a", [1, 2, 3]) and {"link": "a", "ofset": 1}, "e")
+
+
 def test_aliases_are_copies(tmp_path):
     config = load(tmp_path, REQUIRED + "ranges: {a: &r [0, 1], b: *r}")
     assert config.ranges == {"a": [0.0, 1.0], "b": [0.0, 1.0]}
@@ -238,8 +366,56 @@ def test_aliases_are_copies(tmp_path):
         ("inner: {rat: 1}", "test.yaml, line 3: key 'inner.rat' does not exist; nearest: 'inner.rate'"),
         ("steps: 1", "test.yaml, line 3: key 'steps' does not exist; nearest: 'inner.steps'"),
         ("stepz: 1", "test.yaml, line 3: key 'stepz' does not exist; nearest: 'inner.steps'"),
-        ("qqq: 1", "test.yaml, line 3: key 'qqq' does not exist; available: inner, loose, maybe, name, names, "),
-        ("<<: {on: true}", "test.yaml, line 3: key '<<' does not exist; "),
+        ("inner.rate: 1", "test.yaml, line 3: key 'inner.rate' has a section of its own: write rate below inner"),
+        ("inner: {learning_rate: 1}", "key 'inner.learning_rate' does not exist; available: inner.rate, inner.steps"),
+        ("entry: [a]", "test.yaml, line 3: entry must be text, {link, offset} or {link, up, flipped}, found a list"),
+        (
+            "entry: {}",
+            "test.yaml, line 3: entry must be text, {link, offset} or {link, up, flipped}, found an empty map",
+        ),
+        ("entry: ???", "test.yaml, line 3: entry has no value yet: replace '???' by text, {link, offset} or"),
+        ("entry: {link: 3, upp: 1}", "test.yaml, line 3: key 'entry.upp' does not exist; nearest: 'entry.up'"),
+        ("entry:\n  link: a\n  colour: 1", "line 5: key 'entry.colour' does not exist; available: entry.flipped, "),
+        ("entry:\n  up: [0, 0, 1]", "test.yaml, line 3: a required key is missing: entry.link (Its link)"),
+        ("entry: {link: }", "test.yaml, line 3: entry.link must be text, found nothing"),
+        ("entry: {link: a, up: up}", "test.yaml, line 3: entry.up must be three numbers [x, y, z], found 'up'"),
+        (
+            "entry: {link: a, offset: [0, 0, 1], up: [0, 0, 1]}",
+            "entry: 'offset' and 'up' do not go together; give {link, ",
+        ),
+        ("entries: {a: 1, b: {offset: [0, 0]}}", "entries.b.offset must be three numbers [x, y, z], found [0, 0]"),
+        (
+            "entries:\n  a: x\n  b: {link: l, offset: [0, .nan, 0]}",
+            "test.yaml, line 5: entries.b.offset[1] must be a number from -10.0 to 10.0, found .nan",
+        ),
+        ("entries: {a: {links: {x: y}}}", "test.yaml, line 3: entries.a.links.x must be a number, found 'y'"),
+        (
+            "entries: {a: {links: {x: 1}, link: y}}",
+            "entries.a: 'link' and 'links' do not go together; give {link, offset}, ",
+        ),
+        ("entries: {a: }", "entries.a must be a word, {link, offset}, {links, offset} or {offset}, found nothing"),
+        ("entries: [a]", "test.yaml, line 3: entries must be a mapping of name to a word, {link, offset}, "),
+        ("sections:\n- {}\n- rate: 2", "test.yaml, line 5: sections[1].rate must be a number from 0.0 to 1.0, found 2"),
+        ("sections: [{}, x]", "test.yaml, line 3: sections[1] must be {rate, steps, word}, found 'x'"),
+        (
+            "sections: [{rat: 1}]",
+            "test.yaml, line 3: key 'sections[0].rat' does not exist; nearest: 'sections[0].rate'",
+        ),
+        ("sections: {rate: 1}", "test.yaml, line 3: sections must be a list of {rate, steps, word}, found a mapping"),
+        ("vector: [0, 0, '1']", "test.yaml, line 3: vector[2] must be a number from -10.0 to 10.0, found '1'"),
+        ("vector: [0, 0, true]", "test.yaml, line 3: vector[2] must be a number from -10.0 to 10.0, found true"),
+        ("vector: [0, 0, 11]", "test.yaml, line 3: vector[2] must be a number from -10.0 to 10.0, found 11"),
+        ("vector: 1", "test.yaml, line 3: vector must be three numbers [x, y, z], found 1"),
+        ("spans: {a: [1, 1]}", "spans.a must be two numbers [low, high], low below high, found [1, 1]"),
+        ("spans: {a: [2, 1]}", "spans.a must be two numbers [low, high], low below high, found [2, 1]"),
+        ("spans: {a: [1]}", "spans.a must be two numbers [low, high], low below high, found [1]"),
+        ("either: x", "test.yaml, line 3: either must be list of any value or {rate, steps, word}, found 'x'"),
+        ("either: {rate: 2}", "test.yaml, line 3: either.rate must be a number from 0.0 to 1.0, found 2"),
+        (
+            "qqq: 1",
+            "test.yaml, line 3: key 'qqq' does not exist; available: either, entries, entry, inner, loose, maybe, name, names, ",
+        ),
+        ("<<: {on: true}", "test.yaml, line 3: merge keys ("),
         ("? {a: b}\n: c", "test.yaml, line 3: a key must be text"),
     ],
 )
@@ -318,6 +494,14 @@ def test_aliases_cannot_expand_without_end(tmp_path):
     assert refusal(tmp_path, "\n".join(lines)) == "test.yaml: more than 100000 values, which no config has"
 
 
+def test_windows_files(tmp_path):
+    text = "# \u00e4\r\nname: n\r\nsource: s\r\ninner:\r\n  rate: 0.25\r\nnames:\r\n- a\r\nloose: |\r\n  x\r\n  y\r\n"
+    config = load(tmp_path, b"\xef\xbb\xbf" + text.encode())
+    assert config.inner == Inner(0.25) and config.names == ["a"] and config.loose == "x\ny\n"
+    assert refusal(tmp_path, text.replace("0.25", "2")).startswith("test.yaml, line 5: inner.rate must be")
+    assert refusal(tmp_path, text.encode("utf-16")) == "test.yaml is not a YAML file: byte 0 is not UTF-8 text"
+
+
 def test_bom_is_skipped(tmp_path):
     file = tmp_path / "bom.yaml"
     file.write_bytes(b"\xef\xbb\xbfrate: 1")
@@ -381,17 +565,30 @@ plain = st.recursive(
 
 
 def _values(kind: Any, metadata: Any) -> st.SearchStrategy[Any]:
+    kind, optional = optional_kind(kind)
+    if optional and kind is not Any:
+        return st.none() | _values(kind, metadata)
+    kind, rule = without_rule(kind)
+    metadata = metadata if rule is None else rule.metadata
     low, high = metadata.get("low"), metadata.get("high")
     if "choices" in metadata:
         return st.sampled_from(metadata["choices"])
     if dataclasses.is_dataclass(kind):
-        return st.builds(kind, **{key.field.name: values(key) for key in fields_of(kind)})  # type: ignore[arg-type]
+        found = st.builds(kind, **{key.field.name: values(key) for key in fields_of(kind)})  # type: ignore[arg-type]
+        return found.filter(lambda made: not isinstance(made, FrameEntry) or made.forward or made.up)  # else a point
     if typing.get_origin(kind) is list:
+        length = metadata.get("length")
+        if metadata.get("rising"):
+            return st.lists(_values(float, {}), min_size=length, max_size=length, unique=True).map(sorted)
+        if length is not None:
+            return st.lists(_values(typing.get_args(kind)[0], metadata), min_size=length, max_size=length)
         return st.lists(_values(typing.get_args(kind)[0], metadata), max_size=3)
     if typing.get_origin(kind) is dict:
         return st.dictionaries(st.text(max_size=8), _values(typing.get_args(kind)[1], metadata), max_size=3)
+    if members := union_of(kind):
+        return st.one_of([_values(member, metadata) for member in members])
     simple: dict[Any, Any] = {
-        int: st.integers(low, high),
+        int: st.integers(None if low is None else math.ceil(low), None if high is None else math.floor(high)),
         float: st.floats(low, high, allow_nan=False, allow_infinity=False),
         bool: st.booleans(),
         str: texts,
@@ -407,7 +604,7 @@ def relaxed(max_examples: int = 100) -> settings:
     return settings(max_examples=max_examples, deadline=None, suppress_health_check=allowed)
 
 
-@pytest.mark.parametrize("schema", [Outer, Config, Inner])
+@pytest.mark.parametrize("schema", [Outer, Config, Inner, SweepConfig])
 @relaxed(max_examples=60)
 @given(data=st.data())
 def test_round_trip(tmp_path, schema, data):
@@ -436,6 +633,10 @@ yaml_pieces = st.lists(
             "a",
             "inner",
             "rate",
+            "link",
+            "up",
+            "offset",
+            "[0, 0, 1]",
             "${",
             "}",
             "<<",
@@ -457,14 +658,20 @@ yaml_pieces = st.lists(
 @given(junk=st.binary(max_size=200) | st.text(max_size=200).map(lambda t: t.encode()) | yaml_pieces.map(str.encode))
 def test_junk_is_a_user_error(tmp_path, junk):
     file = tmp_path / "junk.yaml"
-    for content in (junk, b"loose: " + junk, b"inner:\n  " + junk):
+    for content in (
+        junk,
+        *(key + junk for key in (b"loose: ", b"inner:\n  ", b"entry: ", b"entries: {a: ", b"vector: ")),
+    ):
         file.write_bytes(content)
         outcome(file, [], Outer)
 
 
 @relaxed(max_examples=300)
 @given(
-    override=st.text(max_size=40) | yaml_pieces | yaml_pieces.map("loose=".__add__) | yaml_pieces.map("inner.".__add__)
+    override=st.text(max_size=40)
+    | st.tuples(
+        st.sampled_from(["", "loose=", "inner.", "entry=", "entry.", "entries=", "sections="]), yaml_pieces
+    ).map("".join)
 )
 def test_junk_overrides_are_a_user_error(tmp_path, override):
     file = tmp_path / "good.yaml"

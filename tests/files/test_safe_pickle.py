@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from mrhubo.body import VPoser, open_skeleton
 from mrhubo.errors import UserError
-from mrhubo.files.safe_pickle import Inert, read_checkpoint, to_array, to_tensor, unpickle
+from mrhubo.files.safe_pickle import RecordedObject, read_checkpoint, to_array, to_tensor, unpickle
 
 MODULES = ("numpy", "scipy", "collections", "_codecs", "__builtin__")
 
@@ -79,7 +79,7 @@ def test_any_bytes_give_plain_objects_or_a_named_error(content: bytes) -> None:
         found = unpickle(io.BytesIO(content), MODULES)
     except UserError:
         return
-    with pytest.raises(UserError) if not isinstance(found, Inert) else _maybe():
+    with pytest.raises(UserError) if not isinstance(found, RecordedObject) else _maybe():
         to_array(found)
 
 

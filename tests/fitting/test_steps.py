@@ -39,6 +39,7 @@ def home(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("drinking", "wave"):
         shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "data" / "motions")
     monkeypatch.setattr(locations, "project_root", lambda: tmp_path)
+    monkeypatch.setattr(locations, "shipped_root", lambda: tmp_path)
     return tmp_path
 
 

@@ -197,15 +197,17 @@ def test_an_answer_is_saved_with_names_and_time(made: Retargeter, tmp_path: Path
 
 
 def test_it_moves_whole(folder: Path) -> None:
-    """Without a second device: to `meta`, where nothing may be left behind, the robot's cost and shapes included."""
+    """Without a second device: to `meta`, where nothing may be left behind."""
     retargeter = Retargeter.load(folder)
-    assert retargeter.to("cpu") is retargeter
-    expected = retargeter.retarget(human(3)).q
-    assert torch.equal(retargeter.to(torch.device("cpu")).retarget(human(3)).q, expected)
+    expected = retargeter.retarget(human(3)).q  # reads the collision shapes too
+    assert retargeter.to("cpu") is retargeter and torch.equal(retargeter.retarget(human(3)).q, expected)
     retargeter.to("meta")
-    tensors = [*retargeter.parameters(), *retargeter.buffers(), retargeter.body_map.robot.lower_N]
-    tensors += [*retargeter.directions.buffers(), *retargeter.collision.buffers()]
-    assert {tensor.device.type for tensor in tensors} == {"meta"}
+    names = {name for name, tensor in [*retargeter.named_parameters(), *retargeter.named_buffers()]}
+    assert {"body_map", "directions", "network", "prior"} <= {name.partition(".")[0] for name in names}
+    for module in retargeter.modules():
+        tensors = [*module.parameters(), *module.buffers(), *(v for v in vars(module).values() if torch.is_tensor(v))]
+        assert {tensor.device.type for tensor in tensors} <= {"meta"}, type(module).__name__
+    assert retargeter.device.type == "meta"
     if torch.cuda.is_available():
         moved = Retargeter.load(folder).to("cuda")
         torch.testing.assert_close(moved.retarget(human(3)).q.cpu(), expected, atol=1e-4, rtol=0)

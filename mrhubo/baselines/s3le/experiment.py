@@ -13,7 +13,7 @@ from torch import Tensor
 
 from mrhubo.baselines.s3le.model import S3LE
 from mrhubo.baselines.s3le.training import S3LEData, make_data, train_s3le
-from mrhubo.body.prior_training.poses import load_training_poses, sound_frames
+from mrhubo.body.prior_training.poses import load_training_poses, plausible_frames
 from mrhubo.config import BaselineConfig, S3LEConfig, to_plain
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, evaluate_clips, latencies, mean_score, run_metrics, score_clip, table
@@ -63,7 +63,7 @@ class Baseline:
         pose_FJ6 = load_training_poses(path)[0]
         generator = torch.Generator().manual_seed(config.s3le.seed)
         chosen = pose_FJ6[torch.randint(len(pose_FJ6), (2 * config.s3le.glue,), generator=generator)]
-        chosen = chosen[sound_frames(chosen, _MAX_EXCESS_DEG)][: config.s3le.glue]
+        chosen = chosen[plausible_frames(chosen, _MAX_EXCESS_DEG)][: config.s3le.glue]
         if not len(chosen):
             raise UserError(f"s3le.poses: {path} holds no pose that a human can strike")
         data = make_data(prepared.body_map, chosen, config.s3le, report)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from mrhubo.baselines.s3le.experiment import Baseline, capture_of, open_run
-from mrhubo.config import BaselineConfig, S3LEConfig, SweepConfig, load_config, to_yaml
+from mrhubo.config import BaselineConfig, SweepConfig, load_config, to_yaml
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.sweeping import Sweep, SweepResult, SweepTrial
 from mrhubo.runtime.progress import SILENT, Reporter
@@ -52,7 +53,7 @@ class S3LETrials:
             errors: dict[tuple[int, float], float] = {}
             for neighbours in NEIGHBOURS:
                 for width in WIDTHS if neighbours > 1 else WIDTHS[:1]:
-                    tried = S3LEConfig(**{**vars(settings), "neighbours": neighbours, "width": width})
+                    tried = replace(settings, neighbours=neighbours, width=width)
                     errors[neighbours, width] = self.baseline.validation_link_cm(model, tried)
             log_all(trial.client, run_id, {f"val/link_cm_{n}_{width}": link for (n, width), link in errors.items()})
             neighbours, width = min(errors, key=lambda pair: errors[pair])

@@ -8,9 +8,11 @@ import torch
 from torch import Tensor
 
 
-def length(x: Tensor, knee: float) -> Tensor:
-    """Euclidean length of the last axis, quadratic below the knee: the mean error counts, not the mean square."""
-    return (x.square().sum(-1) + knee * knee).sqrt() - knee
+def pseudo_huber(x: Tensor, delta: float) -> Tensor:
+    """Pseudo-Huber loss, divided by delta, of the Euclidean norm of the last axis: |x|^2 / (2 delta) near 0, |x| far
+    off, so that the mean error counts, not the mean square.
+    """
+    return (x.square().sum(-1) + delta * delta).sqrt() - delta
 
 
 def sliced_wasserstein(z_BZ: Tensor, slices: int = 64) -> Tensor:
@@ -25,8 +27,8 @@ def sliced_wasserstein(z_BZ: Tensor, slices: int = 64) -> Tensor:
     return ((z_BZ @ direction).sort(dim=0).values - expected[:, None]).square().mean()
 
 
-def column_defect(raw_BJ6: Tensor) -> Tensor:
-    """How far the six raw numbers of each joint are from two orthogonal unit vectors: (B, 21), 0 if they are.
+def orthonormality_penalty(raw_BJ6: Tensor) -> Tensor:
+    """|A'A - I|^2 (B, 21) of each joint's six raw numbers as a matrix A (3, 2): 0 if its columns are orthonormal.
 
     Where a raw vector shrinks to nothing or both become parallel, Gram-Schmidt has a singularity, and second-order
     latent inverse kinematics gets stuck beside it.

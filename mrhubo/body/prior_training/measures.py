@@ -148,7 +148,7 @@ def latent_ik(prior: BodyPrior, skeleton: Skeleton, pose_BJ6: Tensor) -> dict[st
     """
     target = skeleton.keypoints(rotation.sixd_to_matrix(pose_BJ6))
     given = [KEYPOINT_NAMES.index(name) for name in IK_KEYPOINTS]
-    problem = LatentProblem(prior, skeleton, given)
+    problem = LatentProblem(prior.decoder, skeleton, given)
     nothing = torch.zeros(len(pose_BJ6), prior.latent, device=pose_BJ6.device)
     found = []
     for start in (nearest_samples(problem, target[:, given]), nothing):
@@ -165,47 +165,47 @@ _UPPER_BODY = [i for i, name in enumerate(JOINT_NAMES) if i and name not in LEG_
 
 
 def samples(
-    prior: BodyPrior, skeleton: Skeleton, known_BJ6: Tensor | None, count: int = 2_000, seed: int = 0
+    prior: BodyPrior, skeleton: Skeleton, training_BJ6: Tensor | None, count: int = 2_000, seed: int = 0
 ) -> dict[str, float]:
-    """Of poses drawn from N(0, I): share inside anatomical ranges, mean joint distance to the nearest known pose [mm].
+    """Of poses drawn from N(0, I): share inside anatomical ranges, mean joint distance to the nearest training pose.
 
     Args:
         prior: the prior.
         skeleton: gives the joints.
-        known_BJ6: training poses (or a large sample of them) to look for the nearest in; None leaves that out.
+        training_BJ6: training poses (or a large sample of them) to look for the nearest in; None leaves that out.
         count: how many to draw.
         seed: of the draw.
     """
     z = torch.randn(count, prior.latent, generator=torch.Generator().manual_seed(seed))
-    drawn = prior.decode(z.to(prior.identity_F.device))
+    drawn = prior.decode(z.to(prior.device))
     values = {"samples_inside": float(anatomy.inside(drawn).float().mean())}
-    if known_BJ6 is not None:
-        values["samples_nearest_mm"] = float(nearest_mm(skeleton, drawn, known_BJ6).mean())
+    if training_BJ6 is not None:
+        values["samples_nearest_mm"] = float(nearest_mm(skeleton, drawn, training_BJ6).mean())
     return values
 
 
-def nearest_mm(skeleton: Skeleton, pose_BJ6: Tensor, known_BJ6: Tensor) -> Tensor:
-    """Mean distance of the 22 joints [mm] of each pose to its nearest among the known ones: (B,).
+def nearest_mm(skeleton: Skeleton, pose_BJ6: Tensor, training_BJ6: Tensor) -> Tensor:
+    """Mean distance of the 22 joints [mm] of each pose to its nearest among the training poses: (B,).
 
     Nearest in the root mean square over joints, of which the mean over joints is then given.
     """
     joints = len(JOINT_NAMES)
-    points, known = (
+    points, training = (
         torch.cat([skeleton.keypoints(rotation.sixd_to_matrix(part))[:, :joints] for part in poses.split(16_384)])
-        for poses in (pose_BJ6, known_BJ6)
+        for poses in (pose_BJ6, training_BJ6)
     )
-    best = torch.cat([torch.cdist(part, known.flatten(1)).argmin(dim=1) for part in points.flatten(1).split(1_024)])
-    return 1000 * (points - known[best]).norm(dim=-1).mean(dim=1)
+    best = torch.cat([torch.cdist(part, training.flatten(1)).argmin(dim=1) for part in points.flatten(1).split(1_024)])
+    return 1000 * (points - training[best]).norm(dim=-1).mean(dim=1)
 
 
 @torch.no_grad()
-def measure(prior: BodyPrior, pose_BJ6: Tensor, known_BJ6: Tensor | None = None, seed: int = 0) -> dict[str, float]:
+def measure(prior: BodyPrior, pose_BJ6: Tensor, training_BJ6: Tensor | None = None, seed: int = 0) -> dict[str, float]:
     """All measures on unseen poses (B, 21, 6): names with their unit, in the order of the model card.
 
     Args:
         prior: the prior.
         pose_BJ6: poses it was not trained on; up to 500 of them, evenly spaced, go through latent IK.
-        known_BJ6: training poses to measure samples against; None leaves the distance out.
+        training_BJ6: training poses to measure samples against; None leaves the distance out.
         seed: of all draws.
     """
     skeleton = Skeleton().to(pose_BJ6.device)
@@ -218,7 +218,7 @@ def measure(prior: BodyPrior, pose_BJ6: Tensor, known_BJ6: Tensor | None = None,
     }
     values |= latent_ik(prior, skeleton, pose_BJ6[:: max(1, len(pose_BJ6) // 500)])
     values |= detection(prior, skeleton, pose_BJ6, seed)
-    values |= samples(prior, skeleton, known_BJ6, seed=seed)
+    values |= samples(prior, skeleton, training_BJ6, seed=seed)
     return values | denoising(prior, skeleton, pose_BJ6, seed)
 
 

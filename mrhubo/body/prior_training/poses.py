@@ -40,23 +40,23 @@ def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
     return sixd, [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)], [str(n) for n in names]
 
 
-def sound_frames(pose_FJ6: Tensor, max_excess_deg: float) -> Tensor:
+def plausible_frames(pose_FJ6: Tensor, max_excess_deg: float) -> Tensor:
     """Which frames (F,) have no joint further outside its anatomical range: the others are defects of a recording."""
     chunks = (anatomy.excess(rotation.sixd_to_matrix(chunk)) for chunk in pose_FJ6.split(32_768))
     return torch.cat([(chunk <= math.radians(max_excess_deg)).flatten(1).all(dim=1) for chunk in chunks])
 
 
-class Rows(Dataset[Tensor]):
-    """A table of poses, indexed by whole batches of row numbers."""
+class PoseDataset(Dataset[Tensor]):
+    """Poses (F, 21, 6), indexed by whole batches of frame numbers."""
 
-    def __init__(self, rows: Tensor) -> None:
-        self.rows = rows
+    def __init__(self, pose_FJ6: Tensor) -> None:
+        self.pose_FJ6 = pose_FJ6
 
     def __getitem__(self, index: Tensor) -> Tensor:
-        return self.rows[index]
+        return self.pose_FJ6[index]
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.pose_FJ6)
 
 
 class RandomBatches(Sampler[Tensor]):

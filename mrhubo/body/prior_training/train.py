@@ -1,14 +1,15 @@
-"""How the shipped body prior is trained: `python -m mrhubo.body.prior_training --config conf/prior.yaml`.
+"""How the shipped body prior is trained: `python -m mrhubo.prior --config conf/prior.yaml`.
 
 Loss per pose H, decoded as H^ from a latent z drawn from the posterior q, with chordal distances of the 21 rotations
-and distances of all keypoints [m], both rounded off near 0:
+and distances of all keypoints [m], both by a pseudo-Huber loss rho:
 
-    L = sum_j |R_j - R^_j|_F + w_position * sum_k |p_k - p^_k| + w_kl * KL(q(z|H) || N(0, I))
-        + w_latent * SW(z, N(0, I)) + w_anatomy * excess(decode(N(0, I)))^2 + w_columns * defect(raw columns)
+    L = sum_j rho(|R_j - R^_j|_F) + w_position * sum_k rho(|p_k - p^_k|) + w_kl * KL(q(z|H) || N(0, I))
+        + w_latent * SW(z, N(0, I)) + w_anatomy * excess(decode(N(0, I)))^2 + w_columns * |A'A - I|^2
 
 SW, the sliced Wasserstein distance of the batch's latents, makes N(0, I) what the poses look like in the latent space,
-so that samples are poses; the excess over anatomical ranges keeps samples possible; the last term keeps Gram-Schmidt
-away from its singularities, which stop second-order solvers. Every batch is mirrored at random; some poses are seen
+so that samples are poses; the excess over anatomical ranges keeps samples possible; the last term, the orthonormality
+penalty of the six raw numbers of a joint as a matrix A (3, 2), keeps Gram-Schmidt away from its singularities, which
+stop second-order solvers. Every batch is mirrored at random; some poses are seen
 with noise and asked for without. Clips are held out whole. Legend: B batch, Z latent, J = 21 joints.
 """
 
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,85 +29,30 @@ from torch.utils.data import DataLoader
 
 from mrhubo import rotation
 from mrhubo.body import anatomy
-from mrhubo.body.prior import ACTIVATIONS, SHIPPED_WEIGHTS, BodyPrior
+from mrhubo.body.prior import BodyPrior
 from mrhubo.body.prior_training.augmentation import add_missing_motion, add_noise
-from mrhubo.body.prior_training.losses import column_defect, length, sliced_wasserstein
+from mrhubo.body.prior_training.losses import orthonormality_penalty, pseudo_huber, sliced_wasserstein
 from mrhubo.body.prior_training.measures import measure, reconstruction
-from mrhubo.body.prior_training.poses import RandomBatches, Rows, load_training_poses, sound_frames
+from mrhubo.body.prior_training.poses import PoseDataset, RandomBatches, load_training_poses, plausible_frames
 from mrhubo.body.skeleton import Skeleton, mirror_pose
 from mrhubo.callbacks.progress import TrainingProgress
-from mrhubo.config import (
-    bounded,
-    changed_settings,
-    choice,
-    fingerprint,
-    to_plain,
-    without_paths,
-)
+from mrhubo.config import PriorConfig, changed_settings, fingerprint, to_plain, without_paths
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.tracking import git_commit, open_logger, resumable_run
 from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
 from mrhubo.runtime.workspace import Workspace
 
-_KNOWN, _UNSEEN = 50_000, 5_000
+_MEASURED_TRAINING, _MEASURED_HELD_OUT = 50_000, 5_000
 """Poses that the final measures take from the training clips and from those held out."""
 
 _SHOWN = {"val/joint_mm": "held-out joints mm", "val/geodesic_deg": "deg"}
 _EPOCH = 1_000
 """Steps between validations and checkpoints."""
-_ROTATION_KNEE, _POSITION_KNEE = 0.02, 0.002
+_ROTATION_DELTA, _POSITION_DELTA = 0.02, 0.002
+"""Of the pseudo-Huber losses: rotations as a Frobenius norm, positions in metres."""
 _MARGIN = math.radians(5.0)
 """Samples are kept this far inside the anatomical ranges [rad]."""
-
-
-@dataclass
-class PriorConfig:
-    """Training of the body prior."""
-
-    data: Path
-    """File of training poses: `poses` (F, 66) axis-angle, root first; `clip_starts`, one more than clips;
-    `clip_ids`."""
-    output: Path = SHIPPED_WEIGHTS
-    """Where the weights go (.safetensors)."""
-    steps: int = bounded(16_000, 1, 100_000_000)
-    """Optimiser steps."""
-    batch_size: int = bounded(1_024, 2, 1_000_000)
-    """Poses per step."""
-    lr: float = bounded(1e-3, 1e-9, 1.0)
-    """Peak learning rate of AdamW; cosine decay to 0."""
-    weight_decay: float = bounded(1e-4, 0.0, 1.0)
-    """Weight decay of AdamW."""
-    hidden: int = bounded(512, 8, 65_536)
-    """Width of the decoder's two hidden layers."""
-    encoder_hidden: int = bounded(1_024, 8, 65_536)
-    """Width of the encoder's two hidden layers."""
-    latent: int = bounded(32, 1, 1_024)
-    """Size of the latent."""
-    activation: str = choice("silu", *ACTIVATIONS)
-    """Activation of the hidden layers; second-order solvers need a smooth one."""
-    w_position: float = bounded(10.0, 0.0)
-    """Weight of the keypoint distances, 1/m."""
-    w_kl: float = bounded(2e-3, 0.0)
-    """Weight of the Kullback-Leibler divergence from N(0, I)."""
-    w_latent: float = bounded(10.0, 0.0)
-    """Weight of the sliced Wasserstein distance between the batch's latents and N(0, I)."""
-    w_anatomy: float = bounded(60.0, 0.0)
-    """Weight of the squared excess [rad^2] over anatomical ranges of poses decoded from N(0, I)."""
-    w_columns: float = bounded(0.2, 0.0)
-    """Weight that keeps the six raw numbers of every joint near two orthogonal unit vectors."""
-    noise_share: float = bounded(0.3, 0.0, 1.0)
-    """Share of the poses that the encoder sees with noise, and the decoder has to give clean."""
-    max_excess_deg: float = bounded(20.0, 0.0)
-    """Frames with a joint further outside its anatomical range than this are dropped."""
-    missing_share: float = bounded(0.5, 0.0, 1.0)
-    """Share of the poses whose wrists (and of those whose collars, toes) get random angles, which the data lacks."""
-    held_out: float = bounded(0.05, 0.001, 0.5)
-    """Share of the clips held out for validation."""
-    seed: int = bounded(0, 0, 2**32 - 1)
-    """Seed of weights, split and draws."""
-    tracking_dir: Path = field(default_factory=lambda: Path("mlruns"))
-    """Folder of the MLflow database."""
 
 
 class PriorTraining(lightning.LightningModule):
@@ -131,16 +77,16 @@ class PriorTraining(lightning.LightningModule):
         seen_BJ6 = add_noise(pose_BJ6, self.config.noise_share)
         mean, log_std = self.prior.posterior(seen_BJ6)
         z_BZ = mean + log_std.exp() * torch.randn_like(mean)
-        raw_BJ6 = self.prior.decode_raw(torch.cat((z_BZ, torch.randn_like(z_BZ[: len(z_BZ) // 4]))))
+        raw_BJ6 = self.prior.decoder(torch.cat((z_BZ, torch.randn_like(z_BZ[: len(z_BZ) // 4]))))
         decoded = rotation.sixd_to_matrix(raw_BJ6)
         matrices, drawn = decoded[: len(z_BZ)], decoded[len(z_BZ) :]
         anatomy_cost = anatomy.excess(drawn, margin=_MARGIN).square().sum(dim=(1, 2)).mean()
-        columns = column_defect(raw_BJ6).sum(dim=1).mean()
+        columns = orthonormality_penalty(raw_BJ6).sum(dim=1).mean()
         latent = sliced_wasserstein(z_BZ)
         target = rotation.sixd_to_matrix(pose_BJ6)
-        rotations = length((matrices - target).flatten(2), _ROTATION_KNEE).sum(dim=1).mean()
+        rotations = pseudo_huber((matrices - target).flatten(2), _ROTATION_DELTA).sum(dim=1).mean()
         distance = self.skeleton.keypoints(matrices) - self.skeleton.keypoints(target)
-        positions = length(distance, _POSITION_KNEE).sum(dim=1).mean()
+        positions = pseudo_huber(distance, _POSITION_DELTA).sum(dim=1).mean()
         kl = 0.5 * (mean.square() + (2 * log_std).exp() - 1 - 2 * log_std).sum(-1).mean()
         loss = (
             rotations
@@ -177,9 +123,9 @@ class PriorTraining(lightning.LightningModule):
 
 @dataclass(frozen=True)
 class Split:
-    """The sound frames of the training clips, (F, 21, 6), and of the clips held out, of which every fourth is used."""
+    """The plausible frames (F, 21, 6) of the training clips, and of the clips held out, every fourth of them."""
 
-    kept: Tensor
+    training: Tensor
     held_out: Tensor
     clips: int
     held_out_clips: list[str]
@@ -195,19 +141,20 @@ class Split:
         else:
             held = {i for i, name in enumerate(names) if name in held_out_clips}
         parts = [[poses[clips[i]] for i in range(len(clips)) if (i in held) == wanted] for wanted in (False, True)]
-        kept, held_out = (pose[sound_frames(pose, config.max_excess_deg)] for pose in map(torch.cat, parts))
-        if not len(kept) or not len(held_out):
+        training, held_out = (pose[plausible_frames(pose, config.max_excess_deg)] for pose in map(torch.cat, parts))
+        if not len(training) or not len(held_out):
             raise UserError(f"max_excess_deg: {config.max_excess_deg:g} leaves no frame to train or to validate on")
-        share = 1 - (len(kept) + len(held_out)) / len(poses)
-        return cls(kept, held_out[::4], len(clips), [names[i] for i in sorted(held)], share)
+        share = 1 - (len(training) + len(held_out)) / len(poses)
+        return cls(training, held_out[::4], len(clips), [names[i] for i in sorted(held)], share)
 
-    def known(self, seed: int) -> Tensor:
+    def training_sample(self, seed: int) -> Tensor:
         """Training poses to measure samples against."""
-        return self.kept[torch.randperm(len(self.kept), generator=torch.Generator().manual_seed(seed))[:_KNOWN]]
+        order = torch.randperm(len(self.training), generator=torch.Generator().manual_seed(seed))
+        return self.training[order[:_MEASURED_TRAINING]]
 
-    def unseen(self) -> Tensor:
+    def held_out_sample(self) -> Tensor:
         """Held-out poses for the measures, evenly spaced."""
-        return self.held_out[:: max(1, len(self.held_out) // _UNSEEN)]
+        return self.held_out[:: max(1, len(self.held_out) // _MEASURED_HELD_OUT)]
 
 
 def train(config: PriorConfig, report: Reporter = SILENT) -> BodyPrior:
@@ -238,17 +185,17 @@ def train(config: PriorConfig, report: Reporter = SILENT) -> BodyPrior:
                 ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
             ],
         )
-        batches = RandomBatches(len(split.kept), config.batch_size, epoch, config.seed)
+        batches = RandomBatches(len(split.training), config.batch_size, epoch, config.seed)
         in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
         run_trainer(
             trainer,
             module,
             workspace.last_checkpoint(),
-            DataLoader(Rows(split.kept), sampler=batches, batch_size=None),
-            DataLoader(Rows(split.held_out), sampler=in_order, batch_size=None),
+            DataLoader(PoseDataset(split.training), sampler=batches, batch_size=None),
+            DataLoader(PoseDataset(split.held_out), sampler=in_order, batch_size=None),
         )
         prior = module.prior.cpu().requires_grad_(False).eval()
-        measures = measure(prior, split.unseen(), split.known(config.seed), config.seed)
+        measures = measure(prior, split.held_out_sample(), split.training_sample(config.seed), config.seed)
         logger.log_metrics({f"held_out/{name}": value for name, value in measures.items()}, config.steps)
         prior.save(config.output, _card(config, split, measures))
         workspace.finish()

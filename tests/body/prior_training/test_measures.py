@@ -8,7 +8,8 @@ from sklearn.metrics import roc_auc_score
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, anatomy, measures
+from mrhubo.body import POSED_JOINT_NAMES, BodyPrior, Skeleton, anatomy
+from mrhubo.body.prior_training import measures
 
 
 @pytest.fixture(scope="module")

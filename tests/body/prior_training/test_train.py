@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 import torch
 
-from mrhubo.body import BodyPrior, training
-from mrhubo.body.prior_training.__main__ import main
-from mrhubo.body.prior_training.poses import load_training_poses, sound_frames
-from mrhubo.body.prior_training.train import PriorConfig, PriorTraining, train
+from mrhubo.body import BodyPrior
+from mrhubo.body.prior_training import train as training
+from mrhubo.body.prior_training.poses import load_training_poses, plausible_frames
+from mrhubo.body.prior_training.train import PriorTraining, train
+from mrhubo.config import PriorConfig
 from mrhubo.errors import UserError
 from mrhubo.files.storage import read_tensors
+from mrhubo.prior import main
 
 
 @pytest.fixture
@@ -104,6 +106,8 @@ def test_missing_and_truncated_files_are_refused(data: Path) -> None:
 
 def test_defects_of_the_recording_are_dropped(data: Path) -> None:
     poses, _, _ = load_training_poses(data)
-    assert 0 < float(sound_frames(poses, 20.0).float().mean()) <= float(sound_frames(poses, 40.0).float().mean())
+    assert (
+        0 < float(plausible_frames(poses, 20.0).float().mean()) <= float(plausible_frames(poses, 40.0).float().mean())
+    )
     with pytest.raises(UserError, match="max_excess_deg: 0 leaves no frame"):
         training.Split.of(PriorConfig(data=data, max_excess_deg=0.0, held_out=0.001))

@@ -1,0 +1,226 @@
+"""Every benchmark runs to its end at a tiny size and prints its tables; the figures themselves mean nothing here."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from subprocess import PIPE
+
+import numpy as np
+import pytest
+import torch
+
+from mrhubo import pair, rotation
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.pairing import lbfgs
+from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.robot import build_body_map
+
+SCRIPTS = ["pair_pictures", "pair_quality", "pairing", "prior", "prior_experiments", "reference", "retarget", "scaling"]
+SCRIPTS += ["training"]
+LIBRARIES = ["common", "levenberg_marquardt"]
+Run = Callable[..., str]
+
+
+@pytest.fixture
+def run(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Runs a benchmark's `main` in this process, from the repository's root, and gives what it printed."""
+
+    def run(name: str, *arguments: object) -> str:
+        argv = [str(argument) for argument in arguments]
+        monkeypatch.chdir(root)
+        monkeypatch.setattr(sys, "argv", [f"benchmarks/{name}.py", *argv])
+        importlib.import_module(name).main(argv)
+        text = capsys.readouterr().out
+        assert re.search(r"^machine: .*\ncommit:  .*\ncommand: python benchmarks/" + name, text, re.M), text
+        assert "nan" not in text.lower().split()
+        return text
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def clips(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of two short motions: 24 frames of two shipped ones."""
+    folder = tmp_path_factory.mktemp("clips")
+    for name in ("wave", "boxing"):
+        motion = np.load(root / "data" / "motions" / f"{name}.npz")
+        arrays = {key: motion[key][60:84] if motion[key].ndim == 2 else motion[key] for key in motion.files}
+        np.savez(folder / f"{name}.npz", **arrays)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of training poses: ten clips of poses that the shipped prior draws, one under a name that it held out."""
+    prior = BodyPrior.open()
+    z = torch.randn(200, prior.latent, generator=torch.Generator().manual_seed(0))
+    turns = rotation.matrix_to_axis_angle(prior.decode_matrices(z)).flatten(1)
+    poses = torch.cat((torch.zeros(200, 3), turns), dim=1).numpy()
+    path = tmp_path_factory.mktemp("capture") / "poses.npz"
+    names = np.array([json.loads(prior.metadata["card"])["held_out_clips"][0], *(f"clip{i}" for i in range(9))])
+    np.savez(path, poses=poses, clip_starts=np.arange(0, 201, 20), clip_ids=names)
+    return path
+
+
+def rows(text: str, heading: str) -> list[list[str]]:
+    """The cells of the first table whose heading starts with a word, without the heading."""
+    lines = iter(text.splitlines())
+    for line in lines:
+        if line.startswith(f"| {heading}"):
+            next(lines)
+            break
+    else:
+        raise AssertionError(f"no table of '{heading}' in\n{text}")
+    found = []
+    for line in lines:
+        if not line.startswith("|"):
+            break
+        found.append([cell.strip() for cell in line.strip("|").split("|")])
+    return found
+
+
+def few_pairs(folder: Path) -> list[str]:
+    return [f"pairs.dir={folder}", "pairs.amortiser_steps=10", "pairs.shard_size=100", "pairs.fine_steps=3"]
+
+
+def two_clips(folder: Path) -> list[str]:
+    return [f"evaluation.motions=[{folder}]", "evaluation.validation=[wave]"]
+
+
+def test_every_benchmark_has_a_test(root: Path) -> None:
+    assert sorted(path.stem for path in (root / "benchmarks").glob("*.py")) == sorted(SCRIPTS + LIBRARIES)
+    here = Path(__file__).read_text()
+    assert all(f'run("{name}"' in here for name in SCRIPTS)
+
+
+@pytest.fixture
+def short_lbfgs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The paper's solver stops early: its 500 iterations take seconds for a single pose too."""
+    monkeypatch.setattr(lbfgs, "_ITERATIONS", 5)
+
+
+@pytest.mark.usefixtures("short_lbfgs")
+def test_pairing(run: Run, tmp_path: Path) -> None:
+    sizes = ["--robots", "nao", "--poses", 5, "--parts", 20, "--reverse", 5, "--exhaustive", 10, "--pairs", 300]
+    text = run("pairing", *sizes, *few_pairs(tmp_path))
+    methods = [row[0] for row in rows(text, "method")]
+    assert len(methods) == 6 and "fine (up to 3 steps)" in methods
+    assert [row[0] for row in rows(text, "part")][-2] == "all of `fast`"
+    assert [row[0] for row in rows(text, "reverse pairs")][1] == "4 starts (used)"
+    assert [row[0] for row in rows(text, "`mrhubo.pair`")] == ["fast", "fine", "reverse"]
+
+
+@pytest.mark.usefixtures("short_lbfgs")
+def test_pair_pictures(run: Run, tmp_path: Path) -> None:
+    options = ["--robots", "nao", "--poses", 8, "--out", tmp_path / "pictures"]
+    text = run("pair_pictures", *options, *few_pairs(tmp_path))
+    assert [row[:2] for row in rows(text, "robot")] == [["nao", solver] for solver in ("fine", "fast", "paper")]
+    assert (tmp_path / "pictures" / "pairs_nao.png").stat().st_size > 10_000
+
+
+def test_pair_quality(run: Run, tmp_path: Path, clips: Path) -> None:
+    options = ["--robots", "nao", "--only", "not aligned", "--counts", "100,200,300", "--results", tmp_path / "results"]
+    small = ["model.hidden=8", "trainer.max_steps=2", "trainer.batch_size=16", "trainer.validate_every=2"]
+    settings = [*few_pairs(tmp_path), *two_clips(clips), *small, "trainer.accelerator=cpu"]
+    text = run("pair_quality", *options, *settings)
+    ((name, error),) = rows(text, "pairs")
+    assert name == "fine, 200, linear, k 1, not aligned" and float(error) > 0
+    assert run("pair_quality", *options, *settings) == text, "what is in the results is not trained again"
+
+
+def test_prior(run: Run, tmp_path: Path, clips: Path, capture: Path) -> None:
+    (tmp_path / "prior.yaml").write_text(f"data: {capture}\nmax_excess_deg: 180\n")
+    text = run("prior", "--motions", clips, "--seconds", 0.01, "--config", tmp_path / "prior.yaml")
+    assert all(row[1] and row[2] for row in rows(text, "measure") if "others' limbs" not in row[0])
+    assert [row[0] for row in rows(text, "clip")] == ["boxing", "wave", "mean over clips"]
+    assert [row[0] for row in rows(text, "joint")][:3] == ["hip", "spine1", "knee"]
+    assert "poses/s decoded" in text
+
+
+def test_prior_experiments(run: Run, tmp_path: Path, clips: Path, capture: Path) -> None:
+    (tmp_path / "prior.yaml").write_text(f"data: {capture}\ntracking_dir: {tmp_path}\nmax_excess_deg: 180\n")
+    small = ["steps=2", "batch_size=8", "hidden=8", "encoder_hidden=8", "held_out=0.2"]
+    options = ["--config", tmp_path / "prior.yaml", "--only", "no noise", "--motions", clips]
+    ((name, *cells),) = rows(run("prior_experiments", *options, *small), "variant")
+    assert name == "no noise" and sum(float(cell) >= 0 for cell in cells if cell) >= len(cells) - 1
+
+
+def test_reference(run: Run, clips: Path) -> None:
+    text = run("reference", "--robots", "nao", *two_clips(clips))
+    assert "## nao, 2 clips, " in text
+    assert [row[0] for row in rows(text, "output")] == ["q", "q_cf, from q"]
+
+
+def test_retarget(run: Run, root: Path, tmp_path: Path) -> None:
+    config = load_config(root / "conf" / "nao.yaml", ["model.hidden=8"])
+    body_map = build_body_map(config.robot)
+    torch.manual_seed(0)
+    package = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
+    folder = package.save(tmp_path / "package", {"run_id": "abc"})
+    ((_, one, twenty),) = rows(run("retarget", folder, "--frames", "1,20", "--rounds", 2), "commit")
+    assert 0 < float(one.split()[0]) < 1_000 and 0 < float(twenty.split()[0]) < 1_000
+
+
+def test_retarget_compares_two_checkouts(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes that claim known times stand in for those that retarget: the other checkout's is half of ours."""
+    retarget = importlib.import_module("retarget")
+
+    @contextmanager
+    def claims(checkout: Path, package: Path) -> Iterator[subprocess.Popen[str]]:
+        factor = 1 if checkout == tmp_path else 2
+        code = f"import sys\nfor line in sys.stdin: print(0.001 * {factor} * int(line), flush=True)"
+        process = subprocess.Popen([sys.executable, "-c", code], stdin=PIPE, stdout=PIPE, text=True, bufsize=1)
+        yield process
+        process.communicate()
+
+    monkeypatch.setattr(retarget, "server", claims)
+    text = run("retarget", tmp_path, "--against", tmp_path, "--frames", "1,20", "--rounds", 5)
+    ours, other, ratio = rows(text, "commit")
+    assert ours[1:] == ["2.000 (2.000 to 2.000)", "40.000 (40.000 to 40.000)"] and other[1].startswith("1.000 ")
+    assert ratio == ["first over second", "2.000", "2.000"]
+
+
+def test_scaling(run: Run, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The commands run in this process, one rank each, as starting a dozen would take a minute; of a fit's, whose
+    parts other tests run, it is only checked that its file and keys exist.
+    """
+    scaling = importlib.import_module("scaling")
+    commands = []
+
+    def run_here(arguments: list[str]) -> float:
+        start = len(arguments) - 1 - arguments[::-1].index("-m")
+        command, (flag, config, *rest) = arguments[start + 1], arguments[start + 2 :]
+        commands.append(command)
+        if command == "mrhubo.pair":
+            pair.main([*arguments[start + 2 :], "pairs.workers=1"])
+        else:
+            assert flag == "--config"
+            load_config(root / config, [argument for argument in rest if "=" in argument])
+        return float(len(commands))
+
+    monkeypatch.setattr(scaling, "run", lambda arguments: run_here(list(arguments)))
+    small = ["pairs.amortiser_steps=10", "pairs.shard_size=100", "pairs.fine_steps=3"]
+    text = run("scaling", "--pairs", 200, "--steps", 5, "--torchrun", "2", *small)
+    assert commands == ["mrhubo.pair"] * 4 + ["mrhubo.fit"] * 5
+    assert len(rows(text, "pairs")) == 3 and "the same bytes: yes" in text
+    assert [row[0] for row in rows(text, "training")] == ["one process", "torchrun, 2 processes"]
+
+
+def test_scaling_starts_commands_and_says_what_failed() -> None:
+    scaling = importlib.import_module("scaling")
+    assert 0 < scaling.run(["-c", "pass"]) < 60
+    with pytest.raises(SystemExit, match="no luck"):
+        scaling.run(["-c", "raise ValueError('no luck')"])
+
+
+def test_training(run: Run) -> None:
+    text = run("training", "--steps", 2, "--pairs", 64, "--repeats", 1, "trainer.batch_size=16", "model.hidden=8")
+    assert [row[0] for row in rows(text, "loop")] == ["bare loop", "Trainer", "Trainer + MLflow"]

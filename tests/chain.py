@@ -1,0 +1,76 @@
+"""What tests of the whole chain share: the ways into the package, all named here, and short motions."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+import mrhubo
+from mrhubo import Motion, OptimizationRetargeter, Retargeter, read_motion
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.files.storage import read_tensors, write_tensors
+from mrhubo.fit import main as fit
+from mrhubo.pair import main as pair
+from mrhubo.retargeter import build_network
+from mrhubo.robot import build_body_map
+
+ROOT = Path(__file__).resolve().parent.parent
+__all__ = [
+    "ROOT", "Motion", "answer", "cut_motion", "fit", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
+    "read_tensors", "write_tensors",
+]  # fmt: skip
+
+
+def quietly(command: Callable[[list[str]], object], arguments: Sequence[str]) -> str:
+    """Runs a command in this process; what it printed."""
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        command(list(arguments))
+    return output.getvalue()
+
+
+def load(folder: Path) -> Retargeter:
+    """A package's retargeter."""
+    return mrhubo.load(folder)
+
+
+def answer(retargeter: Retargeter, motion: Motion) -> dict[str, Tensor]:
+    """Joint angles (T, N) and all that is said about them."""
+    result = retargeter(motion)
+    return {name: getattr(result, name) for name in ("q", "confidence", "direction_error_deg", "phi", "collision")}
+
+
+def optimise(config: Path, motions: Iterable[Motion], smoothness: Iterable[float]) -> dict[float, list[Tensor]]:
+    """The reference retargeter's joint angles (T, N) of each motion, by smoothness; with 0 each frame is on its own."""
+    body_map, found = build_body_map(load_config(config).robot), {}
+    for weight in smoothness:
+        retargeter = OptimizationRetargeter(body_map, weight)
+        found[weight] = [retargeter(motion).q for motion in motions]
+    return found
+
+
+def new_package(config: Path, folder: Path, *overrides: str) -> Path:
+    """A package with random weights: what holds for them holds for trained ones."""
+    settings = load_config(config, overrides)
+    body_map = build_body_map(settings.robot)
+    torch.manual_seed(0)
+    network = build_network(settings, body_map)
+    return Retargeter(network, body_map, BodyPrior.open(), settings, phi_threshold=0.01).save(folder, {})
+
+
+def cut_motion(name: str, folder: Path, seconds: tuple[float, float] = (0, 1e9), every: int = 1) -> Path:
+    """A part of a shipped motion as a file of its own: from one second to another, every so many frames."""
+    with np.load(ROOT / "data" / "motions" / f"{name}.npz") as data:
+        arrays = dict(data)
+    frames, rate = len(arrays["pose_body"]), float(arrays["mocap_frame_rate"])
+    part = slice(int(seconds[0] * rate), int(min(seconds[1] * rate, frames)), every)
+    arrays = {key: array[part] if array.ndim and len(array) == frames else array for key, array in arrays.items()}
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez(folder / f"{name}.npz", **{**arrays, "mocap_frame_rate": np.array(rate / every)})
+    return folder / f"{name}.npz"

@@ -1,0 +1,64 @@
+"""Which name is near enough to be suggested."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mrhubo.errors import nearest, unknown_name
+
+PARTS = ["chest", "head", "left_elbow", "left_hand", "left_shoulder", "left_wrist", "right_hand", "right_wrist"]
+KEYS = ["accelerator", "batch_size", "loss", "lr", "max_steps", "precision", "seed", "validate_every", "weight_decay"]
+
+
+@pytest.mark.parametrize(
+    ("name", "names", "near"),
+    [
+        ("left_elbo", PARTS, "left_elbow"),
+        ("left_ebwo", PARTS, "left_elbow"),  # swapped, and one is missing
+        ("haed", PARTS, "head"),  # swapped
+        ("leftelbow", PARTS, "left_elbow"),
+        ("LeftElbow", PARTS, "left_elbow"),
+        ("left-elbow", PARTS, "left_elbow"),
+        ("elbow", PARTS, "left_elbow"),  # a word that no other has
+        ("wrist", PARTS, None),  # two have it
+        ("left", PARTS, None),
+        ("right_h", PARTS, "right_hand"),
+        ("foot", PARTS, None),
+        ("hip", PARTS, None),
+        ("learning_rate", KEYS, None),
+        ("step", KEYS, None),
+        ("steps", KEYS, "max_steps"),
+        ("batch", KEYS, "batch_size"),
+        ("maxsteps", KEYS, "max_steps"),
+        ("seed_of_it", KEYS, "seed"),
+        ("lr", ["dir", "uri"], None),
+        ("", KEYS, None),
+        ("x", [], None),
+    ],
+)
+def test_near(name: str, names: list[str], near: str | None) -> None:
+    assert nearest(name, names) == near
+
+
+@given(st.sampled_from(PARTS + KEYS), st.data())
+def test_one_slip_is_near(name: str, data: st.DataObject) -> None:
+    place = data.draw(st.integers(0, len(name) - 1))
+    letter = data.draw(st.sampled_from("aexz_"))
+    slips = [name[:place] + letter + name[place:], name[:place] + letter + name[place + 1 :]]
+    slips += [name[:place] + name[place + 1 :], name[:place] + name[place : place + 2][::-1] + name[place + 2 :]]
+    slip = data.draw(st.sampled_from(slips))
+    assert nearest(slip, [name]) == name
+
+
+@given(st.text(max_size=12), st.lists(st.text(max_size=12)))
+def test_what_is_suggested_exists(name: str, names: list[str]) -> None:
+    near = nearest(name, names)
+    assert near is None or near in names
+
+
+def test_sentences() -> None:
+    assert unknown_name("link", "Hed", ["Head"], "nao.urdf") == "link 'Hed' does not exist in nao.urdf; nearest: 'Head'"
+    assert unknown_name("link", "Foot", ["Head", "Arm"]) == "link 'Foot' does not exist; available: Arm, Head"
+    assert unknown_name("link", "Foot", []) == "link 'Foot' does not exist; available: none"
