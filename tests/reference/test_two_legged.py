@@ -219,6 +219,12 @@ def test_keypoints_have_the_directions_and_a_humans_lengths(body_map: BodyMap) -
         across_B3 = torch.nn.functional.normalize(at["left_shoulder"] - at["right_shoulder"], dim=-1)
         left_B3 = torch.linalg.cross(seen["chest_up"], seen["chest_forward"])
         torch.testing.assert_close(across_B3, left_B3, atol=1e-5, rtol=0)
+        chest_B33 = torch.stack((left_B3, seen["chest_up"], seen["chest_forward"]), dim=-1)
+        for direction in body_map.directions:
+            if isinstance(direction, Limb) and direction.part.seen_from == "chest":
+                bone_B3 = torch.nn.functional.normalize(at[direction.part.end] - at[direction.part.start], dim=-1)
+                expected_B3 = (chest_B33 @ seen[direction.name][..., None])[..., 0]
+                torch.testing.assert_close(bone_B3, expected_B3, atol=1e-5, rtol=0)
 
 
 def test_a_human_is_turned_until_he_points_there(body_map: BodyMap) -> None:

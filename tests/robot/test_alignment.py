@@ -62,6 +62,20 @@ def test_an_arm_is_not_twisted(root: Path, humans: torch.Tensor) -> None:
     assert float((turn * arm).sum(1).abs().max()) < 1e-3
 
 
+def test_neck_and_head_share_the_heads_turn(root: Path, humans: torch.Tensor) -> None:
+    body_map, direction_BD3 = of(root, "reachy")
+    before, after = (
+        body_map.skeleton.global_rotations(rotation.sixd_to_matrix(p))
+        for p in (humans, align(body_map, humans, direction_BD3))
+    )
+    neck_B, head_B = (
+        rotation.geodesic_distance(before[:, joint], after[:, joint])
+        for joint in (JOINT_NAMES.index("neck"), JOINT_NAMES.index("head"))
+    )
+    assert float(head_B.max()) > 0.5
+    torch.testing.assert_close(neck_B, head_B / 2, atol=2e-3, rtol=0)
+
+
 def test_mirrored_poses_are_aligned_in_mirror_image(root: Path, humans: torch.Tensor) -> None:
     body_map, direction_BD3 = of(root, "reachy")
     flip = torch.tensor([-1.0, 1.0, 1.0])
