@@ -45,7 +45,7 @@ _HOMES = {
     "UserError": "mrhubo.errors",
     "read_motion": "mrhubo.motion",
 }
-"""Module of each public name, and its name there where that is another."""
+"""Module of each public name."""
 
 
 def load(source: str | os.PathLike[str]) -> Retargeter:
@@ -72,8 +72,7 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         value: Any = _version()
     elif name in _HOMES:
-        module, _, other = _HOMES[name].partition(":")
-        value = getattr(importlib.import_module(module), other or name)
+        value = getattr(importlib.import_module(_HOMES[name]), name)
     else:
         raise AttributeError(f"module 'mrhubo' has no attribute '{name}'")
     globals()[name] = value
