@@ -18,8 +18,10 @@ __all__ = [
     "matrix_to_axis_angle",
     "matrix_to_quaternion",
     "matrix_to_sixd",
+    "orthonormal",
     "quaternion_to_matrix",
     "sixd_to_matrix",
+    "stack_columns",
     "wrap_angle",
 ]
 
@@ -39,6 +41,20 @@ def sixd_to_matrix(sixd: Tensor) -> Tensor:
         second = second - (x * second).sum(-1, keepdim=True) * x
     y = second * torch.rsqrt(second.square().sum(-1, keepdim=True) + _TINY)
     return torch.stack((x, y, torch.linalg.cross(x, y)), dim=-1)
+
+
+def orthonormal(matrix: Tensor) -> Tensor:
+    """(..., 3, 3) nearly rotations to rotations: Gram-Schmidt on the first two columns."""
+    return sixd_to_matrix(matrix_to_sixd(matrix))
+
+
+def stack_columns(sixd: Tensor) -> Tensor:
+    """(..., 6) to (..., 3, 3): the two columns as they are, and their cross product.
+
+    A rotation if they are orthonormal; `matrix_to_sixd` gives the same six numbers back, bit for bit.
+    """
+    first, second = sixd[..., :3], sixd[..., 3:]
+    return torch.stack((first, second, torch.linalg.cross(first, second)), dim=-1)
 
 
 def axis_angle_to_matrix(axis_angle: Tensor) -> Tensor:

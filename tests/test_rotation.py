@@ -44,6 +44,42 @@ def test_sixd_round_trip_and_projection() -> None:
     torch.testing.assert_close(torch.linalg.det(projected), torch.ones(100, dtype=torch.float64))
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_a_rotation_stays_and_an_oblique_matrix_becomes_one(dtype: torch.dtype) -> None:
+    rounding = 4 * torch.finfo(dtype).eps + 1e-11  # 1e-12 keeps the square root of a column's length finite
+    matrix = rotation.axis_angle_to_matrix(random_axis_angle(500)).to(dtype).unflatten(0, (20, 25))
+    torch.testing.assert_close(rotation.orthonormal(matrix), matrix, atol=rounding, rtol=0)
+    oblique = matrix + 0.1 * torch.randn(matrix.shape, generator=torch.Generator().manual_seed(1), dtype=dtype)
+    mended = rotation.orthonormal(oblique)
+    assert mended.shape == matrix.shape and mended.dtype == dtype
+    identity = torch.eye(3, dtype=dtype).expand_as(mended)
+    torch.testing.assert_close(mended.mT @ mended, identity, atol=rounding, rtol=0)
+    torch.testing.assert_close(torch.linalg.det(mended), torch.ones(20, 25, dtype=dtype), atol=rounding, rtol=0)
+    torch.testing.assert_close(rotation.orthonormal(mended), mended, atol=rounding, rtol=0)
+    assert float((oblique.mT @ oblique - identity).abs().max()) > 0.1  # else the test shows nothing
+    assert float(rotation.geodesic_distance(mended, matrix).max()) < 0.6  # it is near what was disturbed
+
+
+def test_the_first_column_keeps_its_direction_and_the_second_its_plane() -> None:
+    oblique = torch.randn(200, 3, 3, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+    mended = rotation.orthonormal(oblique)
+    first, second = torch.nn.functional.normalize(oblique, dim=-2).unbind(-1)[:2]
+    torch.testing.assert_close(mended[..., 0], first, atol=1e-9, rtol=0)
+    assert float((mended[..., 2] * second).sum(-1).abs().max()) < 1e-9
+    assert bool(((mended[..., 1] * second).sum(-1) > 0).all())
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_stacked_columns_are_the_same_six_numbers(dtype: torch.dtype) -> None:
+    """Bit for bit, rotation or not; where they are a rotation's, it is that rotation."""
+    sixd = torch.randn(7, 40, 6, generator=torch.Generator().manual_seed(3), dtype=dtype)
+    assert torch.equal(rotation.matrix_to_sixd(rotation.stack_columns(sixd)), sixd)
+    matrix = rotation.axis_angle_to_matrix(random_axis_angle(200)).to(dtype)
+    found = rotation.stack_columns(rotation.matrix_to_sixd(matrix))
+    assert torch.equal(found[..., :2], matrix[..., :2])
+    torch.testing.assert_close(found, matrix, atol=4 * torch.finfo(dtype).eps, rtol=0)
+
+
 @pytest.mark.parametrize("apart", [1e-1, 1e-2, 1e-3])
 def test_nearly_parallel_halves_still_give_a_rotation_in_float32(apart: float) -> None:
     first, other = torch.randn(2, 500, 3, generator=torch.Generator().manual_seed(0))

@@ -25,6 +25,7 @@ from mrhubo.files.storage import checksum_tensors, locked
 from mrhubo.pairing import ProportionTest, pose_settings
 from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
+from mrhubo.rotation import matrix_to_sixd
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.tracking import log_all, start_run
 from mrhubo.search import open_study, open_trials
@@ -101,14 +102,14 @@ class ScaleFactorSearch(lightning.Callback):
         """
         assert config.robot.search is not None and config.robot.manual is not None
         self.config, self.start, self.settings = config, config.robot.manual, config.robot.search
-        pose_FJ6 = torch.cat([clip.motion.pose_TJ6 for clip in clips])
+        local_FJ33 = torch.cat([clip.motion.local_TJ33 for clip in clips])
         reference_FN = torch.cat([clip.reference_TN for clip in clips])
-        chosen = _reachable(body_map, reference_FN, pose_FJ6, self.settings.poses)
-        self.q_PN, self.pose_PJ6 = reference_FN[chosen], pose_FJ6[chosen]
-        self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.pose_PJ6, config.model.input_frame)
+        chosen = _reachable(body_map, reference_FN, local_FJ33, self.settings.poses)
+        self.q_PN, self.local_PJ33 = reference_FN[chosen], local_FJ33[chosen]
+        self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.local_PJ33, config.model.input_frame)
         self.artist = Artist(body_map.robot, body_map.skeleton)
         self.folder, self.report, self.found = folder, report, found
-        measured_on = checksum_tensors({"q": self.q_PN, "pose": self.pose_PJ6}, {})
+        measured_on = checksum_tensors({"q": self.q_PN, "pose": matrix_to_sixd(self.local_PJ33)}, {})
         pairs, robot = config.pairs, pose_settings(config)
         robot["search"] = {**robot["search"], "trials": 0}  # more of them go on where fewer stopped
         self.name = f"{config.robot.name}-scale-" + fingerprint(
@@ -215,24 +216,24 @@ class ScaleFactorSearch(lightning.Callback):
 
     def _poses(self, best: ManualScaleConfig, worst: ManualScaleConfig, count: int = 5) -> Image:
         """Human poses, the reference's robot poses, and what the best and the worst numbers make of those."""
-        pose_2PJ6 = self.test.human_poses([best, worst])
+        local_2PJ33 = self.test.human_poses([best, worst])
         shown = [round(place) for place in np.linspace(0.1, 0.9, count) * (len(self.q_PN) - 1)]
         rows = [
-            [self.artist.human(self.pose_PJ6[i]) for i in shown],
+            [self.artist.human(self.local_PJ33[i]) for i in shown],
             [self.artist.robot_figure(self.q_PN[i]) for i in shown],
-            *([self.artist.human(pose_PJ6[i]) for i in shown] for pose_PJ6 in pose_2PJ6),
+            *([self.artist.human(local_PJ33[i]) for i in shown] for local_PJ33 in local_2PJ33),
         ]
-        best_deg, worst_deg = self.test.distances(pose_2PJ6).rad2deg().mean(dim=1).tolist()
+        best_deg, worst_deg = self.test.distances(local_2PJ33).rad2deg().mean(dim=1).tolist()
         titles = ["human", "reference", f"best: {best_deg:.1f} deg", f"worst: {worst_deg:.1f} deg"]
         caption = f"{self.config.robot.name}: what the best and the worst scale factor make of the robot's poses"
         return figure_sheet(rows, (), titles, caption)
 
 
 @torch.no_grad()
-def _reachable(body_map: BodyMap, q_FN: Tensor, pose_FJ6: Tensor, count: int) -> Tensor:
+def _reachable(body_map: BodyMap, q_FN: Tensor, local_FJ33: Tensor, count: int) -> Tensor:
     """`count` frames, evenly spaced among those in which every limb of the robot points where the human's does."""
     robot_FD3 = body_map.robot_directions(body_map.robot.forward(q_FN))
-    off_F = angle_between(robot_FD3, body_map.human_directions(pose_FJ6)).amax(dim=1)
+    off_F = angle_between(robot_FD3, body_map.human_directions(local_FJ33)).amax(dim=1)
     reached = (off_F < _REACHED_RAD).nonzero()[:, 0]
     if len(reached) < count:
         reached = off_F.argsort()[:count].sort().values

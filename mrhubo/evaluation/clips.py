@@ -106,8 +106,8 @@ def solve_references(
                 reference = tensors["q"] if found == header else None
             except (DamagedFile, KeyError):
                 reference = None
-            if reference is None or reference.shape != (len(motion.pose_TJ6), len(body_map.robot.joint_names)):
-                reference = retargeter.retarget(motion.pose_TJ6, motion.frame_rate).q_TN.float()
+            if reference is None or reference.shape != (len(motion), len(body_map.robot.joint_names)):
+                reference = retargeter.retarget(motion.local_TJ33, motion.frame_rate).q_TN.float()
                 write_tensors(path, {"q": reference}, header)
             clips.append(Clip(motion, reference))
         progress.update(len(everything))

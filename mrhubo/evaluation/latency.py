@@ -1,6 +1,6 @@
 """How long a retargeter takes for a frame.
 
-Legend: T frames, N joints.
+Legend: T frames, J = 21 human joints.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from mrhubo.evaluation.clips import Clip
 from mrhubo.runtime.threads import use_threads
 
 
-def latency_us(predict: Callable[[Tensor], Tensor], pose_TJ6: Tensor, batch: int, seconds: float = 0.5) -> float:
+def latency_us(predict: Callable[[Tensor], Tensor], local_TJ33: Tensor, batch: int, seconds: float = 0.5) -> float:
     """Median time a frame [us] of `batch` frames at once, one thread, over calls that take `seconds` together."""
-    frames = pose_TJ6.repeat(-(-batch // len(pose_TJ6)), 1, 1)[:batch]
+    frames = local_TJ33.repeat(-(-batch // len(local_TJ33)), 1, 1, 1)[:batch]
     found = []
     with use_threads(1):
         predict(frames)
@@ -33,6 +33,6 @@ def latencies(predict: Callable[[Tensor], Tensor], clips: Sequence[Clip], second
     """`latency_us` of one frame alone and `latency_1000_us` a frame of 1,000 at once, frames of the clips: as
     `latency_us`.
     """
-    pose_TJ6 = torch.cat([clip.motion.pose_TJ6 for clip in clips])
+    local_TJ33 = torch.cat([clip.motion.local_TJ33 for clip in clips])
     batches = {"latency_us": 1, "latency_1000_us": 1_000}
-    return {name: latency_us(predict, pose_TJ6, batch, seconds) for name, batch in batches.items()}
+    return {name: latency_us(predict, local_TJ33, batch, seconds) for name, batch in batches.items()}

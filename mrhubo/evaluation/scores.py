@@ -17,6 +17,7 @@ from mrhubo.reference import angle_between, at_limit_share, direction_jerk, join
 from mrhubo.retargeter import RetargetNetwork
 from mrhubo.robot import BodyMap, LinkPoses, Robot
 from mrhubo.robot.parts import Region
+from mrhubo.rotation import matrix_to_sixd
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,10 @@ def predict_clips(network: RetargetNetwork, clips: Sequence[Clip]) -> list[Tenso
     device = network.limited.lower_N.device
     training = network.training
     network.eval()
-    frames = torch.cat([clip.motion.pose_TJ6 for clip in clips]).to(device)
+    frames = torch.cat([matrix_to_sixd(clip.motion.local_TJ33) for clip in clips]).to(device)
     joints = torch.cat([network(part) for part in frames.split(16_384)]).cpu()
     network.train(training)
-    return list(joints.split([len(clip.motion.pose_TJ6) for clip in clips]))
+    return list(joints.split([len(clip.motion) for clip in clips]))
 
 
 def score_clip(clip: Clip, q_TN: Tensor, robot: Robot, key_links: Sequence[str]) -> ClipScore:
@@ -87,7 +88,7 @@ class Evaluation(ClipScore):
 
 def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str]) -> Evaluation:
     """Measures of predicted joint angles (T, N) [rad]."""
-    robot, shapes, human_TD3 = body_map.robot, body_map.collision, body_map.human_directions(clip.motion.pose_TJ6)
+    robot, shapes, human_TD3 = body_map.robot, body_map.collision, body_map.human_directions(clip.motion.local_TJ33)
     poses, reference_poses = (robot.forward(q) for q in (q_TN, clip.reference_TN))
     robot_TD3, reference_TD3 = (body_map.robot_directions(p) for p in (poses, reference_poses))
     error_TD, reference_TD = (torch.rad2deg(angle_between(d, human_TD3)) for d in (robot_TD3, reference_TD3))

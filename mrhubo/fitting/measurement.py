@@ -64,7 +64,7 @@ def measure(prepared: Prepared, report: Reporter, retargeter: Retargeter, clips:
 def _score(
     prepared: Prepared, predict: Callable[[Tensor], Tensor], clips: Sequence[Clip]
 ) -> tuple[list[Tensor], list[Evaluation]]:
-    predictions = [predict(clip.motion.pose_TJ6) for clip in clips]
+    predictions = [predict(clip.motion.local_TJ33) for clip in clips]
     return predictions, evaluate_clips(predictions, clips, prepared.body_map, prepared.config.robot.key_links)
 
 
@@ -96,7 +96,7 @@ def measure_package(
     predictions = []
     with report.step("evaluation", len(clips), "clips") as progress:
         for done, clip in enumerate(clips, start=1):
-            predictions.append(retargeter.predict(clip.motion.pose_TJ6, polish))
+            predictions.append(retargeter.predict(clip.motion.local_TJ33, polish))
             progress.update(done, clip.name)
     found = evaluate_clips(predictions, clips, body_map, prepared.config.robot.key_links)
     one, many = latencies(lambda pose: retargeter.predict(pose, polish), clips).values()

@@ -45,14 +45,9 @@ class Motion:
         return len(self.local_TJ33)
 
     @property
-    def pose_TJ6(self) -> Tensor:
-        """The local rotations (T, 21, 6) in 6D."""
-        return matrix_to_sixd(self.local_TJ33)
-
-    @property
     def checksum(self) -> str:
         """xxh3 of local rotations and frame rate, 16 hex digits: the same motion, whatever its file is called."""
-        pose_TJ6 = self.pose_TJ6
+        pose_TJ6 = matrix_to_sixd(self.local_TJ33)
         digest = xxhash.xxh3_64(f"{tuple(pose_TJ6.shape)} {self.frame_rate!r}".encode())
         digest.update(pose_TJ6.contiguous().numpy().data)
         return digest.hexdigest()

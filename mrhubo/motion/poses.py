@@ -1,6 +1,6 @@
 """What a retargeter takes: a `Motion`, or human poses as a NumPy or torch array in one of three forms.
 
-Legend: ... any leading axes, T frames (the leading axes as one), J = 21: SMPL's joints 1..21, J6 the same in 6D.
+Legend: ... any leading axes, T frames (the leading axes as one), J = 21: SMPL's joints 1..21.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from torch import Tensor
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.rotation import axis_angle_to_matrix, stack_columns
 
 MotionLike: TypeAlias = Motion | Tensor | np.ndarray
 """A motion, or local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3), axis-angle [rad] (..., 63), as AMASS's
@@ -34,8 +34,8 @@ _FLAT = 1e-4
 class Poses:
     """Human poses in the form that the networks and the optimiser work with."""
 
-    pose_TJ6: Tensor
-    """Local rotations (T, 21, 6) of SMPL's joints 1..21, 6D, float32."""
+    local_TJ33: Tensor
+    """Local rotations (T, 21, 3, 3) of SMPL's joints 1..21, as they were given, float32."""
     shape: tuple[int, ...]
     """The leading axes as they were given, T numbers in all: `()` for a single pose."""
     frame_rate: float | None
@@ -62,14 +62,14 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
     shape = tuple(array.shape)
     if shape[-3:] == (_JOINTS, 3, 3):
         leading, wrong, what = shape[:-3], _no_matrix(array), "a matrix that is no rotation"
-        pose = matrix_to_sixd(array)
+        pose = array
     elif shape[-2:] == (_JOINTS, 6):
         leading, wrong, what = shape[:-2], _no_sixd(array), "six numbers that are no rotation"
-        pose = array
+        pose = stack_columns(array)
     elif shape[-1:] == (3 * _JOINTS,):
         array = array.unflatten(-1, (_JOINTS, 3))
         leading, wrong, what = shape[:-1], (array.abs() > MAX_TURN).any(-1), "no axis-angle in radians (degrees?)"
-        pose = matrix_to_sixd(axis_angle_to_matrix(array))
+        pose = axis_angle_to_matrix(array)
     else:
         raise UserError(
             f"human poses must have the shape (..., {_JOINTS}, 3, 3) (matrices), (..., {3 * _JOINTS}) (axis-angle, rad)"
@@ -78,7 +78,7 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
     numbers = array.flatten(len(leading) + 1)
     _refuse(~numbers.isfinite().all(-1), leading, "NaN or infinite numbers")
     _refuse(wrong.any(-1), leading, what)
-    return Poses(pose.reshape(-1, _JOINTS, 6).float(), leading, frame_rate)
+    return Poses(pose.reshape(-1, _JOINTS, 3, 3).float(), leading, frame_rate)
 
 
 def _to_tensor(array: Tensor | np.ndarray) -> Tensor:

@@ -118,7 +118,7 @@ class PairGenerator:
             return None, self.robot.sample(count, generator)
         z_BZ = self.settings.reverse_spread * torch.randn(count, self.prior.latent, generator=generator)
         z_BZ = z_BZ.to(self.device)
-        poses = [self.prior.decode(part) for part in z_BZ.split(poses_at_once(self.device))]
+        poses = [self.prior.decode_matrices(part) for part in z_BZ.split(poses_at_once(self.device))]
         return z_BZ, self.reference.solve_frames(torch.cat(poses))[0]
 
     @torch.no_grad()
@@ -131,7 +131,7 @@ class PairGenerator:
             if self.settings.align:
                 pose_BJ6 = rotation.matrix_to_sixd(align_pose(self.body_map, matrices, direction_BD3))
         else:  # the prior's humans bend their backs; only what the robot has is compared, on an upright human
-            points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(found_BJ6))
+            points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(matrices))
         distance_BK = (points_BK3 - target_BK3).norm(dim=-1)
         prior_B = z_BZ.square().sum(-1)
         return {

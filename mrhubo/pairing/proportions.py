@@ -29,10 +29,10 @@ class ProportionTest:
     """Measures scale factors on a set of pairs, many at once."""
 
     def __init__(
-        self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig, q_PN: Tensor, pose_PJ6: Tensor, frame: str
+        self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig, q_PN: Tensor, local_PJ33: Tensor, frame: str
     ) -> None:
-        """Robot poses (P, N) [rad] and the human poses (P, 21, 6) that they imitate; `frame` as `model.input_frame`."""
-        self.body_map, self.prior, self.settings, self.pose_PJ6 = body_map, prior, settings, pose_PJ6
+        """Robot poses (P, N) [rad], the human poses (P, 21, 3, 3) that they imitate, and `model.input_frame`."""
+        self.body_map, self.prior, self.settings, self.local_PJ33 = body_map, prior, settings, local_PJ33
         self.frame = frame
         self._poses = body_map.robot.forward(q_PN)
         arms = {part.joint for part in body_map.keypoints.parts if part.region in ("arm", "hand")}
@@ -42,7 +42,7 @@ class ProportionTest:
 
     @torch.no_grad()
     def human_poses(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
-        """g_theta(q): human poses (C, P, 21, 6), solved from the nearest of 4,096 samples of the prior."""
+        """g_theta(q): human poses (C, P, 21, 3, 3), solved from the nearest of 4,096 samples of the prior."""
         scales = [ManualScale(config) for config in configs]
         targets = []
         for scale in scales:
@@ -58,24 +58,24 @@ class ProportionTest:
         )
         start_BZ = nearest_samples(problem, target_BK3)
         z_BZ = solve_quasi_newton(problem, start_BZ, target_BK3, self.settings.fine_steps)
-        pose_BJ6 = torch.cat([self.prior.decode(part) for part in z_BZ.split(poses_at_once(z_BZ.device))])
-        return pose_BJ6.unflatten(0, (len(configs), -1))
+        local_BJ33 = torch.cat([self.prior.decode_matrices(part) for part in z_BZ.split(poses_at_once(z_BZ.device))])
+        return local_BJ33.unflatten(0, (len(configs), -1))
 
     @torch.no_grad()
-    def distances(self, pose_CPJ6: Tensor) -> Tensor:
+    def distances(self, local_CPJ33: Tensor) -> Tensor:
         """Distance (C, P) [rad] of human poses to those that the robot poses imitate."""
-        found, wanted = (self._arms(pose) for pose in (pose_CPJ6, self.pose_PJ6))
+        found, wanted = (self._arms(pose) for pose in (local_CPJ33, self.local_PJ33))
         return rotation.geodesic_distance(found, wanted.expand_as(found)).mean(dim=-1)
 
-    def _arms(self, pose_XJ6: Tensor) -> Tensor:
-        """Rotations (..., arm joints, 3, 3) of poses (..., 21, 6)."""
-        matrices = rotation.sixd_to_matrix(pose_XJ6)
+    def _arms(self, local_XJ33: Tensor) -> Tensor:
+        """Rotations (..., arm joints, 3, 3) of poses (..., 21, 3, 3)."""
+        matrices = rotation.orthonormal(local_XJ33)
         if self.frame == "local":
             return matrices[..., self.arm_joints, :, :]
         turned = self.body_map.skeleton.global_rotations(matrices.flatten(0, -4))
         chest = turned[:, [JOINT_NAMES.index("spine3")]].transpose(-1, -2)
         seen = chest @ turned[:, [1 + joint for joint in self.arm_joints]]
-        return seen.unflatten(0, pose_XJ6.shape[:-2])
+        return seen.unflatten(0, local_XJ33.shape[:-3])
 
     def measure(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
         """Mean distance (C,) [rad] of scale factors over the pairs."""

@@ -96,31 +96,31 @@ class OptimizationRetargeter(nn.Module):
                 frame), or the frame rate is not positive.
         """
         poses = read_poses(motion, frame_rate)
-        pose_TJ6, shape = poses.pose_TJ6.to(self.problem.device), poses.shape
-        clips = pose_TJ6.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [pose_TJ6]
-        answers = [self._solve(clip_TJ6, poses.frame_rate) for clip_TJ6 in clips if len(clip_TJ6)]
+        local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
+        clips = local_TJ33.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [local_TJ33]
+        answers = [self._solve(clip_TJ33, poses.frame_rate) for clip_TJ33 in clips if len(clip_TJ33)]
         robot = self.body_map.robot
-        q_TN = torch.cat(answers) if answers else pose_TJ6.new_zeros(0, len(robot.joint_names))
+        q_TN = torch.cat(answers) if answers else local_TJ33.new_zeros(0, len(robot.joint_names))
         links = robot.forward(q_TN)
-        error_TD = direction_error(self.body_map, q_TN, pose_TJ6, links)
+        error_TD = direction_error(self.body_map, q_TN, local_TJ33, links)
         found = (q_TN, error_TD, self.body_map.collision.collides(q_TN, links))
         q, error, collision = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
         return OptimizationResult(q, robot.joint_names, error, collision, poses.frame_rate)
 
-    def _solve(self, pose_TJ6: Tensor, frame_rate: float | None) -> Tensor:
+    def _solve(self, local_TJ33: Tensor, frame_rate: float | None) -> Tensor:
         """Joint angles (T, N) [rad] of one motion, or of frames on their own."""
-        return self.solve_frames(pose_TJ6)[0] if frame_rate is None else self.retarget(pose_TJ6, frame_rate).q_TN
+        return self.solve_frames(local_TJ33)[0] if frame_rate is None else self.retarget(local_TJ33, frame_rate).q_TN
 
     @torch.no_grad()
-    def retarget(self, pose_TJ6: Tensor, frame_rate: float) -> ReferenceResult:
-        """The robot's motion for human poses (T, 21, 6) at `frame_rate` frames per second.
+    def retarget(self, local_TJ33: Tensor, frame_rate: float) -> ReferenceResult:
+        """The robot's motion for human poses, local rotations (T, 21, 3, 3) at `frame_rate` frames per second.
 
         Raises:
             UserError: the pose has the wrong shape or a frame that is no pose, or the frame rate is not positive.
         """
         if not (math.isfinite(frame_rate) and frame_rate > 0):
             raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
-        target_TD3 = self._targets(pose_TJ6)
+        target_TD3 = self._targets(local_TJ33)
         candidates_TSN, cost_TSC = self._candidates(target_TD3)
         pull = self._pull(frame_rate)
         if pull == 0 or len(target_TD3) == 1:
@@ -131,12 +131,12 @@ class OptimizationRetargeter(nn.Module):
 
     @torch.no_grad()
     def retarget_collision_free(
-        self, pose_TJ6: Tensor, frame_rate: float, q_TN: Tensor | None = None
+        self, local_TJ33: Tensor, frame_rate: float, q_TN: Tensor | None = None
     ) -> ReferenceResult:
         """A motion in which the robot never touches itself, as near to the human's as that allows.
 
         Args:
-            pose_TJ6: human poses.
+            local_TJ33: human poses, local rotations (T, 21, 3, 3).
             frame_rate: frames per second.
             q_TN: what `retarget` gave for the same poses, if it is there already.
 
@@ -144,8 +144,8 @@ class OptimizationRetargeter(nn.Module):
             UserError: as for `retarget`; or no pose that was tried, nor the robot's home pose, is free of collision.
         """
         if q_TN is None:
-            q_TN = self.retarget(pose_TJ6, frame_rate).q_TN
-        target_TD3 = self._targets(pose_TJ6)
+            q_TN = self.retarget(local_TJ33, frame_rate).q_TN
+        target_TD3 = self._targets(local_TJ33)
         pull = self._pull(frame_rate)
         q_TN, rests_T = avoid_collisions(self._free_problem, self._pool, q_TN.to(target_TD3), target_TD3, pull)
         return self._result(q_TN, target_TD3, frame_rate, rests_T)
@@ -161,26 +161,26 @@ class OptimizationRetargeter(nn.Module):
         return self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2
 
     @torch.no_grad()
-    def solve_frames(self, pose_BJ6: Tensor) -> tuple[Tensor, Tensor]:
-        """The best joint angles (B, N) [rad] of independent human poses (B, 21, 6), and their cost (B,).
+    def solve_frames(self, local_BJ33: Tensor) -> tuple[Tensor, Tensor]:
+        """The best joint angles (B, N) [rad] of independent human poses (B, 21, 3, 3), and their cost (B,).
 
         Raises:
             UserError: the pose has the wrong shape or a frame that is no pose.
         """
-        target_BD3 = self._targets(pose_BJ6)
+        target_BD3 = self._targets(local_BJ33)
         q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
         return q_BN, cost_BC.sum(dim=1)
 
-    def _targets(self, pose_BJ6: Tensor) -> Tensor:
+    def _targets(self, local_BJ33: Tensor) -> Tensor:
         joints = len(POSED_JOINT_NAMES)
-        if pose_BJ6.ndim != 3 or tuple(pose_BJ6.shape[1:]) != (joints, 6) or not len(pose_BJ6):
-            raise UserError(f"human motion: expected poses of shape (frames, {joints}, 6) with at least one frame, "
-                            f"found {tuple(pose_BJ6.shape)}")  # fmt: skip
-        pose_BJ6 = pose_BJ6.to(self.problem.device, torch.float32)
-        target_BD3 = self.body_map.human_directions(pose_BJ6)
+        if local_BJ33.ndim != 4 or tuple(local_BJ33.shape[1:]) != (joints, 3, 3) or not len(local_BJ33):
+            raise UserError(f"human motion: expected rotations of shape (frames, {joints}, 3, 3), one frame or more, "
+                            f"found {tuple(local_BJ33.shape)}")  # fmt: skip
+        local_BJ33 = local_BJ33.to(self.problem.device, torch.float32)
+        target_BD3 = self.body_map.human_directions(local_BJ33)
         for wrong_B, what in (
-            (~pose_BJ6.isfinite().flatten(1).all(dim=1), "has numbers that are NaN or infinite"),
-            (((target_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has six numbers that are no rotation"),
+            (~local_BJ33.isfinite().flatten(1).all(dim=1), "has numbers that are NaN or infinite"),
+            (((target_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has a matrix that is no rotation"),
         ):
             if bool(wrong_B.any()):
                 frames = torch.nonzero(wrong_B)[:, 0]

@@ -2,7 +2,7 @@
 
     retargeter = Retargeter.load("package")
     result = retargeter(motion)                     # joint angles, with a confidence for each frame
-    q_TN = retargeter.predict(pose_TJ6)             # the two networks alone, microseconds a frame
+    q_TN = retargeter.predict(local_TJ33)           # the two networks alone, microseconds a frame
 
 Legend: T frames, J = 21 human joints, N robot joints, D directions.
 """
@@ -25,7 +25,7 @@ from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
 from mrhubo.motion import MotionLike, read_poses
-from mrhubo.reference import DirectionProblem, direction_error
+from mrhubo.reference import DirectionProblem, angle_between
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import confidence
 from mrhubo.retargeter.networks import RetargetNetwork
@@ -94,46 +94,60 @@ class Retargeter(nn.Module):
                 frame), `polish` is negative, or the frame rate is not positive.
         """
         poses = read_poses(motion, frame_rate)
-        return self.retarget(poses.pose_TJ6, polish).with_leading(poses.shape, poses.frame_rate)
+        return self.retarget(poses.local_TJ33, polish).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
-    def predict(self, pose_TJ6: Tensor, polish: int = 0) -> Tensor:
-        """Joint angles (T, N) [rad] of human poses (T, 21, 6); inside the limits.
+    def predict(self, local_TJ33: Tensor, polish: int = 0) -> Tensor:
+        """Joint angles (T, N) [rad] of human poses; inside the limits.
 
         Args:
-            pose_TJ6: human poses, 6D.
+            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21.
             polish: Levenberg-Marquardt steps of the reference retargeter from the networks' answer, each frame on its
                 own; a step that does not bring the limbs nearer to the human's is not taken. 0: the networks alone.
 
         Raises:
             UserError: the poses have another shape, or hold NaN or infinite numbers; `polish` is negative.
         """
-        if polish < 0:
-            raise UserError(f"polish must be 0 or more steps, found {polish}")
-        if pose_TJ6.ndim != 3 or pose_TJ6.shape[1:] != (len(POSED_JOINT_NAMES), 6):
-            raise UserError(f"human poses must have the shape (frames, 21, 6), found {tuple(pose_TJ6.shape)}")
-        finite = torch.isfinite(pose_TJ6).all(dim=2).all(dim=1)
-        if not bool(finite.all()):
-            raise UserError(f"human pose {int((~finite).nonzero()[0, 0])} holds NaN or infinite numbers")
-        pose_TJ6 = pose_TJ6.to(self.device, torch.float32)
-        q_TN = self.network(pose_TJ6)
-        if not polish or not len(q_TN):
-            return q_TN
-        return self.directions.minimise(q_TN, self.body_map.human_directions(pose_TJ6), steps=polish)[0]
+        local_TJ33 = self._checked(local_TJ33, polish)
+        human = self.body_map.human(local_TJ33) if polish and len(local_TJ33) else None
+        return self._answer(local_TJ33, None if human is None else self.body_map.human_directions(human), polish)
 
     @torch.no_grad()
-    def retarget(self, pose_TJ6: Tensor, polish: int = POLISH) -> RetargetResult:
+    def retarget(self, local_TJ33: Tensor, polish: int = POLISH) -> RetargetResult:
         """Joint angles, by default after a step of optimisation, with a confidence for each frame; arguments as for
         `predict`.
         """
-        q_TN = self.predict(pose_TJ6, polish)
-        pose_TJ6 = pose_TJ6.to(self.device, torch.float32)
-        poses = self.body_map.robot.forward(q_TN)
-        error_deg_TD = direction_error(self.body_map, q_TN, pose_TJ6, poses)
-        phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_TJ6)))
+        local_TJ33 = self._checked(local_TJ33, polish)
+        human = self.body_map.human(local_TJ33)
+        target_TD3 = self.body_map.human_directions(human)
+        q_TN = self._answer(local_TJ33, target_TD3, polish)
+        links = self.body_map.robot.forward(q_TN)
+        error_deg_TD = torch.rad2deg(angle_between(self.body_map.robot_directions(links), target_TD3))
+        phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(human.local_BJ33))
         trust_T = confidence(phi_T, self.phi_threshold, error_deg_TD)
-        collision_T = self.collision.collides(q_TN, poses)
+        collision_T = self.collision.collides(q_TN, links)
         return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, collision_T)
+
+    def _checked(self, local_TJ33: Tensor, polish: int) -> Tensor:
+        """The poses as the networks want them: on their device, float32."""
+        if polish < 0:
+            raise UserError(f"polish must be 0 or more steps, found {polish}")
+        joints = len(POSED_JOINT_NAMES)
+        if local_TJ33.ndim != 4 or local_TJ33.shape[1:] != (joints, 3, 3):
+            raise UserError(
+                f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(local_TJ33.shape)}"
+            )
+        finite_T = torch.isfinite(local_TJ33).flatten(1).all(dim=1)
+        if not bool(finite_T.all()):
+            raise UserError(f"human pose {int((~finite_T).nonzero()[0, 0])} holds NaN or infinite numbers")
+        return local_TJ33.to(self.device, torch.float32)
+
+    def _answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int) -> Tensor:
+        """Joint angles (T, N) [rad]; the human's directions (T, D, 3) are needed for steps of optimisation."""
+        q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
+        if not polish or not len(q_TN) or target_TD3 is None:
+            return q_TN
+        return self.directions.minimise(q_TN, target_TD3, steps=polish)[0]
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""

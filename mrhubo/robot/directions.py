@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.frames import human_axes
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.rotation import sixd_to_matrix
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,9 @@ class Directions(nn.Module):
         view_X = self.view_D[self.limb_columns] if limbs else self.view_D
         return (vectors_BX3[..., None, :] @ torch.stack(list(views), dim=1).index_select(1, view_X))[..., 0, :]
 
-    def of_human(self, pose_BJ6: Tensor) -> Tensor:
-        """Unit directions (B, D, 3) of human poses (B, 21, 6), in human axes of the parts from which they are seen."""
-        keypoints, rotations = self.skeleton.keypoints_and_rotations(sixd_to_matrix(pose_BJ6))
+    def of_human(self, human: HumanPose) -> Tensor:
+        """Unit directions (B, D, 3) of human poses, in human axes of the parts from which they are seen."""
+        keypoints, rotations = human.keypoint_BK3, human.rotation_BJ33
         starts, ends = self._bones
         limbs = torch.nn.functional.normalize(keypoints[:, ends] - keypoints[:, starts], dim=-1)
         axes = (rotations[:, self._axis_joints] @ self.rest_A3.to(rotations)[..., None])[..., 0]

@@ -19,11 +19,11 @@ from mrhubo.view.solids import Color, Solids
 
 
 def human_figure(
-    pose_J6: Tensor, skeleton: Skeleton | None = None, color: Color = HUMAN_COLOR, skin: Color | None = SKIN_COLOR
+    local_J33: Tensor, skeleton: Skeleton | None = None, color: Color = HUMAN_COLOR, skin: Color | None = SKIN_COLOR
 ) -> Solids:
-    """A human in a pose (21, 6); colours as for `human_solids`."""
+    """A human in a pose, local rotations (21, 3, 3); colours as for `human_solids`."""
     with torch.no_grad():
-        matrices = rotation.sixd_to_matrix(pose_J6[None].float())
+        matrices = rotation.orthonormal(local_J33[None].float())
         points = (skeleton or Skeleton()).keypoints(matrices)[0]
     return human_solids(points.numpy(), KEYPOINT_NAMES, color, skin)
 

@@ -16,6 +16,7 @@ from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.evaluation.clips import Clip
 from mrhubo.pairing import PairFilter
 from mrhubo.robot import Robot, link_poses, read_geometry
+from mrhubo.rotation import stack_columns
 from mrhubo.view import (
     Solids,
     contact_sheet,
@@ -46,9 +47,9 @@ class Artist:
         height = float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2]))
         self.scale = _FIGURE_HEIGHT_M / max(height, 1e-3)
 
-    def human(self, pose_J6: Tensor) -> Solids:
-        """A human in a pose (21, 6)."""
-        return human_figure(pose_J6, self.skeleton)
+    def human(self, local_J33: Tensor) -> Solids:
+        """A human in a pose, local rotations (21, 3, 3)."""
+        return human_figure(local_J33, self.skeleton)
 
     def robot_figure(self, q_N: Tensor, scaled: bool = True) -> Solids:
         """The robot at joint angles (N,) [rad], scaled to the human's height."""
@@ -70,7 +71,8 @@ class Artist:
                 for index in chosen:
                     pose = pairs["H"][index]
                     denoised = prior.denoise(pose[None])[0]
-                    rows.append([self.robot_figure(pairs["q"][index]), self.human(pose), self.human(denoised)])
+                    humans = (self.human(stack_columns(sixd)) for sixd in (pose, denoised))
+                    rows.append([self.robot_figure(pairs["q"][index]), *humans])
                     titles.append(f"{kind}\nphi {float(pairs['phi'][index]):.2g}")
         columns = ["robot pose q", "human pose H", "denoised H~"]
         return figure_sheet(rows, columns, titles, f"{self.robot.name}: pairs by reconstruction error phi")
@@ -93,7 +95,7 @@ class Artist:
         chosen = [(word, int(order[min(place, last)])) for word, pair in places.items() for place in pair]
         rows = [
             [self.robot_figure(pairs["q"][index]) for _, index in chosen],
-            [self.human(pairs["H"][index]) for _, index in chosen],
+            [self.human(stack_columns(pairs["H"][index])) for _, index in chosen],
         ]
         titles = [
             f"{word}: {1000 * float(pairs['residual_m'][i]):.1f} mm, phi {float(pairs['phi'][i]):.2g}"
@@ -106,7 +108,7 @@ class Artist:
         """Human, reference and predictions (T, N) by their names at evenly spaced frames of a clip."""
         frames = [round(f) for f in np.linspace(0.08, 0.92, count) * (len(clip.reference_TN) - 1)]
         rows = [
-            [self.human(clip.motion.pose_TJ6[f]) for f in frames],
+            [self.human(clip.motion.local_TJ33[f]) for f in frames],
             [self.robot_figure(clip.reference_TN[f]).recolored(_REFERENCE_TINT) for f in frames],
             *([self.robot_figure(q_TN[f]) for f in frames] for q_TN in predictions.values()),
         ]
@@ -120,7 +122,7 @@ class Artist:
         times = np.arange((last - shown) / 2, (last + shown) / 2 + 1e-6, rate / GIF_RATE)
         frames = [round(f) for f in times]
         columns = [
-            [self.human(clip.motion.pose_TJ6[f]) for f in frames],
+            [self.human(clip.motion.local_TJ33[f]) for f in frames],
             [self.robot_figure(clip.reference_TN[f]).recolored(_REFERENCE_TINT) for f in frames],
             *([self.robot_figure(q_TN[f]) for f in frames] for q_TN in predictions.values()),
         ]

@@ -45,17 +45,25 @@ def test_denoising_moves_towards_the_clean_pose(prior: BodyPrior) -> None:
 
 
 def test_mirrored_poses_are_as_plausible(prior: BodyPrior, external_dir: Path) -> None:
-    pose = torch.cat([motion.pose_TJ6[::10] for motion in read_folder(external_dir / "cmu" / "evaluation")])
+    pose = torch.cat(
+        [
+            rotation.matrix_to_sixd(motion.local_TJ33[::10])
+            for motion in read_folder(external_dir / "cmu" / "evaluation")
+        ]
+    )
     one, other = prior.reconstruction_error(pose).median(), prior.reconstruction_error(mirror_pose(pose)).median()
     assert 0.5 < float(one / other) < 2
 
 
 def test_it_is_as_good_on_the_evaluation_clips_as_the_card_says(prior: BodyPrior, external_dir: Path) -> None:
     motions = read_folder(external_dir / "cmu" / "evaluation")
-    means = {m.name: float(reconstruction(prior, Skeleton(), m.pose_TJ6)[0].mean()) for m in motions}
+    means = {
+        m.name: float(reconstruction(prior, Skeleton(), rotation.matrix_to_sixd(m.local_TJ33))[0].mean())
+        for m in motions
+    }
     assert sum(means.values()) / len(means) < 4
     assert max(mean for name, mean in means.items() if name != "54_16") < 6
-    found = measure(prior, torch.cat([motion.pose_TJ6[::4] for motion in motions]))
+    found = measure(prior, torch.cat([rotation.matrix_to_sixd(motion.local_TJ33[::4]) for motion in motions]))
     assert found["ik_keypoint_mm"] < 5
     assert found["roc_bent"] > 0.97 and found["roc_random"] > 0.999
     assert found["samples_inside"] > 0.99

@@ -54,30 +54,30 @@ def clip(config: Config, body_map: BodyMap, prior: BodyPrior) -> Clip:
     """Robot poses, and the human poses that the config's own numbers make of them: a theta without error exists."""
     q_PN = body_map.robot.sample(12, torch.Generator().manual_seed(0))
     assert config.robot.manual is not None
-    test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 6), "local")
-    return Clip(Motion("made", rotation.sixd_to_matrix(test.human_poses([config.robot.manual])[0]), 24.0), q_PN)
+    test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 3, 3), "local")
+    return Clip(Motion("made", test.human_poses([config.robot.manual])[0], 24.0), q_PN)
 
 
 def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip) -> None:
     manual = config.robot.manual
     assert manual is not None
-    test = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.pose_TJ6, "local")
+    test = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "local")
     same, other = test.measure([manual, varied(manual, {"factor": 2.6})]).tolist()
     assert same < 0.01 < 0.03 < other
-    pose = clip.motion.pose_TJ6.clone()
-    pose[:, [0, 1, 2, 11]] = torch.tensor([0.0, 1.0, 0.0, -1.0, 0.0, 0.0])  # hips, spine, neck turned by 90 degrees
+    pose = clip.motion.local_TJ33.clone()
+    quarter = torch.tensor([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a turn by 90 degrees
+    pose[:, [0, 1, 2, 11]] = quarter  # of hips, spine, neck
     assert float(test.distances(pose).max()) < 1e-3
-    turned = rotation.sixd_to_matrix(pose)
+    turned = pose.clone()
     turn = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.5, 0.0]))
     turned[:, test.arm_joints[0]] = turned[:, test.arm_joints[0]] @ turn
     expected = torch.full((12,), 0.5 / len(test.arm_joints))
-    torch.testing.assert_close(test.distances(rotation.matrix_to_sixd(turned)), expected, atol=1e-3, rtol=0)
-    seen = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.pose_TJ6, "chest")
-    collar = rotation.sixd_to_matrix(clip.motion.pose_TJ6)
+    torch.testing.assert_close(test.distances(turned), expected, atol=1e-3, rtol=0)
+    seen = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "chest")
+    collar = clip.motion.local_TJ33.clone()
     collar[:, 12] = collar[:, 12] @ turn  # carries shoulder and elbow along, as seen from the chest
-    pose = rotation.matrix_to_sixd(collar)
-    assert float(test.distances(pose).max()) < 1e-3
-    torch.testing.assert_close(seen.distances(pose), 2 * expected, atol=1e-3, rtol=0)
+    assert float(test.distances(collar).max()) < 1e-3
+    torch.testing.assert_close(seen.distances(collar), 2 * expected, atol=1e-3, rtol=0)
 
 
 def test_only_reached_poses_are_measured_on(
@@ -85,14 +85,14 @@ def test_only_reached_poses_are_measured_on(
 ) -> None:
     """The reference's answers to half of the frames are spoilt: none of them is taken."""
     with torch.no_grad():
-        reached = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path).pose_PJ6
+        reached = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path).local_PJ33
         local = clip.motion.local_TJ33
         q_FN, local_FJ33 = clip.reference_TN.repeat(2, 1), torch.cat((local, local.flip(0)))
     both = Clip(Motion("both", local_FJ33, 24.0), q_FN)
     search = ScaleFactorSearch(config, body_map, prior, [both], tmp_path)
     other = ScaleFactorSearch(config, body_map, prior, [Clip(both.motion, q_FN.flip(0))], tmp_path)
     assert other.name != search.name, "another reference set is another study"
-    assert search.pose_PJ6.shape == reached.shape and torch.equal(search.pose_PJ6, clip.motion.pose_TJ6)
+    assert search.local_PJ33.shape == reached.shape and torch.equal(search.local_PJ33, clip.motion.local_TJ33)
 
 
 @pytest.fixture()

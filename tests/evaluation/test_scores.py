@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 import torch
 
-from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
@@ -27,19 +26,19 @@ def body_map_of(root: Path, robot: str) -> tuple[BodyMap, list[str]]:
 
 
 @pytest.fixture(scope="module")
-def pose_TJ6() -> torch.Tensor:
+def local_TJ33() -> torch.Tensor:
     """A smooth motion between poses of the prior."""
     prior = BodyPrior.open()
     z = torch.randn(4, prior.latent, generator=torch.Generator().manual_seed(0))
     path = torch.nn.functional.interpolate(z.T[None], 60, mode="linear", align_corners=True)[0].T
-    return prior.decode(path).detach()
+    return prior.decode_matrices(path).detach()
 
 
 @pytest.mark.parametrize("name", ["nao", "reachy"])
-def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: torch.Tensor) -> None:
+def test_the_reference_itself_is_without_error(root: Path, name: str, local_TJ33: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, name)
-    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0)
-    clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference.q_TN)
+    reference = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0)
+    clip = Clip(Motion("a", local_TJ33, 24.0), reference.q_TN)
     found = evaluate_clip(clip, reference.q_TN, body_map, key_links)
     assert found.joint_rad == 0 and found.link_cm == 0 and found.frames == 60
     assert found.limb_deg == found.reference_limb_deg
@@ -49,10 +48,10 @@ def test_the_reference_itself_is_without_error(root: Path, name: str, pose_TJ6: 
     assert math.isnan(found.hand_deg) == math.isnan(found.head_deg) == (name == "nao")
 
 
-def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: torch.Tensor) -> None:
+def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, local_TJ33: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, "nao")
-    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
-    clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference)
+    reference = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0).q_TN
+    clip = Clip(Motion("a", local_TJ33, 24.0), reference)
     turned = reference.clone()
     turned[:, body_map.robot.joint_names.index("LElbowRoll")] += 0.3
     good, bad = (evaluate_clip(clip, q, body_map, key_links) for q in (reference, turned))
@@ -60,10 +59,10 @@ def test_a_turned_elbow_shows_in_joints_links_and_limbs(root: Path, pose_TJ6: to
     assert bad.link_cm > 0.3 and bad.limb_deg > good.limb_deg and bad.reference_limb_deg == good.limb_deg
 
 
-def test_a_trembling_robot_has_a_higher_jerk(root: Path, pose_TJ6: torch.Tensor) -> None:
+def test_a_trembling_robot_has_a_higher_jerk(root: Path, local_TJ33: torch.Tensor) -> None:
     body_map, key_links = body_map_of(root, "nao")
-    reference = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN
-    clip = Clip(Motion("a", rotation.sixd_to_matrix(pose_TJ6), 24.0), reference)
+    reference = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0).q_TN
+    clip = Clip(Motion("a", local_TJ33, 24.0), reference)
     noise = 0.02 * torch.randn(reference.shape, generator=torch.Generator().manual_seed(0))
     still, moving, trembling = (
         evaluate_clip(clip, q, body_map, key_links).jerk_ratio
@@ -110,7 +109,7 @@ def test_means_count_clips_or_frames() -> None:
 
 
 def test_latency_is_a_time_a_frame() -> None:
-    poses = torch.zeros(3, 21, 6)
+    poses = torch.zeros(3, 21, 3, 3)
     seen = []
     assert latency_us(lambda pose: seen.append(len(pose)) or pose, poses, 7, seconds=0.01) > 0
     assert set(seen) == {7}

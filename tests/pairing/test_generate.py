@@ -53,8 +53,11 @@ def test_aligned_humans_point_where_the_robot_does(root: Path, made: PairStore, 
     after, body_map = made.read_all(), build_body_map(config_of(root, tmp_path).robot)
     forward = ~after["reverse"]
     directions = body_map.robot_directions(body_map.robot.forward(after["q"][forward]))
-    torch.testing.assert_close(body_map.human_directions(after["H"][forward]), directions, atol=1e-4, rtol=0)
-    assert float((body_map.human_directions(before["H"][forward]) - directions).abs().max()) > 0.1
+    torch.testing.assert_close(
+        body_map.human_directions(rotation.stack_columns(after["H"][forward])), directions, atol=1e-4, rtol=0
+    )
+    unaligned = body_map.human_directions(rotation.stack_columns(before["H"][forward]))
+    assert float((unaligned - directions).abs().max()) > 0.1
     for name in ("q", "R", *MEASURES):
         torch.testing.assert_close(after[name], before[name])
     assert torch.equal(after["H"][~forward], before["H"][~forward])
@@ -74,10 +77,10 @@ def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
     torch.testing.assert_close(prior.reconstruction_error(pairs["H"]), pairs["phi"], atol=1e-6, rtol=1e-3)
     target = body_map.targets(robot.forward(pairs["q"]))
     reached = body_map.skeleton.keypoints(matrices)[:, body_map.keypoint_indices]
-    reached[150:] = body_map.human_keypoints(body_map.human_directions(pairs["H"][150:]))
+    reached[150:] = body_map.human_keypoints(body_map.human_directions(matrices[150:]))
     torch.testing.assert_close((reached - target).norm(dim=-1).mean(1), pairs["residual_m"], atol=1e-5, rtol=1e-3)
     assert pairs["reverse"].tolist() == 150 * [False] + 100 * [True]
-    directions = body_map.human_directions(pairs["H"]) * body_map.robot_directions(robot.forward(pairs["q"]))
+    directions = body_map.human_directions(matrices) * body_map.robot_directions(robot.forward(pairs["q"]))
     for reverse in (False, True):
         same = directions.sum(-1)[pairs["reverse"] == reverse].mean()
         assert float(same) > 0.8, "human and robot limbs point the same way"
@@ -86,10 +89,11 @@ def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
 def test_reverse_pairs_are_the_references_answer_to_the_priors_poses(root: Path, made: PairStore) -> None:
     pairs = {name: tensor[made.read_all()["reverse"]] for name, tensor in made.read_all().items()}
     reference = OptimizationRetargeter(build_body_map(config_of(root, made.folder.parent).robot))
-    target = reference.body_map.human_directions(pairs["H"])
+    local_BJ33 = rotation.stack_columns(pairs["H"])
+    target = reference.body_map.human_directions(local_BJ33)
     cost_B = reference.problem.quadratic(pairs["q"], target).cost_BC.sum(1)
     assert float((cost_B - reference.problem.minimise(pairs["q"], target)[1].sum(1)).max()) < 1e-3, "converged"
-    assert float(cost_B.mean()) < 1.02 * float(reference.solve_frames(pairs["H"])[1].mean()), (
+    assert float(cost_B.mean()) < 1.02 * float(reference.solve_frames(local_BJ33)[1].mean()), (
         "no better with more starts"
     )
     assert abs(float(pairs["z_norm"].mean()) / BodyPrior.open().latent ** 0.5 - 1.1) < 0.1

@@ -40,31 +40,31 @@ def retargeters(body_maps: dict[str, BodyMap]) -> dict[str, OptimizationRetarget
 
 @pytest.fixture(scope="session")
 def cmu_poses(external_dir: Path) -> dict[str, Tensor]:
-    """The eleven evaluation clips as poses (T, 21, 6), 24 frames per second."""
+    """The eleven evaluation clips as local rotations (T, 21, 3, 3), 24 frames per second."""
     clips = {}
     for path in sorted((external_dir / "cmu" / "evaluation").glob("*.npz")):
         with np.load(path) as data:
             axis_angle = torch.from_numpy(data["pose_body"]).float().reshape(-1, 21, 3)
-        clips[path.stem] = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(axis_angle))
+        clips[path.stem] = rotation.axis_angle_to_matrix(axis_angle)
     return clips
 
 
 @pytest.fixture(scope="session")
 def make_pose() -> Callable[..., Tensor]:
-    """Function: poses (T, 21, 6) from axis-angles (T, 3) [rad] by joint name; the other joints at rest."""
+    """Function: local rotations (T, 21, 3, 3) from axis-angles (T, 3) [rad] by joint name; the other joints at rest."""
 
     def make(**axis_angles: Tensor) -> Tensor:
         whole = torch.zeros(len(next(iter(axis_angles.values()))), len(POSED_JOINT_NAMES), 3)
         for name, value in axis_angles.items():
             whole[:, POSED_JOINT_NAMES.index(name)] = value
-        return rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(whole))
+        return rotation.axis_angle_to_matrix(whole)
 
     return make
 
 
 @pytest.fixture(scope="session")
 def random_pose(make_pose: Callable[..., Tensor]) -> Callable[[int, int], Tensor]:
-    """Function of count and seed: poses (count, 21, 6) with normally distributed axis-angles in chest, arms and head."""
+    """Function of count and seed: poses (count, 21, 3, 3) with normally distributed axis-angles in chest, arms and head."""
     spread = {"spine2": 0.3, "neck": 0.3, "head": 0.3, "collar": 0.2, "shoulder": 0.7, "elbow": 0.7, "wrist": 0.7}
 
     def draw(count: int, seed: int) -> Tensor:

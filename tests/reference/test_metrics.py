@@ -50,8 +50,8 @@ def test_link_error_names_the_nearest_link(body_maps: dict[str, BodyMap]) -> Non
 def test_direction_error_of_the_arm_at_rest(body_maps: dict[str, BodyMap]) -> None:
     """Reachy at zero hangs its arms, a human at rest spreads them: 90 degrees; the head agrees but for 10 degrees' rounding."""
     body_map = body_maps["reachy"]
-    rest_TJ6 = torch.tensor([1.0, 0, 0, 0, 1, 0]).expand(1, 21, 6)
-    error_TD = direction_error(body_map, torch.zeros(1, 17), rest_TJ6)
+    rest_TJ33 = torch.eye(3).expand(1, 21, 3, 3)
+    error_TD = direction_error(body_map, torch.zeros(1, 17), rest_TJ33)
     found = dict(zip(body_map.direction_names, error_TD[0].tolist(), strict=True))
     for name in ("left_elbow", "left_wrist", "right_elbow", "right_wrist", "left_hand_fingers"):
         assert found[name] == pytest.approx(90, abs=1e-3)
@@ -62,12 +62,12 @@ def test_direction_error_ignores_what_is_below_the_chest(
     body_maps: dict[str, BodyMap], random_pose: Callable[[int, int], Tensor]
 ) -> None:
     body_map = body_maps["coman"]
-    pose_TJ6 = random_pose(5, 1)
-    bowed_TJ6 = pose_TJ6.clone()
-    bowed_TJ6[:, 2] = random_pose(5, 2)[:, 15]  # spine1 turns the chest and all above it alike
+    local_TJ33 = random_pose(5, 1)
+    bowed_TJ33 = local_TJ33.clone()
+    bowed_TJ33[:, 2] = random_pose(5, 2)[:, 15]  # spine1 turns the chest and all above it alike
     q_TN = body_map.robot.sample(5, torch.Generator().manual_seed(0))
     torch.testing.assert_close(
-        direction_error(body_map, q_TN, pose_TJ6), direction_error(body_map, q_TN, bowed_TJ6), atol=1e-3, rtol=0
+        direction_error(body_map, q_TN, local_TJ33), direction_error(body_map, q_TN, bowed_TJ33), atol=1e-3, rtol=0
     )
 
 

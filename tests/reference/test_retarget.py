@@ -44,14 +44,14 @@ def test_straight_arm_does_not_flip(
     name: str, retargeters: dict[str, OptimizationRetargeter], waving: Callable[[float], Tensor]
 ) -> None:
     retargeter = retargeters[name]
-    pose_TJ6 = waving(24.0)
-    result = retargeter.retarget(pose_TJ6, 24.0)
+    local_TJ33 = waving(24.0)
+    result = retargeter.retarget(local_TJ33, 24.0)
     assert result.jumps == 0
     assert float(result.q_TN.diff(dim=0).abs().max()) < 0.5
-    torch.testing.assert_close(result.residual_deg_TD, direction_error(retargeter.body_map, result.q_TN, pose_TJ6))
-    alone_TN, _ = retargeter.solve_frames(pose_TJ6)
+    torch.testing.assert_close(result.residual_deg_TD, direction_error(retargeter.body_map, result.q_TN, local_TJ33))
+    alone_TN, _ = retargeter.solve_frames(local_TJ33)
     assert float((alone_TN.diff(dim=0).abs()).max()) > 0.5  # frame by frame, the twist does flip
-    alone_TD = direction_error(retargeter.body_map, alone_TN, pose_TJ6)
+    alone_TD = direction_error(retargeter.body_map, alone_TN, local_TJ33)
     assert float(result.residual_deg_TD.mean() - alone_TD.mean()) < 0.5  # smoothness costs next to no accuracy
 
 
@@ -67,11 +67,11 @@ def test_frame_rate_changes_little(
 def test_recorded_motion_stays_near_the_best_of_each_frame(
     retargeters: dict[str, OptimizationRetargeter], cmu_poses: dict[str, Tensor]
 ) -> None:
-    pose_TJ6 = cmu_poses["13_21"][:200]
+    local_TJ33 = cmu_poses["13_21"][:200]
     for name, most_jumps in (("nao", 0), ("reachy", 0)):
         retargeter = retargeters[name]
-        result = retargeter.retarget(pose_TJ6, 24.0)
-        alone_TN, _ = retargeter.solve_frames(pose_TJ6)
+        result = retargeter.retarget(local_TJ33, 24.0)
+        alone_TN, _ = retargeter.solve_frames(local_TJ33)
         assert float((result.q_TN - alone_TN).abs().mean()) < 0.03
         assert float(result.residual_deg_TD.mean()) < 2
         assert result.jumps <= most_jumps
@@ -83,23 +83,23 @@ def test_recorded_motion_stays_near_the_best_of_each_frame(
 def test_same_seed_same_result(
     retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
 ) -> None:
-    retargeter, pose_TJ6 = retargeters["nao"], random_pose(40, 8)
-    first = retargeter.retarget(pose_TJ6, 30.0)
-    again = OptimizationRetargeter(retargeter.body_map).retarget(pose_TJ6, 30.0)
+    retargeter, local_TJ33 = retargeters["nao"], random_pose(40, 8)
+    first = retargeter.retarget(local_TJ33, 30.0)
+    again = OptimizationRetargeter(retargeter.body_map).retarget(local_TJ33, 30.0)
     assert torch.equal(first.q_TN, again.q_TN)
-    other = OptimizationRetargeter(retargeter.body_map, seed=1).retarget(pose_TJ6, 30.0)
+    other = OptimizationRetargeter(retargeter.body_map, seed=1).retarget(local_TJ33, 30.0)
     assert not torch.equal(first.q_TN, other.q_TN)
 
 
 def test_one_frame_and_no_smoothness(
     retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
 ) -> None:
-    pose_TJ6 = random_pose(20, 9)
-    alone_TN, _ = retargeters["nao"].solve_frames(pose_TJ6)
-    one = retargeters["nao"].retarget(pose_TJ6[:1], 24.0)
+    local_TJ33 = random_pose(20, 9)
+    alone_TN, _ = retargeters["nao"].solve_frames(local_TJ33)
+    one = retargeters["nao"].retarget(local_TJ33[:1], 24.0)
     assert one.q_TN.shape == (1, 8) and one.residual_deg_TD.shape == (1, 4) and one.jumps == 0
     torch.testing.assert_close(one.q_TN, alone_TN[:1], atol=1e-3, rtol=0)
-    rough = OptimizationRetargeter(retargeters["nao"].body_map, smoothness=0.0).retarget(pose_TJ6, 24.0)
+    rough = OptimizationRetargeter(retargeters["nao"].body_map, smoothness=0.0).retarget(local_TJ33, 24.0)
     torch.testing.assert_close(rough.q_TN, alone_TN, atol=1e-3, rtol=0)
 
 
@@ -120,22 +120,22 @@ def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, Opt
 
 def test_bad_input_is_named(retargeters: dict[str, OptimizationRetargeter]) -> None:
     retargeter = retargeters["nao"]
-    good_TJ6 = torch.tensor([1.0, 0, 0, 0, 1, 0]).repeat(6, 21, 1)
+    good_TJ33 = torch.eye(3).repeat(6, 21, 1, 1)
     for bad, message in ((math.nan, "frame 4, .*NaN"), (math.inf, "frame 4, .*infinite")):
-        pose_TJ6 = good_TJ6.clone()
-        pose_TJ6[4, 3, 2] = bad
+        local_TJ33 = good_TJ33.clone()
+        local_TJ33[4, 3, 2, 0] = bad
         with pytest.raises(UserError, match=message):
-            retargeter.retarget(pose_TJ6, 24.0)
-    pose_TJ6 = good_TJ6.clone()
-    pose_TJ6[[2, 5], 15] = 0.0
+            retargeter.retarget(local_TJ33, 24.0)
+    local_TJ33 = good_TJ33.clone()
+    local_TJ33[[2, 5], 15] = 0.0
     with pytest.raises(UserError, match=r"frame 2 \(and 1 more\), .*no rotation"):
-        retargeter.solve_frames(pose_TJ6)
-    for shape in ((6, 21, 3), (21, 6), (6, 22, 6), (0, 21, 6)):
-        with pytest.raises(UserError, match="21, 6"):
+        retargeter.solve_frames(local_TJ33)
+    for shape in ((6, 21, 6), (6, 21, 3), (21, 3, 3), (6, 22, 3, 3), (0, 21, 3, 3)):
+        with pytest.raises(UserError, match=r"shape \(frames, 21, 3, 3\)"):
             retargeter.retarget(torch.zeros(shape), 24.0)
     for rate in (0.0, -1.0, math.nan):
         with pytest.raises(UserError, match="frame rate"):
-            retargeter.retarget(good_TJ6, rate)
+            retargeter.retarget(good_TJ33, rate)
     with pytest.raises(UserError, match="smoothness"):
         OptimizationRetargeter(retargeter.body_map, smoothness=-1.0)
     with pytest.raises(UserError, match="starts"):
@@ -145,11 +145,12 @@ def test_bad_input_is_named(retargeters: dict[str, OptimizationRetargeter]) -> N
 def test_it_is_called_like_a_retargeter(
     retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor], tmp_path: Path
 ) -> None:
-    retargeter, pose_TJ6 = retargeters["nao"], random_pose(12, 3)
-    wanted = retargeter.retarget(pose_TJ6, 30.0)
-    motion = Motion("made", rotation.sixd_to_matrix(pose_TJ6), 30.0)
+    retargeter, local_TJ33 = retargeters["nao"], random_pose(12, 3)
+    wanted = retargeter.retarget(local_TJ33, 30.0)
+    motion = Motion("made", local_TJ33, 30.0)
     axis_angle_T63 = rotation.matrix_to_axis_angle(motion.local_TJ33).flatten(1).numpy()
-    for result in (retargeter(motion), retargeter(pose_TJ6, 30.0), retargeter(axis_angle_T63, frame_rate=30.0)):
+    forms = (local_TJ33, rotation.matrix_to_sixd(local_TJ33), axis_angle_T63)
+    for result in (retargeter(motion), *(retargeter(form, frame_rate=30.0) for form in forms)):
         torch.testing.assert_close(result.q, wanted.q_TN, atol=1e-3, rtol=0)
         torch.testing.assert_close(result.direction_error_deg, wanted.residual_deg_TD, atol=1e-2, rtol=0)
         assert result.joint_names == retargeter.body_map.robot.joint_names and result.frame_rate == 30.0
@@ -163,25 +164,25 @@ def test_it_is_called_like_a_retargeter(
 def test_leading_axes_are_motions_or_frames_of_their_own(
     retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
 ) -> None:
-    retargeter, pose_TJ6 = retargeters["nao"], random_pose(12, 4)
-    two = retargeter(pose_TJ6.unflatten(0, (2, 6)), 30.0)
+    retargeter, local_TJ33 = retargeters["nao"], random_pose(12, 4)
+    two = retargeter(local_TJ33.unflatten(0, (2, 6)), 30.0)
     assert two.q.shape == (2, 6, 8) and two.collision.shape == (2, 6)
-    for found, part_TJ6 in zip(two.q, pose_TJ6.split(6), strict=True):
-        assert torch.equal(found, retargeter.retarget(part_TJ6, 30.0).q_TN)
-    alone = retargeter(pose_TJ6)
-    assert torch.equal(alone.q, retargeter.solve_frames(pose_TJ6)[0]) and alone.frame_rate is None
-    one = retargeter(pose_TJ6[0])
+    for found, part_TJ33 in zip(two.q, local_TJ33.split(6), strict=True):
+        assert torch.equal(found, retargeter.retarget(part_TJ33, 30.0).q_TN)
+    alone = retargeter(local_TJ33)
+    assert torch.equal(alone.q, retargeter.solve_frames(local_TJ33)[0]) and alone.frame_rate is None
+    one = retargeter(local_TJ33[0])
     assert one.q.shape == (8,) and one.direction_error_deg.shape == (4,)
-    assert retargeter(pose_TJ6[:0], 30.0).q.shape == (0, 8)
+    assert retargeter(local_TJ33[:0], 30.0).q.shape == (0, 8)
     with pytest.raises(UserError, match="frame rate"):
-        retargeter(pose_TJ6, -1.0)
+        retargeter(local_TJ33, -1.0)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
 def test_cuda_gives_the_same(retargeters: dict[str, OptimizationRetargeter], waving: Callable[[float], Tensor]) -> None:
-    pose_TJ6 = waving(24.0)
-    here = retargeters["nao"].retarget(pose_TJ6, 24.0)
-    there = retargeters["nao"].to("cuda").retarget(pose_TJ6.cuda(), 24.0)
+    local_TJ33 = waving(24.0)
+    here = retargeters["nao"].retarget(local_TJ33, 24.0)
+    there = retargeters["nao"].to("cuda").retarget(local_TJ33.cuda(), 24.0)
     retargeters["nao"].to("cpu")
     assert there.q_TN.is_cuda
     torch.testing.assert_close(there.q_TN.cpu(), here.q_TN, atol=5e-3, rtol=0)

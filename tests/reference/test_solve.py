@@ -9,6 +9,7 @@ import torch
 from scipy.optimize import least_squares
 from torch import Tensor
 
+from mrhubo import rotation
 from mrhubo.body.skeleton import mirror_pose
 from mrhubo.reference import DirectionProblem, OptimizationRetargeter
 from mrhubo.reference.metrics import angle_between
@@ -101,10 +102,10 @@ def test_never_worse_than_scipy(
     """SciPy starts in the middle, then also at a random pose, then also where we ended."""
     retargeter = retargeters[name]
     problem, generator = retargeter.problem, torch.Generator().manual_seed(6)
-    every_TJ6 = torch.cat(list(cmu_poses.values()))
-    pose_BJ6 = every_TJ6[torch.randint(len(every_TJ6), (frames,), generator=generator)]
-    q_BN, cost_B = retargeter.solve_frames(pose_BJ6)
-    target_BD3 = retargeter.body_map.human_directions(pose_BJ6)
+    every_TJ33 = torch.cat(list(cmu_poses.values()))
+    local_BJ33 = every_TJ33[torch.randint(len(every_TJ33), (frames,), generator=generator)]
+    q_BN, cost_B = retargeter.solve_frames(local_BJ33)
+    target_BD3 = retargeter.body_map.human_directions(local_BJ33)
     for q_N, cost, target_D3 in zip(q_BN, cost_B.tolist(), target_BD3, strict=True):
         starts = [problem.posture.mid_N, *problem.robot.sample(1, generator), q_N][:most]
         assert cost <= 1.01 * min(scipy_cost(problem, target_D3, start.double().numpy()) for start in starts) + 1e-6
@@ -118,9 +119,10 @@ def test_mirrored_human_gives_mirrored_robot(
     names = retargeter.problem.robot.joint_names
     swapped = [names.index({"L": "R", "R": "L"}[n[0]] + n[1:]) for n in names]
     sign_N = torch.tensor([1.0 if "Pitch" in n else -1.0 for n in names])
-    pose_BJ6 = random_pose(200, 7)
-    q_BN, cost_B = retargeter.solve_frames(pose_BJ6)
-    mirrored_BN, mirrored_cost_B = retargeter.solve_frames(mirror_pose(pose_BJ6))
+    local_BJ33 = random_pose(200, 7)
+    q_BN, cost_B = retargeter.solve_frames(local_BJ33)
+    mirrored_BJ33 = rotation.stack_columns(mirror_pose(rotation.matrix_to_sixd(local_BJ33)))
+    mirrored_BN, mirrored_cost_B = retargeter.solve_frames(mirrored_BJ33)
     assert float((cost_B / mirrored_cost_B - 1).abs().median()) < 1e-3
     assert float(((cost_B / mirrored_cost_B).log().abs() < 0.01).float().mean()) > 0.99
     same_B = ((mirrored_BN[:, swapped] * sign_N) - q_BN).abs().amax(1) < 0.02

@@ -122,7 +122,7 @@ def robot_directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
 
 
 def human_poses(count: int) -> Tensor:
-    return BodyPrior.open().decode(torch.randn(count, 32, generator=torch.Generator().manual_seed(0)))
+    return BodyPrior.open().decode_matrices(torch.randn(count, 32, generator=torch.Generator().manual_seed(0)))
 
 
 def columns(body_map: BodyMap, *regions: str) -> list[int]:
@@ -138,11 +138,11 @@ def test_home_stands(body_map: BodyMap) -> None:
 
 
 def test_legs_are_seen_from_the_pelvis_and_arms_from_the_chest(body_map: BodyMap) -> None:
-    pose_BJ6 = human_poses(20)
-    bowed_BJ6 = pose_BJ6.clone()
+    local_BJ33 = human_poses(20)
+    bowed_BJ33 = local_BJ33.clone()
     spine = [POSED_JOINT_NAMES.index(f"spine{number}") for number in (1, 2, 3)]
-    bowed_BJ6[:, spine] = human_poses(40)[20:][:, spine]
-    before, after = (body_map.human_directions(pose) for pose in (pose_BJ6, bowed_BJ6))
+    bowed_BJ33[:, spine] = human_poses(40)[20:][:, spine]
+    before, after = (body_map.human_directions(pose) for pose in (local_BJ33, bowed_BJ33))
     limbs = columns(body_map, "arm", "leg", "foot")
     torch.testing.assert_close(after[:, limbs], before[:, limbs], atol=1e-5, rtol=0)
     if "waist" not in body_map.robot.joint_names:
@@ -189,8 +189,8 @@ def test_a_human_who_squats_and_turns_is_followed(body_map: BodyMap) -> None:
         turn[:, POSED_JOINT_NAMES.index(f"{side}_knee"), 0] = 2 * bend
         turn[:, POSED_JOINT_NAMES.index(f"{side}_ankle"), 0] = -bend
     turn[:, POSED_JOINT_NAMES.index("spine2"), 1] = 0.5 * bend
-    pose_TJ6 = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(turn))
-    result = OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0)
+    local_TJ33 = rotation.axis_angle_to_matrix(turn)
+    result = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0)
     assert result.jumps == 0
     legs = columns(body_map, "leg", "foot", "trunk")
     assert float(result.residual_deg_TD[:, legs].mean()) < 3
@@ -219,14 +219,20 @@ def test_keypoints_have_the_directions_and_a_humans_lengths(body_map: BodyMap) -
         across_B3 = torch.nn.functional.normalize(at["left_shoulder"] - at["right_shoulder"], dim=-1)
         left_B3 = torch.linalg.cross(seen["chest_up"], seen["chest_forward"])
         torch.testing.assert_close(across_B3, left_B3, atol=1e-5, rtol=0)
+        chest_B33 = torch.stack((left_B3, seen["chest_up"], seen["chest_forward"]), dim=-1)
+        for direction in body_map.directions:
+            if isinstance(direction, Limb) and direction.part.seen_from == "chest":
+                bone_B3 = torch.nn.functional.normalize(at[direction.part.end] - at[direction.part.start], dim=-1)
+                expected_B3 = (chest_B33 @ seen[direction.name][..., None])[..., 0]
+                torch.testing.assert_close(bone_B3, expected_B3, atol=1e-5, rtol=0)
 
 
 def test_a_human_is_turned_until_he_points_there(body_map: BodyMap) -> None:
-    pose_BJ6, wanted_BD3 = human_poses(30), robot_directions(
+    local_BJ33, wanted_BD3 = human_poses(30), robot_directions(
         body_map, body_map.robot.sample(30, torch.Generator().manual_seed(2))
     )  # fmt: skip
-    aligned = align_pose(body_map, rotation.sixd_to_matrix(pose_BJ6), wanted_BD3)
-    found_BD3 = body_map.human_directions(rotation.matrix_to_sixd(aligned))
+    aligned = align_pose(body_map, local_BJ33, wanted_BD3)
+    found_BD3 = body_map.human_directions(aligned)
     torch.testing.assert_close(found_BD3, wanted_BD3, atol=2e-4, rtol=0)
 
 

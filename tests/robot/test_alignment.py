@@ -18,7 +18,7 @@ ROBOTS = ["nao", "coman", "reachy"]
 
 @pytest.fixture(scope="module")
 def humans() -> torch.Tensor:
-    return BodyPrior.open().decode(torch.randn(64, 32, generator=torch.Generator().manual_seed(0)))
+    return BodyPrior.open().decode_matrices(torch.randn(64, 32, generator=torch.Generator().manual_seed(0)))
 
 
 def of(root: Path, name: str) -> tuple[BodyMap, torch.Tensor]:
@@ -27,17 +27,17 @@ def of(root: Path, name: str) -> tuple[BodyMap, torch.Tensor]:
     return body_map, body_map.robot_directions(body_map.robot.forward(q_BN))
 
 
-def align(body_map: BodyMap, pose_BJ6: torch.Tensor, direction_BD3: torch.Tensor) -> torch.Tensor:
-    return rotation.matrix_to_sixd(align_pose(body_map, rotation.sixd_to_matrix(pose_BJ6), direction_BD3))
+def mirrored(local_BJ33: torch.Tensor) -> torch.Tensor:
+    return rotation.stack_columns(mirror_pose(rotation.matrix_to_sixd(local_BJ33)))
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_human_points_where_the_robot_does(root: Path, name: str, humans: torch.Tensor) -> None:
     body_map, direction_BD3 = of(root, name)
-    aligned = align(body_map, humans, direction_BD3)
+    aligned = align_pose(body_map, humans, direction_BD3)
     torch.testing.assert_close(body_map.human_directions(aligned), direction_BD3, atol=1e-4, rtol=0)
-    torch.testing.assert_close(rotation.matrix_to_sixd(rotation.sixd_to_matrix(aligned)), aligned, atol=1e-5, rtol=0)
-    changed = (aligned - humans).abs().amax((0, 2)) > 1e-6
+    torch.testing.assert_close(rotation.orthonormal(aligned), aligned, atol=1e-5, rtol=0)
+    changed = (aligned - humans).abs().amax((0, 2, 3)) > 1e-6
     parts = {"shoulder", "elbow", "wrist", "neck", "head"}
     assert {name.split("_")[-1] for name, c in zip(POSED_JOINT_NAMES, changed.tolist(), strict=True) if c} <= parts
 
@@ -45,7 +45,7 @@ def test_the_human_points_where_the_robot_does(root: Path, name: str, humans: to
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_pose_that_points_there_already_stays(root: Path, name: str, humans: torch.Tensor) -> None:
     body_map, _ = of(root, name)
-    kept = align(body_map, humans, body_map.human_directions(humans))
+    kept = align_pose(body_map, humans, body_map.human_directions(humans))
     torch.testing.assert_close(kept, humans, atol=2e-3, rtol=0)
 
 
@@ -54,13 +54,26 @@ def test_an_arm_is_not_twisted(root: Path, humans: torch.Tensor) -> None:
     body_map, direction_BD3 = of(root, "nao")
     skeleton, joint = body_map.skeleton, JOINT_NAMES.index("left_shoulder")
     before, after = (
-        skeleton.global_rotations(rotation.sixd_to_matrix(p))[:, joint]
-        for p in (humans, align(body_map, humans, direction_BD3))
+        skeleton.global_rotations(p)[:, joint] for p in (humans, align_pose(body_map, humans, direction_BD3))
     )
     turn = rotation.matrix_to_axis_angle(after @ before.mT)
     assert float(turn.norm(dim=1).max()) > 0.5
     arm = before @ torch.tensor([1.0, 0.0, 0.0])  # the bone at rest
     assert float((turn * arm).sum(1).abs().max()) < 1e-3
+
+
+def test_neck_and_head_share_the_heads_turn(root: Path, humans: torch.Tensor) -> None:
+    body_map, direction_BD3 = of(root, "reachy")
+    before, after = (
+        body_map.skeleton.global_rotations(rotation.sixd_to_matrix(p))
+        for p in (humans, align(body_map, humans, direction_BD3))
+    )
+    neck_B, head_B = (
+        rotation.geodesic_distance(before[:, joint], after[:, joint])
+        for joint in (JOINT_NAMES.index("neck"), JOINT_NAMES.index("head"))
+    )
+    assert float(head_B.max()) > 0.5
+    torch.testing.assert_close(neck_B, head_B / 2, atol=2e-3, rtol=0)
 
 
 def test_mirrored_poses_are_aligned_in_mirror_image(root: Path, humans: torch.Tensor) -> None:
@@ -70,13 +83,13 @@ def test_mirrored_poses_are_aligned_in_mirror_image(root: Path, humans: torch.Te
     swap = [names.index({"left": "right", "right": "left"}.get(n.split("_")[0], "") + n[len(n.split("_")[0]) :])
             if n.split("_")[0] in ("left", "right") else names.index(n) for n in names]  # fmt: skip
     mirrored_BD3 = direction_BD3[:, swap] * flip
-    found = align(body_map, mirror_pose(humans), mirrored_BD3)
-    torch.testing.assert_close(found, mirror_pose(align(body_map, humans, direction_BD3)), atol=2e-3, rtol=0)
+    found = align_pose(body_map, mirrored(humans), mirrored_BD3)
+    torch.testing.assert_close(found, mirrored(align_pose(body_map, humans, direction_BD3)), atol=2e-3, rtol=0)
 
 
 def test_an_opposite_direction_gives_a_finite_pose(root: Path) -> None:
     body_map, _ = of(root, "nao")
     rest = torch.eye(3).expand(1, 21, 3, 3)
-    opposite = -body_map.human_directions(rotation.matrix_to_sixd(rest))
+    opposite = -body_map.human_directions(rest)
     aligned = align_pose(body_map, rest, opposite)
     torch.testing.assert_close(aligned @ aligned.mT, torch.eye(3).expand_as(aligned), atol=1e-5, rtol=0)

@@ -59,10 +59,10 @@ def test_robots_from_config_and_urdf_are_those_of_the_body_map(root: Path, name:
 
 def test_the_optimisation_takes_a_robot(root: Path) -> None:
     robot = Robot.from_config(root / "conf" / "nao.yaml")
-    pose_TJ6 = torch.tensor([1.0, 0, 0, 0, 1, 0]).repeat(3, 21, 1)
-    from_robot = OptimizationRetargeter(robot).retarget(pose_TJ6, 24.0)
+    local_TJ33 = torch.eye(3).repeat(3, 21, 1, 1)
+    from_robot = OptimizationRetargeter(robot).retarget(local_TJ33, 24.0)
     body_map = build_body_map(load_config(root / "conf" / "nao.yaml").robot)
-    assert torch.equal(from_robot.q_TN, OptimizationRetargeter(body_map).retarget(pose_TJ6, 24.0).q_TN)
+    assert torch.equal(from_robot.q_TN, OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0).q_TN)
     with pytest.raises(UserError, match=r"nao.urdf: nothing tells which link of 'nao'.*from_config"):
         OptimizationRetargeter(Robot(robot.urdf, robot.joint_names))
 

@@ -20,6 +20,7 @@ from mrhubo.evaluation import Clip, evaluate_clips, latencies, mean_score, run_m
 from mrhubo.fitting.preparation import Prepared, prepare
 from mrhubo.fitting.record import log_predictions
 from mrhubo.fitting.references import make_references
+from mrhubo.rotation import stack_columns
 from mrhubo.runtime.locations import default_capture, project_root
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.tracking import ending, git_commit, log_all, open_client, start_run
@@ -66,7 +67,7 @@ class Baseline:
         chosen = chosen[plausible_frames(chosen, _MAX_EXCESS_DEG)][: config.s3le.glue]
         if not len(chosen):
             raise UserError(f"s3le.poses: {path} holds no pose that a human can strike")
-        data = make_data(prepared.body_map, chosen, config.s3le, report)
+        data = make_data(prepared.body_map, stack_columns(chosen), config.s3le, report)
         validation, test = make_references(prepared, report)
         return cls(prepared, data, validation, test)
 
@@ -82,11 +83,11 @@ class Baseline:
 
     def predict(self, model: S3LE, settings: S3LEConfig, clips: Sequence[Clip]) -> list[Tensor]:
         """Joint angles (T, N) for each clip."""
-        return [self.answer(model, settings, clip.motion.pose_TJ6) for clip in clips]
+        return [self.answer(model, settings, clip.motion.local_TJ33) for clip in clips]
 
-    def answer(self, model: S3LE, settings: S3LEConfig, pose_TJ6: Tensor) -> Tensor:
-        """Joint angles (T, N) of human poses (T, 21, 6)."""
-        codes = model.human_codes(self.prepared.body_map.human_directions(pose_TJ6))
+    def answer(self, model: S3LE, settings: S3LEConfig, local_TJ33: Tensor) -> Tensor:
+        """Joint angles (T, N) of human poses (T, 21, 3, 3)."""
+        codes = model.human_codes(self.prepared.body_map.human_directions(local_TJ33))
         return model.answer(codes, settings.neighbours, settings.width, self.data.collision)
 
     def validation_link_cm(self, model: S3LE, settings: S3LEConfig) -> float:

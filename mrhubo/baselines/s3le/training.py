@@ -36,20 +36,20 @@ class S3LEData:
     collision: SelfCollision
 
 
-def make_data(body_map: BodyMap, pose_GJ6: Tensor, settings: S3LEConfig, report: Reporter = SILENT) -> S3LEData:
-    """Glue pairs of human poses (G, 21, 6) from motion capture, and random robot poses."""
+def make_data(body_map: BodyMap, local_GJ33: Tensor, settings: S3LEConfig, report: Reporter = SILENT) -> S3LEData:
+    """Glue pairs of human poses (G, 21, 3, 3) from motion capture, and random robot poses."""
     robot, collision = body_map.robot, body_map.collision
     retargeter = OptimizationRetargeter(body_map)
     answers = []
-    with report.step("glue pairs", len(pose_GJ6)) as progress:
-        for done, part in enumerate(pose_GJ6.split(2_000)):
+    with report.step("glue pairs", len(local_GJ33)) as progress:
+        for done, part in enumerate(local_GJ33.split(2_000)):
             progress.update(2_000 * done)
             answers.append(retargeter.solve_frames(part)[0])
     generator = torch.Generator().manual_seed(settings.seed)
     random_UN = robot.sample(settings.random_poses, generator)
     random_UN = random_UN[~collision.collides(random_UN)]
     return S3LEData(
-        body_map.human_directions(pose_GJ6),
+        body_map.human_directions(local_GJ33),
         torch.cat(answers),
         random_UN,
         _directions(body_map, random_UN),

@@ -41,7 +41,7 @@ def mlflow_datasets(prepared: Prepared) -> list[DatasetInput]:
 
 def _clips(folder: Path, clips: Sequence[Motion], context: str) -> DatasetInput:
     checksums = {clip.name: clip.checksum for clip in clips}
-    profile = {"clips": len(clips), "frames": sum(len(clip.pose_TJ6) for clip in clips), "motion_xxh3": checksums}
+    profile = {"clips": len(clips), "frames": sum(len(clip) for clip in clips), "motion_xxh3": checksums}
     return _dataset(f"{folder.name}-{context}", fingerprint(checksums), folder, profile, context)
 
 

@@ -45,8 +45,8 @@ def register_package(recording: Recording, retargeter: Retargeter, score: Evalua
         "test_joint_rad": f"{score.joint_rad:.4f}",
         "test_link_cm": f"{score.link_cm:.3f}",
     }
-    example_TJ6 = clip.motion.pose_TJ6[:_EXAMPLE]
+    example_TJ33 = clip.motion.local_TJ33[:_EXAMPLE]
     try:
-        return register(recording.client, recording.run_id, package_dir(recording), retargeter, example_TJ6, tags)
+        return register(recording.client, recording.run_id, package_dir(recording), retargeter, example_TJ33, tags)
     except Exception as error:  # MLflow's own, the network's, the database's
         return f"not registered: {type(error).__name__}: {' '.join(str(error).split())[:200]}"

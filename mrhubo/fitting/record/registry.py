@@ -16,7 +16,7 @@ from torch import Tensor
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter
-from mrhubo.rotation import matrix_to_axis_angle, sixd_to_matrix
+from mrhubo.rotation import matrix_to_axis_angle, orthonormal
 from mrhubo.runtime.locations import default_tracking
 from mrhubo.runtime.tracking import database_uri, library_versions
 
@@ -31,13 +31,18 @@ def model_name(robot: str) -> str:
     return f"mrhubo-{robot}"
 
 
-def example_input(pose_TJ6: Tensor) -> np.ndarray:
-    """Human poses (T, 21, 6) as the model wants them: axis-angle [rad] (T, 63), float32."""
-    return matrix_to_axis_angle(sixd_to_matrix(pose_TJ6)).flatten(1).numpy().astype(np.float32)
+def example_input(local_TJ33: Tensor) -> np.ndarray:
+    """Human poses (T, 21, 3, 3) as the model wants them: axis-angle [rad] (T, 63), float32."""
+    return matrix_to_axis_angle(orthonormal(local_TJ33)).flatten(1).numpy().astype(np.float32)
 
 
 def register(
-    client: MlflowClient, run_id: str, package: Path, retargeter: Retargeter, pose_TJ6: Tensor, tags: Mapping[str, str]
+    client: MlflowClient,
+    run_id: str,
+    package: Path,
+    retargeter: Retargeter,
+    local_TJ33: Tensor,
+    tags: Mapping[str, str],
 ) -> str:
     """Makes a new version of the robot's model and returns its URI, `models:/mrhubo-nao/3`.
 
@@ -48,7 +53,7 @@ def register(
         run_id: the run that made the package.
         package: its folder.
         retargeter: what is in it.
-        pose_TJ6: human poses (T, 21, 6), the input example.
+        local_TJ33: human poses (T, 21, 3, 3), the input example.
         tags: of the model version.
 
     Raises:
@@ -60,7 +65,7 @@ def register(
     model = client.create_logged_model(run.info.experiment_id, name, run_id, tags=dict(tags))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model"
-        _save(path, package, retargeter, example_input(pose_TJ6), model.model_id, run_id)
+        _save(path, package, retargeter, example_input(local_TJ33), model.model_id, run_id)
         client.log_model_artifacts(model.model_id, str(path))
     client.finalize_logged_model(model.model_id, "READY")
     client.log_outputs(run_id, [LoggedModelOutput(model.model_id, step=0)])

@@ -19,7 +19,7 @@ from mlflow.pyfunc.model import PythonModel, PythonModelContext
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.rotation import axis_angle_to_matrix
 
 
 class ServedRetargeter(PythonModel):
@@ -57,7 +57,7 @@ class ServedRetargeter(PythonModel):
                 f" found {pose_T63.shape}"
             )
         pose_TJ3 = torch.from_numpy(pose_T63.copy()).unflatten(1, (len(POSED_JOINT_NAMES), 3))
-        result = self.retargeter.retarget(matrix_to_sixd(axis_angle_to_matrix(pose_TJ3)))
+        result = self.retargeter.retarget(axis_angle_to_matrix(pose_TJ3))
         table = pd.DataFrame(result.q.numpy(), columns=list(self.retargeter.joint_names))
         return table.assign(confidence=result.confidence.numpy())
 

@@ -20,7 +20,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import BaselineConfig, S3LEConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
-from mrhubo.rotation import matrix_to_axis_angle, sixd_to_matrix
+from mrhubo.rotation import matrix_to_axis_angle
 from mrhubo.runtime.tracking import database_uri
 
 SMALL = S3LEConfig(glue=400, random_poses=3000, self_made=500, latent=8, hidden=64, steps=250, batch_size=128)
@@ -33,9 +33,9 @@ def body_map(root: Path) -> BodyMap:
 
 @pytest.fixture(scope="module")
 def poses() -> torch.Tensor:
-    """Human poses (600, 21, 6)."""
+    """Human poses (600, 21, 3, 3)."""
     prior = BodyPrior.open()
-    return prior.decode(torch.randn(600, prior.latent, generator=torch.Generator().manual_seed(0))).detach()
+    return prior.decode_matrices(torch.randn(600, prior.latent, generator=torch.Generator().manual_seed(0))).detach()
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_the_command_measures_searches_and_resumes(
     motions.mkdir()
     for name in ("drinking", "wave"):
         shutil.copy(root / "data" / "motions" / f"{name}.npz", motions)
-    axis_angle = matrix_to_axis_angle(sixd_to_matrix(poses)).flatten(1)
+    axis_angle = matrix_to_axis_angle(poses).flatten(1)
     whole = torch.cat((torch.zeros(len(poses), 3), axis_angle), dim=1).numpy()
     np.savez(tmp_path / "poses.npz", poses=whole, clip_starts=np.array([0, 600]), clip_ids=np.array(["a"]))
     given = ["--config", str(root / "conf" / "nao.yaml"), "--quiet", f"tracking.dir={tmp_path / 'mlruns'}"]

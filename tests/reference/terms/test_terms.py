@@ -102,7 +102,9 @@ def test_self_collision(name: str, body_maps: dict[str, BodyMap]) -> None:
         return table_BP[near.row_X, near.pair_X]
 
     torch.testing.assert_close(shortfall(q_BN), short_X)
-    assert float((jacobian_XN - differences(shortfall, q_BN[:, :])).abs().median()) < 1e-3
+    off_XN = (jacobian_XN - differences(shortfall, q_BN)).abs()
+    assert float(off_XN.quantile(0.99)) < 2e-4  # a contact that changes side within the step has no one derivative
+    assert float(jacobian_XN.abs().quantile(0.99)) > 0.01
     rows = [(jacobian_XN[row_X == row], short_X[row_X == row]) for row in range(len(q_BN))]
     model = term.add_to(None, state(body_map, q_BN, target_BD3), blocks)
     torch.testing.assert_close(model.cost_BC[:, 0], torch.stack([3 * r.square().sum() for _, r in rows]))
