@@ -237,7 +237,7 @@ def reverse(setup: PairSetup, maker: PairGenerator, count: int) -> None:
     z = maker.settings.reverse_spread * torch.randn(count, maker.prior.latent, generator=generator)
     near = z + 0.05 * torch.randn(z.shape, generator=generator)
     with torch.no_grad():
-        pose, near_pose = (maker.prior.decode(latent.to(device)) for latent in (z, near))
+        pose, near_pose = (maker.prior.decode_matrices(latent.to(device)) for latent in (z, near))
     rows = []
     for starts in (2, 4, 12):
         reference = OptimizationRetargeter(setup.body_map, starts=starts)

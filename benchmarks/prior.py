@@ -26,6 +26,7 @@ from mrhubo.body.skeleton import PAIRED_JOINTS, SIDES
 from mrhubo.config import PriorConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.rotation import matrix_to_sixd
 from mrhubo.runtime.locations import default_motions
 
 ROWS = {
@@ -65,8 +66,9 @@ def by_clip(prior: BodyPrior, motions: list[Motion]) -> tuple[list[list[str]], f
     """Reconstruction of every clip, and the joint error's mean over clips."""
     rows, means = [], []
     for motion in motions:
-        joints_mm, angles_deg = reconstruction(prior, Skeleton(), motion.pose_TJ6)
-        phi = prior.reconstruction_error(motion.pose_TJ6).mean()
+        pose_TJ6 = matrix_to_sixd(motion.local_TJ33)
+        joints_mm, angles_deg = reconstruction(prior, Skeleton(), pose_TJ6)
+        phi = prior.reconstruction_error(pose_TJ6).mean()
         means.append([float(joints_mm.mean()), float(angles_deg.mean())])
         rows.append([motion.name, str(len(joints_mm)), *[f"{m:.2f}" for m in means[-1]], f"{phi:.5f}"])
     mean = torch.tensor(means).mean(0)
@@ -120,7 +122,7 @@ def main(argv: list[str]) -> None:
     motions = read_folder(folder)
     clips, mean_mm = by_clip(prior, motions)
     training = training_poses(prior, given.config)
-    everything = torch.cat([motion.pose_TJ6 for motion in motions])
+    everything = torch.cat([matrix_to_sixd(motion.local_TJ33) for motion in motions])
     evaluation = measure(prior, everything, training[1] if training else None)
     held_out = measure(prior, *training) if training else {}
     columns = {"held-out clips": held_out, f"{folder.name}, {len(motions)} clips": {**evaluation, "joint_mm": mean_mm}}

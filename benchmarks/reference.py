@@ -31,12 +31,12 @@ def main(argv: list[str]) -> None:
         config = load_config(Path(f"conf/{robot}.yaml"), argv)
         config.evaluation.motions = config.evaluation.motions or default_motions()
         motions, retargeter = load_motions(config).all, OptimizationRetargeter(build_body_map(config.robot))
-        retargeter.retarget(motions[0].pose_TJ6[:50], motions[0].frame_rate)
+        retargeter.retarget(motions[0].local_TJ33[:50], motions[0].frame_rate)
         start = time.perf_counter()
-        plain = [retargeter.retarget(motion.pose_TJ6, motion.frame_rate) for motion in motions]
+        plain = [retargeter.retarget(motion.local_TJ33, motion.frame_rate) for motion in motions]
         middle = time.perf_counter()
         free = [
-            retargeter.retarget_collision_free(motion.pose_TJ6, motion.frame_rate, found.q_TN)
+            retargeter.retarget_collision_free(motion.local_TJ33, motion.frame_rate, found.q_TN)
             for motion, found in zip(motions, plain, strict=True)
         ]
         end = time.perf_counter()
@@ -46,7 +46,7 @@ def main(argv: list[str]) -> None:
             for name, found, seconds in (("q", plain, middle - start), ("q_cf, from q", free, end - middle))
         ]
         heads = ["frames/s", *(f"{part} [deg]" for part in parts), "at a limit", "jumps", "jerk", "collision", "rests"]
-        print(f"## {robot}, {len(motions)} clips, {sum(len(m.pose_TJ6) for m in motions):,} frames\n")
+        print(f"## {robot}, {len(motions)} clips, {sum(len(m) for m in motions):,} frames\n")
         print_table(["output", *heads], rows)
         print()
 
@@ -65,7 +65,7 @@ def measures(
     jerks = []
     for motion, result in zip(motions, found, strict=True):
         robot_TD3 = body_map.robot_directions(body_map.robot.forward(result.q_TN))
-        human_TD3 = body_map.human_directions(motion.pose_TJ6)
+        human_TD3 = body_map.human_directions(motion.local_TJ33)
         jerks.append([float(direction_jerk(d, motion.frame_rate).sum()) for d in (robot_TD3, human_TD3)])
     robot_jerk, human_jerk = torch.tensor(jerks).sum(0).tolist()
     limits = sum(f.at_limit_share * len(f.q_TN) for f in found) / len(q_TN)

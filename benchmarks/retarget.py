@@ -31,18 +31,21 @@ def serve(package: str) -> None:
     import torch
 
     import mrhubo
+    from mrhubo import rotation
     from mrhubo.retargeter import Retargeter
 
     torch.set_num_threads(1)
     retargeter = Retargeter.load(package)
+    # Checkouts from before poses were rotation matrices take 6D.
+    decode = retargeter.prior.decode_matrices if hasattr(rotation, "orthonormal") else retargeter.prior.decode
     print(json.dumps(str(Path(mrhubo.__file__).resolve().parents[1])), file=answers, flush=True)
     generator = torch.Generator().manual_seed(0)
     for line in sys.stdin:
         z_TZ = 0.7 * torch.randn(int(line), retargeter.prior.latent, generator=generator)
         with torch.no_grad():
-            pose_TJ6 = retargeter.prior.decode(z_TZ)
+            poses = decode(z_TZ)
         start = time.perf_counter()
-        retargeter.retarget(pose_TJ6)
+        retargeter.retarget(poses)
         print(json.dumps(time.perf_counter() - start), file=answers, flush=True)
 
 

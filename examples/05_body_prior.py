@@ -20,17 +20,18 @@ def main(out: str = "body_prior.png") -> None:
     """Draws samples, spoilt and mended poses, and poses whose left hand was told where to be."""
     prior = BodyPrior.open()
     generator = torch.Generator().manual_seed(0)
-    poses = prior.decode(torch.randn(5, prior.latent, generator=generator))
+    poses = prior.decode_matrices(torch.randn(5, prior.latent, generator=generator))
 
     turns = axis_angle_to_matrix(0.4 * torch.randn(5, 21, 3, generator=generator))  # each joint by some 0.6 rad
-    spoilt = matrix_to_sixd(sixd_to_matrix(poses) @ turns)
-    mended = prior.denoise(spoilt)
+    spoilt = poses @ turns
+    mended = sixd_to_matrix(prior.denoise(matrix_to_sixd(spoilt)))  # the prior takes and gives 6D
     for name, some in (("sampled", poses), ("spoilt", spoilt), ("mended", mended)):
-        print(f"{name}: reconstruction error {float(prior.reconstruction_error(some).mean()):.4f} on average")
+        phi = prior.reconstruction_error(matrix_to_sixd(some))
+        print(f"{name}: reconstruction error {float(phi.mean()):.4f} on average")
 
     heights = torch.linspace(-0.2, 0.6, 5)
     goals = torch.stack([torch.tensor([0.4, float(height), 0.3]) for height in heights])  # m from the pelvis
-    reaching = inverse_kinematics(prior, {"left_wrist": goals})
+    reaching = sixd_to_matrix(inverse_kinematics(prior, {"left_wrist": goals}))
 
     rows = [[human_figure(pose) for pose in some] for some in (poses, spoilt, mended, reaching)]
     titles = ["sampled", "spoilt", "mended", "left hand\nhigher and higher"]

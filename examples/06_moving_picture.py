@@ -29,7 +29,7 @@ def main(
 
     times = [first + i / GIF_RATE for i in range(round(seconds * GIF_RATE))]
     frames = [round(time * motion.frame_rate) for time in times if time * motion.frame_rate <= len(q_TN) - 1]
-    people = [artist.human(motion.pose_TJ6[frame]) for frame in frames]
+    people = [artist.human(motion.local_TJ33[frame]) for frame in frames]
     robots = [artist.robot_figure(q_TN[frame]) for frame in frames]
     pictures = figure_animation([people, robots], ["person", artist.robot.name], [""] * len(frames), (260, 330))
     save_gif(pictures, out, GIF_RATE)

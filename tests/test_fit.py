@@ -173,12 +173,12 @@ def test_the_package_retargets(root: Path, fitted: tuple[Path, str], motions: Pa
     assert retargeter.joint_names[0] == "LShoulderPitch"
     config = load_config(root / "conf" / "nao.yaml", [f"evaluation.motions=[{motions}]"])
     for motion in load_motions(config).test:
-        result = retargeter.retarget(motion.pose_TJ6)
+        result = retargeter.retarget(motion.local_TJ33)
         robot = retargeter.body_map.robot
         assert bool(((result.q >= robot.lower_N) & (result.q <= robot.upper_N)).all())
         assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
-        assert result.q.shape == (len(motion.pose_TJ6), 8)
-        torch.testing.assert_close(retargeter.predict(motion.pose_TJ6, polish=1), result.q)
+        assert result.q.shape == (len(motion), 8)
+        torch.testing.assert_close(retargeter.predict(motion.local_TJ33, polish=1), result.q)
 
 
 def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,9 +191,9 @@ def test_the_dashboards_code_runs(root: Path, fitted: tuple[Path, str], monkeypa
     finally:
         mlflow.set_tracking_uri(before)
     (package, *_) = sorted((fitted[0] / "mlruns" / "packages").iterdir(), key=lambda path: path.stat().st_mtime)
-    retargeter, pose_TJ6 = Retargeter.load(package), read_motion(root / "data" / "motions" / "wave.npz").pose_TJ6
+    retargeter, local_TJ33 = Retargeter.load(package), read_motion(root / "data" / "motions" / "wave.npz").local_TJ33
     q_TN = torch.tensor(names["table"][list(retargeter.joint_names)].to_numpy())
-    torch.testing.assert_close(q_TN, retargeter.retarget(pose_TJ6).q, atol=1e-3, rtol=0)
+    torch.testing.assert_close(q_TN, retargeter.retarget(local_TJ33).q, atol=1e-3, rtol=0)
 
 
 def final_metrics(folder: Path) -> dict[str, float]:

@@ -81,8 +81,8 @@ def test_the_training_makes_the_pairs_that_are_missing(home: Path, config: Confi
     assert training.pairing.made == 200 and len(training.pairs["phi"]) == 200 and prepared.store.missing() == []
     again = train(prepared, SILENT, validation, home / "again")
     assert again.pairing.made == 0 and again.best_link_cm == training.best_link_cm
-    pose_TJ6 = validation[0].motion.pose_TJ6
-    assert torch.equal(again.retargeter.predict(pose_TJ6), training.retargeter.predict(pose_TJ6))
+    local_TJ33 = validation[0].motion.local_TJ33
+    assert torch.equal(again.retargeter.predict(local_TJ33), training.retargeter.predict(local_TJ33))
 
 
 def test_a_filter_that_drops_every_pair_is_refused(home: Path, config: Config) -> None:

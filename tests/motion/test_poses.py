@@ -31,22 +31,23 @@ def test_the_three_forms_agree_for_any_leading_axes(turns: np.ndarray, dtype: ty
     for array in (form.astype(dtype) for form in forms):
         found = read_poses(torch.from_numpy(array) if as_torch else array)
         assert found.shape == turns.shape[:-1] and found.frame_rate is None
-        assert found.pose_TJ6.shape == (math.prod(found.shape), 21, 6) and found.pose_TJ6.dtype == torch.float32
-        expected = matrix_to_sixd(matrices).reshape(-1, 21, 6).float()
-        torch.testing.assert_close(found.pose_TJ6, expected, atol=2e-5, rtol=0)
+        assert found.local_TJ33.shape == (math.prod(found.shape), 21, 3, 3)
+        assert found.local_TJ33.dtype == torch.float32
+        expected = matrices.reshape(-1, 21, 3, 3).float()
+        torch.testing.assert_close(found.local_TJ33, expected, atol=2e-5, rtol=0)
 
 
 def test_a_motion_is_taken_as_it_is() -> None:
     motion = Motion("turn", axis_angle_to_matrix(torch.linspace(0, 3, 4 * 63).reshape(4, 21, 3)), 30.0)
     found = read_poses(motion)
-    assert found.frame_rate == 30.0 and found.shape == (4,) and torch.equal(found.pose_TJ6, motion.pose_TJ6)
+    assert found.frame_rate == 30.0 and found.shape == (4,) and torch.equal(found.local_TJ33, motion.local_TJ33)
 
 
 def test_views_and_whole_numbers_do_too() -> None:
     turns = np.zeros((5, 63), dtype=np.int64)
     turns[:, 0] = np.arange(5)
     turns.flags.writeable = False
-    assert torch.equal(read_poses(turns[::-1]).pose_TJ6, read_poses(turns).pose_TJ6.flip(0))
+    assert torch.equal(read_poses(turns[::-1]).local_TJ33, read_poses(turns).local_TJ33.flip(0))
 
 
 def identity(*leading: int) -> torch.Tensor:

@@ -13,7 +13,7 @@ import torch
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton
 from mrhubo.motion import Motion, read_folder
-from mrhubo.rotation import matrix_to_axis_angle, sixd_to_matrix
+from mrhubo.rotation import matrix_to_axis_angle, orthonormal
 
 NAMES = [
     "bow_and_greet", "boxing", "conversation", "crossing_arms", "directing_traffic", "drinking", "pointing", "stretch", "wave",
@@ -44,7 +44,7 @@ def folder(root: Path) -> Path:
 def bodies(folder: Path) -> dict[str, Body]:
     skeleton, found = Skeleton().double(), {}
     for motion in read_folder(folder):
-        local_TJ33 = sixd_to_matrix(motion.pose_TJ6.double())
+        local_TJ33 = orthonormal(motion.local_TJ33.double())
         points, rotations = skeleton.keypoints_and_rotations(local_TJ33)
         found[motion.name] = Body(
             motion,
@@ -67,7 +67,7 @@ def test_names_rates_and_sizes(folder: Path, bodies: dict[str, Body]) -> None:
     for body in bodies.values():
         assert body.motion.frame_rate == 60.0
         assert 5.0 <= len(body.motion) / 60.0 <= 10.1
-        assert torch.isfinite(body.motion.pose_TJ6).all()
+        assert torch.isfinite(body.motion.local_TJ33).all()
         assert len(body.motion.description) > 20
     assert all(file.stat().st_size < 300_000 for file in folder.glob("*.npz"))
 

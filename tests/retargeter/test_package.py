@@ -35,7 +35,8 @@ def folder(made: Retargeter, tmp_path: Path) -> Path:
 
 
 def human(count: int) -> torch.Tensor:
-    return BodyPrior.open().decode(torch.randn(count, 32, generator=torch.Generator().manual_seed(1)))
+    """Local rotations (count, 21, 3, 3) of plausible poses."""
+    return BodyPrior.open().decode_matrices(torch.randn(count, 32, generator=torch.Generator().manual_seed(1)))
 
 
 def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: Path) -> None:
@@ -51,7 +52,7 @@ def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: 
 def test_arms_and_head_have_networks_of_their_own(made: Retargeter) -> None:
     """The human's right arm and head move nothing of the robot's left arm; each moves its own."""
     joints, pose = made.joint_names, human(30)
-    turned = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(30, 21, 3)))
+    turned = rotation.axis_angle_to_matrix(torch.randn(30, 21, 3))
     for parts, own in (
         ("r", ["right_collar", "right_shoulder", "right_elbow", "right_wrist"]),
         ("n", ["neck", "head"]),
@@ -74,7 +75,7 @@ def test_a_head_that_no_joint_turns_is_not_looked_at(root: Path) -> None:
     assert {"neck", "head"}.isdisjoint(network.features.input_joints) and "left_wrist" in network.features.input_joints
     pose = human(30)
     found = OptimizationRetargeter(body_map).retarget(pose, 24.0)
-    assert found.q_TN.shape == network(pose).shape == (30, 8)
+    assert found.q_TN.shape == network(rotation.matrix_to_sixd(pose)).shape == (30, 8)
     limbs = [i for i, name in enumerate(body_map.direction_names) if name.endswith(("elbow", "wrist"))]
     still = direction_error(body_map, ((body_map.robot.lower_N + body_map.robot.upper_N) / 2).expand(30, 8), pose)
     assert float(found.residual_deg_TD[:, limbs].mean()) < 0.3 * float(still[:, limbs].mean())
@@ -122,7 +123,7 @@ def test_no_path_of_this_machine_is_in_a_package(folder: Path, root: Path) -> No
 
 
 def test_confidence_falls_for_implausible_poses(made: Retargeter) -> None:
-    noise = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(2 * torch.randn(50, 21, 3)))
+    noise = rotation.axis_angle_to_matrix(2 * torch.randn(50, 21, 3))
     good, bad = made.retarget(human(50)), made.retarget(noise)
     assert float(bad.phi.min()) > float(good.phi.max())
     for result in (good, bad):
@@ -141,7 +142,7 @@ def test_polish_brings_every_frame_nearer_and_stays_inside_the_limits(made: Reta
         assert bool(((result.q >= robot.lower_N) & (result.q <= robot.upper_N)).all())
         assert torch.equal(result.collision, made.collision.collides(result.q))
         errors.append(made.directions.quadratic(result.q, made.body_map.human_directions(pose)).cost_BC)
-    assert torch.equal(made.predict(pose), made.network(pose))
+    assert torch.equal(made.predict(pose), made.network(rotation.matrix_to_sixd(pose)))
     assert bool((errors[1] <= errors[0]).all()) and bool((errors[2] <= errors[1]).all())
     assert float(errors[2].sum(1).mean()) < 0.5 * float(errors[0].sum(1).mean())
     assert made.predict(pose[:0], 1).shape == (0, 17)
@@ -152,25 +153,24 @@ def test_polish_brings_every_frame_nearer_and_stays_inside_the_limits(made: Reta
 def test_a_call_takes_a_motion_and_arrays_of_any_form(made: Retargeter) -> None:
     pose = human(6)
     expected = made.retarget(pose)
-    result = made(Motion("a", rotation.sixd_to_matrix(pose), 30.0))
+    result = made(Motion("a", pose, 30.0))
     torch.testing.assert_close(result.q, expected.q)
     torch.testing.assert_close(result.confidence, expected.confidence)
     assert result.frame_rate == 30.0 and result.joint_names == made.joint_names
-    matrices = rotation.sixd_to_matrix(pose)
-    turns = rotation.matrix_to_axis_angle(matrices).flatten(1)
-    for array in (pose, matrices, turns, turns.double().numpy()):
+    turns = rotation.matrix_to_axis_angle(pose).flatten(1)
+    for array in (rotation.matrix_to_sixd(pose), pose, turns, turns.double().numpy()):
         found = made(array, frame_rate=24.0)
         torch.testing.assert_close(found.q, expected.q, atol=1e-4, rtol=0)
         assert found.frame_rate == 24.0
     assert torch.equal(made(pose, polish=0).q, made.predict(pose))
     with pytest.raises(UserError, match="human pose 2 holds a matrix that is no rotation"):
-        made(matrices * torch.tensor([1.0, 1.0, 1.2, 1.0, 1.0, 1.0])[:, None, None, None])
+        made(pose * torch.tensor([1.0, 1.0, 1.2, 1.0, 1.0, 1.0])[:, None, None, None])
 
 
 @pytest.mark.parametrize("leading", [(), (1,), (6,), (2, 3), (0,), (3, 0)])
 def test_the_answer_has_the_leading_axes_of_the_question(made: Retargeter, leading: tuple[int, ...]) -> None:
     pose = human(6)[: int(np.prod(leading))]
-    result, expected = made(pose.reshape(*leading, 21, 6).numpy()), made.retarget(pose)
+    result, expected = made(pose.reshape(*leading, 21, 3, 3).numpy()), made.retarget(pose)
     directions = len(made.body_map.direction_names)
     for name, more in {
         "q": (17,), "confidence": (), "phi": (), "collision": (), "direction_error_deg": (directions,),
@@ -182,7 +182,7 @@ def test_the_answer_has_the_leading_axes_of_the_question(made: Retargeter, leadi
 
 @pytest.mark.parametrize("name", ["a.npz", "a.csv"])
 def test_an_answer_is_saved_with_names_and_time(made: Retargeter, tmp_path: Path, name: str) -> None:
-    result = made(Motion("a", rotation.sixd_to_matrix(human(6)), 30.0))
+    result = made(Motion("a", human(6), 30.0))
     result.save(tmp_path / name)
     if name.endswith("npz"):
         with np.load(tmp_path / name, allow_pickle=False) as file:
@@ -213,7 +213,7 @@ def test_it_moves_whole(folder: Path) -> None:
         torch.testing.assert_close(moved.retarget(human(3)).q.cpu(), expected, atol=1e-4, rtol=0)
 
 
-@pytest.mark.parametrize("shape", [(5, 20, 6), (21, 6), (5, 21, 3)])
+@pytest.mark.parametrize("shape", [(5, 20, 3, 3), (21, 3, 3), (5, 21, 3), (5, 21, 6)])
 def test_a_wrong_shape_is_refused(made: Retargeter, shape: tuple[int, ...]) -> None:
     with pytest.raises(UserError, match="shape"):
         made.predict(torch.zeros(shape))

@@ -65,8 +65,7 @@ def test_an_arm_is_not_twisted(root: Path, humans: torch.Tensor) -> None:
 def test_neck_and_head_share_the_heads_turn(root: Path, humans: torch.Tensor) -> None:
     body_map, direction_BD3 = of(root, "reachy")
     before, after = (
-        body_map.skeleton.global_rotations(rotation.sixd_to_matrix(p))
-        for p in (humans, align(body_map, humans, direction_BD3))
+        body_map.skeleton.global_rotations(p) for p in (humans, align_pose(body_map, humans, direction_BD3))
     )
     neck_B, head_B = (
         rotation.geodesic_distance(before[:, joint], after[:, joint])

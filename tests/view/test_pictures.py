@@ -15,7 +15,6 @@ from mrhubo.evaluation import Clip
 from mrhubo.motion import Motion
 from mrhubo.pairing import make_filter
 from mrhubo.robot import Robot, build_body_map
-from mrhubo.rotation import sixd_to_matrix
 from mrhubo.view import save_gif
 from mrhubo.view.pictures import GIF_RATE, Artist, liveliness
 
@@ -37,9 +36,9 @@ def test_key_poses_show_what_differs(root: Path, tmp_path: Path, shapes: bool) -
     config = load_config(root / "conf" / "nao.yaml").robot
     robot = Robot(config.urdf if shapes else bare(config.urdf, tmp_path), config.joints)
     artist, prior = Artist(robot), BodyPrior.open()
-    pose = prior.decode(torch.randn(3, 32, generator=torch.Generator().manual_seed(0)))
+    pose = prior.decode_matrices(torch.randn(3, 32, generator=torch.Generator().manual_seed(0)))
     q = robot.sample(3, torch.Generator().manual_seed(1))
-    clip = Clip(Motion("clip", sixd_to_matrix(pose), 24.0, "a motion"), q)
+    clip = Clip(Motion("clip", pose, 24.0, "a motion"), q)
     same, again = (np.asarray(artist.key_poses(clip, {"mrhubo": q}, count=2), float) for _ in range(2))
     other = np.asarray(
         artist.key_poses(clip, {"mrhubo": robot.sample(3, torch.Generator().manual_seed(2))}, count=2), float

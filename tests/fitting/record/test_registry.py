@@ -17,13 +17,13 @@ from mrhubo.fitting.record import registry
 from mrhubo.fitting.record.registry import example_input, register
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.runtime.tracking import database_uri, open_client, start_run
 
 
 @pytest.fixture(scope="module")
 def pose() -> torch.Tensor:
-    return BodyPrior.open().decode(torch.randn(20, 32, generator=torch.Generator().manual_seed(1)))
+    return BodyPrior.open().decode_matrices(torch.randn(20, 32, generator=torch.Generator().manual_seed(1)))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_it_answers_as_the_package_does(
     pose_T63 = example_input(pose)
     table = served.predict(pose_T63)
     assert list(table.columns) == [*made.joint_names, "confidence"]
-    given = matrix_to_sixd(axis_angle_to_matrix(torch.from_numpy(pose_T63).reshape(-1, 21, 3)))
+    given = axis_angle_to_matrix(torch.from_numpy(pose_T63).reshape(-1, 21, 3))
     torch.testing.assert_close(given, pose, atol=1e-5, rtol=0)
     expected, robot = made.retarget(given), made.body_map.robot
     q_TN = torch.tensor(table[list(made.joint_names)].to_numpy())

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder, read_motion, write_motion
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.rotation import axis_angle_to_matrix
 
 GENERATOR = np.random.default_rng(0)
 POSE_T63 = GENERATOR.normal(0, 0.5, (7, 63)).astype(np.float32)
@@ -55,7 +55,7 @@ def _npy(array: np.ndarray) -> bytes:
 
 
 def _expected(pose_T63: np.ndarray) -> torch.Tensor:
-    return matrix_to_sixd(axis_angle_to_matrix(torch.from_numpy(pose_T63).double().unflatten(-1, (21, 3)))).float()
+    return axis_angle_to_matrix(torch.from_numpy(pose_T63).double().unflatten(-1, (21, 3))).float()
 
 
 def _accepts_or_refuses(content: bytes) -> None:
@@ -67,15 +67,15 @@ def _accepts_or_refuses(content: bytes) -> None:
         except UserError as error:
             assert str(path) in str(error)
         else:
-            assert motion.pose_TJ6.shape[1:] == (21, 6) and torch.isfinite(motion.pose_TJ6).all()
+            assert motion.local_TJ33.shape[1:] == (21, 3, 3) and torch.isfinite(motion.local_TJ33).all()
             assert 1 <= motion.frame_rate <= 1000
 
 
 def test_round_trip(tmp_path: Path) -> None:
     motion = read_motion(_write(tmp_path / "wave.npz", "waves\n  twice"))
     assert (motion.name, motion.frame_rate, motion.description) == ("wave", 30.0, "waves twice")
-    assert motion.pose_TJ6.dtype == torch.float32
-    torch.testing.assert_close(motion.pose_TJ6, _expected(POSE_T63))
+    assert motion.local_TJ33.dtype == torch.float32
+    torch.testing.assert_close(motion.local_TJ33, _expected(POSE_T63))
 
 
 def test_writing_is_deterministic_and_has_amass_keys(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_poses_with_the_root_first(tmp_path: Path, width: int, key: str) -> None
     motion = read_motion(_save(tmp_path / "13_28_poses.npz", poses=poses, **{key: rate}, gender=np.array([b"male"])))
     assert motion.name == "13_28" == motion.description
     assert motion.frame_rate == 120.0
-    torch.testing.assert_close(motion.pose_TJ6, _expected(poses[:, 3:66]))
+    torch.testing.assert_close(motion.local_TJ33, _expected(poses[:, 3:66]))
 
 
 def test_pose_body_goes_before_poses_and_unread_pickles_do_not_matter(tmp_path: Path) -> None:
@@ -123,14 +123,14 @@ def test_pose_body_goes_before_poses_and_unread_pickles_do_not_matter(tmp_path: 
     )
     motion = read_motion(path)
     assert motion.name == "a"
-    torch.testing.assert_close(motion.pose_TJ6, _expected(POSE_T63))
+    torch.testing.assert_close(motion.local_TJ33, _expected(POSE_T63))
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float64, np.longdouble, np.int8, ">f4"])
 def test_any_type_of_number(tmp_path: Path, dtype) -> None:
     pose_T63 = np.round(POSE_T63).astype(dtype)
     motion = read_motion(_save(tmp_path / "a.npz", pose_body=np.asfortranarray(pose_T63), **RATE))
-    torch.testing.assert_close(motion.pose_TJ6, _expected(np.round(POSE_T63)))
+    torch.testing.assert_close(motion.local_TJ33, _expected(np.round(POSE_T63)))
 
 
 def _with(row: int, column: int, value: float) -> np.ndarray:
@@ -325,7 +325,7 @@ def test_find_motions_takes_the_first_that_holds_any(tmp_path: Path) -> None:
 def test_evaluation_clips_are_read(external_dir: Path) -> None:
     motions = {motion.name: motion for motion in read_folder(external_dir / "cmu" / "evaluation")}
     assert len(motions) == 11
-    assert motions["13_28"].pose_TJ6.shape == (824, 21, 6) and motions["13_28"].frame_rate == 24.0
+    assert motions["13_28"].local_TJ33.shape == (824, 21, 3, 3) and motions["13_28"].frame_rate == 24.0
     assert motions["13_28"].description == "direct traffic, wave, point"
 
 
