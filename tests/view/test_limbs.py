@@ -76,7 +76,8 @@ def test_limbs_are_mirrored_with_their_points(
     human: tuple[np.ndarray, list[str]], part: Callable[[Points, str, float], list[Row]], names: tuple[str, ...]
 ) -> None:
     mirror, points = np.array([1.0, -1.0, 1.0]), bent(human, names)
-    swapped = {name.replace("left", "right"): mirror * point for name, point in points.items() if "left" in name}
+    other = {"left": "right", "right": "left"}
+    swapped = {"_".join(other.get(word, word) for word in name.split("_")): mirror * p for name, p in points.items()}
     before, after = table(part(points, "left", 1.0)), table(part(swapped, "right", 1.0))
     after[:, 1], after[:, 4] = -after[:, 1], -after[:, 4]
     order = [np.lexsort(rows.round(6).T) for rows in (before, after)]
