@@ -26,7 +26,7 @@ def test_every_verb_has_a_command_and_every_command_a_verb(root: Path) -> None:
         tree = ast.parse(Path(spec.origin).read_text())
         assert "main" in [node.name for node in tree.body if isinstance(node, ast.FunctionDef)], verb.module
     commands = {p.stem for p in (root / "mrhubo").glob("*.py") if "run_command(main)" in p.read_text()}
-    assert commands == set(VERBS) - {"prior"}
+    assert commands == set(VERBS)
 
 
 def test_help_lists_the_verbs_and_loads_no_torch(capsys: pytest.CaptureFixture[str]) -> None:

@@ -252,7 +252,7 @@ def test_a_full_disk_ends_in_one_sentence_and_no_broken_file(root: Path, tmp_pat
 def test_workers_make_the_same_bytes(
     root: Path, tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workers, "_WORTH_A_WORKER", 150)
+    monkeypatch.setattr(workers, "_MIN_PAIRS_PER_WORKER", 150)
     started = []
     popen = subprocess.Popen
     monkeypatch.setattr(workers.subprocess, "Popen", lambda *a, **k: started.append(popen(*a, **k)) or started[-1])
@@ -265,7 +265,7 @@ def test_workers_make_the_same_bytes(
 def test_a_worker_that_cannot_write_says_why(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoilt: PairStore
 ) -> None:
-    monkeypatch.setattr(workers, "_WORTH_A_WORKER", 150)
+    monkeypatch.setattr(workers, "_MIN_PAIRS_PER_WORKER", 150)
     for index in (0, 1):
         spoilt.path(index).unlink()
     popen = subprocess.Popen

@@ -20,8 +20,8 @@ from mrhubo.robot import build_body_map
 def test_arms_count_and_neither_collars_nor_the_head(root: Path, name: str, joints: list[str]) -> None:
     config = load_config(root / "conf" / f"{name}.yaml")
     body_map, prior = build_body_map(config.robot), BodyPrior.open()
-    q_PN, pose_PJ6 = body_map.robot.home()[None], prior.decode(torch.zeros(1, prior.latent))
-    test = ProportionTest(body_map, prior, config.pairs, q_PN, pose_PJ6, "chest")
+    q_PN, local_PJ33 = body_map.robot.home()[None], prior.decode_matrices(torch.zeros(1, prior.latent))
+    test = ProportionTest(body_map, prior, config.pairs, q_PN, local_PJ33, "chest")
     found = [POSED_JOINT_NAMES[joint] for joint in test.arm_joints]
     assert found == [f"{side}_{joint}" for joint in joints for side in ("left", "right")]
-    assert float(test.distances(pose_PJ6[None]).max()) < 1e-3
+    assert float(test.distances(local_PJ33[None]).max()) < 1e-3

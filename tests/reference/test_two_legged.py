@@ -34,7 +34,7 @@ def leg(side: str) -> tuple[BodyPart, ...]:
         LimbPart(name=f"{side}_shin", joint=knee, region="leg", hangs_on=f"{side}_thigh", seen_from="pelvis",
                  start=knee, end=ankle, inputs=(knee,)),
         OrientedPart(name=f"{side}_foot", joint=ankle, region="foot", hangs_on=f"{side}_shin", seen_from="pelvis",
-                     words=("toes", "instep"), rest=(FORWARD, UP), turned_by=(ankle,), inputs=(ankle,), weight=0.5,
+                     words=("forward", "up"), rest=(FORWARD, UP), turned_by=(ankle,), inputs=(ankle,), weight=0.5,
                      points=(f"{side}_foot", f"{side}_toe", f"{side}_heel")),
     )  # fmt: skip
 
@@ -88,7 +88,7 @@ def entries() -> dict[str, object]:
     for side, s in (("left", "l"), ("right", "r")):
         found |= {
             f"{side}_hip": f"{s}_thigh", f"{side}_knee": f"{s}_shin", f"{side}_ankle": f"{s}_foot",
-            f"{side}_foot": {"link": f"{s}_foot", "toes": [1, 0, 0], "instep": [0, 0, 1]},
+            f"{side}_foot": {"link": f"{s}_foot", "forward": [1, 0, 0], "up": [0, 0, 1]},
             f"{side}_shoulder": f"{s}_upper", f"{side}_elbow": f"{s}_fore",
             f"{side}_wrist": {"link": f"{s}_fore", "offset": [0, 0, -0.2]},
         }  # fmt: skip
@@ -134,7 +134,7 @@ def test_home_stands(body_map: BodyMap) -> None:
     for side in ("left", "right"):
         for name in ("knee", "ankle"):
             assert float(home[f"{side}_{name}"] @ torch.tensor([0.0, -1.0, 0.0])) > 0.99
-        torch.testing.assert_close(home[f"{side}_foot_toes"], torch.tensor(FORWARD), atol=0.06, rtol=0)
+        torch.testing.assert_close(home[f"{side}_foot_forward"], torch.tensor(FORWARD), atol=0.06, rtol=0)
 
 
 def test_legs_are_seen_from_the_pelvis_and_arms_from_the_chest(body_map: BodyMap) -> None:
