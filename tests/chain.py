@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
-from collections.abc import Callable, Iterable, Sequence
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +18,7 @@ from torch import Tensor
 import mrhubo
 from mrhubo import Motion, OptimizationRetargeter, Retargeter, read_motion
 from mrhubo.body import BodyPrior
-from mrhubo.config import load_config
+from mrhubo.config import load_config, run_command
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fit import main as fit
 from mrhubo.pair import main as pair
@@ -23,7 +27,7 @@ from mrhubo.robot import build_body_map
 
 ROOT = Path(__file__).resolve().parent.parent
 __all__ = [
-    "ROOT", "Motion", "answer", "cut_motion", "fit", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
+    "ROOT", "Motion", "answer", "as_command", "cut_motion", "fit", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
     "read_tensors", "write_tensors",
 ]  # fmt: skip
 
@@ -33,6 +37,18 @@ def quietly(command: Callable[[list[str]], object], arguments: Sequence[str]) ->
     with contextlib.redirect_stdout(io.StringIO()) as output:
         command(list(arguments))
     return output.getvalue()
+
+
+def as_command(name: str, arguments: Sequence[str], output: Path, environment: Mapping[str, str]) -> None:
+    """In a process of its own: what `python -m mrhubo.<name>` does, in a session of its own, its output in a file."""
+    os.setsid()
+    os.environ.update(environment)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored below a shell's background job
+    stream = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    for standard in (1, 2):
+        os.dup2(stream, standard)
+    sys.argv = [f"mrhubo.{name}", *arguments]
+    run_command(importlib.import_module(f"mrhubo.{name}").main)
 
 
 def load(folder: Path) -> Retargeter:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-from collections.abc import Callable
+import sqlite3
+from collections.abc import Callable, Iterator
+from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import filelock
 import pytest
 
 if TYPE_CHECKING:
+    from sqlalchemy import Engine
     from torch import Tensor
 
     from mrhubo.body.latent import LatentProblem
@@ -37,6 +42,70 @@ def external_dir() -> Path:
             pytest.fail(message + ", and MRHUBO_REQUIRE_EXTERNAL=1 asks for it")
         pytest.skip(message)
     return path
+
+
+@pytest.fixture(scope="module")
+def light_records(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Runs in this process are recorded as ever, but for what takes most of a small fit's time: a new database is a
+    copy of one that MLflow made (its migrations take three seconds), MLflow does not compare the installed versions
+    with those that it has just been told, and figures in pictures are blank.
+    """
+    import mlflow.store.db.utils as databases
+    import mlflow.utils.environment as environment
+    from PIL import Image
+
+    from mrhubo.view import figures, pictures
+
+    make = databases._initialize_tables
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared.parent if "PYTEST_XDIST_WORKER" in os.environ else shared
+    template = shared / "template.db"
+
+    def copy(engine: Engine) -> None:
+        path = engine.url.database
+        if engine.url.get_backend_name() != "sqlite" or not path:
+            make(engine)
+            return
+        with filelock.FileLock(f"{template}.lock"):
+            if not template.exists():
+                unfinished = template.with_suffix(".new")
+                made = databases.create_sqlalchemy_engine_with_retry(f"sqlite:///{unfinished}")
+                make(made)
+                made.dispose()
+                unfinished.rename(template)
+        with sqlite3.connect(template) as source, sqlite3.connect(path) as target:
+            source.backup(target)
+        source.close()
+        target.close()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(databases, "_initialize_tables", copy)
+        patch.setattr(environment, "warn_dependency_requirement_mismatches", lambda requirements: None)
+        patch.setattr(pictures, "GIF_RATE", 1.0)
+        patch.setattr(figures, "render", lambda solids, size, *_, **__: Image.new("RGB", size))
+        yield
+
+
+@pytest.fixture(scope="session")
+def server() -> ForkServerContext:
+    """Starts processes that have imported everything already, which takes a fresh interpreter seconds."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(
+        ["mrhubo.fit", "mrhubo.pair", "mrhubo.sweep", "mrhubo.fitting.sweeping", "mrhubo.fitting.fit", "tests.chain",
+         "mlflow.store.tracking.sqlalchemy_store"]
+    )  # fmt: skip
+    return context
+
+
+@pytest.fixture(scope="module")
+def one_thread() -> Iterator[None]:
+    """Small batches: threads cost more than they give, much more when the machine is busy."""
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
 
 
 @pytest.fixture(scope="session")

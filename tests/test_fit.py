@@ -9,10 +9,9 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
+import socket
 import time
-from collections.abc import Iterator
+from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +31,14 @@ from mrhubo.fitting.record import run_name
 from mrhubo.motion import read_motion
 from mrhubo.retargeter import Retargeter
 from mrhubo.runtime.ranks import Ranks
-from mrhubo.view import pictures
+from tests.chain import as_command
+
+pytestmark = pytest.mark.usefixtures("light_records")
 
 SMALL = [
-    "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=40", "pairs.fine_steps=3", "model.hidden=64",
+    "pairs.count=600", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "model.hidden=64",
     "model.layers=2",
-    "trainer.max_steps=120", "trainer.batch_size=128", "trainer.validate_every=30", "trainer.accelerator=cpu",
+    "trainer.max_steps=60", "trainer.batch_size=128", "trainer.validate_every=15", "trainer.accelerator=cpu",
 ]  # fmt: skip
 
 
@@ -57,23 +58,11 @@ def arguments(root: Path, folder: Path, motions: Path, *overrides: str) -> list[
     ]  # fmt: skip
 
 
-def command(given: list[str]) -> list[str]:
-    return [sys.executable, "-m", "mrhubo.fit", *given]
-
-
 def runs_of(folder: Path) -> list[Any]:
     client = mlflow.MlflowClient(tracking_uri=f"sqlite:///{folder / 'mlruns' / 'mlflow.db'}")
     experiment = client.get_experiment_by_name("mrhubo")
     assert experiment is not None
     return client.search_runs([experiment.experiment_id])
-
-
-@pytest.fixture(scope="module", autouse=True)
-def few_frames() -> Iterator[None]:
-    """Short animations: a whole one takes four seconds a fit."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pictures, "GIF_RATE", 1.0)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +97,7 @@ def test_the_run_holds_everything(fitted: tuple[Path, str]) -> None:
     }  # fmt: skip
     assert 0 < found.data.metrics["test/retarget/limb_deg"] < found.data.metrics["test/limb_deg"]
     assert set(found.data.tags) >= {"robot", "git_commit", "pairs_fingerprint", "prior_xxh3", "version.torch"}
-    assert found.data.params["trainer/max_steps"] == "120" and found.data.params["pairs/seed"] == "0"
+    assert found.data.params["trainer/max_steps"] == "60" and found.data.params["pairs/seed"] == "0"
     artifacts = Path(found.info.artifact_uri.removeprefix("file://"))
     names = {str(path.relative_to(artifacts)) for path in artifacts.rglob("*") if path.is_file()}
     assert names >= {
@@ -205,25 +194,28 @@ def final_metrics(folder: Path) -> dict[str, float]:
 
 @pytest.mark.parametrize(("stop", "status"), [(signal.SIGKILL, None), (signal.SIGINT, 130)])
 def test_stopped_in_training_it_resumes_to_the_same_metrics(
-    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, stop: signal.Signals, status: int | None
+    root: Path,
+    fitted: tuple[Path, str],
+    motions: Path,
+    tmp_path: Path,
+    server: ForkServerContext,
+    stop: signal.Signals,
+    status: int | None,
 ) -> None:
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
     given = arguments(root, tmp_path, motions)
-    process = subprocess.Popen(
-        command(given),
-        start_new_session=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored below a shell's background job
-    )
+    process = server.Process(target=as_command, args=("fit", given, tmp_path / "output", {}))
+    process.start()
     deadline = time.monotonic() + 200
-    while time.monotonic() < deadline and process.poll() is None:
+    while time.monotonic() < deadline and process.is_alive():
         if list((tmp_path / "mlruns").glob("fits/*/checkpoints/last.ckpt")):
             break
         time.sleep(0.005)
-    assert process.poll() is None, "it ended before it could be stopped"
+    assert process.is_alive(), f"it ended before it could be stopped: {(tmp_path / 'output').read_text()}"
+    assert process.pid is not None
     os.killpg(process.pid, stop)
-    assert process.wait(timeout=60) == (status if status is not None else -stop)
+    process.join(60)
+    assert process.exitcode == (status if status is not None else -stop)
     (unfinished,) = runs_of(tmp_path)
     assert unfinished.info.status == ("KILLED" if stop == signal.SIGINT else "RUNNING")
     assert ("ended_by" in unfinished.data.tags) is (stop == signal.SIGINT)
@@ -281,10 +273,8 @@ def test_nan_in_a_motion_is_refused_before_any_work(root: Path, motions: Path, t
     arrays = dict(np.load(folder / "wave.npz"))
     arrays["pose_body"][17, 3] = np.nan
     np.savez(folder / "wave.npz", **arrays)
-    given = arguments(root, tmp_path, folder)
-    done = subprocess.run(command(given), capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2 and done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
-    assert "wave.npz" in done.stderr and "17" in done.stderr
+    with pytest.raises(UserError, match=r"wave\.npz.* 17"):
+        main(arguments(root, tmp_path, folder))
     assert [path.name for path in tmp_path.iterdir()] == ["motions"]
 
 
@@ -314,14 +304,33 @@ def test_variants_are_settings(
     assert ("train/loss_pre" in found.data.metrics) is (variant != "model.stages=1")
 
 
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
 def test_two_ranks_fit_together_to_nearly_the_same_result(
-    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, server: ForkServerContext
 ) -> None:
+    """With what `torch.distributed.run` sets; that it starts ranks is seen where they make pairs."""
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
-    launcher = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "-m", "mrhubo.fit"]
-    process = subprocess.run([*launcher, *arguments(root, tmp_path, motions)], capture_output=True, text=True)
-    assert process.returncode == 0, process.stderr
-    assert process.stdout.count("package:") == 1, "one rank reports"
+    given = arguments(root, tmp_path, motions)
+    shared = {"WORLD_SIZE": "2", "LOCAL_WORLD_SIZE": "2", "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(free_port())}
+    ranks = [
+        server.Process(
+            target=as_command,
+            args=("fit", given, tmp_path / f"output{rank}", {**shared, "RANK": str(rank), "LOCAL_RANK": str(rank)}),
+        )
+        for rank in range(2)
+    ]
+    for process in ranks:
+        process.start()
+    for process in ranks:
+        process.join(200)
+    outputs = [(tmp_path / f"output{rank}").read_text() for rank in range(2)]
+    assert [process.exitcode for process in ranks] == [0, 0], outputs
+    assert "".join(outputs).count("package:") == 1, "one rank reports"
     expected, got = final_metrics(fitted[0]), final_metrics(tmp_path)
     assert got.keys() == expected.keys()
     for name, value in expected.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import random
 import resource
@@ -26,7 +25,7 @@ from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
 
 SMALL = [
-    "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=60", "pairs.fine_steps=4",
+    "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=10", "pairs.fine_steps=4",
 ]  # fmt: skip
 
 
@@ -62,16 +61,6 @@ def spoilt(root: Path, undisturbed: Path, tmp_path: Path) -> PairStore:
     for path in source.iterdir():
         (store.folder / path.name).write_bytes(path.read_bytes())
     return store
-
-
-@pytest.fixture(scope="module")
-def server() -> ForkServerContext:
-    """Starts processes that have imported everything already."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(
-        ["mrhubo.pair", "mrhubo.fitting.pairs", "mrhubo.fitting.preparation", "mrhubo.runtime.ranks"]
-    )
-    return context
 
 
 def test_pairs_are_made_summed_up_and_found_again(

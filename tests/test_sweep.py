@@ -5,11 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
-import signal
 import sqlite3
-import subprocess
-import sys
 import time
+from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +18,16 @@ import pytest
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.sweep import main
+from tests.chain import as_command
+
+pytestmark = pytest.mark.usefixtures("light_records")
 
 SMALL = [
-    "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=30", "pairs.fine_steps=3", "trainer.max_steps=60",
+    "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "trainer.max_steps=60",
     "trainer.batch_size=64", "trainer.validate_every=20", "trainer.accelerator=cpu",
 ]  # fmt: skip
 SPACE = (
-    "name: tiny\ntrials: 4\nspace:\n  model.hidden: [8, 16, 32]\n  trainer.lr: {low: 0.001, high: 0.01, log: true}\n"
+    "name: tiny\ntrials: 3\nspace:\n  model.hidden: [8, 16, 32]\n  trainer.lr: {low: 0.001, high: 0.01, log: true}\n"
 )
 
 
@@ -64,22 +65,26 @@ def runs_of(folder: Path) -> list[Any]:
     return client.search_runs([experiment.experiment_id])
 
 
-def test_one_of_two_processes_dies(arguments: list[str], tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    command = [sys.executable, "-m", "mrhubo.sweep", *arguments]
-    two = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(2)]
+def test_one_of_two_processes_dies(
+    arguments: list[str], tmp_path: Path, capfd: pytest.CaptureFixture[str], server: ForkServerContext
+) -> None:
+    outputs = [tmp_path / f"output{number}" for number in range(2)]
+    two = [server.Process(target=as_command, args=("sweep", arguments, output, {})) for output in outputs]
+    for process in two:
+        process.start()
     deadline = time.monotonic() + 120
     while time.monotonic() < deadline and two[0].pid not in at_work(tmp_path / "runs"):
-        assert two[0].poll() is None, two[0].communicate()[1].decode()
+        assert two[0].is_alive(), outputs[0].read_text()
         time.sleep(0.05)
-    two[0].send_signal(signal.SIGKILL)
-    _, errors = two[1].communicate(timeout=180)
-    two[0].communicate()
-    assert two[1].returncode == 0, errors.decode()
+    two[0].kill()
+    for process in two:
+        process.join(180)
+    assert two[1].exitcode == 0, outputs[1].read_text()
     main(arguments)  # started again: nothing is left to do, or the last trial
     output = capfd.readouterr().out
     (study,) = studies_of(tmp_path / "runs")
     states = [trial.state.name for trial in study.trials]
-    assert states.count("COMPLETE") + states.count("PRUNED") == 4 and states.count("FAIL") == 1
+    assert states.count("COMPLETE") + states.count("PRUNED") == 3 and states.count("FAIL") == 1
     dead = next(trial for trial in study.trials if trial.state.name == "FAIL")
     if dead.params:
         assert any(trial.params == dead.params for trial in study.trials if trial.number > dead.number)

@@ -87,6 +87,10 @@ POINT_NAMES: tuple[str, ...] = tuple(_POINTS)
 """The points fixed to head, wrists, ankles and feet."""
 KEYPOINT_NAMES: tuple[str, ...] = JOINT_NAMES + POINT_NAMES
 """The 22 joints, then the points fixed to head, wrists, ankles and feet."""
+PAIRED_KEYPOINTS: dict[str, tuple[str, ...]] = {
+    name: tuple(f"{side}_{name}" for side in SIDES) for name in (*PAIRED_JOINTS, *_FIXED_POINTS)
+}
+"""The left and the right keypoint of each that there are two of, by the name that they share."""
 KEYPOINT_JOINT: tuple[int, ...] = tuple(range(22)) + tuple(joint for joint, _ in _POINTS.values())
 """Index in JOINT_NAMES of the joint that carries each keypoint (a joint's own keypoint is carried by itself)."""
 

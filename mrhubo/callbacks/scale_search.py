@@ -22,7 +22,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import Config, ManualScaleConfig, fingerprint
 from mrhubo.evaluation.clips import Clip
 from mrhubo.files.storage import checksum_tensors, locked
-from mrhubo.pairing import ProportionTest, pose_settings
+from mrhubo.pairing import ScaleFactorObjective, pose_settings
 from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
 from mrhubo.rotation import matrix_to_sixd
@@ -72,8 +72,8 @@ class ScaleFactorSearch(lightning.Callback):
 
     The reference set are frames of the validation clips with the joint angles that the reference retargeter gives
     them, where the robot can do what the human does: elsewhere no theta can be right, and one that distorts the arms
-    would win. The distance is that of `ProportionTest`. Trials are kept in an Optuna study: a search that was stopped
-    goes on, a finished one is read.
+    would win. The distance is that of `ScaleFactorObjective`. Trials are kept in an Optuna study: a search that was
+    stopped goes on, a finished one is read.
 
     It searches in `setup`, which Lightning calls before anything is trained, and hands the config that it ends with to
     the data module, `SearchedData`, which makes the pairs only then. Each trial is an MLflow run under the training's.
@@ -106,7 +106,9 @@ class ScaleFactorSearch(lightning.Callback):
         reference_FN = torch.cat([clip.reference_TN for clip in clips])
         chosen = _reachable(body_map, reference_FN, local_FJ33, self.settings.poses)
         self.q_PN, self.local_PJ33 = reference_FN[chosen], local_FJ33[chosen]
-        self.test = ProportionTest(body_map, prior, config.pairs, self.q_PN, self.local_PJ33, config.model.input_frame)
+        self.objective = ScaleFactorObjective(
+            body_map, prior, config.pairs, self.q_PN, self.local_PJ33, config.model.input_frame
+        )
         self.artist = Artist(body_map.robot, body_map.skeleton)
         self.folder, self.report, self.found = folder, report, found
         measured_on = checksum_tensors({"q": self.q_PN, "pose": matrix_to_sixd(self.local_PJ33)}, {})
@@ -149,7 +151,7 @@ class ScaleFactorSearch(lightning.Callback):
             **study_plots(study, "arm distance [rad]"),
             "poses": self._poses(config.robot.manual, varied(self.start, worst)),
         }
-        start = float(self.test.measure([self.start]))
+        start = float(self.objective.measure([self.start]))
         self.result = ScaleResult(config, values, distance, start, pictures)
         return self.result
 
@@ -201,7 +203,7 @@ class ScaleFactorSearch(lightning.Callback):
     def _measure(
         self, study: Study, drawn: dict[int, dict[str, float]], client: MlflowClient | None, parent: str | None
     ) -> None:
-        distances = self.test.measure([varied(self.start, values) for values in drawn.values()]).tolist()
+        distances = self.objective.measure([varied(self.start, values) for values in drawn.values()]).tolist()
         for (number, values), distance in zip(drawn.items(), distances, strict=True):
             if client is not None:
                 self._log_trial(client, parent, number, {"distance_rad": distance, **values})
@@ -216,14 +218,14 @@ class ScaleFactorSearch(lightning.Callback):
 
     def _poses(self, best: ManualScaleConfig, worst: ManualScaleConfig, count: int = 5) -> Image:
         """Human poses, the reference's robot poses, and what the best and the worst numbers make of those."""
-        local_2PJ33 = self.test.human_poses([best, worst])
+        local_2PJ33 = self.objective.human_poses([best, worst])
         shown = [round(place) for place in np.linspace(0.1, 0.9, count) * (len(self.q_PN) - 1)]
         rows = [
             [self.artist.human(self.local_PJ33[i]) for i in shown],
             [self.artist.robot_figure(self.q_PN[i]) for i in shown],
             *([self.artist.human(local_PJ33[i]) for i in shown] for local_PJ33 in local_2PJ33),
         ]
-        best_deg, worst_deg = self.test.distances(local_2PJ33).rad2deg().mean(dim=1).tolist()
+        best_deg, worst_deg = self.objective.distances(local_2PJ33).rad2deg().mean(dim=1).tolist()
         titles = ["human", "reference", f"best: {best_deg:.1f} deg", f"worst: {worst_deg:.1f} deg"]
         caption = f"{self.config.robot.name}: what the best and the worst scale factor make of the robot's poses"
         return figure_sheet(rows, (), titles, caption)

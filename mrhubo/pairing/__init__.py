@@ -3,7 +3,7 @@
 from mrhubo.pairing.filter import PairFilter, make_filter
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.lbfgs import solve_lbfgs
-from mrhubo.pairing.proportions import ProportionTest
+from mrhubo.pairing.scale_objective import ScaleFactorObjective
 from mrhubo.pairing.setup import PairSetup
 from mrhubo.pairing.store import PairStore, pose_settings
 from mrhubo.pairing.workers import PairingReport, generate_pairs
@@ -14,7 +14,7 @@ __all__ = [
     "PairSetup",
     "PairStore",
     "PairingReport",
-    "ProportionTest",
+    "ScaleFactorObjective",
     "generate_pairs",
     "make_filter",
     "pose_settings",

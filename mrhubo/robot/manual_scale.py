@@ -21,15 +21,14 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor, nn
 
-from mrhubo.body.skeleton import KEYPOINT_NAMES, keypoint_indices
+from mrhubo.body.skeleton import KEYPOINT_NAMES, PAIRED_KEYPOINTS, keypoint_indices
 from mrhubo.config import ConstantEntry, ManualScaleConfig, MeanEntry, Range, typed_value
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.frames import base_to_human
 from mrhubo.robot.entries import read_mean, read_vector
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.parts import PARTS, LimbPart, points_beyond
 
-_SIDES = ("left", "right")
-_HAND = ("thumb", "index", "middle", "pinky")
 _AXES = ("x", "y", "z")
 _NUMBERS = {
     field.name: (field.metadata["low"], field.metadata["high"])
@@ -74,6 +73,17 @@ class ManualScale(nn.Module):
         self.keypoint_names = tuple(self._entries)
         self.keypoint_indices = keypoint_indices(self.keypoint_names)
         self._place = {name: row for row, name in enumerate(self.keypoint_names)}
+        self._lengthened = [
+            (
+                part.lengthened_by,
+                [self._place[part.start]],
+                [self._place[part.end]],
+                [self._place[name] for name in points_beyond(part) if name in self._place],
+            )
+            for part in PARTS
+            if isinstance(part, LimbPart) and part.lengthened_by and {part.start, part.end} <= self._place.keys()
+        ]
+        """Of each limb that a number lengthens: the number, the rows of its start, its end and all that moves along."""
 
     @property
     def links(self) -> list[str]:
@@ -95,15 +105,8 @@ class ManualScale(nn.Module):
         """Target keypoints (B, K, 3) [m], human frame, of robot poses."""
         base_BK3 = self.weight_KL @ poses.position_BL3 + self.offset_K3
         moved_BK3 = base_BK3.clone()
-        for side in _SIDES:
-            shoulder, elbow, wrist = (self._place.get(f"{side}_{part}") for part in ("shoulder", "elbow", "wrist"))
-            hand = [self._place[f"{side}_{part}"] for part in _HAND if f"{side}_{part}" in self._place]
-            if shoulder is not None and elbow is not None:
-                more_B13 = self.config.upper_arm * (base_BK3[:, [elbow]] - base_BK3[:, [shoulder]])
-                moved_BK3[:, [elbow, *([] if wrist is None else [wrist]), *hand]] += more_B13
-            if elbow is not None and wrist is not None:
-                more_B13 = self.config.forearm * (base_BK3[:, [wrist]] - base_BK3[:, [elbow]])
-                moved_BK3[:, [wrist, *hand]] += more_B13
+        for number, start, end, moving in self._lengthened:
+            moved_BK3[:, moving] += getattr(self.config, number) * (base_BK3[:, end] - base_BK3[:, start])
         scaled_BK3 = (moved_BK3 + self.shift_3) * self.config.factor
         human_BK3 = base_to_human(scaled_BK3)
         pelvis = self._place["pelvis"]
@@ -115,15 +118,15 @@ def varied(config: ManualScaleConfig, values: Mapping[str, float]) -> ManualScal
     keypoint's offset [m]; without a side to those of both sides, y mirrored.
     """
     config = copy.deepcopy(config)
+    offsets = _offsets(config)
     for name, value in values.items():
         if name in _NUMBERS:
             setattr(config, name, value)
             continue
-        part, axis = name.split(".")
-        for keypoint, sign in _keypoints_of(part, config):
+        for keypoint, axis, sign in offsets[name]:
             links, offset = read_mean(keypoint, config.keypoints[keypoint])
             moved: list[int | float] = list(offset)
-            moved[_AXES.index(axis)] += value * (sign if axis == "y" else 1)
+            moved[axis] += value * sign
             config.keypoints[keypoint] = MeanEntry({**links}, moved) if links else ConstantEntry(moved)
     return config
 
@@ -136,22 +139,24 @@ def check_ranges(config: ManualScaleConfig, ranges: Mapping[str, Sequence[float]
     """
     if not ranges:
         raise UserError("robot.search.ranges: is empty; name what varies")
+    offsets = _offsets(config)
     for name, range_2 in ranges.items():
         key = f"robot.search.ranges.{name}"
-        part, dot, axis = name.partition(".")
-        if not dot and name not in _NUMBERS or dot and (axis not in _AXES or not _keypoints_of(part, config)):
-            known = [f"{keypoint}.z" for keypoint in config.keypoints]
-            known += [f"{keypoint.removeprefix('left_')}.z" for keypoint in config.keypoints if "left_" in keypoint]
-            raise UserError(f"{key}: {unknown_name('number', name, [*_NUMBERS, *known])}")
+        if name not in _NUMBERS and name not in offsets:
+            raise UserError(f"{key}: {unknown_name('number', name, [*_NUMBERS, *offsets])}")
         range_2 = typed_value(Range, range_2, key)
-        low, high = _NUMBERS[name] if not dot else (-1e3, 1e3)
+        low, high = _NUMBERS.get(name, (-1e3, 1e3))
         if range_2[0] < low or range_2[1] > high:
             raise UserError(f"{key}: must lie within [{low}, {high}], found {list(range_2)}")
 
 
-def _keypoints_of(part: str, config: ManualScaleConfig) -> list[tuple[str, int]]:
-    """The keypoints that a name of a range stands for, with the sign of y."""
-    if part in config.keypoints:
-        return [(part, 1)]
-    sides = [(f"{side}_{part}", sign) for side, sign in zip(_SIDES, (1, -1), strict=True)]
-    return [(name, sign) for name, sign in sides if name in config.keypoints]
+def _offsets(config: ManualScaleConfig) -> dict[str, list[tuple[str, int, int]]]:
+    """What KEYPOINT.AXIS stands for: keypoints, the axis' place, and the sign; without a side both, y mirrored."""
+    both = {name: list(zip(pair, (1, -1), strict=True)) for name, pair in PAIRED_KEYPOINTS.items()}
+    found = {}
+    for part, keypoints in ({name: [(name, 1)] for name in config.keypoints} | both).items():
+        for place, axis in enumerate(_AXES):
+            given = [(name, place, sign if axis == "y" else 1) for name, sign in keypoints if name in config.keypoints]
+            if given:
+                found[f"{part}.{axis}"] = given
+    return found

@@ -10,6 +10,7 @@ and a part after the one that it hangs on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -47,6 +48,11 @@ class BodyPart:
         """Names of its directions."""
         raise NotImplementedError
 
+    @property
+    def outer_points(self) -> tuple[str, ...]:
+        """The human keypoints that it carries itself."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True, kw_only=True)
 class LimbPart(BodyPart):
@@ -54,10 +60,17 @@ class LimbPart(BodyPart):
 
     start: str
     end: str
+    lengthened_by: str | None = None
+    """The number of `robot.manual` that lengthens it, if there is one."""
 
     @property
     def direction_names(self) -> tuple[str, ...]:
         """Its direction is called after its outer point."""
+        return (self.end,)
+
+    @property
+    def outer_points(self) -> tuple[str, ...]:
+        """Its end."""
         return (self.end,)
 
 
@@ -79,6 +92,11 @@ class OrientedPart(BodyPart):
         """The part's name with each of the words; none if nothing sees it."""
         return tuple(f"{self.name}_{word}" for word in self.words) if self.seen_from else ()
 
+    @property
+    def outer_points(self) -> tuple[str, ...]:
+        """Those that turn with it."""
+        return self.points
+
     def turn(self, first: Tensor, second: Tensor) -> Tensor:
         """The rotation (..., 3, 3) that takes the part at rest to two directions (..., 3), unit and orthogonal."""
         return _columns(first, second) @ _columns(*torch.tensor(self.rest).to(first)).T
@@ -93,9 +111,9 @@ def _arm(side: str) -> tuple[LimbPart, LimbPart]:
     upper, collar = f"{side}_upper_arm", f"{side}_collar"
     return (
         LimbPart(name=upper, joint=shoulder, region="arm", hangs_on="chest", seen_from="chest",
-                 start=shoulder, end=elbow, inputs=(collar, shoulder)),
+                 start=shoulder, end=elbow, inputs=(collar, shoulder), lengthened_by="upper_arm"),
         LimbPart(name=f"{side}_forearm", joint=elbow, region="arm", hangs_on=upper, seen_from="chest",
-                 start=elbow, end=wrist, inputs=(collar, elbow)),
+                 start=elbow, end=wrist, inputs=(collar, elbow), lengthened_by="forearm"),
     )  # fmt: skip
 
 
@@ -123,3 +141,9 @@ PARTS: tuple[BodyPart, ...] = (
     HEAD,
 )
 """The table."""
+
+
+def points_beyond(part: BodyPart, table: Sequence[BodyPart] = PARTS) -> tuple[str, ...]:
+    """The human keypoints that move when a part gets longer: those that it carries, and all that hangs on it."""
+    hanging = [point for other in table if other.hangs_on == part.name for point in points_beyond(other, table)]
+    return (*part.outer_points, *hanging)

@@ -24,12 +24,14 @@ from mrhubo.evaluation import Clip
 from mrhubo.fit import main
 from mrhubo.fitting.preparation import prepare
 from mrhubo.motion import Motion
-from mrhubo.pairing import ProportionTest
+from mrhubo.pairing import ScaleFactorObjective
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap, ManualScale, build_body_map, varied
 from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.tracking import open_client, start_run
 from mrhubo.runtime.trainer import quiet_lightning
+
+pytestmark = pytest.mark.usefixtures("light_records")
 
 RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 24, poses: 12}"
 
@@ -54,29 +56,29 @@ def clip(config: Config, body_map: BodyMap, prior: BodyPrior) -> Clip:
     """Robot poses, and the human poses that the config's own numbers make of them: a theta without error exists."""
     q_PN = body_map.robot.sample(12, torch.Generator().manual_seed(0))
     assert config.robot.manual is not None
-    test = ProportionTest(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 3, 3), "local")
-    return Clip(Motion("made", test.human_poses([config.robot.manual])[0], 24.0), q_PN)
+    objective = ScaleFactorObjective(body_map, prior, config.pairs, q_PN, torch.zeros(12, 21, 3, 3), "local")
+    return Clip(Motion("made", objective.human_poses([config.robot.manual])[0], 24.0), q_PN)
 
 
 def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip) -> None:
     manual = config.robot.manual
     assert manual is not None
-    test = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "local")
-    same, other = test.measure([manual, varied(manual, {"factor": 2.6})]).tolist()
+    objective = ScaleFactorObjective(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "local")
+    same, other = objective.measure([manual, varied(manual, {"factor": 2.6})]).tolist()
     assert same < 0.01 < 0.03 < other
     pose = clip.motion.local_TJ33.clone()
     quarter = torch.tensor([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a turn by 90 degrees
     pose[:, [0, 1, 2, 11]] = quarter  # of hips, spine, neck
-    assert float(test.distances(pose).max()) < 1e-3
+    assert float(objective.distances(pose).max()) < 1e-3
     turned = pose.clone()
     turn = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.5, 0.0]))
-    turned[:, test.arm_joints[0]] = turned[:, test.arm_joints[0]] @ turn
-    expected = torch.full((12,), 0.5 / len(test.arm_joints))
-    torch.testing.assert_close(test.distances(turned), expected, atol=1e-3, rtol=0)
-    seen = ProportionTest(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "chest")
+    turned[:, objective.arm_joints[0]] = turned[:, objective.arm_joints[0]] @ turn
+    expected = torch.full((12,), 0.5 / len(objective.arm_joints))
+    torch.testing.assert_close(objective.distances(turned), expected, atol=1e-3, rtol=0)
+    seen = ScaleFactorObjective(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "chest")
     collar = clip.motion.local_TJ33.clone()
     collar[:, 12] = collar[:, 12] @ turn  # carries shoulder and elbow along, as seen from the chest
-    assert float(test.distances(collar).max()) < 1e-3
+    assert float(objective.distances(collar).max()) < 1e-3
     torch.testing.assert_close(seen.distances(collar), 2 * expected, atol=1e-3, rtol=0)
 
 
@@ -142,10 +144,10 @@ def test_it_goes_on_where_it_stopped(
         measured.append(len(manuals))
         if sum(measured) > 20:
             raise KeyboardInterrupt
-        return ProportionTest.measure(stopped.test, manuals)
+        return ScaleFactorObjective.measure(stopped.objective, manuals)
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(stopped.test, "measure", measure)
+        patch.setattr(stopped.objective, "measure", measure)
         stopped.search()  # without MLflow
     assert sum(measured) == 24 and measured[0] < 24, "stopped on the way"
     assert stopped.search(*runs).values == whole.values
@@ -211,7 +213,7 @@ def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
         shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "motions")
     arguments = [
         "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("24", "8"),
-        "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=20", "pairs.fine_steps=5", "pairs.solver=fine",
+        "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=10", "pairs.fine_steps=5", "pairs.solver=fine",
         "model.hidden=16", "trainer.max_steps=20", "trainer.batch_size=64", "trainer.accelerator=cpu",
         f"evaluation.motions=[{tmp_path / 'motions'}]", f"pairs.dir={tmp_path / 'pairs'}", f"tracking.dir={tmp_path / 'runs'}",
     ]  # fmt: skip

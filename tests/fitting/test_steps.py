@@ -26,8 +26,10 @@ from mrhubo.runtime import locations
 from mrhubo.runtime.progress import SILENT
 from mrhubo.runtime.tracking import open_client
 
+pytestmark = pytest.mark.usefixtures("light_records")
+
 SMALL = [
-    "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=20", "pairs.fine_steps=3", "model.hidden=16",
+    "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "model.hidden=16",
     "trainer.max_steps=20", "trainer.batch_size=64", "trainer.accelerator=cpu",
 ]  # fmt: skip
 

@@ -11,6 +11,8 @@ import pytest
 
 from tests.golden.values import LOSSES, facts, logged, measure, platform_key, read_values
 
+pytestmark = pytest.mark.usefixtures("light_records")
+
 TODAY_CM = 0.49
 """`test/link_cm` of the fit: 0.46, 0.46 and 0.56 with the seeds 0, 1 and 2; 9.6 without learning (trainer.lr=1e-9)."""
 RECORD = "python -m tests.golden.record writes this platform's values down; tests/golden/README.md says when to"

@@ -42,12 +42,7 @@ def joints_of(config: Path) -> list[str]:
     return yaml.safe_load(config.read_text())["robot"]["joints"]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 @pytest.fixture(scope="module")

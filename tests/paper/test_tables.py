@@ -18,8 +18,10 @@ from mrhubo.reproduce import main
 from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.tracking import database_uri
 
+pytestmark = pytest.mark.usefixtures("light_records")
+
 SMALL = [
-    "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=30", "pairs.fine_steps=3", "model.hidden=16",
+    "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "model.hidden=16",
     "trainer.max_steps=20", "trainer.batch_size=64",
 ]  # fmt: skip
 

@@ -20,12 +20,8 @@ ROBOTS = ("nao", "coman", "reachy")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    """Small batches: threads cost more than they give, much more when the machine is busy."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+def _small_batches(one_thread: None) -> None:
+    """Everything here."""
 
 
 @pytest.fixture(scope="session")

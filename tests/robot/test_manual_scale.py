@@ -170,7 +170,7 @@ def test_varied_numbers_and_offsets(root: Path) -> None:
         ({}, "empty"),
         ({"facto": [1.0, 2.0]}, "'facto' .*'factor'"),
         ({"sholder.y": [0.0, 1.0]}, "'sholder.y' .*'shoulder"),
-        ({"shoulder.w": [0.0, 1.0]}, "'shoulder.w' .*'shoulder.z'"),
+        ({"shoulder.w": [0.0, 1.0]}, "'shoulder.w' .*'shoulder.x'"),
         ({"left_toe.x": [0.0, 1.0]}, "'left_toe.x' does not exist"),
         ({"factor": [2.0, 1.0]}, "low below high"),
         ({"factor": [1.0]}, "low below high"),

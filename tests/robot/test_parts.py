@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, Skeleton
-from mrhubo.robot.parts import PARTS, BodyPart, LimbPart, OrientedPart
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, Skeleton, ancestors
+from mrhubo.robot.parts import PARTS, BodyPart, LimbPart, OrientedPart, points_beyond
 
 NAMES = [part.name for part in PARTS]
 
@@ -34,6 +34,20 @@ def test_a_limb_ends_at_the_joint_below_its_own() -> None:
     for part in PARTS:
         if isinstance(part, LimbPart):
             assert PARENTS[JOINT_NAMES.index(part.end)] == JOINT_NAMES.index(part.joint)
+
+
+def test_what_moves_with_a_limb_is_all_that_the_human_has_beyond_its_start() -> None:
+    """Of the keypoints that the table knows: those whose joint hangs on the limb's own."""
+    known = {point for part in PARTS for point in part.outer_points}
+    for part in PARTS:
+        if isinstance(part, LimbPart):
+            joint = JOINT_NAMES.index(part.joint)
+            beyond = {
+                name
+                for name, carrier in zip(KEYPOINT_NAMES, KEYPOINT_JOINT, strict=True)
+                if joint in ancestors(carrier) and name in known and name != part.start
+            }
+            assert set(points_beyond(part)) == beyond
 
 
 def test_names_of_parts_and_directions_are_distinct() -> None:

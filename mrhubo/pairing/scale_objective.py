@@ -25,7 +25,7 @@ from mrhubo.robot import BodyMap, ManualScale
 from mrhubo.runtime.threads import use_threads
 
 
-class ProportionTest:
+class ScaleFactorObjective:
     """Measures scale factors on a set of pairs, many at once."""
 
     def __init__(
