@@ -316,7 +316,8 @@ def test_two_ranks_fit_together_to_nearly_the_same_result(
     """With what `torch.distributed.run` sets; that it starts ranks is seen where they make pairs."""
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
     given = arguments(root, tmp_path, motions)
-    shared = {"WORLD_SIZE": "2", "LOCAL_WORLD_SIZE": "2", "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(free_port())}
+    shared = {"TORCHELASTIC_RUN_ID": "1", "WORLD_SIZE": "2", "LOCAL_WORLD_SIZE": "2", "GROUP_RANK": "0"}
+    shared |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(free_port())}
     ranks = [
         server.Process(
             target=as_command,

@@ -21,7 +21,7 @@ from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_motions
 from mrhubo.runtime.progress import SILENT, Reporter
 
-REFERENCE_SCHEMA = "mrhubo.reference/1"
+REFERENCE_SCHEMA = "mrhubo.reference/2"
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from mrhubo.robot import BodyMap
 _WEIGHTS = (1e3, 1e4)
 _MARGIN = 0.005
 _REACH = 12
+_SWEEPS, _TOLERANCE = 20, 3e-3
+"""Contacts come and go with each step: what more steps gain is lost again when the contacts weigh more."""
 _SMOOTHER = 10.0
 
 
@@ -78,7 +80,7 @@ def _refine_around(
     near_T, kept_T = (_widen(close_T, reach) for reach in (_REACH, _REACH + 1))
     part_TN = q_TN[kept_T]
     for problem.contact.weight in _WEIGHTS:
-        part_TN = refine(problem, part_TN, target_TD3[kept_T], pull, fixed_T=~near_T[kept_T])[0]
+        part_TN = refine(problem, part_TN, target_TD3[kept_T], pull, _SWEEPS, _TOLERANCE, ~near_T[kept_T])[0]
     found_TN = q_TN.clone()
     found_TN[kept_T] = part_TN
     return found_TN

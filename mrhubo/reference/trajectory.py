@@ -94,16 +94,16 @@ def refine(
     q_TN: Tensor,
     target_TD3: Tensor,
     pull: float,
-    sweeps: int = 30,
-    tolerance: float = 3e-5,
+    sweeps: int = 100,
+    tolerance: float = 3e-4,
     fixed_T: Tensor | None = None,
 ) -> tuple[Tensor, Tensor]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
 
     Gauss-Newton on all frames at once: the system is block-tridiagonal, solved as a banded one. Joints at a limit that
     the descent would push beyond it are frozen for the step. A block's step counts only if the block's cost falls;
-    damping is raised in the frames whose own share of the cost rose. Ends when no block's cost falls by more than the
-    share `tolerance`, or five steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
+    damping is raised in the frames whose own share of the cost rose. A block ends when a step turns none of its joints
+    by `tolerance` [rad], or five steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
     """
     model = _motion_quadratic(problem, q_TN, target_TD3, pull)
     cost_C = model.cost_BC.double().sum(0)
@@ -116,7 +116,8 @@ def refine(
         trial = _motion_quadratic(problem, trial_TN, target_TD3, pull)
         trial_cost_C = trial.cost_BC.double().sum(0)
         better_C = trial_cost_C < cost_C
-        settled_C = better_C & (trial_cost_C > cost_C * (1 - tolerance))
+        moved_C = ((trial_TN - q_TN).abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
+        settled_C = better_C & (moved_C < tolerance)
         failures_C = torch.where(better_C, torch.where(settled_C, _PATIENCE, 0), failures_C + 1)
         damping_TC = torch.where(trial.cost_BC > model.cost_BC, damping_TC * 10, damping_TC * 0.1).clamp(1e-3, 1e6)
         q_TN = torch.where(better_C[problem.blocks.block_N], trial_TN, q_TN)

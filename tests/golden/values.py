@@ -28,7 +28,7 @@ CLIPS = ("drinking", "boxing", "pointing", "wave")
 PAIRS = ["pairs.amortiser_steps=40", "pairs.fine_steps=20", "pairs.workers=1", "trainer.accelerator=cpu"]
 FIT = [
     "pairs.count=5000", "pairs.shard_size=500", *PAIRS, "model.hidden=48", "model.layers=2", "trainer.batch_size=128",
-    "trainer.max_steps=1000", "trainer.validate_every=500",
+    "trainer.max_steps=1500", "trainer.validate_every=750",
 ]  # fmt: skip
 LOSSES = 20
 _FRAMES = slice(None, None, 20)

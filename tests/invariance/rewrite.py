@@ -18,6 +18,9 @@ import yaml
 from lxml import etree
 from torch import Tensor
 
+KINDS = ("names", "order", "signs", "base")
+"""The kinds of changes."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -38,7 +41,7 @@ class Change:
 
 
 def draw_change(config: Path, seed: int, *kinds: str) -> Change:
-    """A random change of the given kinds: `names`, `order`, `signs`, `base`."""
+    """A random change of the given `KINDS`."""
     draw = random.Random(seed)
     settings, robot = read(config)
     joints = settings["robot"]["joints"]
