@@ -76,8 +76,8 @@ def test_a_joint_that_moves_no_part_is_refused_from_a_robot_too(root: Path) -> N
 
 def test_the_urdf_is_parsed_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
-    load = urdf.load_urdf
-    monkeypatch.setattr(urdf, "load_urdf", lambda path: (read.append(path), load(path))[1])
+    load = urdf.read_tree
+    monkeypatch.setattr(urdf, "read_tree", lambda path: (read.append(path), load(path))[1])
     body_map = build_body_map(load_config(root / "conf" / "coman.yaml").robot)
     assert body_map.collision.pairs
     Artist(body_map.robot).robot_figure(body_map.robot.home())

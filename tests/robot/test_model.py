@@ -113,7 +113,7 @@ REFUSALS = [
     ([('<child link="slide"/>', '<child link="hand"/>')], {}, r"hangs on two joints"),
     ([('name="finger"', 'name="hand"')], {}, r"link 'hand' appears twice"),
     ([('mimic joint="elbow"', 'mimic joint="wrist"')], {"links": ["hand"]}, r"'wrist' mimics itself"),
-    ([('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>')], {}, r"origin or axis that is zero"),
+    ([('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>')], {}, r"line 5: joint 'shoulder': <axis xyz=\"0 0 0\"> is zero"),
     ([("</robot>", "")], {}, r"no well-formed XML"),
     ([("robot name", "model name"), ("</robot>", "</model>")], {}, r"root element is <model>"),
 ]  # fmt: skip
