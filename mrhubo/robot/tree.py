@@ -35,13 +35,17 @@ _READ: dict[str, dict[str, int]] = {
 _MOST_FACTOR = 1e6
 _MOST_TURN = 7.0
 """A little over one turn."""
-_UNREAD = {
-    "inertial/mass": {"value": 1},
-    "inertial/inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
-    "inertial/origin": {"xyz": 3, "rpy": 3},
-    "limit": {"effort": 1, "velocity": 1},
-    "dynamics": {"damping": 1, "friction": 1},
-    "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1},
+_UNREAD: dict[str, dict[str, dict[str, int]]] = {
+    "link": {
+        "inertial/mass": {"value": 1},
+        "inertial/inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+        "inertial/origin": {"xyz": 3, "rpy": 3},
+    },
+    "joint": {
+        "limit": {"effort": 1, "velocity": 1},
+        "dynamics": {"damping": 1, "friction": 1},
+        "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1},
+    },
 }
 """What need not be read: a broken number there is told, and that is all."""
 
@@ -219,7 +223,8 @@ def _joint(document: Document, joint: etree._Element, found: _Findings) -> etree
         if element is None:
             continue
         given = {word: str(element.get(word)) for word in attributes if element.get(word) is not None}
-        wrong = [word for word, n in attributes.items() if n and problem(element, word, n, infinite=tag == "limit")]
+        most, infinite = (math.inf, True) if tag == "limit" else (_MOST_FACTOR, False)
+        wrong = [word for word, n in attributes.items() if n and problem(element, word, n, most, infinite)]
         if tag == "mimic" and (wrong or not given.get("joint") or joint.get("name") in found.faults):
             continue
         etree.SubElement(clean, tag, {word: text for word, text in given.items() if word not in wrong})
@@ -287,7 +292,7 @@ def _material(document: Document, material: etree._Element, found: _Findings) ->
 
 
 def _list_unread(document: Document, element: etree._Element, name: str, found: _Findings) -> None:
-    for path, attributes in _UNREAD.items():
+    for path, attributes in _UNREAD[element.tag].items() if len(element) else ():
         part = element.find(path)
         wrong = (
             [] if part is None else [problem(part, word, count, infinite=True) for word, count in attributes.items()]
