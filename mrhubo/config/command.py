@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import select
 import sys
-import warnings
 from collections.abc import Callable
-from typing import NoReturn, TextIO
+from typing import NoReturn
 
-from mrhubo.errors import InputWarning, UserError, was_interrupted
+from mrhubo.config.notices import show_warnings_plainly
+from mrhubo.errors import UserError, was_interrupted
 
 _INTERRUPTED = "interrupted; the same command resumes"
 
@@ -20,6 +20,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     A `UserError` is one line on stderr and status 2, Ctrl-C one line and status 130, a reader that went
     away (``| head``) silence and status 141. Anything else is a bug and shows its traceback.
     """
+    show_warnings_plainly()
     status: str | int | None
     try:
         try:
@@ -43,25 +44,6 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
             raise
         status = _end(_INTERRUPTED, 130)
     sys.exit(status)
-
-
-def _show_warnings_plainly() -> None:
-    """Our own warnings as sentences, without the line of code that gave them; others' as Python shows them."""
-    shown, show = set(), warnings.showwarning
-
-    def show_plainly(
-        message: Warning | str, category: type[Warning], filename: str, lineno: int,
-        file: TextIO | None = None, line: str | None = None,
-    ) -> None:  # fmt: skip
-        if not issubclass(category, InputWarning):
-            return show(message, category, filename, lineno, file, line)
-        sentence = " ".join(str(message).split())
-        if sentence not in shown and sys.stderr is not None:
-            shown.add(sentence)
-            print(f"warning: {sentence}", file=sys.stderr, flush=True)
-
-    warnings.simplefilter("always", InputWarning)
-    warnings.showwarning = show_plainly
 
 
 def _end(sentence: str, status: int) -> int:

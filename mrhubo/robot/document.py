@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,13 +80,13 @@ def read_document(path: Path) -> Document:
 
 
 def _read(path: Path) -> bytes:
-    if not path.exists():
-        raise UserError(f"robot.urdf: {path} does not exist; name a URDF file, relative to the YAML")
-    if path.is_dir():
-        raise UserError(f"robot.urdf: {path} is a folder; name the URDF file in it")
-    if not path.is_file():
-        raise UserError(f"robot.urdf: {path} is no regular file")
     try:
+        if not path.exists():
+            raise UserError(f"robot.urdf: {path} does not exist; name a URDF file, relative to the YAML")
+        if path.is_dir():
+            raise UserError(f"robot.urdf: {path} is a folder; name the URDF file in it")
+        if not path.is_file():
+            raise UserError(f"robot.urdf: {path} is no regular file, and others are not read")
         with path.open("rb") as file:
             text = file.read(_MAX_BYTES + 1)
         packed = text.startswith(b"\x1f\x8b")
@@ -118,9 +117,11 @@ def _parse(path: Path, text: bytes) -> etree._Element:
         for beginning, what in _NO_XML.items():
             if text[:1000].lstrip().lower().startswith(beginning.lower()):
                 raise UserError(f"robot.urdf: {path} {what}") from error
-        if all(entry.type == _UNDEFINED_PREFIX for entry in parser.error_log):
-            # Simulators' tags whose prefix nobody has explained, which ROS's parser takes too.
-            return etree.fromstring(text, etree.XMLParser(**options, recover=True))
+        # Simulators' tags whose prefix nobody has explained, which ROS's parser takes too.
+        if len(parser.error_log) and all(entry.type == _UNDEFINED_PREFIX for entry in parser.error_log):
+            robot = etree.fromstring(text, etree.XMLParser(**options, recover=True))
+            if robot is not None:
+                return robot
         reason = "it is empty" if not text.strip() else error
         raise UserError(f"robot.urdf: {path} is no well-formed XML: {reason}") from error
 
@@ -129,20 +130,26 @@ def _remove_namespaces(path: Path, robot: etree._Element) -> None:
     """Leaves the names of elements alone where they have no prefix, and takes away those of foreign namespaces: they
     belong to simulators. A file with xacro's is no URDF yet.
     """
-    own = etree.QName(robot).namespace
+    own = _split(robot)[0]
     foreign = []
     for element in robot.iter(etree.Element):
-        prefix = element.prefix or element.tag.rpartition("}")[2].rpartition(":")[0]
-        name = etree.QName(element)
-        if prefix == "xacro" or re.search(r"/xacro$", name.namespace or ""):
+        namespace, prefix, name = _split(element)
+        if prefix == "xacro" or namespace.endswith("/xacro"):
             raise UserError(f"robot.urdf: {path}: {_XACRO.format(name=path.name)}")
-        if prefix and name.namespace != own:
+        if prefix and namespace != own:
             foreign.append(element)
-        else:
-            element.tag = name.localname
+        elif namespace:
+            element.tag = name
     for element in foreign:
         if element.getparent() is not None:
             element.getparent().remove(element)
+
+
+def _split(element: etree._Element) -> tuple[str, str, str]:
+    """Namespace, prefix and name of an element, ``""`` for none; a prefix that nobody explains is part of the tag."""
+    namespace, _, name = element.tag.rpartition("}")
+    prefix, _, name = name.rpartition(":")
+    return namespace.removeprefix("{"), element.prefix or prefix, name
 
 
 def _root(tag: str) -> str:
