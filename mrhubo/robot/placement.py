@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
 
 _ODD_LINE, _WRONG_LINE = 45.0, 85.0
-"""Degrees between the line through two shoulders (or hips) and a human's; 0 to 28 on right maps, 90 to 180 on wrong ones."""
+"""Degrees between the line through two shoulders (or hips) and a human's; 0 to 28 on right maps, 90 to 180 on wrong."""
 _ODD_MIDDLE = 60.0
 """Degrees between where these lie and where a human's do; 0 to 35 on right maps."""
 _ASIDE = 0.3

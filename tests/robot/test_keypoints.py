@@ -74,6 +74,20 @@ def test_a_joint_that_moves_no_part_is_refused_from_a_robot_too(root: Path) -> N
         BodyMap.of(robot)
 
 
+def test_differences_are_named(root: Path) -> None:
+    entries = load_config(root / "conf" / "reachy.yaml").robot.keypoints
+    known = read_keypoints(entries)
+    assert known.differences(read_keypoints({**entries, "chest": {"link": "torso", "forward": [2, 0, 0]}})) == []
+    changed = {
+        **entries,
+        "left_wrist": {"link": "l_wrist2hand", "offset": [0, 0, 0.01]},
+        "head": {"link": "head", "forward": [1, 0, 0], "up": [0, 0, 1]},
+    }
+    del changed["right_hand"]
+    assert known.differences(read_keypoints(changed)) == ["left_wrist", "right_hand", "head"]
+    assert set(read_keypoints(changed).differences(known)) == {"left_wrist", "right_hand", "head"}
+
+
 def test_the_urdf_is_parsed_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
     load = urdf.read_tree
