@@ -122,9 +122,9 @@ def link_poses(urdf: yourdfpy.URDF, configuration: Mapping[str, float]) -> dict[
     for link in order:
         for joint in below.get(link, []):
             angle = configuration.get(joint.name, 0.0)
-            if joint.mimic is not None:
-                source = configuration.get(joint.mimic.joint, 0.0) if joint.mimic.joint in free else 0.0
-                angle = source * joint.mimic.multiplier + joint.mimic.offset
+            if (mimic := _mimic(joint)) is not None:
+                source = configuration.get(mimic.joint, 0.0) if mimic.joint in free else 0.0
+                angle = source * mimic.multiplier + mimic.offset
             poses[joint.child] = poses[link] @ _placed(joint, angle)
             order.append(joint.child)
     return {link.name: poses[link.name] for link in urdf.robot.links}
@@ -179,9 +179,16 @@ def _joint(element: etree._Element, read: yourdfpy.urdf.Joint | None) -> Joint:
         return Joint(name, kind, parent, child, np.eye(4), np.array([1.0, 0.0, 0.0]), None, None, None)
     axis_3 = np.asarray(read.axis, dtype=float)
     origin_44 = np.eye(4) if read.origin is None else np.asarray(read.origin, dtype=float)
-    limit, mimic = read.limit if kind != "continuous" else None, read.mimic
+    limit = read.limit if kind != "continuous" else None
     lower, upper = (None, None) if limit is None else (limit.lower, limit.upper)
     axis_3 = axis_3 / max(np.linalg.norm(axis_3), 1e-9)
-    mimicked = None if mimic is None else Mimic(mimic.joint, float(mimic.multiplier), float(mimic.offset))
-    joint = Joint(name, kind, parent, child, origin_44, axis_3, lower, upper, mimicked)
+    joint = Joint(name, kind, parent, child, origin_44, axis_3, lower, upper, _mimic(read))
     return with_soft_limits(joint, element.find("safety_controller"))
+
+
+def _mimic(joint: yourdfpy.urdf.Joint) -> Mimic | None:
+    mimic = joint.mimic
+    if mimic is None:
+        return None
+    multiplier = 1.0 if mimic.multiplier is None else float(mimic.multiplier)
+    return Mimic(mimic.joint, multiplier, 0.0 if mimic.offset is None else float(mimic.offset))
