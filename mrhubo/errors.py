@@ -1,4 +1,6 @@
-"""The one exception that means "the user can fix this": printed as one sentence, exit code 2, no traceback."""
+"""The one exception that means "the user can fix this": printed as one sentence, exit code 2, no traceback; and the
+warning that means "look at this".
+"""
 
 from __future__ import annotations
 
@@ -7,6 +9,10 @@ from collections.abc import Iterable
 
 class UserError(Exception):
     """A mistake in a config, a file or a command line: what is wrong, where, and what to do about it."""
+
+
+class InputWarning(UserWarning):
+    """Something in a config or a file that is odd but may be meant: one sentence, and the work goes on."""
 
 
 def unknown_name(kind: str, name: str, available: Iterable[str], where: str = "") -> str:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
+from mrhubo.config.notices import show_warnings_plainly
 from mrhubo.errors import UserError, was_interrupted
 
 _INTERRUPTED = "interrupted; the same command resumes"
@@ -19,6 +20,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     A `UserError` is one line on stderr and status 2, Ctrl-C one line and status 130, a reader that went
     away (``| head``) silence and status 141. Anything else is a bug and shows its traceback.
     """
+    show_warnings_plainly()
     status: str | int | None
     try:
         try:

@@ -92,6 +92,12 @@ def measure_package(
             f"{package}: was made for another robot or other joints ('{own.name}': {', '.join(own.joint_names)}) than"
             f" the config's ('{config.name}': {', '.join(config.joints)})"
         )
+    differ = retargeter.body_map.keypoints.differences(body_map.keypoints)
+    if differ:
+        raise UserError(
+            f"{package}: was made with other links or offsets for {', '.join(differ)} than robot.keypoints of "
+            "the config has; measured against each other, they would tell nothing"
+        )
     clips = make_references(prepared, report)[0 if validation else 1]
     predictions = []
     with report.step("evaluation", len(clips), "clips") as progress:

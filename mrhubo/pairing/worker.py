@@ -11,10 +11,11 @@ import json
 import signal
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 from mrhubo.config import load_config
-from mrhubo.errors import UserError
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.setup import PairSetup
 from mrhubo.pairing.store import PairStore
@@ -22,6 +23,7 @@ from mrhubo.pairing.store import PairStore
 
 def main() -> None:
     """Answers lines until there are no more."""
+    warnings.simplefilter("ignore", InputWarning)  # whoever started us has given them
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; whoever started us ends us
     lines = iter(sys.stdin)
     answers, sys.stdout = sys.stdout, sys.stderr  # nothing else may come between the answers

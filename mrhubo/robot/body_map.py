@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import torch
 from torch import Tensor, nn
 
 from mrhubo.body.pose import HumanPose
@@ -15,6 +14,7 @@ from mrhubo.body.skeleton import Skeleton
 from mrhubo.config import RobotConfig, with_places
 from mrhubo.errors import UserError
 from mrhubo.robot.auto_scale import AutoScale
+from mrhubo.robot.checks import check_body_map, check_key_links
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.directions import Directions
 from mrhubo.robot.entries import check_names
@@ -71,11 +71,10 @@ class BodyMap(nn.Module):
         """A body map that has been checked; arguments as for the class.
 
         Raises:
-            UserError: a limb has no length, or a joint moves no body part; names it.
+            UserError: the map cannot be right (`mrhubo.robot.checks`); names what is wrong.
         """
         body_map = cls(robot, keypoints, skeleton, manual)
-        body_map._check_lengths()
-        body_map._check_moved()
+        check_body_map(body_map)
         return body_map
 
     @property
@@ -137,35 +136,6 @@ class BodyMap(nn.Module):
         """Keypoints (B, K, 3) [m] of an upright human whose parts have these directions (`scale: auto`)."""
         return self.auto.keypoints(direction_BD3)
 
-    def _check_lengths(self) -> None:
-        """Refuses a limb between two points that are one."""
-        view = self.shared.view_robot(self.robot.forward(self.robot.sample(64, torch.Generator().manual_seed(0))))
-        shortest_E = (view.end_BE3 - view.start_BE3).norm(dim=-1).amin(0)
-        limbs = [d for d in self.directions if isinstance(d, Limb)]
-        for limb, shortest in zip(limbs, shortest_E.tolist(), strict=True):
-            if shortest < 1e-4:
-                raise UserError(
-                    f"robot.keypoints: '{limb.part.start}' and '{limb.part.end}' lie on one point, so the limb has no "
-                    "direction; choose another link or an offset"
-                )
-
-    def _check_moved(self) -> None:
-        """Refuses a joint that turns no direction: no human pose could tell its angle."""
-        robot = self.robot
-        q_BN = robot.sample(16, torch.Generator().manual_seed(0))
-        before = self.robot_directions(robot.forward(q_BN))
-        for column, joint in enumerate(robot.joint_names):
-            moved = q_BN.clone()
-            moved[:, column] = (robot.lower_N + robot.upper_N)[column] - q_BN[:, column]  # mirrored in its range
-            change = (self.robot_directions(robot.forward(moved)) - before).abs().max()
-            if float(change) < 1e-4:
-                views = zip(self.shared.views, self.shared.view_links, strict=True)
-                seen_from = ", ".join(f"the {name} '{link}'" for name, link in views)
-                raise UserError(
-                    f"robot.joints: '{joint}' turns no limb, hand or head of robot.keypoints relative to {seen_from}, "
-                    "so no human pose could tell its angle; leave it out or name what it moves"
-                )
-
 
 @with_places
 def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> BodyMap:
@@ -173,6 +143,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
 
     Raises:
         UserError: the URDF, a joint, a link or a keypoint entry is wrong; says which, and the nearest valid name.
+            Or the body map as a whole cannot be right.
     """
     keypoints = read_keypoints(config.keypoints)
     if config.scale != "auto" and config.manual is None:
@@ -188,4 +159,6 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     description = describe(config.urdf)
     check_names(config, description)
     robot = Robot(description, config.joints, links, config.ranges, config.hold, config.name)
-    return BodyMap.of(robot, keypoints, skeleton, manual)
+    body_map = BodyMap.of(robot, keypoints, skeleton, manual)
+    check_key_links(robot, config.key_links)
+    return body_map

@@ -8,28 +8,38 @@ Links that the sampled joints do not move against each other are one body. Two b
 apart, so they are not compared; nor are two of which some capsules overlap in more than half of all random poses (an
 upper arm and a forearm with an axis of its own between the two, both of which reach around the elbow).
 
+Pairs grow with the square of the capsules. So poses are looked at few at a time where there are many pairs, and of more
+than two thousand capsules the links with most are left out.
+
 Legend: B batch, C capsules, P pairs of them, X pairs in some pose, A driven joints, N joints of q, L bodies.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from mrhubo.errors import InputWarning
+from mrhubo.robot.capsules import SHORT, Capsule, capsules, closest_points
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry
+from mrhubo.robot.shapes import read_collision_geometry
 from mrhubo.robot.urdf import link_poses
 
 _SAMPLES = 2_000
+_FEW_SAMPLES = 100
 _ALWAYS = 0.5
-_SHORT = 1e-9
 _SLACK = 1e-3
 _CHUNK = 1024
+"""Most poses at a time."""
+_AT_ONCE = 2**24
+"""Most pairs of capsules, over all poses, whose rough distance is in memory; a sixteenth of them with what is exact."""
+_MOST = 2_000
+"""Most capsules."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,26 @@ class Contacts:
     """
 
 
+@dataclass(frozen=True)
+class _Placed:
+    """Bodies and capsules in the base frame."""
+
+    rotation_BL33: Tensor
+    position_BL3: Tensor
+    ends_BC23: Tensor
+
+
+@dataclass(frozen=True)
+class _Close:
+    """Contacts, with the point on the first capsule's axis [m] and the direction to it from the second's."""
+
+    row_X: Tensor
+    pair_X: Tensor
+    distance_X: Tensor
+    point_X3: Tensor
+    normal_X3: Tensor
+
+
 class SelfCollision(nn.Module):
     """Capsule pairs of one robot, on the robot's device."""
 
@@ -63,6 +93,8 @@ class SelfCollision(nn.Module):
     _radius_C: Tensor
     _reach_C: Tensor
     _pair_2P: Tensor
+    _reach_CC: Tensor
+    _pair_CC: Tensor
 
     def __init__(self, robot: Robot) -> None:
         """Takes the collision geometry of the URDF that the robot was read from."""
@@ -90,41 +122,79 @@ class SelfCollision(nn.Module):
 
     def _read_capsules(self) -> None:
         urdf = self.robot.description.parsed
-        shapes = read_collision_geometry(urdf)
-        shaped = {shape.link for shape in shapes}
-        self.uncovered = tuple(x.name for x in urdf.robot.links if x.collisions and x.name not in shaped)
-        """Links whose collision geometry is of meshes alone, which are not looked at."""
         rest = link_poses(urdf, self.robot.configuration(self.robot.home().cpu().numpy()))
-        self._links: list[str] = []
-        ends, radii = [], []
-        for shape in shapes:
+        found: dict[str, list[Capsule]] = {}
+        for shape in read_collision_geometry(urdf):
             pose_44 = np.linalg.inv(rest[self._body(shape.link)]) @ rest[shape.link] @ shape.origin_44
-            for start_3, end_3, radius in _capsules(shape, pose_44):
-                self._links.append(shape.link)
-                ends.append((start_3, end_3))
-                radii.append(radius)
+            found.setdefault(shape.link, []).extend(capsules(shape, pose_44))
+        self._leave_out(found)
+        unread = self.robot.description.unread_collisions
+        solid = (link.name for link in urdf.robot.links if link.collisions or link.name in unread)
+        self.uncovered = tuple(name for name in solid if name not in found)
+        """Links that are not looked at: their collision geometry is of meshes alone, cannot be read, or is too much."""
+        self._links = [link for link, some in found.items() for _ in some]
+        ends = [(start_3, end_3) for some in found.values() for start_3, end_3, _ in some]
+        radii = [radius for some in found.values() for _, _, radius in some]
         body_C = [self._bodies.index(self._body(link)) for link in self._links]
         self._keep("_body_C", torch.tensor(body_C, dtype=torch.long))
         self._keep("_ends_C23", torch.tensor(np.array(ends, dtype=np.float32).reshape(-1, 2, 3)))
         self._keep("_radius_C", torch.tensor(radii, dtype=torch.float32))
         self._keep("_reach_C", (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C)
 
+    def _leave_out(self, found: dict[str, list[Capsule]]) -> None:
+        """Takes away the capsules of the links with most, until there are few enough."""
+        count = sum(map(len, found.values()))
+        left_out = []
+        for link in sorted(found, key=lambda link: len(found[link]), reverse=True):
+            if sum(map(len, found.values())) > _MOST:
+                left_out.append(link)
+                del found[link]
+        if left_out:
+            warnings.warn(
+                f"robot.urdf: {self.robot.urdf}: has {count:,} collision shapes, more than {_MOST:,}; those of "
+                f"{', '.join(left_out)} are not looked at",
+                InputWarning,
+                stacklevel=2,
+            )
+
     def _choose_pairs(self, neighbours: set[frozenset[str]]) -> None:
         """All pairs of capsules of different bodies that can be kept apart; `neighbours` share a joint."""
-        bodies = [self._bodies[i] for i in self._body_C.tolist()]
-        every = [(i, j) for i, j in itertools.combinations(range(len(bodies)), 2) if bodies[i] != bodies[j]]
-        both = [frozenset((bodies[i], bodies[j])) for i, j in every]
+        count = len(self._bodies)
+        apart_LL = ~torch.eye(count, dtype=torch.bool)
+        for names in neighbours:
+            i, j = (self._bodies.index(name) for name in names)
+            apart_LL[i, j] = apart_LL[j, i] = False
+        body_C = self._body_C.cpu()
+        every_2P = torch.triu_indices(len(body_C), len(body_C), offset=1)
+        self._keep_pairs(every_2P[:, apart_LL[body_C[every_2P[0]], body_C[every_2P[1]]]])
+        often_P = self._overlaps(self.robot.sample(self._samples(), torch.Generator().manual_seed(0)))
+        for i, j in body_C[self._pair_2P[:, often_P].cpu()].T.unique(dim=0).tolist():
+            apart_LL[i, j] = apart_LL[j, i] = False
+        pair_2P = self._pair_2P.cpu()
+        self._keep_pairs(pair_2P[:, apart_LL[body_C[pair_2P[0]], body_C[pair_2P[1]]]])
 
-        def keep(wanted: list[bool]) -> Tensor:
-            chosen = [pair for pair, good in zip(every, wanted, strict=True) if good]
-            return torch.tensor(chosen, dtype=torch.long, device=self._body_C.device).reshape(-1, 2).T.contiguous()
+    def _keep_pairs(self, pair_2P: Tensor) -> None:
+        """The pairs in their order, how near two centres must be for a closer look, and which pair two capsules are."""
+        reach_C = self._reach_C.cpu()
+        count, (i_P, j_P) = len(reach_C), pair_2P
+        reach_CC, pair_CC = torch.full((count, count), -torch.inf), torch.zeros(count, count, dtype=torch.int32)
+        reach_CC[i_P, j_P] = reach_C[i_P] + reach_C[j_P]
+        pair_CC[i_P, j_P] = torch.arange(len(i_P), dtype=torch.int32)
+        self._keep("_pair_2P", pair_2P)
+        self._keep("_reach_CC", reach_CC)
+        self._keep("_pair_CC", pair_CC)
 
-        self._keep("_pair_2P", keep([names not in neighbours for names in both]))
-        near = self.near(self.robot.sample(_SAMPLES, torch.Generator().manual_seed(0)), 0.0)
-        often_P = torch.bincount(near.pair_X, minlength=self._pair_2P.shape[1]) > _ALWAYS * _SAMPLES
-        first = self._pair_2P[:, often_P].T.tolist()
-        inseparable = {frozenset((bodies[i], bodies[j])) for i, j in first}
-        self._pair_2P = keep([names not in neighbours | inseparable for names in both])
+    def _samples(self) -> int:
+        """Random poses that tell which bodies always overlap: fewer where there are very many pairs."""
+        return max(_FEW_SAMPLES, min(_SAMPLES, _AT_ONCE // max(1, self._pair_2P.shape[1])))
+
+    def _overlaps(self, q_BN: Tensor) -> Tensor:
+        """Which pairs overlap in more than half of the poses."""
+        count_P = torch.zeros(self._pair_2P.shape[1], dtype=torch.long, device=self._body_C.device)
+        for rows in self._chunks(len(q_BN)):
+            close = self._closer(self._place(self._poses(q_BN, None, rows)), 0.0)
+            count_P += torch.bincount(close.pair_X, minlength=len(count_P))
+        return count_P > _ALWAYS * len(q_BN)
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -134,7 +204,9 @@ class SelfCollision(nn.Module):
     def collides(self, q_BN: Tensor, poses: LinkPoses | None = None) -> Tensor:
         """Whether any pair overlaps (B,), at joint angles (B, N) [rad]; `poses` as for `near`."""
         found_B = torch.zeros(len(q_BN), dtype=torch.bool, device=q_BN.device)
-        found_B[self.near(q_BN, 0.0, poses).row_X] = True
+        for rows in self._chunks(len(q_BN)):
+            close = self._closer(self._place(self._poses(q_BN, poses, rows)), 0.0)
+            found_B[rows.start + close.row_X] = True
         return found_B
 
     def near(self, q_BN: Tensor, margin: float, poses: LinkPoses | None = None) -> Contacts:
@@ -143,74 +215,65 @@ class SelfCollision(nn.Module):
         `poses` are what `Robot.forward` gives for these angles, if they are there already.
         """
         parts = []
-        for first in range(0, max(1, len(q_BN)), _CHUNK):
-            part = self._near(self._poses(q_BN, poses, slice(first, first + _CHUNK)), margin)
-            parts.append(Contacts(part.row_X + first, *(getattr(part, f.name) for f in fields(Contacts)[1:])))
+        for rows in self._chunks(len(q_BN)):
+            part = self._near(self._poses(q_BN, poses, rows), margin)
+            parts.append(Contacts(part.row_X + rows.start, *(getattr(part, f.name) for f in fields(Contacts)[1:])))
         return Contacts(*(torch.cat([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
+
+    def _chunks(self, poses: int) -> Iterator[slice]:
+        """Poses that are looked at together; at least one chunk, which may be empty."""
+        size = max(1, min(_CHUNK, _AT_ONCE // max(1, len(self._links) ** 2)))
+        return (slice(first, first + size) for first in range(0, max(1, poses), size))
 
     def _poses(self, q_BN: Tensor, poses: LinkPoses | None, rows: slice) -> LinkPoses:
         if poses is None:
             return self.robot.forward(q_BN[rows])
         return LinkPoses(poses.rotation_BL33[rows], poses.position_BL3[rows])
 
-    def _near(self, poses: LinkPoses, margin: float) -> Contacts:
+    def _place(self, poses: LinkPoses) -> _Placed:
+        """Bodies and capsules where the links are."""
         rotation_BA33 = poses.rotation_BL33.index_select(1, self._children_A)
         position_BA3 = poses.position_BL3.index_select(1, self._children_A)
         eye_B133 = torch.eye(3, dtype=position_BA3.dtype, device=position_BA3.device).expand(len(position_BA3), 1, 3, 3)
         rotation_BL33 = torch.cat((eye_B133, rotation_BA33), dim=1)
         position_BL3 = torch.cat((eye_B133[..., 0] * 0, position_BA3), dim=1)
         ends_BC23 = self._ends_C23 @ rotation_BL33[:, self._body_C].mT + position_BL3[:, self._body_C, None]
+        return _Placed(rotation_BL33, position_BL3, ends_BC23)
+
+    def _closer(self, placed: _Placed, margin: float) -> _Close:
+        """The pairs that are closer than `margin` [m]."""
+        if not self._pair_2P.shape[1]:
+            none_X = self._body_C[:0]
+            return self._exactly(placed, none_X, none_X, margin)
         # The spheres around the capsules tell cheaply which pairs need a closer look.
-        i_P, j_P = self._pair_2P
-        centre_BC3 = ends_BC23.mean(dim=2)
-        apart_BP = torch.cdist(centre_BC3, centre_BC3).flatten(1)[:, i_P * len(self._links) + j_P]
-        row_X, pair_X = torch.nonzero(apart_BP < self._reach_C[i_P] + self._reach_C[j_P] + margin + _SLACK).T
+        centre_BC3 = placed.ends_BC23.mean(dim=2)
+        apart_BCC = torch.cdist(centre_BC3, centre_BC3)
+        row_X, i_X, j_X = torch.nonzero(apart_BCC < self._reach_CC + margin + _SLACK).T
+        pair_X = self._pair_CC[i_X, j_X].long()
+        blocks = zip(row_X.split(_AT_ONCE // 16), pair_X.split(_AT_ONCE // 16), strict=True)
+        parts = [self._exactly(placed, row_Y, pair_Y, margin) for row_Y, pair_Y in blocks]
+        return _Close(*(torch.cat([getattr(part, f.name) for part in parts]) for f in fields(_Close)))
+
+    def _exactly(self, placed: _Placed, row_X: Tensor, pair_X: Tensor, margin: float) -> _Close:
+        """Those of some pairs that are closer than `margin` [m]."""
         i_X, j_X = self._pair_2P[:, pair_X]
-        point_X3, other_X3 = closest_points(ends_BC23[row_X, i_X], ends_BC23[row_X, j_X])
+        point_X3, other_X3 = closest_points(placed.ends_BC23[row_X, i_X], placed.ends_BC23[row_X, j_X])
         apart_X3 = point_X3 - other_X3
         length_X = apart_X3.norm(dim=-1)
         distance_X = length_X - self._radius_C[i_X] - self._radius_C[j_X]
         x = torch.nonzero(distance_X < margin)[:, 0]
-        row_X, normal_X3 = row_X[x], apart_X3[x] / length_X[x, None].clamp_min(_SHORT)
-        axis_XA3 = ((rotation_BL33[:, 1:] @ self._axes_A3[..., None])[..., 0])[row_X]
-        lever_XA3 = torch.linalg.cross(axis_XA3, position_BL3[:, 1:][row_X])
-        moment_X31 = torch.linalg.cross(point_X3[x], normal_X3)[..., None]
-        turn_XA = (axis_XA3 @ moment_X31 - lever_XA3 @ normal_X3[..., None])[..., 0]
-        slide_XA = (axis_XA3 @ normal_X3[..., None])[..., 0]
-        sign_XA = self._above_LA[self._body_C[i_X[x]]] - self._above_LA[self._body_C[j_X[x]]]
+        normal_X3 = apart_X3[x] / length_X[x, None].clamp_min(SHORT)
+        return _Close(row_X[x], pair_X[x], distance_X[x], point_X3[x], normal_X3)
+
+    def _near(self, poses: LinkPoses, margin: float) -> Contacts:
+        placed = self._place(poses)
+        close = self._closer(placed, margin)
+        i_X, j_X = self._pair_2P[:, close.pair_X]
+        axis_XA3 = ((placed.rotation_BL33[:, 1:] @ self._axes_A3[..., None])[..., 0])[close.row_X]
+        lever_XA3 = torch.linalg.cross(axis_XA3, placed.position_BL3[:, 1:][close.row_X])
+        moment_X31 = torch.linalg.cross(close.point_X3, close.normal_X3)[..., None]
+        turn_XA = (axis_XA3 @ moment_X31 - lever_XA3 @ close.normal_X3[..., None])[..., 0]
+        slide_XA = (axis_XA3 @ close.normal_X3[..., None])[..., 0]
+        sign_XA = self._above_LA[self._body_C[i_X]] - self._above_LA[self._body_C[j_X]]
         moved_XA = torch.where(self._rotary_A > 0, turn_XA, slide_XA) * sign_XA
-        return Contacts(row_X, pair_X[x], distance_X[x], moved_XA @ self.robot.drive_DN)
-
-
-def closest_points(a_23: Tensor, b_23: Tensor) -> tuple[Tensor, Tensor]:
-    """The points (..., 3) where segments a and b (..., 2, 3) are nearest; a segment may be a point.
-
-    C. Ericson, Real-Time Collision Detection (2005), section 5.1.9, without branches.
-    """
-    start_a, start_b = a_23[..., 0, :], b_23[..., 0, :]
-    along_a, along_b, r = a_23[..., 1, :] - start_a, b_23[..., 1, :] - start_b, start_a - start_b
-    a, e, b = along_a.square().sum(-1), along_b.square().sum(-1), (along_a * along_b).sum(-1)
-    c, f = (along_a * r).sum(-1), (along_b * r).sum(-1)
-    safe_a, safe_e = a.clamp_min(_SHORT), e.clamp_min(_SHORT)
-    # Nearly parallel segments have no one answer; any point of a will do, the other end follows from it.
-    determinant = a * e - b * b
-    s = torch.where(determinant > 1e-7 * a * e, (b * f - c * e) / determinant.clamp_min(_SHORT * _SHORT), 0.0)
-    t = ((b * s.clamp(0, 1) + f) / safe_e).clamp(0, 1)
-    s = ((b * t - c) / safe_a).clamp(0, 1)
-    t = ((b * s + f) / safe_e).clamp(0, 1)
-    return start_a + s[..., None] * along_a, start_b + t[..., None] * along_b
-
-
-def _capsules(shape: LinkGeometry, pose_44: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, float]]:
-    """Capsules (start (3,), end (3,), radius) around a shape whose centre is at the pose."""
-    centre_3, axes_33 = pose_44[:3, 3], pose_44[:3, :3]
-    if shape.kind != "box":
-        half_3 = 0.5 * (shape.size[1] if len(shape.size) == 2 else 0.0) * axes_33[:, 2]
-        return [(centre_3 - half_3, centre_3 + half_3, shape.size[0])]
-    thin, wide, long = np.argsort(shape.size)
-    count = max(1, math.ceil(shape.size[wide] / max(shape.size[thin], 0.1 * shape.size[wide])))
-    step = shape.size[wide] / count
-    radius = 0.5 * math.hypot(shape.size[thin], step)
-    half_3 = max(0.0, 0.5 * shape.size[long]) * axes_33[:, long]
-    centres = [centre_3 + ((k + 0.5) * step - 0.5 * shape.size[wide]) * axes_33[:, wide] for k in range(count)]
-    return [(centre - half_3, centre + half_3, radius) for centre in centres]
+        return Contacts(close.row_X, close.pair_X, close.distance_X, moved_XA @ self.robot.drive_DN)

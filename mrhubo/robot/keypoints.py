@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError, unknown_name
@@ -59,6 +60,11 @@ class Keypoints:
         seen = [end.link for name, end in self.ends.items() if self._row(name).seen_from]
         return (*views, *(point.link for point in self.points.values()), *seen)
 
+    def differences(self, other: Keypoints) -> list[str]:
+        """Names of the points and oriented parts that are elsewhere on the other robot, or that only one has."""
+        mine, theirs = ({**keypoints.points, **keypoints.ends} for keypoints in (self, other))
+        return [name for name in {**mine, **theirs} if not _same(mine.get(name), theirs.get(name))]
+
     def _row(self, name: str) -> BodyPart:
         return next(part for part in self.parts if part.name == name)
 
@@ -74,6 +80,12 @@ class Keypoints:
                 rows = zip(part.direction_names, end.axes_23, part.rest, strict=False)
                 found += [Axis(part, name, end.link, axis_3, rest) for name, axis_3, rest in rows]
         return tuple(found)
+
+
+def _same(one: Point | End | None, other: Point | End | None) -> bool:
+    if isinstance(one, End) and isinstance(other, End):
+        return one.link == other.link and bool(torch.equal(one.axes_23, other.axes_23))
+    return one == other
 
 
 def read_keypoints(entries: Mapping[str, Any], table: Sequence[BodyPart] = PARTS) -> Keypoints:

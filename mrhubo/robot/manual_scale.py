@@ -23,7 +23,7 @@ from torch import Tensor, nn
 
 from mrhubo.body.skeleton import KEYPOINT_NAMES, PAIRED_KEYPOINTS, keypoint_indices
 from mrhubo.config import ConstantEntry, ManualScaleConfig, MeanEntry, Range, typed_value
-from mrhubo.errors import UserError, unknown_name
+from mrhubo.errors import InputWarning, UserError, unknown_name
 from mrhubo.frames import base_to_human
 from mrhubo.robot.entries import read_mean, read_vector
 from mrhubo.robot.model import LinkPoses, Robot
@@ -68,6 +68,7 @@ class ManualScale(nn.Module):
             warnings.warn(
                 f"robot.manual.shift: {list(config.shift)} moves nothing, because all keypoints are placed relative to "
                 "the pelvis; to move the others, add the opposite to the offset of robot.manual.keypoints.pelvis",
+                InputWarning,
                 stacklevel=2,
             )
         self.keypoint_names = tuple(self._entries)

@@ -8,24 +8,27 @@ driven by the N joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
-from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.config import find_config, load_config, places_named
-from mrhubo.errors import UserError
-from mrhubo.robot.chain import build_chain
+from mrhubo.errors import InputWarning, UserError
+from mrhubo.robot.chain import build_chain, chain_joints, chain_xml
 from mrhubo.robot.entries import check_names
+from mrhubo.robot.joint import Joint, Mimic, drive
 from mrhubo.robot.keypoints import Keypoints, read_keypoints
-from mrhubo.robot.urdf import Description, describe, joint_range
+from mrhubo.robot.limits import held_angle, joint_range, narrow_to_mimics
+from mrhubo.robot.urdf import Description, describe
+
+_MOST_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -94,28 +97,42 @@ class Robot(nn.Module):
             description.joint(key)
             if key in self.joint_names:
                 raise UserError(f"robot.hold.{key}: is among robot.joints, so it cannot be held")
+        for joint in self.joint_names:
+            _refuse_faults(description, [description.joint(joint)])
+        narrowed = narrow_to_mimics(self.urdf, description.joints, self.joint_names)
+        if narrowed:
+            description = description.with_joints({name: found.joint for name, found in narrowed.items()})
+            self.description = description
         limits = [joint_range(self.urdf, description.joint(j), ranges.get(j)) for j in self.joint_names]
+        for found in (found for name, found in narrowed.items() if name not in ranges):
+            warnings.warn(f"{self.urdf}: {found}", InputWarning, stacklevel=2)
         self.register_buffer("lower_N", _inward([low for low, _ in limits], torch.inf), persistent=False)
         self.register_buffer("upper_N", _inward([high for _, high in limits], -torch.inf), persistent=False)
         self.moving_links = tuple(description.joint(j).child for j in self.joint_names)
         self.links = tuple(dict.fromkeys((*self.moving_links, *(description.check_link(x) for x in links))))
-        self.held = {
-            j.name: _held_angle(description, j.name, hold) for j in description.joints.values() if j.kind != "fixed"
-        }
+        self.held = {j.name: held_angle(j, hold.get(j.name)) for j in description.joints.values() if j.kind != "fixed"}
         self._prepare_chain()
 
     def _prepare_chain(self) -> None:
-        needed = {joint.name for link in self.links for joint in self.description.joints_above(link)}
-        self._chain = build_chain(_chain_xml(self.description, needed)).to(dtype=torch.float32)
+        needed = {joint.name: joint for link in self.links for joint in self.description.joints_above(link)}
+        _refuse_faults(self.description, needed.values())
+        drives = {name: self._drive(name) for name in needed}
+        _refuse_faults(self.description, [self.description.joints[drive.joint] for drive in drives.values()])
+        turned = [name for name, drive in drives.items() if drive.joint in self.joint_names and drive.multiplier]
+        rest = {
+            name: drive.multiplier * self.held.get(drive.joint, 0.0) + drive.offset for name, drive in drives.items()
+        }
+        joints = chain_joints(self.description, self.links, turned, rest)
+        self._chain = build_chain(chain_xml(self.description.root, joints)).to(dtype=torch.float32)
         angles = self._chain.get_joint_parameter_names()
         select_AN, constant_A = torch.zeros(len(angles), len(self.joint_names)), torch.zeros(len(angles))
         for row, joint in enumerate(angles):
-            source, multiplier, offset = _drive(self.description, joint)
-            if source in self.joint_names:
-                select_AN[row, self.joint_names.index(source)] = multiplier
-                constant_A[row] = offset
+            drive = drives[joint]
+            if drive.joint in self.joint_names:
+                select_AN[row, self.joint_names.index(drive.joint)] = drive.multiplier
+                constant_A[row] = drive.offset
             else:
-                constant_A[row] = multiplier * self.held.get(source, 0.0) + offset
+                constant_A[row] = rest[joint]
         driven = [row for row in range(len(angles)) if select_AN[row].abs().sum() > 0]
         self.driven_joints = tuple(angles[row] for row in driven)
         """Joints of the chain that q turns: `joint_names` and those that mimic them."""
@@ -125,6 +142,13 @@ class Robot(nn.Module):
         tensors = {"select_AN": select_AN, "constant_A": constant_A, "drive_DN": select_AN[driven], "_frames": frames}
         for name, tensor in tensors.items():
             self.register_buffer(name, tensor, persistent=False)
+        _tell(self.description, needed)
+
+    def _drive(self, joint: str) -> Mimic:
+        try:
+            return drive(self.description.joints, joint)
+        except UserError as error:
+            raise UserError(f"{self.urdf}: {error}") from error
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Robot:
         """Moves the chain, which is no module, along with the buffers."""
@@ -217,48 +241,24 @@ def _inward(limits: list[float], towards: float) -> Tensor:
     return torch.where(outside, torch.nextafter(rounded, torch.full_like(rounded, towards)), rounded)
 
 
-def _drive(description: Description, joint: str) -> tuple[str, float, float]:
-    """The joint whose angle drives this one in the end, and the multiplier and offset on the way."""
-    multiplier, offset, seen = 1.0, 0.0, [joint]
-    while (mimic := description.joints[joint].mimic) is not None:
-        joint = mimic.joint
-        if joint in seen or joint not in description.joints:
-            reason = "mimics itself" if joint in seen else f"mimics '{joint}', which does not exist"
-            raise UserError(f"{description.path}: joint '{seen[0]}' {reason}")
-        offset, multiplier = offset + multiplier * mimic.offset, multiplier * mimic.multiplier
-        seen.append(joint)
-    return joint, multiplier, offset
+def _refuse_faults(description: Description, joints: Iterable[Joint]) -> None:
+    """Refuses joints that are needed and whose numbers cannot be used."""
+    for joint in joints:
+        if joint.name in description.faults:
+            raise UserError(f"robot.urdf: {description.path}, {description.faults[joint.name]}")
 
 
-def _held_angle(description: Description, joint: str, hold: Mapping[str, float]) -> float:
-    """Angle at which a joint rests when it is not sampled; a joint that mimics follows its source elsewhere."""
-    info = description.joints[joint]
-    low = -np.inf if info.lower is None or info.kind == "continuous" else info.lower
-    high = np.inf if info.upper is None or info.kind == "continuous" else info.upper
-    if joint not in hold:
-        return float(np.clip(0.0, low, max(low, high)))
-    if not low <= hold[joint] <= high:
-        raise UserError(f"robot.hold.{joint}: {hold[joint]} leaves the URDF's limits {low} .. {high}")
-    return float(hold[joint])
-
-
-def _chain_xml(description: Description, needed: set[str]) -> bytes:
-    """A URDF of the needed joints alone: pytorch-kinematics trips over much that it does not need."""
-    robot = etree.Element("robot", name="chain")
-    etree.SubElement(robot, "link", name=description.root)
-    for joint in description.joints.values():
-        if joint.name not in needed:
-            continue
-        etree.SubElement(robot, "link", name=joint.child)
-        element = etree.SubElement(robot, "joint", name=joint.name, type=joint.kind)
-        rpy = Rotation.from_matrix(joint.origin_44[:3, :3]).as_euler("xyz")
-        etree.SubElement(element, "origin", xyz=_numbers(joint.origin_44[:3, 3]), rpy=_numbers(rpy))
-        etree.SubElement(element, "parent", link=joint.parent)
-        etree.SubElement(element, "child", link=joint.child)
-        etree.SubElement(element, "axis", xyz=_numbers(joint.axis_3))
-        etree.SubElement(element, "limit", lower="-1000", upper="1000", effort="1", velocity="1")
-    return etree.tostring(robot)
-
-
-def _numbers(values: np.ndarray) -> str:
-    return " ".join(repr(float(v)) for v in values)
+def _tell(description: Description, needed: Collection[str]) -> None:
+    """Warns of what is odd about joints that are needed, and lists what cannot be read and is not."""
+    for joint, doubt in description.doubts.items():
+        if joint in needed:
+            warnings.warn(f"robot.urdf: {description.path}, {doubt}", InputWarning, stacklevel=3)
+    faults = [fault for joint, fault in description.faults.items() if joint not in needed]
+    if left_out := [*faults, *description.left_out]:
+        more = f"; and {len(left_out) - _MOST_LISTED} more" if len(left_out) > _MOST_LISTED else ""
+        listed = "; ".join(left_out[:_MOST_LISTED])
+        warnings.warn(
+            f"robot.urdf: {description.path}: left out what cannot be read and is not needed: {listed}{more}",
+            InputWarning,
+            stacklevel=3,
+        )

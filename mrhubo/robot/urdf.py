@@ -1,4 +1,4 @@
-"""Reads a URDF with yourdfpy into the few facts that kinematics needs, and refuses what cannot work.
+"""A URDF as the few facts that kinematics needs, read by yourdfpy from what `mrhubo.robot.tree` leaves of the file.
 
 Meshes are never loaded. Lengths in metres, angles in radians.
 """
@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import io
 import logging
-import math
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,43 +17,12 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.config import fingerprint
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.robot.joint import ROTARY, Joint, Mimic
+from mrhubo.robot.limits import with_soft_limits
+from mrhubo.robot.tree import Tree, read_tree
 
 # It warns at every pose about mimic joints whose source is fixed (NAO's fingers), which is no news to our users.
 logging.getLogger("yourdfpy.urdf").setLevel(logging.ERROR)
-
-_MAX_BYTES = 50_000_000
-_ROTARY = ("revolute", "continuous")
-
-
-@dataclass(frozen=True)
-class Mimic:
-    """This joint's angle = multiplier * (angle of `joint`) + offset."""
-
-    joint: str
-    multiplier: float
-    offset: float
-
-
-@dataclass(frozen=True)
-class Joint:
-    """One joint: from link `parent` to link `child`, placed by `origin_44`, turning about `axis_3` (unit, child
-    frame).
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin_44: np.ndarray
-    axis_3: np.ndarray
-    lower: float | None
-    upper: float | None
-    mimic: Mimic | None
-
-    @property
-    def rotary(self) -> bool:
-        """Revolute or continuous."""
-        return self.kind in _ROTARY
 
 
 @dataclass(frozen=True)
@@ -67,7 +36,15 @@ class Description:
     parent_joint: dict[str, Joint]
     """The joint above each link but the root."""
     parsed: yourdfpy.URDF = field(repr=False, compare=False)
-    """What yourdfpy has made of the file: its shapes, and poses of all links (`link_poses`)."""
+    """What yourdfpy has made of what can be read: its shapes, and poses of its links (`link_poses`)."""
+    faults: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+    """By joint, why it cannot be used: line and sentence. It is no matter as long as nothing wanted hangs on it."""
+    doubts: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+    """By joint, what is odd about it: line and sentence."""
+    left_out: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    """What else cannot be read and is not needed."""
+    unread_collisions: frozenset[str] = field(default=frozenset(), repr=False, compare=False)
+    """Links with a collision element that cannot be read."""
 
     @property
     def kinematics(self) -> str:
@@ -78,6 +55,11 @@ class Description:
             place = [j.origin_44.tolist(), j.axis_3.tolist()]
             joints.append([j.name, j.kind, j.parent, j.child, place, repr(j.lower), repr(j.upper), mimic])
         return fingerprint([self.root, joints])
+
+    def with_joints(self, changed: Mapping[str, Joint]) -> Description:
+        """The same robot with some joints in another form."""
+        joints = {**self.joints, **changed}
+        return replace(self, joints=joints, parent_joint={joint.child: joint for joint in joints.values()})
 
     def joint(self, name: str) -> Joint:
         """UserError with the nearest name if there is no such joint."""
@@ -106,167 +88,107 @@ def load_urdf(path: Path) -> yourdfpy.URDF:
     Raises:
         UserError: the file is missing, too large, or no URDF.
     """
-    if not path.is_file():
-        raise UserError(f"robot.urdf: {path} does not exist; name a URDF file, relative to the YAML")
-    if path.stat().st_size > _MAX_BYTES:
-        raise UserError(
-            f"robot.urdf: {path} has {path.stat().st_size:,} bytes; the most that is read is {_MAX_BYTES:,}"
-        )
+    return _parsed(read_tree(path), scene=True)
+
+
+def _parsed(tree: Tree, scene: bool) -> yourdfpy.URDF:
+    """What yourdfpy makes of a tree; `scene`: its graph of all links, which takes long where they are many."""
     try:
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
-        tree = etree.parse(str(path), parser)
-        if tree.getroot().tag != "robot":
-            raise UserError(f"robot.urdf: {path} is no URDF: its root element is <{tree.getroot().tag}>, not <robot>")
-        _check_structure(path, tree.getroot())
-        clean = _kinematic_part(tree.getroot())
         return yourdfpy.URDF.load(
-            io.BytesIO(etree.tostring(clean)),
-            build_scene_graph=True,
+            io.BytesIO(etree.tostring(tree.robot)),
+            build_scene_graph=scene,
             build_collision_scene_graph=False,
             load_meshes=False,
             load_collision_meshes=False,
         )
-    except (etree.XMLSyntaxError, OSError) as error:
-        raise UserError(f"robot.urdf: {path} is no well-formed XML: {error}") from error
-    except UserError:
-        raise
     except Exception as error:
-        raise UserError(f"robot.urdf: {path} cannot be read as a URDF: {type(error).__name__}: {error}") from error
+        raise UserError(f"robot.urdf: {tree.path} cannot be read as a URDF: {type(error).__name__}: {error}") from error
 
 
-def link_poses(urdf: yourdfpy.URDF, configuration: dict[str, float]) -> dict[str, np.ndarray]:
-    """Pose (4, 4) of every link in the root's frame, at angles [rad] by joint (`Robot.configuration`)."""
-    urdf.update_cfg({name: configuration[name] for name in urdf.actuated_joint_names if name in configuration})
-    return {link.name: urdf.get_transform(link.name, urdf.base_link) for link in urdf.robot.links}
+def link_poses(urdf: yourdfpy.URDF, configuration: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """Pose (4, 4) of every link in the root's frame, at angles [rad] by joint (`Robot.configuration`).
 
-
-def _kinematic_part(robot: etree._Element) -> etree._Element:
-    """Links, joints and colours alone: simulators' and sensors' tags, and textures, only trip the parser."""
-    for element in list(robot):
-        if element.tag not in ("link", "joint", "material"):
-            robot.remove(element)
-    for texture in list(robot.iter("texture")):
-        texture.getparent().remove(texture)
-    return robot
-
-
-def _check_structure(path: Path, robot: etree._Element) -> None:
-    links = [e.get("name") for e in robot.findall("link")]
-    joints = [e for e in robot.findall("joint") if e.get("type")]
-    children: dict[str | None, str | None] = {}
-    below: dict[str | None, list[str | None]] = {}
-    for kind, names in (("link", links), ("joint", [e.get("name") for e in joints])):
-        if None in names:
-            raise UserError(f"robot.urdf: {path}: a {kind} has no name")
-        repeated = {n for n in names if names.count(n) > 1}
-        if repeated:
-            raise UserError(f"robot.urdf: {path}: {kind} '{sorted(map(str, repeated))[0]}' appears twice")
+    Joints without an angle are at 0. One that mimics another follows it where that is one of those that can be moved;
+    else it is at its offset, as if the other were at 0.
+    """
+    joints = urdf.robot.joints
+    free = {joint.name for joint in joints if joint.mimic is None and joint.type != "fixed"}
+    below: dict[str, list[yourdfpy.urdf.Joint]] = {}
     for joint in joints:
-        for end in ("parent", "child"):
-            element = joint.find(end)
-            link = element.get("link") if element is not None else None
-            if link not in links:
-                raise UserError(
-                    f"robot.urdf: {path}: joint '{joint.get('name')}' has the {end} link '{link}', which does not exist"
-                )
-            if end == "child" and link in children:
-                raise UserError(
-                    f"robot.urdf: {path}: link '{link}' hangs on two joints, '{children[link]}' and "
-                    f"'{joint.get('name')}'"
-                )
-            if end == "child":
-                children[link] = joint.get("name")
-                below.setdefault(joint.find("parent").get("link"), []).append(link)
-    roots = [n for n in links if n not in children]
-    if len(roots) != 1:
-        shown = ", ".join(f"'{r}'" for r in roots[:5]) or "none (the joints form a loop)"
-        raise UserError(f"robot.urdf: {path}: a robot has one root link, this file has {len(roots)}: {shown}")
-    reached = list(roots)
-    for link in reached:
-        reached += below.get(link, [])
-    lost = [link for link in links if link not in reached]
-    if lost:
-        raise UserError(f"robot.urdf: {path}: link '{lost[0]}' hangs in a loop of joints, not on the root '{roots[0]}'")
+        below.setdefault(joint.parent, []).append(joint)
+    children = {joint.child for joint in joints}
+    root = next(link.name for link in urdf.robot.links if link.name not in children)
+    poses, order = {root: np.eye(4)}, [root]
+    for link in order:
+        for joint in below.get(link, []):
+            angle = configuration.get(joint.name, 0.0)
+            if (mimic := _mimic(joint)) is not None:
+                source = configuration.get(mimic.joint, 0.0) if mimic.joint in free else 0.0
+                angle = source * mimic.multiplier + mimic.offset
+            poses[joint.child] = poses[link] @ _placed(joint, angle)
+            order.append(joint.child)
+    return {link.name: poses[link.name] for link in urdf.robot.links}
+
+
+def _placed(joint: yourdfpy.urdf.Joint, angle: float) -> np.ndarray:
+    """Pose (4, 4) of a joint's child in its parent's frame."""
+    origin_44 = np.eye(4) if joint.origin is None else joint.origin
+    if joint.type not in (*ROTARY, "prismatic"):
+        return origin_44
+    return origin_44 @ moved(np.asarray(joint.axis, dtype=float), angle, joint.type == "prismatic")
+
+
+def moved(axis_3: np.ndarray, angle: float, slides: bool) -> np.ndarray:
+    """The motion (4, 4) of a joint about its axis (which need not be unit), or along it [m]; O. Rodrigues, 1840."""
+    motion_44 = np.eye(4)
+    if slides:
+        motion_44[:3, 3] = angle * axis_3
+        return motion_44
+    x, y, z = unit_3 = axis_3 / np.sqrt(np.dot(axis_3, axis_3))
+    sine, cosine = np.sin(angle), np.cos(angle)
+    motion_44[:3, :3] = np.diag([cosine] * 3) + np.outer(unit_3, unit_3) * (1.0 - cosine)
+    motion_44[:3, :3] += np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) * sine
+    return motion_44
 
 
 def describe(path: Path) -> Description:
     """Joints, links and the root of a URDF file.
 
     Raises:
-        UserError: the file is missing or no URDF; it has several roots, a loop, or a floating or planar joint anywhere
-            but directly under the root (where it only places the robot in the world, and is taken as fixed).
+        UserError: the file is missing or no URDF; it has several roots, a loop, a joint of an unknown type, or a
+            floating or planar joint anywhere but directly under the root (where it only places the robot in the world,
+            and is taken as fixed).
     """
-    parsed = load_urdf(path)
-    robot = parsed.robot
-    children = {joint.child for joint in robot.joints}
-    root = next(link.name for link in robot.links if link.name not in children)
-    joints = {}
-    for joint in robot.joints:
-        kind = joint.type
-        if kind in ("floating", "planar"):
-            if joint.parent != root:
-                raise UserError(
-                    f"{path}: joint '{joint.name}' is {kind}; only rotary, prismatic and fixed joints can be "
-                    "handled below the root"
-                )
-            kind = "fixed"
-        elif kind not in (*_ROTARY, "prismatic", "fixed"):
-            raise UserError(f"{path}: joint '{joint.name}' has the unknown type '{kind}'")
-        axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=float)
-        origin = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=float)
-        length = np.linalg.norm(axis)
-        if not (np.isfinite(origin).all() and np.isfinite(axis).all()) or (kind != "fixed" and length < 1e-9):
-            raise UserError(f"{path}: joint '{joint.name}' has an origin or axis that is zero, NaN or infinite")
-        limit = joint.limit if kind != "continuous" else None
-        mimic = joint.mimic
-        joints[joint.name] = Joint(
-            joint.name,
-            kind,
-            joint.parent,
-            joint.child,
-            origin,
-            axis / max(length, 1e-9),
-            None if limit is None or limit.lower is None else float(limit.lower),
-            None if limit is None or limit.upper is None else float(limit.upper),
-            None
-            if mimic is None
-            else Mimic(
-                mimic.joint,
-                1.0 if mimic.multiplier is None else float(mimic.multiplier),
-                0.0 if mimic.offset is None else float(mimic.offset),
-            ),
-        )
+    tree = read_tree(path)
+    parsed = _parsed(tree, scene=False)
+    read = {joint.name: joint for joint in parsed.robot.joints}
+    joints = {name: _joint(element, read.get(name)) for name, element in tree.joints.items()}
     above = {joint.child: joint for joint in joints.values()}
-    return Description(path, root, tuple(link.name for link in robot.links), joints, above, parsed)
+    return Description(
+        path, tree.root, tree.links, joints, above, parsed,
+        tree.faults, tree.doubts, tree.left_out, tree.unread_collisions,
+    )  # fmt: skip
 
 
-def joint_range(path: Path, joint: Joint, narrower: list[float] | None) -> tuple[float, float]:
-    """Lower and upper limit [rad] of a joint that is to be sampled.
+def _joint(element: etree._Element, read: yourdfpy.urdf.Joint | None) -> Joint:
+    """A joint of the file, and what yourdfpy has read of it: nothing, if it has no place."""
+    name, kind = str(element.get("name")), str(element.get("type"))
+    kind = "fixed" if kind in ("floating", "planar") else kind
+    parent, child = (str(element.find(end).get("link")) for end in ("parent", "child"))
+    if read is None:
+        return Joint(name, kind, parent, child, np.eye(4), np.array([1.0, 0.0, 0.0]), None, None, None)
+    axis_3 = np.asarray(read.axis, dtype=float)
+    origin_44 = np.eye(4) if read.origin is None else np.asarray(read.origin, dtype=float)
+    limit = read.limit if kind != "continuous" else None
+    lower, upper = (None, None) if limit is None else (limit.lower, limit.upper)
+    axis_3 = axis_3 / max(np.linalg.norm(axis_3), 1e-9)
+    joint = Joint(name, kind, parent, child, origin_44, axis_3, lower, upper, _mimic(read))
+    return with_soft_limits(joint, element.find("safety_controller"))
 
-    Raises:
-        UserError: the joint is not rotary, has no limits and no range is given, or its range is empty or outside them.
-    """
-    if not joint.rotary:
-        raise UserError(f"{path}: joint '{joint.name}' is {joint.kind}; only rotary joints can be sampled")
-    if joint.mimic is not None:
-        raise UserError(
-            f"{path}: joint '{joint.name}' mimics '{joint.mimic.joint}'; name '{joint.mimic.joint}' instead"
-        )
-    if narrower is not None:
-        if len(narrower) != 2 or not all(map(math.isfinite, narrower)) or not narrower[0] < narrower[1]:
-            raise UserError(
-                f"robot.ranges.{joint.name}: expected [lower, upper] in rad with lower < upper, found {list(narrower)}"
-            )
-    if joint.lower is None or joint.upper is None:
-        if narrower is None:
-            raise UserError(f"{path}: joint '{joint.name}' has no limits; give it a range in robot.ranges")
-        return narrower[0], narrower[1]
-    if not (math.isfinite(joint.lower) and math.isfinite(joint.upper) and joint.lower < joint.upper):
-        raise UserError(f"{path}: joint '{joint.name}' has the impossible limits {joint.lower} .. {joint.upper}")
-    if narrower is None:
-        return joint.lower, joint.upper
-    if narrower[0] < joint.lower - 1e-9 or narrower[1] > joint.upper + 1e-9:
-        raise UserError(
-            f"robot.ranges.{joint.name}: {list(narrower)} leaves the URDF's limits {joint.lower} .. {joint.upper}"
-        )
-    return narrower[0], narrower[1]
+
+def _mimic(joint: yourdfpy.urdf.Joint) -> Mimic | None:
+    mimic = joint.mimic
+    if mimic is None:
+        return None
+    multiplier = 1.0 if mimic.multiplier is None else float(mimic.multiplier)
+    return Mimic(mimic.joint, multiplier, 0.0 if mimic.offset is None else float(mimic.offset))

@@ -52,6 +52,13 @@ def test_ends(body, status, out, err):
     assert (done.returncode, done.stdout, done.stderr) == (status, out, err)
 
 
+def test_a_warning_about_the_users_input_is_one_line_once():
+    body = "import warnings\nfrom mrhubo.errors import InputWarning\nfor text in ('odd\\n  thing', 'odd thing', 'b'):\n"
+    done = run(body + "    warnings.warn(text, InputWarning)\nwarnings.warn('theirs', UserWarning)")
+    assert done.returncode == 0 and done.stderr.startswith("warning: odd thing\nwarning: b\n")
+    assert done.stderr.count("odd") == 1 and "UserWarning: theirs" in done.stderr
+
+
 def test_a_bug_shows_its_traceback():
     done = run("1 / 0")
     assert done.returncode == 1

@@ -1,11 +1,17 @@
-"""A small robot whose traps are known: an arm with a mimic joint, a negative axis, a limit that excludes zero."""
+"""Small robots whose traps are known: an arm with a mimic joint, a negative axis and a limit that excludes zero; and one
+with two arms that nothing is wrong with, of which tests change one place.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from mrhubo.config import RobotConfig
+from tests.robot.two_arms import KEYPOINTS, PAIR
 
 ARM = """<?xml version="1.0" encoding="utf-8"?>
 <robot name="arm">
@@ -29,12 +35,31 @@ def arm(tmp_path: Path) -> Callable[..., Path]:
     """Writes the arm, with pairs of text replaced, and returns its file."""
 
     def write(*replacements: tuple[str, str]) -> Path:
-        text = ARM
-        for old, new in replacements:
-            assert old in text
-            text = text.replace(old, new)
-        path = tmp_path / "arm.urdf"
-        path.write_text(text)
-        return path
+        return _write(tmp_path / "arm.urdf", ARM, replacements)
 
     return write
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Callable[..., RobotConfig]:
+    """Writes the robot with two arms, with pairs of text replaced in its URDF, and returns its config, with settings
+    replaced, and keypoints among `keypoints`; None takes one away.
+    """
+
+    def write(*replacements: tuple[str, str], keypoints: dict[str, Any] | None = None, **settings: Any) -> RobotConfig:
+        urdf = _write(tmp_path / "pair.urdf", PAIR, replacements)
+        entries = {name: entry for name, entry in {**KEYPOINTS, **(keypoints or {})}.items() if entry is not None}
+        names = [f"{s}_{joint}" for s in "lr" for joint in ("pitch", "roll", "yaw", "elbow")]
+        links = ["l_lower", "l_hand", "r_lower", "r_hand"]
+        config = {"name": "pair", "urdf": urdf, "joints": names, "keypoints": entries, "key_links": links}
+        return RobotConfig(**{**config, **settings})
+
+    return write
+
+
+def _write(path: Path, text: str, replacements: tuple[tuple[str, str], ...]) -> Path:
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    return path

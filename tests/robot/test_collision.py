@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,10 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mrhubo.config import load_config
-from mrhubo.robot import Robot, SelfCollision, build_body_map
-from mrhubo.robot.collision import closest_points
+from mrhubo.config import RobotConfig, load_config
+from mrhubo.errors import InputWarning
+from mrhubo.robot import Robot, SelfCollision, build_body_map, collision
+from mrhubo.robot.capsules import closest_points
 
 ROBOTS = ["nao", "coman", "reachy"]
 
@@ -152,3 +154,56 @@ def test_a_robot_without_shapes_never_collides(tmp_path: Path) -> None:
     mesh = "<mesh filename='a.stl'/>"
     shapes = SelfCollision(toy(tmp_path, mesh, trunk=mesh))
     assert shapes.pairs == () and not bool(shapes.collides(torch.zeros(3, 2)).any())
+
+
+def spheres(count: int) -> str:
+    """Collision elements in a row along a link."""
+    return "".join(
+        f"<collision><origin xyz='0.05 0 {-0.2 + 0.3 * i / count:.4f}'/><geometry><sphere radius='0.01'/></geometry></collision>"
+        for i in range(count)
+    )
+
+
+def test_many_shapes_are_looked_at_few_poses_at_a_time(
+    pair: Callable[..., RobotConfig], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 480 spheres, 230,000 distances a pose; at 1,024 poses that would be a gigabyte."""
+    links = ["chest", "head", "l_upper", "l_lower", "l_hand", "r_upper", "r_lower", "r_hand"]
+    largest, cdist = [], torch.cdist
+
+    def measured(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        largest.append(a.shape[0] * a.shape[1] * b.shape[1])
+        return cdist(a, b)
+
+    monkeypatch.setattr(torch, "cdist", measured)
+    edits = [(f'<link name="{link}"/>', f'<link name="{link}">{spheres(60)}</link>') for link in links]
+    robot = build_body_map(pair(*edits)).robot
+    shapes = SelfCollision(robot)
+    assert len(shapes.pairs) > 20_000
+    shapes.collides(robot.sample(200, torch.Generator().manual_seed(0)))
+    assert max(largest) <= 2**24
+
+
+@pytest.mark.parametrize("name", ["nao", "reachy"])
+def test_how_many_are_looked_at_together_does_not_matter(
+    root: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = robot_of(root, name)
+    shapes = SelfCollision(robot)
+    q_BN = robot.sample(60, torch.Generator().manual_seed(0))
+    together, collides = shapes.near(q_BN, 0.02), shapes.collides(q_BN)
+    monkeypatch.setattr(collision, "_AT_ONCE", 7 * len(shapes._links) ** 2)
+    apart = shapes.near(q_BN, 0.02)
+    for field in ("row_X", "pair_X", "distance_X", "jacobian_XN"):
+        torch.testing.assert_close(getattr(apart, field), getattr(together, field), atol=1e-6, rtol=0)
+    assert torch.equal(shapes.collides(q_BN), collides)
+
+
+def test_too_many_shapes_are_left_out_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(collision, "_MOST", 20)
+    robot = toy(tmp_path, "<sphere radius='0.05'/>", middle=spheres(30))
+    with pytest.warns(
+        InputWarning, match=r"toy.urdf: has 32 collision shapes, more than 20; those of upper are not looked at"
+    ):
+        shapes = SelfCollision(robot)
+    assert shapes.uncovered == ("upper",) and shapes.pairs == (("trunk", "fore"),)

@@ -74,10 +74,24 @@ def test_a_joint_that_moves_no_part_is_refused_from_a_robot_too(root: Path) -> N
         BodyMap.of(robot)
 
 
+def test_differences_are_named(root: Path) -> None:
+    entries = load_config(root / "conf" / "reachy.yaml").robot.keypoints
+    known = read_keypoints(entries)
+    assert known.differences(read_keypoints({**entries, "chest": {"link": "torso", "forward": [2, 0, 0]}})) == []
+    changed = {
+        **entries,
+        "left_wrist": {"link": "l_wrist2hand", "offset": [0, 0, 0.01]},
+        "head": {"link": "head", "forward": [1, 0, 0], "up": [0, 0, 1]},
+    }
+    del changed["right_hand"]
+    assert known.differences(read_keypoints(changed)) == ["left_wrist", "right_hand", "head"]
+    assert set(read_keypoints(changed).differences(known)) == {"left_wrist", "right_hand", "head"}
+
+
 def test_the_urdf_is_parsed_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
-    load = urdf.load_urdf
-    monkeypatch.setattr(urdf, "load_urdf", lambda path: (read.append(path), load(path))[1])
+    load = urdf.read_tree
+    monkeypatch.setattr(urdf, "read_tree", lambda path: (read.append(path), load(path))[1])
     body_map = build_body_map(load_config(root / "conf" / "coman.yaml").robot)
     assert body_map.collision.pairs
     Artist(body_map.robot).robot_figure(body_map.robot.home())

@@ -11,7 +11,7 @@ import torch
 
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
-from mrhubo.robot import Robot, build_body_map, load_urdf
+from mrhubo.robot import Robot, build_body_map, link_poses, load_urdf
 
 Arm = Callable[..., Path]
 
@@ -27,6 +27,8 @@ def test_agrees_with_yourdfpy_on_every_link(root: Path, name: str) -> None:
     for b in range(len(q)):
         wanted = robot.configuration(q[b].numpy())
         urdf.update_cfg({joint: wanted[joint] for joint in urdf.actuated_joint_names})
+        for link, pose_44 in link_poses(robot.description.parsed, wanted).items():
+            np.testing.assert_allclose(pose_44, urdf.get_transform(link, robot.description.root), atol=1e-12)
         for i, link in enumerate(robot.links):
             expected = urdf.get_transform(link, robot.description.root)
             np.testing.assert_allclose(poses.position_BL3[b, i], expected[:3, 3], atol=1e-5, err_msg=link)
@@ -113,7 +115,7 @@ REFUSALS = [
     ([('<child link="slide"/>', '<child link="hand"/>')], {}, r"hangs on two joints"),
     ([('name="finger"', 'name="hand"')], {}, r"link 'hand' appears twice"),
     ([('mimic joint="elbow"', 'mimic joint="wrist"')], {"links": ["hand"]}, r"'wrist' mimics itself"),
-    ([('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>')], {}, r"origin or axis that is zero"),
+    ([('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>')], {}, r"line 5: joint 'shoulder': <axis xyz=\"0 0 0\"> is zero"),
     ([("</robot>", "")], {}, r"no well-formed XML"),
     ([("robot name", "model name"), ("</robot>", "</model>")], {}, r"root element is <model>"),
 ]  # fmt: skip

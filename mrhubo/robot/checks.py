@@ -1,0 +1,225 @@
+"""Whether a body map can be right: what a wrong one shows in the robot's tree, and in random poses of it.
+
+What cannot be right is refused, what may be a mistake is warned of once. Everything follows from the table of body
+parts: a part hangs on another, and a limb runs from one point to another. Where they lie: `mrhubo.robot.placement`.
+
+Legend: B random poses, E limbs, K links, N joints.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import torch
+
+from mrhubo.errors import UserError
+from mrhubo.robot.entries import End
+from mrhubo.robot.keypoints import Limb
+from mrhubo.robot.model import Robot
+from mrhubo.robot.placement import check_placement, warn
+
+if TYPE_CHECKING:
+    from mrhubo.robot.body_map import BodyMap
+
+_POSES = 64
+_NO_LENGTH = 1e-4
+"""Metres under which a limb has no direction, and under which a link stays where it is."""
+_STEADY, _STRETCHED = 1.1, 1.2
+"""How many times longer than at its shortest a limb may be: to be one limb at all, and without a word."""
+_LONG = 5.0
+"""Metres beyond which a limb's length is probably in millimetres."""
+_RATIO = (0.2, 2.0)
+"""Length of a limb by that of the limb which it hangs on."""
+
+
+def check_body_map(body_map: BodyMap) -> None:
+    """Refuses a body map that cannot be right.
+
+    Raises:
+        UserError: one point stands for two body parts, a part does not hang on the one that carries it, a limb has no
+            length, left and right are exchanged, or a joint moves no body part; names it.
+    """
+    robot, generator = body_map.robot, torch.Generator().manual_seed(0)
+    q_BN = robot.sample(_POSES, generator)
+    view = body_map.shared.view_robot(robot.forward(q_BN))
+    limbs = [direction for direction in body_map.directions if isinstance(direction, Limb)]
+    length_BE = (view.end_BE3 - view.start_BE3).norm(dim=-1)
+    lengths = {
+        limb.part.name: (float(shortest), float(longest))
+        for limb, shortest, longest in zip(limbs, length_BE.amin(0), length_BE.amax(0), strict=True)
+    }
+    _check_shared(body_map)
+    _check_tree(body_map, limbs, lengths)
+    _check_lengths(limbs, lengths)
+    check_placement(body_map, q_BN)
+    _check_moved(body_map)
+
+
+def check_key_links(robot: Robot, key_links: Sequence[str]) -> None:
+    """Refuses links of which no joint moves any: their error would be 0 whatever the joints do.
+
+    Raises:
+        UserError: names the links.
+    """
+    position_BL3 = robot.forward(robot.sample(_POSES, torch.Generator().manual_seed(0))).position_BL3
+    moved_BK3 = position_BL3[:, [robot.link_index(link) for link in key_links]]
+    if float((moved_BK3 - moved_BK3[:1]).abs().max()) < _NO_LENGTH:
+        raise UserError(
+            f"robot.key_links: none of robot.joints moves {_quoted(key_links)}, so their error would always be 0; name "
+            "links of the arms"
+        )
+
+
+def _check_shared(body_map: BodyMap) -> None:
+    """Refuses one point, or one link's axes, for two parts."""
+    points, ends = body_map.keypoints.points, body_map.keypoints.ends
+    for (name, point), (other, same) in itertools.combinations(points.items(), 2):
+        if point == same:
+            raise UserError(
+                f"robot.keypoints.{other}: is where '{name}' is, on the link '{point.link}'; one point cannot be two "
+                "body parts"
+            )
+    seen_from = {part.name: part.seen_from for part in body_map.keypoints.parts}
+    for (name, end), (other, same) in itertools.combinations(ends.items(), 2):
+        if end.link != same.link:
+            continue
+        if seen_from[other] != name and seen_from[name] != other:
+            raise UserError(
+                f"robot.keypoints.{other}: is the link '{end.link}', as is '{name}'; one link cannot stand for both"
+            )
+        warn(f"robot.keypoints.{other}: is the link '{end.link}', as is '{name}', against which it never turns")
+
+
+class _Tree:
+    """Who is above whom in the robot's tree."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._description, self._driven = robot.description, set(robot.driven_joints)
+
+    def turning(self, link: str) -> dict[str, None]:
+        """The joints that turn a link as q says, nearest first."""
+        above = self._description.joints_above(link)
+        return {joint.name: None for joint in above if joint.name in self._driven}
+
+    def turns_apart(self, inner: str, outer: str) -> str | None:
+        """A joint that turns the inner link and not the outer one."""
+        outside = self.turning(outer)
+        return next((joint for joint in self.turning(inner) if joint not in outside), None)
+
+    def is_above(self, link: str, other: str) -> bool:
+        """Whether a link is another one, or above it."""
+        return link == other or any(joint.parent == link for joint in self._description.joints_above(other))
+
+    def is_inward(self, limb: Limb, view: End) -> bool:
+        """Whether the tree runs through a limb towards the body: its root is a foot, or a hand."""
+        inner, outer = limb.start.link, limb.end.link
+        return inner != outer and self.is_above(outer, inner) and self.turns_apart(inner, view.link) is None
+
+
+def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]]) -> None:
+    """Refuses a part that does not move with what carries it, and a limb that does not run outwards."""
+    tree, ends, by_part = _Tree(body_map.robot), body_map.keypoints.ends, {limb.part.name: limb for limb in limbs}
+    inward = {x.part.name for x in limbs if x.part.seen_from and tree.is_inward(x, ends[x.part.seen_from])}
+    for part in body_map.keypoints.parts:
+        limb, carrier = by_part.get(part.name), part.hangs_on
+        if carrier in ends:
+            name, link = (limb.part.start, limb.start.link) if limb else (part.name, ends[part.name].link)
+            joint = tree.turns_apart(ends[carrier].link, link)
+            # Of pelvis and chest either may be the root.
+            reversed_ = part.name in inward or (limb is None and tree.turns_apart(link, ends[carrier].link) is None)
+            if joint and not reversed_:
+                raise UserError(
+                    f"robot.keypoints.{carrier}: '{ends[carrier].link}' is turned by the joint '{joint}', which does "
+                    f"not turn '{name}' ('{link}') with it; name the link that carries '{name}'"
+                )
+        elif limb is None and carrier in by_part and carrier not in inward:
+            inner, link = by_part[carrier], ends[part.name].link
+            if joint := tree.turns_apart(inner.start.link, link):
+                raise UserError(
+                    f"robot.keypoints.{part.name}: '{link}' is not turned by the joint '{joint}', which turns "
+                    f"'{inner.part.start}' ('{inner.start.link}'); the two are on different chains"
+                )
+    for limb in (limb for limb in limbs if limb.part.name not in inward):
+        _check_limb(tree, limb, lengths[limb.part.name])
+
+
+def _check_limb(tree: _Tree, limb: Limb, length: tuple[float, float]) -> None:
+    inner, outer = limb.start.link, limb.end.link
+    if tree.is_above(inner, outer):
+        return
+    place = f"robot.keypoints.{limb.part.end}: '{limb.part.start}' ('{inner}')"
+    joint = tree.turns_apart(inner, outer)
+    if tree.is_above(outer, inner):
+        if joint is not None or not any(limb.end.offset_3):
+            raise UserError(
+                f"{place} lies below '{limb.part.end}' ('{outer}') in the robot's tree, and a limb runs outwards; are "
+                "the two exchanged?"
+            )
+    elif joint is not None and length[1] > _STEADY * length[0]:
+        raise UserError(
+            f"{place} is turned by the joint '{joint}', and '{limb.part.end}' ('{outer}') is not: the two are on "
+            f"different chains, {_centimetres(length)} apart"
+        )
+
+
+def _check_lengths(limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]]) -> None:
+    """Refuses a limb between two points that are one; warns of lengths that no limb has."""
+    for limb in limbs:
+        shortest, longest = lengths[limb.part.name]
+        if shortest < _NO_LENGTH:
+            raise UserError(
+                f"robot.keypoints: '{limb.part.start}' and '{limb.part.end}' lie on one point, so the limb has no "
+                "direction; choose another link or an offset"
+            )
+        between = f"from '{limb.part.start}' ('{limb.start.link}') to '{limb.part.end}' ('{limb.end.link}')"
+        if longest > _STRETCHED * shortest:
+            warn(
+                f"robot.keypoints: the {_words(limb)} {between} is {_centimetres((shortest, longest))} long, as the "
+                "joints stand, and a limb keeps its length; take links or offsets at its two joints"
+            )
+        elif longest > _LONG:
+            warn(
+                f"robot.keypoints: the {_words(limb)} {between} is {longest:.0f} m long; are lengths in the URDF in "
+                "millimetres? They are in metres"
+            )
+        inner = lengths.get(limb.part.hangs_on or "")
+        if inner is not None and longest <= _STRETCHED * shortest and inner[1] <= _STRETCHED * inner[0]:
+            if not _RATIO[0] <= longest / inner[1] <= _RATIO[1]:
+                warn(
+                    f"robot.keypoints: the {_words(limb)} {between} is {_centimetres((shortest, longest))} long, and "
+                    f"what it hangs on {_centimetres(inner)}; are these points at the limbs' joints?"
+                )
+
+
+def _check_moved(body_map: BodyMap) -> None:
+    """Refuses a joint that turns no direction: no human pose could tell its angle."""
+    robot, shared = body_map.robot, body_map.shared
+    q_BN = robot.sample(16, torch.Generator().manual_seed(0))
+    before = body_map.robot_directions(robot.forward(q_BN))
+    for column, joint in enumerate(robot.joint_names):
+        moved = q_BN.clone()
+        moved[:, column] = (robot.lower_N + robot.upper_N)[column] - q_BN[:, column]  # mirrored in its range
+        change = (body_map.robot_directions(robot.forward(moved)) - before).abs().max()
+        if float(change) < 1e-4:
+            seen_from = ", ".join(
+                f"the {name} '{link}'" for name, link in zip(shared.views, shared.view_links, strict=True)
+            )
+            raise UserError(
+                f"robot.joints: '{joint}' turns no limb, hand or head of robot.keypoints relative to {seen_from}, "
+                "so no human pose could tell its angle; leave it out or name what it moves"
+            )
+
+
+def _words(limb: Limb) -> str:
+    return limb.part.name.replace("_", " ")
+
+
+def _centimetres(length: tuple[float, float]) -> str:
+    shortest, longest = (f"{100 * metres:.3g}" for metres in length)
+    return f"{shortest} cm" if shortest == longest else f"{shortest} .. {longest} cm"
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)

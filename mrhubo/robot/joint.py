@@ -1,0 +1,63 @@
+"""A joint of a robot, and which joint's angle drives it in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.errors import UserError
+
+ROTARY = ("revolute", "continuous")
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """This joint's angle = multiplier * (angle of `joint`) + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: from link `parent` to link `child`, placed by `origin_44`, turning about `axis_3` (unit, child
+    frame).
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin_44: np.ndarray
+    axis_3: np.ndarray
+    lower: float | None
+    upper: float | None
+    mimic: Mimic | None
+    limited_by: str = "the URDF's limits"
+    """What `lower` and `upper` are, for messages."""
+
+    @property
+    def rotary(self) -> bool:
+        """Revolute or continuous."""
+        return self.kind in ROTARY
+
+
+def drive(joints: Mapping[str, Joint], joint: str) -> Mimic:
+    """The joint whose angle drives this one in the end, with the multiplier and offset on the way; a joint that mimics
+    none drives itself.
+
+    Raises:
+        UserError: a joint on the way mimics itself or none that exists.
+    """
+    multiplier, offset, seen = 1.0, 0.0, [joint]
+    while (mimic := joints[joint].mimic) is not None:
+        joint = mimic.joint
+        if joint in seen or joint not in joints:
+            reason = "mimics itself" if joint in seen else f"mimics '{joint}', which does not exist"
+            raise UserError(f"joint '{seen[0]}' {reason}")
+        offset, multiplier = offset + multiplier * mimic.offset, multiplier * mimic.multiplier
+        seen.append(joint)
+    return Mimic(joint, multiplier, offset)

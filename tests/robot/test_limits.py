@@ -1,0 +1,155 @@
+"""What a URDF's limits mean: soft ones, degrees, none at all, and those of joints that mimic others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mrhubo.config import RobotConfig
+from mrhubo.errors import InputWarning, UserError
+from mrhubo.robot import Robot, build_body_map
+from mrhubo.robot.joint import Joint, Mimic, drive
+from mrhubo.robot.limits import narrow_to_mimics
+from mrhubo.robot.urdf import describe
+from tests.robot.two_arms import joint_of
+
+Pair = Callable[..., RobotConfig]
+NOWHERE = torch.zeros(0).numpy()
+
+
+def within(joint: str, old: str, new: str) -> tuple[str, str]:
+    element = joint_of(joint)
+    assert old in element
+    return element, element.replace(old, new)
+
+
+def limits_of(config: RobotConfig, joint: str = "l_yaw") -> tuple[float, float]:
+    robot = build_body_map(config).robot
+    row = robot.joint_names.index(joint)
+    return round(float(robot.lower_N[row]), 6), round(float(robot.upper_N[row]), 6)
+
+
+YAW = 'lower="-1.5" upper="1.5"'
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ('lower="-90" upper="90"', r"'l_yaw' has limits -90 .. 90, which is 29 turns from end to end: are these degrees\? .*robot.ranges"),
+        ('lower="170" upper="175"', r"'l_yaw' has limits 170 .. 175, .*are these degrees"),
+        ('lower="-1e16" upper="1e16"', r"'l_yaw' has no limits: -1e\+16 .. 1e\+16 mean none; give it a range in robot.ranges"),
+        ('lower="-inf" upper="inf"', r"'l_yaw' has no limits: -inf .. inf mean none"),
+        ('lower="-1.5" upper="3.4e38"', r"'l_yaw' has no limits: -1.5 .. 3.4e\+38 mean none"),
+        ('upper="1.5"', r"'l_yaw' has no limits; give it a range in robot.ranges"),
+        ('lower="1.5" upper="-1.5"', r"'l_yaw' has the impossible limits 1.5 .. -1.5"),
+    ],
+)  # fmt: skip
+def test_limits_that_cannot_be_meant_ask_for_a_range(pair: Pair, limits: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        build_body_map(pair(within("l_yaw", YAW, limits)))
+    if "impossible" not in message and "170" not in limits:
+        assert limits_of(pair(within("l_yaw", YAW, limits), ranges={"l_yaw": [-1.0, 1.25]})) == (-1.0, 1.25)
+
+
+def test_two_turns_are_a_range(pair: Pair) -> None:
+    assert limits_of(pair(within("l_yaw", YAW, 'lower="-6.2832" upper="6.2832"'))) == (-6.2832, 6.2832)
+
+
+def test_degrees_in_the_config_are_refused(pair: Pair) -> None:
+    free = within("l_yaw", 'type="revolute"', 'type="continuous"')
+    with pytest.raises(UserError, match=r"robot.ranges.l_yaw: -180 .. 180, which is 57 turns .*; give radians"):
+        build_body_map(pair(free, ranges={"l_yaw": [-180.0, 180.0]}))
+    with pytest.raises(UserError, match=r"robot.hold.neck: 30 rad is more than two turns; give radians"):
+        build_body_map(pair(within("neck", 'type="revolute"', 'type="continuous"'), hold={"neck": 30.0}))
+
+
+@pytest.mark.parametrize(
+    ("soft", "expected"),
+    [
+        ('soft_lower_limit="-0.5" soft_upper_limit="0.25"', (-0.5, 0.25)),
+        ('soft_lower_limit="-9" soft_upper_limit="0.25"', (-1.5, 0.25)),
+        ('soft_upper_limit="0.25"', (-1.5, 0.25)),
+        ("", (-1.5, 1.5)),
+        ('soft_lower_limit="0" soft_upper_limit="0"', (-1.5, 1.5)),
+        ('soft_lower_limit="2" soft_upper_limit="3"', (-1.5, 1.5)),
+    ],
+)
+def test_the_narrower_of_hard_and_soft_limits_counts(pair: Pair, soft: str, expected: tuple[float, float]) -> None:
+    edit = within("l_yaw", "<axis", f'<safety_controller {soft} k_velocity="1"/><axis')
+    assert limits_of(pair(edit)) == expected
+
+
+def test_a_range_beyond_soft_limits_is_told_so(pair: Pair) -> None:
+    edit = within("l_yaw", "<axis", '<safety_controller soft_lower_limit="-0.5" soft_upper_limit="0.5"/><axis')
+    with pytest.raises(UserError, match=r"robot.ranges.l_yaw: \[-1.0, 0.0\] leaves the URDF's soft limits -0.5 .. 0.5"):
+        build_body_map(pair(edit, ranges={"l_yaw": [-1.0, 0.0]}))
+
+
+def mimicking(multiplier: float, offset: float = 0.0) -> tuple[str, str]:
+    """The right elbow follows the left one."""
+    return within("r_elbow", "<axis", f'<mimic joint="l_elbow" multiplier="{multiplier}" offset="{offset}"/><axis')
+
+
+JOINTS = [f"{s}_{j}" for s in "lr" for j in ("pitch", "roll", "yaw")] + ["l_elbow"]
+
+
+def test_a_range_ends_where_a_mimicking_joint_would_leave_its_limits(pair: Pair) -> None:
+    config = pair(mimicking(2.0), joints=JOINTS)
+    with pytest.warns(
+        InputWarning, match=r"'l_elbow' \(-2.3 .. 0\) is kept to -1.15 .. 0 rad, because 'r_elbow', which"
+    ):
+        robot = build_body_map(config).robot
+    assert float(robot.lower_N[-1]) == pytest.approx(-1.15) and float(robot.upper_N[-1]) == 0.0
+    assert robot.description.kinematics != describe(config.urdf).kinematics  # pairs of the wider range are not reused
+
+
+def test_a_range_that_suits_both_is_silent(pair: Pair, recwarn: pytest.WarningsRecorder) -> None:
+    assert limits_of(pair(mimicking(2.0), joints=JOINTS, ranges={"l_elbow": [-1.0, -0.1]}), "l_elbow") == (-1.0, -0.1)
+    assert limits_of(pair(mimicking(1.0), joints=JOINTS), "l_elbow") == (-2.3, 0.0)
+    assert not recwarn.list
+    with pytest.raises(UserError, match=r"\[-2.0, -0.1\] leaves the range that keeps 'r_elbow', .* -1.15 .. 0"):
+        build_body_map(pair(mimicking(2.0), joints=JOINTS, ranges={"l_elbow": [-2.0, -0.1]}))
+
+
+def test_no_range_is_left(pair: Pair) -> None:
+    with pytest.raises(
+        UserError, match=r"'r_elbow' mimics 'l_elbow' \(times -3, plus 0\) and would leave its own limits"
+    ):
+        build_body_map(pair(mimicking(-3.0), joints=JOINTS))
+
+
+numbers = st.floats(-3, 3)
+
+
+@given(numbers, numbers, st.lists(st.tuples(numbers, numbers, numbers, numbers), min_size=1, max_size=3), st.randoms())
+def test_no_mimicking_joint_leaves_its_limits(low: float, high: float, followers: list, random: object) -> None:
+    def joint(name: str, lower: float, upper: float, mimic: Mimic | None) -> Joint:
+        return Joint(name, "revolute", "a", name, NOWHERE, NOWHERE, min(lower, upper), max(lower, upper), mimic)
+
+    joints = {"source": joint("source", low, high, None)}
+    for i, (lower, upper, multiplier, offset) in enumerate(followers):
+        before = "source" if i == 0 else f"f{i - 1}"  # each mimics the one before
+        joints[f"f{i}"] = joint(f"f{i}", lower, upper, Mimic(before, multiplier, offset))
+    try:
+        found = narrow_to_mimics(NOWHERE, joints, ["source"])  # pyright: ignore[reportArgumentType] (for messages)
+    except UserError:
+        return
+    source = found["source"].joint if "source" in found else joints["source"]
+    assert joints["source"].lower <= source.lower <= source.upper <= joints["source"].upper
+    for name, follower in joints.items():
+        driven = drive(joints, name)
+        for end in (source.lower, source.upper):
+            angle = driven.multiplier * end + driven.offset
+            usable = follower.lower < follower.upper and abs(driven.multiplier) >= 1e-9
+            assert not usable or follower.lower - 2e-4 <= angle <= follower.upper + 2e-4
+
+
+def test_what_mimics_a_joint_that_is_not_sampled_changes_nothing(pair: Pair, recwarn: pytest.WarningsRecorder) -> None:
+    arms = [name for name in JOINTS if name != "l_elbow"]
+    robot = Robot(pair(mimicking(-3.0)).urdf, arms, ["l_hand", "r_hand"])
+    assert robot.held["l_elbow"] == 0.0 and not recwarn.list and math.isfinite(robot.held["neck"])
