@@ -7,17 +7,15 @@ would have.
 
 from __future__ import annotations
 
-import os
-import platform
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import psutil
-
+from mrhubo.config.secrets import redacted
 from mrhubo.errors import UserError
 from mrhubo.files.storage import locked
+from mrhubo.runtime.database import sqlite_uri
+from mrhubo.runtime.processes import is_gone, this_process
 
 if TYPE_CHECKING:
     import optuna
@@ -55,7 +53,7 @@ def open_study(
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-    database = url or f"sqlite:///{folder.resolve() / 'studies.db'}"
+    database = url or sqlite_uri(folder.resolve() / "studies.db")
     pruners = {
         "median": lambda: optuna.pruners.MedianPruner(n_startup_trials=5, n_warmup_steps=0),
         "halving": lambda: optuna.pruners.SuccessiveHalvingPruner(min_resource=1, reduction_factor=4),
@@ -75,8 +73,8 @@ def open_study(
             )
     except Exception as error:  # SQLAlchemy's, its drivers', and ModuleNotFoundError for a driver that is not there
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        shown = re.sub(r"//([^:/@]*):[^@]*@", r"//\1:***@", database)  # logs are no place for a password
-        raise UserError(f"storage: the study's database {shown} cannot be opened: {reason}") from error
+        sentence = f"storage: the study's database {database} cannot be opened: {reason}"
+        raise UserError(redacted(sentence, database)) from error
 
 
 def _seeded_by_trial(kind: str, seed: int) -> BaseSampler:
@@ -146,7 +144,7 @@ def work_on(
 
     def guarded(trial: optuna.Trial) -> float:
         nonlocal failures
-        trial.set_user_attr(_OWNER, _process())
+        trial.set_user_attr(_OWNER, this_process())
         try:
             value = objective(trial)
         except KeyboardInterrupt:
@@ -172,32 +170,18 @@ class _Failed(Exception):
     """A trial failed; the study goes on."""
 
 
-def _process() -> str:
-    """This process, so that another one on the same machine can see whether it lives."""
-    return f"{platform.node()} {os.getpid()} {psutil.Process().create_time()}"
-
-
 def _free_the_dead(study: Study) -> None:
     from optuna.exceptions import UpdateFinishedTrialError
     from optuna.trial import TrialState
 
     for trial in open_trials(study):
-        node, _, rest = trial.user_attrs.get(_OWNER, "").partition(" ")
-        if node != platform.node() or _lives(rest):
+        if not is_gone(trial.user_attrs.get(_OWNER, "")):
             continue
         try:
             study.tell(trial.number, state=TrialState.FAIL)
         except (UpdateFinishedTrialError, ValueError):  # another process was faster
             continue
         _retry(study, trial)
-
-
-def _lives(process: str) -> bool:
-    number, _, born = process.partition(" ")
-    try:
-        return psutil.Process(int(number)).create_time() == float(born)
-    except (psutil.NoSuchProcess, ValueError):
-        return False
 
 
 def _retry(study: Study, trial: FrozenTrial) -> None:

@@ -21,7 +21,7 @@ from mrhubo.config import BaselineConfig, S3LEConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.rotation import matrix_to_axis_angle
-from mrhubo.runtime.tracking import database_uri
+from mrhubo.runtime.database import database_uri
 
 SMALL = S3LEConfig(glue=400, random_poses=3000, self_made=500, latent=8, hidden=64, steps=250, batch_size=128)
 
