@@ -59,7 +59,8 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
         if was_interrupted(error):
             status = _interrupted()
         elif (fault := machine_fault(error)) is not None:
-            status = _end(f"error: {' '.join(fault.split())}", 2)
+            sentence = f"{fault}; put that right and start the same command again, it goes on"
+            status = _end(f"error: {' '.join(sentence.split())}", 2)
         else:
             status = _bug()
     sys.exit(status)

@@ -26,23 +26,18 @@ _LITTLE = 1 << 20
 
 
 def machine_fault(error: BaseException) -> str | None:
-    """One sentence, if a fault of the machine is at the root of an error: which file, what, and what to do."""
+    """If a fault of the machine is at the root of an error, which file and what, else None."""
     for one in _chain(error):
         if isinstance(one, OSError) and one.errno in _SYSTEM:
-            place = f"{os.fsdecode(one.filename)}: " if isinstance(one.filename, str | bytes) and one.filename else ""
-            full = one.errno in (errno.ENOSPC, errno.EDQUOT)
-            return _sentence(place, os.strerror(one.errno or 0), full)
-        words = next((words for words in _WORDS if words in str(one)), None)
-        if words is not None:
-            return _sentence("", words, words in _FULL)
+            name = one.filename2 or one.filename  # of two the second is written
+            place = os.fsdecode(name) if isinstance(name, str | bytes) else ""
+            reason = os.strerror(one.errno or 0)
+        else:
+            place, reason = "", next((words for words in _WORDS if words in str(one)), None)
+        if reason is not None:
+            place = place or (", ".join(_full_folders()) if reason in _FULL else "")
+            return f"{place}: {reason}" if place else reason
     return None
-
-
-def _sentence(place: str, reason: str, full: bool) -> str:
-    if not full:
-        return f"{place}{reason}; put that right and start the same command again, it goes on"
-    where = place or f"{', '.join(_full_folders())}: ".removeprefix(": ")
-    return f"{where}{reason}; make room and start the same command again, it goes on"
 
 
 def _full_folders() -> Iterator[str]:

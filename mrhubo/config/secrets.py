@@ -44,6 +44,16 @@ def has_hidden(address: str) -> bool:
     return any(HIDDEN in _split(found["scheme"], found["rest"])[1] for found in _ADDRESS.finditer(address))
 
 
+def credentials(address: str) -> tuple[str, str, str]:
+    """An address without its user, and user and password, decoded; both are empty unless it has both."""
+    found = _ADDRESS.fullmatch(address)
+    user, host = (None, "") if found is None else _user_and_host(found["rest"])
+    name, _, password = (user or "").partition(":")
+    if found is None or not name or not password:
+        return address, "", ""
+    return f"{found['scheme']}://{host}", unquote(name), unquote(password)
+
+
 def without_secrets(config: T) -> T:
     """A copy of a config, for eyes other than the user's."""
     clean = copy.deepcopy(config)

@@ -20,6 +20,7 @@ from mlflow import MlflowClient
 from mlflow.entities import Metric
 from mlflow.exceptions import MlflowException
 
+from mrhubo.config.faults import machine_fault
 from mrhubo.config.secrets import redacted
 from mrhubo.errors import UserError, was_interrupted
 from mrhubo.runtime.processes import uninterrupted
@@ -123,7 +124,7 @@ class TrackingClient(MlflowClient):
                 raise
             done = f"{whole}; " if whole else ""
             raise Unreachable(
-                f"{self._sentence(error)}, so the run is not complete there; {done}when it is back, start the same"
+                f"{self._sentence(error)}, so the run is not complete; {done}when that is put right, start the same"
                 " command again, which sends what is missing"
             ) from error
 
@@ -263,7 +264,7 @@ def _may_pass(error: Exception) -> bool:
 
 def _reason(error: Exception) -> str:
     """What an error says, without the addresses of objects that libraries quote."""
-    text = str(error)
+    text = machine_fault(error) or str(error)
     system = _SYSTEM.search(text)
     if system is not None and "://" in text:
         return f"nobody answers ({system[1].strip()})"

@@ -10,13 +10,14 @@ import contextlib
 import logging
 import os
 import re
+import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrhubo.config.secrets import HIDDEN, has_hidden, redacted
+from mrhubo.config.secrets import HIDDEN, credentials, has_hidden, redacted
 from mrhubo.errors import UserError, was_interrupted
 from mrhubo.runtime.database import database_uri, open_database, sqlite_file
 from mrhubo.runtime.names import key
@@ -32,12 +33,15 @@ _TALKATIVE = ("alembic", "mlflow.store", "mlflow.tracking", "mlflow.system_metri
 _SETTINGS = {
     "MLFLOW_DISABLE_TELEMETRY": "true",
     "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
     # MLflow's own are 7 retries of 120 s each: minutes of silence about a server that is not there.
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "30",
 }
 _ANSWER_SECONDS = 5.0
 """How long a server may take for a first sign of life."""
+_WEB = ("http://", "https://")
+_CREDENTIALS = ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD")
 _ATTEMPT, _PROCESS, _ENDED_BY = "attempt", "process", "ended_by"
 _RUN_NAME = 250
 """Letters of a run's name that databases keep."""
@@ -61,6 +65,8 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Tracki
 
     uri = uri or database_uri(folder)
     _check_address(uri)
+    if uri.startswith(_WEB):
+        uri = _hand_over_credentials(uri)
     folder.mkdir(parents=True, exist_ok=True)
     file, artifacts = sqlite_file(uri), folder.resolve() / "artifacts"
     try:
@@ -89,15 +95,15 @@ def set_up_mlflow() -> None:
 
 def _check_address(uri: str) -> None:
     """Says within seconds that a server is not there."""
-    if has_hidden(uri):
+    known = uri.startswith(_WEB) and all(os.environ.get(name) for name in _CREDENTIALS)
+    if has_hidden(uri) and not known:
         raise UserError(
             f"tracking.uri: {uri}: the password was left out where this config was written ({HIDDEN}); give the whole"
-            " address, tracking.uri=..., or leave out the user and set MLFLOW_TRACKING_USERNAME and"
-            " MLFLOW_TRACKING_PASSWORD"
+            f" address, tracking.uri=..., or for a server set {' and '.join(_CREDENTIALS)}"
         )
     if re.fullmatch(r"(localhost|[\w-]+(\.[\w-]+)*):\d+(/\S*)?", uri):
         raise UserError(f"tracking.uri: {uri} does not say how to speak to the server; write http://{uri}")
-    if uri.startswith(("http://", "https://")):
+    if uri.startswith(_WEB):
         from mrhubo.runtime.client import silence
 
         fault = silence(uri, _ANSWER_SECONDS)
@@ -106,6 +112,14 @@ def _check_address(uri: str) -> None:
                 redacted(f"tracking.uri: no MLflow server answers at {uri} ({fault}); start it, or leave tracking.uri"
                          " out to keep runs in tracking.dir", uri)
             )  # fmt: skip
+
+
+def _hand_over_credentials(uri: str) -> str:
+    """The address without user and password, which MLflow gets in another way: it prints and quotes addresses."""
+    address, user, password = credentials(uri)
+    if user and password != HIDDEN:
+        os.environ.update(zip(_CREDENTIALS, (user, password), strict=True))
+    return address
 
 
 def _open_experiment(client: TrackingClient, name: str, location: str | None) -> str:
@@ -127,7 +141,7 @@ def _open_experiment(client: TrackingClient, name: str, location: str | None) ->
         address = redacted(client.uri)
         raise UserError(
             f"tracking.experiment: '{name}' was deleted in the dashboard; name another one, or restore it:"
-            f" MLFLOW_TRACKING_URI={address} mlflow experiments restore --experiment-id {found.experiment_id}"
+            f" MLFLOW_TRACKING_URI={shlex.quote(address)} mlflow experiments restore --experiment-id {found.experiment_id}"
         )
     return found.experiment_id
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mrhubo.config.faults import machine_fault
 from mrhubo.config.secrets import redacted
 from mrhubo.evaluation import Clip, Evaluation
 from mrhubo.fitting.record.recording import Recording
@@ -55,5 +56,5 @@ def register_package(recording: Recording, retargeter: Retargeter, score: Evalua
     try:
         return register(recording.client, recording.run_id, package_dir(recording), retargeter, example_TJ33, tags)
     except Exception as error:  # MLflow's own, the network's, the database's
-        reason = redacted(" ".join(str(error).split()), recording.client.uri)
+        reason = redacted(" ".join((machine_fault(error) or str(error)).split()), recording.client.uri)
         return f"not registered: {type(error).__name__}: {reason[:200]}"

@@ -60,12 +60,17 @@ class Recording:
         client = open_client(prepared.tracking_dir, config.tracking.experiment, config.tracking.uri)
         run, new = take_up_run(client, config.tracking.experiment, workspace, name, tags)
         client.keep_in(workspace.unsent)
-        recording = cls(prepared, client, run.info.run_id)
-        recording.logger.log_parameters(to_plain(without_secrets(config)), run.data.params)
-        if config.robot.scale != "search":
-            recording.log_inputs()
-        elif new:  # the pairs are not known yet
-            recording._log_config()
+        try:
+            recording = cls(prepared, client, run.info.run_id)
+            recording.logger.log_parameters(to_plain(without_secrets(config)), run.data.params)
+            if config.robot.scale != "search":
+                recording.log_inputs()
+            elif new:  # the pairs are not known yet
+                recording._log_config()
+        except BaseException as error:
+            client.patient = True  # what is wrong already counts
+            close_run(client, run.info.run_id, error)
+            raise
         return recording
 
     @property
