@@ -182,10 +182,16 @@ class Sweep:
             raise
         finally:
             self.client.patient = True
-            if not open_trials(self.study):  # else another process will end it
+            if not self._others_at_work():  # else another process will end it
                 close_run(self.client, self.parent, error, whole)
             elif error is None:
                 self.client.deliver(whole)
+
+    def _others_at_work(self) -> bool:
+        try:
+            return bool(open_trials(self.study))
+        except Exception:  # the study's database is away, and that is told already
+            return False
 
     def _config(self, texts: Sequence[str]) -> Config:
         return self.load([*self.overrides, *texts])

@@ -22,7 +22,7 @@ from mlflow.exceptions import MlflowException
 
 from mrhubo.config.faults import machine_fault
 from mrhubo.config.secrets import redacted
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import Unreachable, UserError, was_interrupted
 from mrhubo.runtime.processes import uninterrupted
 
 _READS = (
@@ -56,10 +56,6 @@ _SIGN_SECONDS = 3.0
 """How long a server that was away may take for a sign of life."""
 _SYSTEM = re.compile(r"\[Errno -?\d+\] ([^'\"()]+)")
 """What the operating system says, in an error of a library."""
-
-
-class Unreachable(UserError):
-    """MLflow did not answer, or refused; nothing is wrong with the work itself."""
 
 
 class _Kept(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -80,6 +81,9 @@ def _try(folder: Path, made: list[Path]) -> None:
         with contextlib.suppress(FileExistsError):  # another process was faster
             os.mkdir(place)
             made.append(place)
-    with tempfile.TemporaryFile(dir=folder) as probe:
-        probe.write(_PROBE)
-        probe.flush()
+    try:
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(_PROBE)
+    except OSError as error:
+        if error.errno != errno.EFBIG:  # a limit of this process's files says nothing about the folder
+            raise

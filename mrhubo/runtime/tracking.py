@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrhubo.config.secrets import HIDDEN, credentials, has_hidden, redacted
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import Unreachable, UserError, was_interrupted
 from mrhubo.runtime.database import database_uri, open_database, sqlite_file
 from mrhubo.runtime.names import key
 from mrhubo.runtime.processes import is_gone, this_process
@@ -138,10 +138,10 @@ def _open_experiment(client: TrackingClient, name: str, location: str | None) ->
             if found is None:
                 raise
     if found.lifecycle_stage == "deleted":
-        address = redacted(client.uri)
+        address = shlex.quote(redacted(client.uri))
         raise UserError(
             f"tracking.experiment: '{name}' was deleted in the dashboard; name another one, or restore it:"
-            f" MLFLOW_TRACKING_URI={shlex.quote(address)} mlflow experiments restore --experiment-id {found.experiment_id}"
+            f" MLFLOW_TRACKING_URI={address} mlflow experiments restore --experiment-id {found.experiment_id}"
         )
     return found.experiment_id
 
@@ -172,8 +172,6 @@ def start_run(client: TrackingClient, experiment: str, name: str, tags: Mapping[
         Unreachable: the server or the database does not make one.
     """
     from mlflow.exceptions import MlflowException
-
-    from mrhubo.runtime.client import Unreachable
 
     found = client.get_experiment_by_name(experiment)
     assert found is not None

@@ -7,12 +7,13 @@ would have.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrhubo.config.secrets import redacted
-from mrhubo.errors import UserError
+from mrhubo.errors import Unreachable, UserError, was_interrupted
 from mrhubo.files.storage import locked
 from mrhubo.runtime.database import sqlite_uri
 from mrhubo.runtime.processes import is_gone, this_process
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 _HEARTBEAT, _GRACE = 30, 120
 """Seconds between two signs of life, and until a process on another machine is taken for dead."""
+_LOCKED = 120
+"""Seconds that a locked SQLite database is waited for."""
 _OWNER, _ERROR = "owner", "error"
 _FAILURES = 3
 """Trials that may fail one after the other before something is wrong with all of them."""
@@ -63,7 +66,8 @@ def open_study(
         with locked(folder / "studies.lock", wait=True):  # two processes cannot make the tables at once
             beats: dict[str, Any] = {"heartbeat_interval": _HEARTBEAT, "grace_period": _GRACE}
             beats["heartbeat_stale_trial_callback"] = _retry
-            storage = optuna.storages.RDBStorage(database, **(beats if shared else {}))
+            patience = {"connect_args": {"timeout": _LOCKED}} if database.startswith("sqlite") else {}
+            storage = optuna.storages.RDBStorage(database, engine_kwargs=patience, **(beats if shared else {}))
             return optuna.create_study(
                 storage=storage,
                 study_name=name,
@@ -139,6 +143,7 @@ def work_on(
 
     Raises:
         UserError: three trials in a row failed; the reason of the last.
+        Unreachable: the study's database or the tracking server does not answer any more.
     """
     failures = 0
 
@@ -147,7 +152,7 @@ def work_on(
         trial.set_user_attr(_OWNER, this_process())
         try:
             value = objective(trial)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, Unreachable):  # no fault of the trial
             _retry(study, study.trials[trial.number])
             raise
         except UserError as error:
@@ -159,11 +164,27 @@ def work_on(
         failures = 0
         return value
 
-    while not time_is_up():
-        _free_the_dead(study)
-        if remaining(study, trials) <= 0:
-            return
-        study.optimize(guarded, n_trials=1, catch=(_Failed,))
+    with _answering():
+        while not time_is_up():
+            _free_the_dead(study)
+            if remaining(study, trials) <= 0:
+                return
+            study.optimize(guarded, n_trials=1, catch=(_Failed,))
+
+
+@contextmanager
+def _answering() -> Iterator[None]:
+    """One sentence where the database goes away in the midst of the work."""
+    from optuna.exceptions import StorageInternalError
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        yield
+    except (StorageInternalError, SQLAlchemyError) as error:
+        if was_interrupted(error):
+            raise
+        reason = next(iter(str(error.__cause__ or error).splitlines()), "")
+        raise Unreachable(redacted(f"storage: the study's database does not answer any more: {reason}")) from error
 
 
 class _Failed(Exception):
