@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import torch
 
 from mrhubo.runtime.locations import project_root
+from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.tables import markdown
-from mrhubo.runtime.tracking import git_commit
 
 
 def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list[str]]:

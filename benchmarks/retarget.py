@@ -111,7 +111,7 @@ def main(argv: list[str]) -> None:
     from common import print_header, print_table
 
     from mrhubo.runtime.locations import project_root
-    from mrhubo.runtime.tracking import git_commit
+    from mrhubo.runtime.provenance import git_commit
 
     parser = argparse.ArgumentParser(description="How long retarget takes for one frame and for 1,000 at once.")
     parser.add_argument("package", type=Path, help="folder of a trained retargeter")

@@ -26,7 +26,8 @@ from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.pairing import make_filter
 from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
-from mrhubo.runtime.tracking import open_logger
+from mrhubo.runtime.run_logger import RunLogger
+from mrhubo.runtime.tracking import open_client, start_run
 from mrhubo.runtime.trainer import cosine_schedule
 
 
@@ -81,7 +82,10 @@ def main(argv: list[str]) -> None:
 
     def trainer(tracked: bool) -> float:
         with tempfile.TemporaryDirectory() as folder:
-            logger = open_logger(Path(folder), "benchmark", "run", {}) if tracked else False
+            logger = False
+            if tracked:
+                client = open_client(Path(folder), "benchmark")
+                logger = RunLogger(client, start_run(client, "benchmark", "run", {}).info.run_id)
             fit = lightning.Trainer(
                 max_epochs=1, accelerator="cpu", logger=logger, log_every_n_steps=LOG_EVERY, enable_progress_bar=False,
                 enable_model_summary=False, enable_checkpointing=False,

@@ -95,3 +95,9 @@ def was_interrupted(error: BaseException | None) -> bool:
         seen.append(error)
         error = error.__cause__ or error.__context__
     return False
+
+
+class Unreachable(UserError):
+    """A server or a database did not answer, or refused: nothing is wrong with the work, and the same command goes on
+    when it does.
+    """

@@ -22,7 +22,9 @@ def main(argv: list[str]) -> None:
     if not config.data.is_file():
         raise UserError(f"data: {config.data} does not exist; name a file of training poses (docs/prior.md says which)")
     from mrhubo.body.prior_training.train import train
+    from mrhubo.runtime.folders import make_folders
 
+    make_folders({"output": [config.output.parent], "tracking_dir": [config.tracking_dir / "fits"]})
     train(config, Reporter(options.quiet))
     print(f"body prior: {config.output}")
 

@@ -74,7 +74,7 @@ from mrhubo.config import load_config
 from mrhubo.config.shipped import shipped_root
 from mrhubo.motion import find_motions
 from mrhubo.runtime import locations
-from mrhubo.runtime.tracking import git_commit
+from mrhubo.runtime.provenance import git_commit
 
 site, here = Path({str(installed)!r}), Path.cwd()
 assert Path(mrhubo.__file__).is_relative_to(site)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import lightning
 
+from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, mean_score, predict_clips, score_clip
 from mrhubo.retargeter import RetargetNetwork
 from mrhubo.robot import Robot
@@ -18,11 +20,17 @@ class ClipMetrics(lightning.Callback):
         self.clips, self.robot, self.key_links = list(clips), robot, list(key_links)
 
     def on_train_epoch_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
-        """Scores the network as it is now."""
+        """Scores the network as it is now.
+
+        Raises:
+            UserError: its answers are no numbers; the checkpoints are those of before.
+        """
         network = pl_module.network
         assert isinstance(network, RetargetNetwork)
         predictions = predict_clips(network, self.clips)
         mean = mean_score(
             [score_clip(c, q, self.robot, self.key_links) for c, q in zip(self.clips, predictions, strict=True)]
         )
+        if not math.isfinite(mean.link_cm):
+            raise UserError(f"the training came to NaN by step {trainer.global_step:,}; a lower trainer.lr helps")
         pl_module.log_dict({"val/joint_rad": mean.joint_rad, "val/link_cm": mean.link_cm})

@@ -20,6 +20,7 @@ from torch import Tensor
 
 from mrhubo.body import BodyPrior
 from mrhubo.config import Config, ManualScaleConfig, fingerprint
+from mrhubo.errors import UserError
 from mrhubo.evaluation.clips import Clip
 from mrhubo.files.storage import checksum_tensors, locked
 from mrhubo.pairing import ScaleFactorObjective, pose_settings
@@ -34,8 +35,9 @@ from mrhubo.view import figure_sheet
 from mrhubo.view.pictures import Artist
 
 if TYPE_CHECKING:
-    from mlflow import MlflowClient
     from optuna import Study
+
+    from mrhubo.runtime.client import TrackingClient
 
 _AT_ONCE = 20
 """Trials drawn and solved together."""
@@ -136,7 +138,7 @@ class ScaleFactorSearch(lightning.Callback):
         self.found(result)
         data.use_config(result.config)
 
-    def search(self, client: MlflowClient | None = None, parent: str | None = None) -> ScaleResult:
+    def search(self, client: TrackingClient | None = None, parent: str | None = None) -> ScaleResult:
         """Does the trials that are missing; with a client each is an MLflow run under the run `parent`."""
         # Fits that differ in other settings share the study.
         with locked(self.folder / "fits" / f"{self.name}.lock", wait=True):
@@ -156,7 +158,7 @@ class ScaleFactorSearch(lightning.Callback):
         return self.result
 
     def _do_trials(
-        self, study: Study, client: MlflowClient | None, parent: str | None
+        self, study: Study, client: TrackingClient | None, parent: str | None
     ) -> list[tuple[dict[str, float], float]]:
         """Numbers and distances of all trials, the nearest first."""
         if not study.get_trials(deepcopy=False) and (start := self._start_values()):
@@ -201,7 +203,7 @@ class ScaleFactorSearch(lightning.Callback):
         return drawn
 
     def _measure(
-        self, study: Study, drawn: dict[int, dict[str, float]], client: MlflowClient | None, parent: str | None
+        self, study: Study, drawn: dict[int, dict[str, float]], client: TrackingClient | None, parent: str | None
     ) -> None:
         distances = self.objective.measure([varied(self.start, values) for values in drawn.values()]).tolist()
         for (number, values), distance in zip(drawn.items(), distances, strict=True):
@@ -209,10 +211,13 @@ class ScaleFactorSearch(lightning.Callback):
                 self._log_trial(client, parent, number, {"distance_rad": distance, **values})
             study.tell(number, distance)
 
-    def _log_trial(self, client: MlflowClient, parent: str | None, number: int, values: dict[str, float]) -> None:
+    def _log_trial(self, client: TrackingClient, parent: str | None, number: int, values: dict[str, float]) -> None:
         robot = self.config.robot.name
         tags = {"robot": robot, "scale_search": self.name, **({"mlflow.parentRunId": parent} if parent else {})}
-        run = start_run(client, self.config.tracking.experiment, f"{robot} scale {number}", tags).info.run_id
+        try:
+            run = start_run(client, self.config.tracking.experiment, f"{robot} scale {number}", tags).info.run_id
+        except UserError:  # the server is away: the study has what counts
+            return
         log_all(client, run, {f"scale/{name}": value for name, value in values.items()})
         client.set_terminated(run)
 

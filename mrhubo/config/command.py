@@ -1,25 +1,43 @@
-"""How all commands end."""
+"""How all commands begin and end."""
 
 from __future__ import annotations
 
+import io
 import os
 import select
+import signal
 import sys
+import threading
+import traceback
 from collections.abc import Callable
+from types import FrameType
 from typing import NoReturn
 
+from mrhubo.config.faults import machine_fault
 from mrhubo.config.notices import show_warnings_plainly
+from mrhubo.config.secrets import redacted
 from mrhubo.errors import UserError, was_interrupted
 
-_INTERRUPTED = "interrupted; the same command resumes"
+_ENDED_FROM_OUTSIDE = tuple(
+    getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
+)  # a scheduler, a shutdown, a terminal that was closed
+
+
+class Terminated(KeyboardInterrupt):
+    """The process was asked to end: everything ends as after Ctrl-C."""
+
+    number: int | None = None
+    """Of the signal; None as long as none came. Libraries make errors of their own of an interrupt in their midst."""
 
 
 def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     """Run a command's `main(arguments)` and leave with its exit status.
 
-    A `UserError` is one line on stderr and status 2, Ctrl-C one line and status 130, a reader that went
-    away (``| head``) silence and status 141. Anything else is a bug and shows its traceback.
+    A `UserError` is one line on stderr and status 2, and so is a fault of the machine, such as a full disk. Ctrl-C is
+    one line and status 130, SIGTERM one line and 143, a reader that went away (``| head``) silence and status 141.
+    Anything else is a bug and shows its traceback.
     """
+    _begin()
     show_warnings_plainly()
     status: str | int | None
     try:
@@ -33,25 +51,63 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     except UserError as error:
         status = _end(f"error: {' '.join(str(error).split())}", 2)
     except KeyboardInterrupt:
-        status = _end(_INTERRUPTED, 130)
+        status = _interrupted()
     except BrokenPipeError:
         if not _reader_is_gone():
             raise
         _drop_output()
         status = 141
     except Exception as error:
-        if not was_interrupted(error):
-            raise
-        status = _end(_INTERRUPTED, 130)
+        if was_interrupted(error):
+            status = _interrupted()
+        elif (fault := machine_fault(error)) is not None:
+            sentence = f"{fault}; put that right and start the same command again, it goes on"
+            status = _end(f"error: {' '.join(sentence.split())}", 2)
+        else:
+            status = _bug()
     sys.exit(status)
+
+
+def _begin() -> None:
+    """What has to be so before a command does anything, and before torch is imported."""
+    # Waiting threads that spin take the cores from those that work: on a busy machine a training is ten times slower.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a letter that the terminal does not know is no reason to end
+            stream.reconfigure(errors="backslashreplace")
+    if threading.current_thread() is threading.main_thread():
+        for number in _ENDED_FROM_OUTSIDE:
+            if signal.getsignal(number) is signal.SIG_DFL:  # else whoever started us wants something else (nohup)
+                signal.signal(number, _terminate)
+
+
+def _terminate(number: int, frame: FrameType | None) -> NoReturn:
+    """Ends as after Ctrl-C, so that runs are closed and locks let go; a second signal ends at once."""
+    signal.signal(number, signal.SIG_DFL)
+    Terminated.number = number
+    raise Terminated
+
+
+def _interrupted() -> int:
+    number = Terminated.number
+    word = "interrupted" if number is None else "terminated"
+    return _end(f"{word}; the same command resumes", 130 if number is None else 128 + number)
+
+
+def _bug() -> int:
+    """The traceback, without what nobody should read; to be called where an error is handled."""
+    text = traceback.format_exc()
+    if redacted(text) == text:
+        raise
+    return _end(redacted(text).rstrip("\n"), 1)
 
 
 def _end(sentence: str, status: int) -> int:
     try:
         _flush()
-    except BrokenPipeError:
+    except OSError:
         _drop_output()
-    print(sentence, file=sys.stderr, flush=True)
+    print(redacted(sentence), file=sys.stderr, flush=True)
     return status
 
 

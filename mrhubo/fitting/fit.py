@@ -19,8 +19,8 @@ from mrhubo.callbacks import ScaleFactorSearch
 from mrhubo.config import Config
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip
-from mrhubo.fitting.measurement import measure
-from mrhubo.fitting.preparation import Prepared, prepare
+from mrhubo.fitting.measurement import measure, refuse_useless
+from mrhubo.fitting.preparation import Prepared, make_places, prepare
 from mrhubo.fitting.record import (
     Recording,
     dashboard_command,
@@ -67,7 +67,17 @@ def fit(config: Config, report: Reporter = SILENT, parent: str | None = None) ->
     workspace = Workspace(prepared.tracking_dir / "fits", config.robot.name, prepared.fingerprint)
     if ranks.rank > 0:
         return _train_with_the_first(prepared, workspace, ranks)
-    with workspace, Recording.start(prepared, workspace, parent) as recording:
+    make_places(prepared)
+    with workspace:
+        result = _run_steps(prepared, report, workspace, ranks, parent)
+        workspace.finish()
+    return result
+
+
+def _run_steps(
+    prepared: Prepared, report: Reporter, workspace: Workspace, ranks: Ranks, parent: str | None
+) -> FitResult:
+    with Recording.start(prepared, workspace, parent) as recording:
         validation, test = make_references(prepared, report)
         ranks.wait()
         training = train(
@@ -80,16 +90,17 @@ def fit(config: Config, report: Reporter = SILENT, parent: str | None = None) ->
             ranks,
             _search(prepared, report, validation, recording),
         )
-        recording.resume_after_training()
         log_pairs(recording, training)
         retargeter = training.retargeter
         measured = measure(training.prepared, report, retargeter, test)
         log_measures(recording, measured, training.best_link_cm)
         log_answers(recording, test, measured.predictions)
+        robot = training.prepared.body_map.robot
+        remedy = f"a lower trainer.lr than {prepared.config.trainer.lr:g} helps"
+        refuse_useless(test, measured.predictions, robot, remedy)
         package = save_package(recording, retargeter, measured.over_clips, training.best_checkpoint)
         model = register_package(recording, retargeter, measured.over_clips, test[0])
-        workspace.finish()
-    dashboard = dashboard_command(prepared.tracking_dir, config)
+    dashboard = dashboard_command(prepared.tracking_dir, prepared.config)
     return FitResult(package, model, recording.run_id, measured.table, measured.measures, dashboard)
 
 

@@ -10,14 +10,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, Evaluation, evaluate_clips, latencies, measures, table
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.references import make_references
+from mrhubo.reference import at_limit_share
 from mrhubo.retargeter import POLISH, Retargeter
+from mrhubo.robot import Robot
 from mrhubo.runtime.progress import Reporter
+
+_STILL_RAD, _MOVING_RAD = 1e-5, 0.1
+"""Range of the joints' angles over all test clips that counts as none, and as one that should be there."""
+_AT_LIMITS = 0.99
+"""Share of angles at a limit above which nothing can have been learned."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,32 @@ def _score(
 ) -> tuple[list[Tensor], list[Evaluation]]:
     predictions = [predict(clip.motion.local_TJ33) for clip in clips]
     return predictions, evaluate_clips(predictions, clips, prepared.body_map, prepared.config.robot.key_links)
+
+
+def refuse_useless(clips: Sequence[Clip], predictions: Sequence[Tensor], robot: Robot, remedy: str) -> None:
+    """Refuses answers that no training should end with.
+
+    Args:
+        clips: of the test.
+        predictions: joint angles (T, N) [rad] for each.
+        robot: whose.
+        remedy: what to do about it.
+
+    Raises:
+        UserError: they hold NaN; or, unlike the reference's, they stand at the limits of all joints in nearly all
+            frames, or never move.
+    """
+    q_TN, reference_TN = torch.cat(list(predictions)), torch.cat([clip.reference_TN for clip in clips])
+    at_limits, reference_at_limits = (float(at_limit_share(robot, q).mean()) for q in (q_TN, reference_TN))
+    moved, reference_moved = (float((q.amax(dim=0) - q.amin(dim=0)).max()) for q in (q_TN, reference_TN))
+    faults = {
+        "are no numbers": not bool(torch.isfinite(q_TN).all()),
+        "stand at the joints' limits in all frames": at_limits > _AT_LIMITS > reference_at_limits,
+        "never move": moved < _STILL_RAD < _MOVING_RAD < reference_moved,
+    }
+    found = [fault for fault, there in faults.items() if there]
+    if found:
+        raise UserError(f"the training has learned nothing: on the test clips its answers {found[0]}; {remedy}")
 
 
 def measure_package(

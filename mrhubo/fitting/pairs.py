@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mrhubo.errors import UserError
 from mrhubo.files.storage import DamagedFile
-from mrhubo.fitting.preparation import device_of
+from mrhubo.fitting.preparation import device_of, make_places
 from mrhubo.pairing import PairGenerator, PairingReport, PairSetup, generate_pairs
 from mrhubo.pairing.verify import PairSummary, summarise, verify
 from mrhubo.runtime.progress import Reporter
@@ -15,10 +15,11 @@ def make_pairs(setup: PairSetup, report: Reporter, ranks: Ranks | None = None) -
     """Makes the pairs that are not there yet; several ranks share them out.
 
     Raises:
-        UserError: a shard cannot be written.
+        UserError: the folder cannot be used, or a shard cannot be written.
         KeyboardInterrupt: the user stopped it; the same call goes on.
     """
     ranks = ranks or Ranks()
+    make_places(setup)
     device = ranks.device or device_of(setup.config)
     generator = PairGenerator(setup.body_map.to(device), setup.prior.to(device), setup.config.pairs)
     made = generate_pairs(setup.config, generator, setup.store, report, ranks)

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import torch
 
-from mrhubo.config import Config, fingerprint, to_plain, with_places
+from mrhubo.config import Config, fingerprint, places_named, to_plain, with_places
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Motions, load_motions
 from mrhubo.pairing import PairSetup, pose_settings
 from mrhubo.retargeter import build_network
+from mrhubo.runtime.folders import make_folders
 from mrhubo.runtime.locations import default_tracking
+from mrhubo.runtime.names import check_name
 
 
 @dataclass
@@ -50,6 +52,7 @@ def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
     Raises:
         UserError: anything in the config, the URDF or the prior is wrong.
     """
+    check_name("robot.name", config.robot.name)
     if config.robot.scale == "search" and not search:
         raise UserError(
             "robot.scale: 'search' is done by mrhubo.fit alone, in one process; take what it found, config.yaml in its "
@@ -71,6 +74,25 @@ def prepare(config: Config, search: bool = False) -> Prepared:
     setup = prepare_pairs(config, search)
     build_network(config, setup.body_map)
     return Prepared(config, setup.body_map, setup.prior, setup.store, load_motions(config), tracking_dir(config))
+
+
+def make_places(setup: PairSetup, *more: Path) -> None:
+    """Makes the folders that a command is going to write to, before any work.
+
+    Args:
+        setup: of pairs alone, or of a whole fit.
+        more: folders in that of the tracking.
+
+    Raises:
+        UserError: one of them cannot be used.
+    """
+    folders = {"pairs.dir": [setup.store.folder]}
+    if isinstance(setup, Prepared):
+        kept = setup.tracking_dir
+        folders["pairs.dir"].append(setup.references_dir)
+        folders["tracking.dir"] = [kept / "fits", kept / "packages", kept / "artifacts", *more]
+    with places_named(setup.config):
+        make_folders(folders)
 
 
 def tracking_dir(config: Config) -> Path:

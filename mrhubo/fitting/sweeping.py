@@ -14,21 +14,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from mrhubo.config import Config, SweepConfig, fingerprint, to_plain, to_yaml
+from mrhubo.config.secrets import without_secrets
 from mrhubo.errors import UserError
 from mrhubo.files.storage import atomic_path, locked
-from mrhubo.fitting.preparation import Prepared, prepare
+from mrhubo.fitting.preparation import Prepared, make_places, prepare
 from mrhubo.fitting.record import dashboard_command
 from mrhubo.runtime.locations import project_root
+from mrhubo.runtime.names import check_name
 from mrhubo.runtime.progress import Reporter
+from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.tables import markdown
-from mrhubo.runtime.tracking import find_run, git_commit, log_all, open_client, run_status, start_run
+from mrhubo.runtime.tracking import close_run, find_run, log_all, open_client, reopen, start_run
 from mrhubo.runtime.workspace import Workspace
 from mrhubo.search import open_study, open_trials, override, read_space, remaining, work_on
 
 if TYPE_CHECKING:
-    from mlflow import MlflowClient
     from mlflow.entities import Run
     from optuna.trial import FrozenTrial, Trial
+
+    from mrhubo.runtime.client import TrackingClient
 
 _TAG = "sweep_trial"
 _SETTLED = "settled"
@@ -51,7 +55,7 @@ class SweepTrial:
     """One trial, for the method that trains it."""
 
     def __init__(
-        self, trial: Trial, client: MlflowClient, parent: str, workspace: Workspace, show: Callable[[str], None]
+        self, trial: Trial, client: TrackingClient, parent: str, workspace: Workspace, show: Callable[[str], None]
     ) -> None:
         self.trial, self.client = trial, client
         self.parent, self.workspace = parent, workspace
@@ -133,8 +137,10 @@ class Sweep:
         self.overrides = [*(override(key, value) for key, value in settings.fixed.items()), *overrides]
         self.base = self._config([])
         self.space = read_space(settings.space, lambda text: self._config([text]), method.schema)
+        check_name("name", settings.name)
         prepared = prepare(self.base)
         self.folder = prepared.tracking_dir
+        make_places(prepared, self.folder / "sweeps")
         deciding = {**to_plain(settings), "trials": 0, "minutes": 0, "storage": ""}
         mark = fingerprint([prepared.fingerprint, deciding])
         self.name = f"{self.base.robot.name}-{settings.name}-{mark[:8]}"
@@ -155,8 +161,8 @@ class Sweep:
             KeyboardInterrupt: the user stopped it; the same call goes on, with the trial that was interrupted.
         """
         start, limit = time.monotonic(), self.settings.minutes
-        self.client.update_run(self.parent, status="RUNNING")
         error: BaseException | None = None
+        whole = ""
         try:
             with self.report.step("sweep", self.settings.trials, "trials") as self._progress:
                 self._progress.update(self._done())
@@ -167,13 +173,25 @@ class Sweep:
                     lambda: limit is not None and time.monotonic() - start > 60 * limit,
                 )
                 self._progress.update(self._done(), self._best_so_far())
-            return self._conclude()
+            self.client.patient = True
+            result = self._conclude()
+            whole = f"the best config is whole: {result.best}"
+            return result
         except BaseException as raised:
             error = raised
             raise
         finally:
-            if not open_trials(self.study):  # else another process will end it
-                self.client.set_terminated(self.parent, run_status(error))
+            self.client.patient = True
+            if not self._others_at_work():  # else another process will end it
+                close_run(self.client, self.parent, error, whole)
+            elif error is None:
+                self.client.deliver(whole)
+
+    def _others_at_work(self) -> bool:
+        try:
+            return bool(open_trials(self.study))
+        except Exception:  # the study's database is away, and that is told already
+            return False
 
     def _config(self, texts: Sequence[str]) -> Config:
         return self.load([*self.overrides, *texts])
@@ -181,17 +199,21 @@ class Sweep:
     def _open_run(self) -> str:
         """The run that all trials belong to."""
         tags = {"sweep": self.name}
-        found = find_run(self.client, self.base.tracking.experiment, tags)
-        if found is not None:
-            return found.info.run_id
-        tags |= {"robot": self.base.robot.name, "git_commit": git_commit(project_root())}
-        name = f"{self.base.robot.name} sweep {self.settings.name}"
-        run = start_run(self.client, self.base.tracking.experiment, name, tags).info.run_id
+        run = find_run(self.client, self.base.tracking.experiment, tags)
+        if run is None:
+            tags |= {"robot": self.base.robot.name, "git_commit": git_commit(project_root())}
+            name = f"{self.base.robot.name} sweep {self.settings.name}"
+            run = start_run(self.client, self.base.tracking.experiment, name, tags)
+        else:
+            reopen(self.client, run)
         described = {f"space/{dimension.key}": dimension.describe() for dimension in self.space}
         kept = {key: value for key, value in to_plain(self.settings).items() if key not in ("space", "storage")}
-        log_all(self.client, run, {}, {**{f"sweep/{key}": value for key, value in kept.items()}, **described})
-        self.client.log_text(run, to_yaml(self.base), "base.yaml")
-        return run
+        written = {**{f"sweep/{key}": value for key, value in kept.items()}, **described}
+        # Those that a start which was killed has not written.
+        missing = {name: value for name, value in written.items() if name not in run.data.params}
+        log_all(self.client, run.info.run_id, {}, missing)
+        self.client.log_text(run.info.run_id, to_yaml(without_secrets(self.base)), "base.yaml")
+        return run.info.run_id
 
     def _done(self) -> int:
         return self.settings.trials - remaining(self.study, self.settings.trials) - len(open_trials(self.study))
@@ -247,7 +269,7 @@ class Sweep:
         best = self._config([f"{key}={value}" for key, value in chosen[0].items()])
         path = self.folder / "sweeps" / f"{self.name}.yaml"
         with atomic_path(path) as temporary:
-            temporary.write_text(to_yaml(best), encoding="utf-8")
+            temporary.write_text(to_yaml(without_secrets(best)), encoding="utf-8")
         self.client.log_artifact(self.parent, str(path))
         self.client.log_text(self.parent, markdown(heads, rows) + "\n", "trials.md")
         log_all(self.client, self.parent, {_VALUE: float(rows[0][1]), "sweep/trials": float(self._done())})

@@ -26,22 +26,22 @@ class FitTrials:
         """Pairs, references and a training; goes on where an earlier one with this config was stopped."""
         workspace = trial.workspace
         watch = Pruning(trial.trial, lambda step, link_cm: trial.show(f"step {step:,}: {link_cm:.2f} cm"))
-        with workspace, Recording.start(prepared, workspace, trial.parent) as recording:
-            trial.begin(recording.run_id)
-            trial.show("pairs")
-            with locked(prepared.store.folder.with_suffix(".lock"), wait=True):
-                make_pairs(prepared, SILENT)
-                validation, _ = make_references(prepared, SILENT)
-            training = train(
-                prepared,
-                SILENT,
-                validation,
-                workspace.checkpoints,
-                workspace.last_checkpoint(),
-                recording.logger,
-                callbacks=[watch],
-            )
-            recording.resume_after_training()
-            link_cm = trial.conclude(prepared.fingerprint, training.best_link_cm, pruned=watch.pruned)
+        with workspace:
+            with Recording.start(prepared, workspace, trial.parent) as recording:
+                trial.begin(recording.run_id)
+                trial.show("pairs")
+                with locked(prepared.store.folder.with_suffix(".lock"), wait=True):
+                    make_pairs(prepared, SILENT)
+                    validation, _ = make_references(prepared, SILENT)
+                training = train(
+                    prepared,
+                    SILENT,
+                    validation,
+                    workspace.checkpoints,
+                    workspace.last_checkpoint(),
+                    recording.logger,
+                    callbacks=[watch],
+                )
+                link_cm = trial.conclude(prepared.fingerprint, training.best_link_cm, pruned=watch.pruned)
             workspace.finish()
         return link_cm

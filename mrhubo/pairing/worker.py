@@ -30,7 +30,7 @@ def main() -> None:
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "config.yaml"
-            path.write_text(json.loads(next(lines)))
+            path.write_text(json.loads(next(lines)), encoding="utf-8")
             config = load_config(path)
         setup = PairSetup.open(config)
         generator = PairGenerator(setup.body_map, setup.prior, config.pairs)

@@ -10,12 +10,13 @@ from __future__ import annotations
 import json
 import os
 import queue
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -130,7 +131,7 @@ def _dispatch(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) 
             except OSError:
                 pass  # it has ended; its last answer may say why
             line = worker.stdout.readline()
-            answers.put(json.loads(line) if line else f"a worker ended with exit code {worker.wait()}")
+            answers.put(json.loads(line) if line else _ending(worker.wait()))
             if not line:
                 return
 
@@ -139,10 +140,29 @@ def _dispatch(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) 
     for _ in indices:
         answer = answers.get()
         if isinstance(answer, str):
-            raise RuntimeError(f"{answer}; what it wrote to standard error stands above")
+            raise UserError(answer)
         if "error" in answer:
             raise UserError(str(answer["error"]))
         yield answer
+
+
+def _ending(code: int) -> str:
+    """What there is to say of a worker that did not answer."""
+    resume = "the same command goes on; pairs.workers sets how many work at once"
+    if code < 0:
+        memory = ", perhaps because memory ran out" if code == -signal.SIGKILL else ""
+        return f"pairs.workers: a process that makes pairs was killed ({_name(-code)}{memory}); {resume}"
+    return (
+        f"pairs.workers: a process that makes pairs ended with exit code {code}; what it wrote to standard error stands"
+        f" above; {resume}"
+    )
+
+
+def _name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 @contextmanager
@@ -163,8 +183,9 @@ def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]
             )
         for worker in workers:
             assert worker.stdin
-            worker.stdin.write(json.dumps(to_yaml(config)) + "\n")
-            worker.stdin.flush()
+            with suppress(OSError):  # it has ended already; it is told when it does not answer
+                worker.stdin.write(json.dumps(to_yaml(config)) + "\n")
+                worker.stdin.flush()
         yield workers
     finally:
         for worker in workers:

@@ -16,13 +16,15 @@ from mrhubo.fitting.references import make_references
 from mrhubo.paper.tables import ALL_METHODS, BASELINE, METHODS, OUR_DEFAULT, Part, chart, parts, tables
 from mrhubo.runtime.locations import default_capture, project_root
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.tracking import ending, find_run, git_commit, open_client, start_run
+from mrhubo.runtime.provenance import git_commit
+from mrhubo.runtime.tracking import ending, find_run, open_client, reopen, start_run
 from mrhubo.view.pictures import Artist, liveliness
 
 if TYPE_CHECKING:
-    from mlflow import MlflowClient
     from mlflow.entities import Run
     from PIL.Image import Image
+
+    from mrhubo.runtime.client import TrackingClient
 
 
 def reproduce(
@@ -75,7 +77,7 @@ def reproduce(
     return text
 
 
-def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
+def _open_parent(work: Sequence[Part]) -> tuple[TrackingClient, str]:
     """The run that all trainings belong to: that of an earlier call with the same settings, or a new one."""
     config = work[0].config
     tags = {
@@ -88,11 +90,12 @@ def _open_parent(work: Sequence[Part]) -> tuple[MlflowClient, str]:
     found = find_run(client, config.tracking.experiment, {"reproduce": tags["reproduce"]})
     if found is None:
         found = start_run(client, config.tracking.experiment, name, tags)
-    client.update_run(found.info.run_id, status="RUNNING")
+    else:
+        reopen(client, found)
     return client, found.info.run_id
 
 
-def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], report: Reporter) -> Image | None:
+def _key_poses(client: TrackingClient, runs: Sequence[tuple[Part, str]], report: Reporter) -> Image | None:
     """Human, reference, and what the two-stage network and the baseline made of one test clip, as in the paper's
     figure 3; None if no run has kept its answers.
     """
@@ -105,7 +108,7 @@ def _key_poses(client: MlflowClient, runs: Sequence[tuple[Part, str]], report: R
     return artist.key_poses(clip, answers) if answers else None
 
 
-def _run_of(part: Part, client: MlflowClient, parent: str, report: Reporter) -> Run:
+def _run_of(part: Part, client: TrackingClient, parent: str, report: Reporter) -> Run:
     """A finished run with the same settings, pairs, prior and motions, or that of a new fit."""
     wanted = {"config_fingerprint": prepare(part.config).fingerprint}
     experiment = part.config.tracking.experiment

@@ -6,145 +6,259 @@ imported only when a run starts: it costs two seconds.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
-import signal
-import subprocess
-import tempfile
-import threading
+import re
+import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrhubo.config.shipped import shipped_root
-from mrhubo.errors import UserError, was_interrupted
-from mrhubo.files.storage import locked
+from mrhubo.config.secrets import HIDDEN, credentials, has_hidden, redacted
+from mrhubo.errors import Unreachable, UserError, was_interrupted
+from mrhubo.runtime.database import database_uri, open_database, sqlite_file
+from mrhubo.runtime.names import key
+from mrhubo.runtime.processes import is_gone, this_process
+from mrhubo.runtime.workspace import Workspace
 
 if TYPE_CHECKING:
-    from lightning.pytorch.loggers import MLFlowLogger
-    from mlflow import MlflowClient
     from mlflow.entities import Run
 
-_LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yourdfpy", "roma", "safetensors", "scipy")
+    from mrhubo.runtime.client import TrackingClient
 
 _TALKATIVE = ("alembic", "mlflow.store", "mlflow.tracking", "mlflow.system_metrics", "mlflow.pyfunc")
+_SETTINGS = {
+    "MLFLOW_DISABLE_TELEMETRY": "true",
+    "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
+    # MLflow's own are 7 retries of 120 s each: minutes of silence about a server that is not there.
+    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
+    "MLFLOW_HTTP_REQUEST_TIMEOUT": "30",
+}
+_ANSWER_SECONDS = 5.0
+"""How long a server may take for a first sign of life."""
+_WEB = ("http://", "https://")
+_CREDENTIALS = ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD")
+_ATTEMPT, _PROCESS, _ENDED_BY = "attempt", "process", "ended_by"
+_RUN_NAME = 250
+"""Letters of a run's name that databases keep."""
 
 
-def database_uri(folder: Path) -> str:
-    """SQLite tracking URI of `mlflow.db` in a folder."""
-    return f"sqlite:///{folder.resolve() / 'mlflow.db'}"
-
-
-def open_client(folder: Path, experiment: str, uri: str | None = None) -> MlflowClient:
+def open_client(folder: Path, experiment: str, uri: str | None = None) -> TrackingClient:
     """A client whose database and experiment exist; artifacts go under `folder`/artifacts.
 
-    Raises:
-        UserError: the tracking server or database cannot be reached.
-    """
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
-    import mlflow
+    Runs whose process has ended without a word are marked as killed.
 
-    for name in _TALKATIVE:
-        logging.getLogger(name).setLevel(logging.ERROR)
-    folder.mkdir(parents=True, exist_ok=True)
+    Args:
+        folder: for the database and the artifacts.
+        experiment: its name; it is made if it is not there.
+        uri: of a server or another database.
+
+    Raises:
+        UserError: the tracking server or database cannot be reached, or the experiment was deleted.
+    """
+    set_up_mlflow()
+    from mrhubo.runtime.client import TrackingClient
+
     uri = uri or database_uri(folder)
+    _check_address(uri)
+    if uri.startswith(_WEB):
+        uri = _hand_over_credentials(uri)
+    folder.mkdir(parents=True, exist_ok=True)
+    file, artifacts = sqlite_file(uri), folder.resolve() / "artifacts"
     try:
-        with locked(folder / "mlflow.lock", wait=True):  # two processes cannot make a database at once
-            client = mlflow.MlflowClient(tracking_uri=uri)
-            if client.get_experiment_by_name(experiment) is None:
-                location = (folder.resolve() / "artifacts").as_uri() if uri.startswith("sqlite") else None
-                # The tag opens the experiment in the dashboard's view of trainings, not of language models.
-                kind = {"mlflow.experimentKind": "custom_model_development"}
-                client.create_experiment(experiment, artifact_location=location, tags=kind)
-    except Exception as error:
-        raise _unreachable(uri, error) from error
+        if file is not None:
+            open_database(file, artifacts)
+        client = TrackingClient(uri)
+        location = artifacts.as_uri() if file is not None else None
+        _close_the_dead(client, _open_experiment(client, experiment, location))
+    except UserError:
+        raise
+    except Exception as error:  # MLflow's own, SQLAlchemy's, its drivers'
+        if was_interrupted(error):
+            raise
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise UserError(redacted(f"tracking.uri: MLflow cannot open {uri}: {reason}", uri)) from error
     return client
 
 
-def log_file(client: MlflowClient, run_id: str, name: str, write: Callable[[Path], object]) -> None:
-    """The artifact `name` (folder and file) of a run, made by `write`, which is given the path to write to."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / Path(name).name
-        write(path)
-        client.log_artifact(run_id, str(path), str(Path(name).parent))
+def set_up_mlflow() -> None:
+    """The settings without which MLflow misbehaves; those of the user stay."""
+    for name, value in _SETTINGS.items():
+        os.environ.setdefault(name, value)
+    for name in _TALKATIVE:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Holds Ctrl-C back until the block has ended.
+def _check_address(uri: str) -> None:
+    """Says within seconds that a server is not there."""
+    known = uri.startswith(_WEB) and all(os.environ.get(name) for name in _CREDENTIALS)
+    if has_hidden(uri) and not known:
+        raise UserError(
+            f"tracking.uri: {uri}: the password was left out where this config was written ({HIDDEN}); give the whole"
+            f" address, tracking.uri=..., or for a server set {' and '.join(_CREDENTIALS)}"
+        )
+    if re.fullmatch(r"(localhost|[\w-]+(\.[\w-]+)*):\d+(/\S*)?", uri):
+        raise UserError(f"tracking.uri: {uri} does not say how to speak to the server; write http://{uri}")
+    if uri.startswith(_WEB):
+        from mrhubo.runtime.client import silence
 
-    A transaction of SQLite that is broken off keeps its lock as long as the traceback lives, and whoever then wants to
-    mark the run as killed waits for minutes.
-    """
-    if threading.current_thread() is not threading.main_thread():  # only the main thread is interrupted
-        yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
-        if held:
-            signal.raise_signal(signal.SIGINT)
+        fault = silence(uri, _ANSWER_SECONDS)
+        if fault is not None:
+            raise UserError(
+                redacted(f"tracking.uri: no MLflow server answers at {uri} ({fault}); start it, or leave tracking.uri"
+                         " out to keep runs in tracking.dir", uri)
+            )  # fmt: skip
 
 
-def open_logger(
-    folder: Path,
-    experiment: str,
-    run_name: str,
-    tags: dict[str, str],
-    uri: str | None = None,
-    run_id: str | None = None,
-) -> MLFlowLogger:
-    """A Lightning logger of a new run, or of the run `run_id`, in what `open_client` opens.
+def _hand_over_credentials(uri: str) -> str:
+    """The address without user and password, which MLflow gets in another way: it prints and quotes addresses."""
+    address, user, password = credentials(uri)
+    if user and password != HIDDEN:
+        os.environ.update(zip(_CREDENTIALS, (user, password), strict=True))
+    return address
+
+
+def _open_experiment(client: TrackingClient, name: str, location: str | None) -> str:
+    from mlflow.exceptions import MlflowException
+
+    found = client.get_experiment_by_name(name)
+    if found is None:
+        # The tag opens the experiment in the dashboard's view of trainings, not of language models.
+        kind = {"mlflow.experimentKind": "custom_model_development"}
+        try:
+            return client.create_experiment(name, artifact_location=location, tags=kind)
+        except MlflowException as error:
+            if error.error_code != "RESOURCE_ALREADY_EXISTS":  # by another process, meanwhile
+                raise
+            found = client.get_experiment_by_name(name)
+            if found is None:
+                raise
+    if found.lifecycle_stage == "deleted":
+        address = shlex.quote(redacted(client.uri))
+        raise UserError(
+            f"tracking.experiment: '{name}' was deleted in the dashboard; name another one, or restore it:"
+            f" MLFLOW_TRACKING_URI={address} mlflow experiments restore --experiment-id {found.experiment_id}"
+        )
+    return found.experiment_id
+
+
+def _close_the_dead(client: TrackingClient, experiment_id: str) -> None:
+    """Runs that still count as running, though their process on this machine has ended (kill -9, no memory left)."""
+    for run in client.search_runs([experiment_id], "attributes.status = 'RUNNING'"):
+        process = run.data.tags.get(_PROCESS)
+        if process is not None and is_gone(process):
+            drop_half_models(client, run)
+            client.set_tag(run.info.run_id, _ENDED_BY, "its process ended without a word")
+            client.set_terminated(run.info.run_id, "KILLED")
+
+
+def drop_half_models(client: TrackingClient, run: Run, linked: str | None = None) -> None:
+    """Removes the models of a run that were never finished, and with `linked` those that lack this tag."""
+    query = f"source_run_id = '{run.info.run_id}'"
+    with contextlib.suppress(Exception):  # an old server knows no such models
+        for model in client.search_logged_models([run.info.experiment_id], query):
+            if model.status == "PENDING" or (linked is not None and linked not in model.tags):
+                client.delete_logged_model(model.model_id)
+
+
+def start_run(client: TrackingClient, experiment: str, name: str, tags: Mapping[str, str]) -> Run:
+    """A new run in an experiment that `open_client` has opened.
 
     Raises:
-        UserError: the tracking server or database cannot be reached.
+        Unreachable: the server or the database does not make one.
     """
-    open_client(folder, experiment, uri)
-    from lightning.pytorch.loggers import MLFlowLogger
+    from mlflow.exceptions import MlflowException
 
-    class Logger(MLFlowLogger):
-        def log_metrics(self, metrics: Mapping[str, float], step: int | None = None) -> None:
-            with uninterrupted():
-                super().log_metrics(metrics, step)
-
-        def finalize(self, status: str = "success") -> None:
-            with uninterrupted():
-                super().finalize(status)
-
-    uri = uri or database_uri(folder)
-    try:
-        logger = Logger(
-            experiment_name=experiment, run_name=run_name, tracking_uri=uri, tags=tags, run_id=run_id, log_model=False
-        )
-        _ = logger.run_id
-    except Exception as error:
-        raise _unreachable(uri, error) from error
-    return logger
-
-
-def start_run(client: MlflowClient, experiment: str, name: str, tags: dict[str, str]) -> Run:
-    """A new run in an experiment that `open_client` has opened."""
     found = client.get_experiment_by_name(experiment)
     assert found is not None
-    with uninterrupted():
-        return client.create_run(found.experiment_id, tags=tags, run_name=name)
+    tags = {**tags, _PROCESS: this_process()}
+    try:
+        return client.create_run(found.experiment_id, tags=tags, run_name=name[:_RUN_NAME])
+    except MlflowException as error:
+        raise Unreachable(redacted(f"tracking.uri: {client.uri} makes no run: {error}", client.uri)) from error
 
 
-def log_all(client: MlflowClient, run_id: str, metrics: dict[str, float], params: dict[str, Any] | None = None) -> None:
+def take_up_run(
+    client: TrackingClient, experiment: str, workspace: Workspace, name: str, tags: Mapping[str, str]
+) -> tuple[Run, bool]:
+    """The unfinished run of a workspace, or a new one; and whether it is new.
+
+    A start that was killed before it could note its run finds it again by a mark that was noted before.
+
+    Raises:
+        Unreachable: the server does not say whether the run is still there; nothing is removed then.
+    """
+    run = _active_run(client, workspace.run_id)
+    if run is None and workspace.attempt is not None:
+        run = find_run(client, experiment, {_ATTEMPT: workspace.attempt})
+    if run is None:
+        run = start_run(client, experiment, name, {**tags, _ATTEMPT: workspace.new_attempt()})
+        workspace.start(run.info.run_id)
+        return run, True
+    workspace.start(run.info.run_id)
+    reopen(client, run)
+    return run, False
+
+
+def reopen(client: TrackingClient, run: Run) -> None:
+    """Marks a run as running again, in this process."""
+    run_id = run.info.run_id
+    client.update_run(run_id, status="RUNNING")
+    client.set_tag(run_id, _PROCESS, this_process())
+    client.set_tag(run_id, "resumed", time.strftime("%Y-%m-%d %H:%M:%S"))
+    if _ENDED_BY in run.data.tags:
+        client.delete_tag(run_id, _ENDED_BY)
+    drop_half_models(client, run)
+
+
+def _active_run(client: TrackingClient, run_id: str | None) -> Run | None:
+    """The run of that id if it is still there: a user may have deleted it."""
+    from mlflow.exceptions import MlflowException
+
+    if run_id is None:
+        return None
+    try:
+        run = client.get_run(run_id)
+    except MlflowException as error:
+        if error.error_code != "RESOURCE_DOES_NOT_EXIST":
+            raise UserError(redacted(f"tracking.uri: {client.uri}: run {run_id}: {error}", client.uri)) from error
+        return None
+    return run if run.info.lifecycle_stage == "active" else None
+
+
+def find_run(client: TrackingClient, experiment: str, tags: Mapping[str, str], finished: bool = False) -> Run | None:
+    """The newest run of an experiment that has these tags (and is finished), if there is one."""
+    found = client.get_experiment_by_name(experiment)
+    if found is None:
+        return None
+    wanted = [f"tags.`{name}` = {_quoted(value)}" for name, value in tags.items()]
+    if finished:
+        wanted.append("attributes.status = 'FINISHED'")
+    return next(iter(client.search_runs([found.experiment_id], " and ".join(wanted), max_results=1)), None)
+
+
+def _quoted(value: str) -> str:
+    return f'"{value}"' if "'" in value else f"'{value}'"
+
+
+def log_all(
+    client: TrackingClient, run_id: str, metrics: Mapping[str, float], params: Mapping[str, Any] | None = None
+) -> None:
     """Metrics and parameters in one go: one at a time, each costs about 20 ms on SQLite."""
     from mlflow.entities import Metric, Param
 
     now = int(1000 * time.time())
-    written = [Param(name, str(value)) for name, value in (params or {}).items()]
-    with uninterrupted():
-        client.log_batch(run_id, [Metric(name, value, now, 0) for name, value in metrics.items()], written)
+    written = [Param(key(name), redacted(str(value))) for name, value in (params or {}).items()]
+    client.log_batch(run_id, [Metric(key(name), value, now, 0) for name, value in metrics.items()], written)
+
+
+def log_file(client: TrackingClient, run_id: str, name: str, write: Callable[[Path], object]) -> None:
+    """The artifact `name` (folder and file) of a run, made by `write`, which is given the path to write to."""
+    client.log_made(run_id, key(name), write)
 
 
 def run_status(error: BaseException | None) -> str:
@@ -152,74 +266,27 @@ def run_status(error: BaseException | None) -> str:
     return "FINISHED" if error is None else "KILLED" if was_interrupted(error) else "FAILED"
 
 
+def close_run(client: TrackingClient, run_id: str, error: BaseException | None, whole: str = "") -> None:
+    """Ends a run as finished, killed or failed, and sends what was kept.
+
+    Raises:
+        Unreachable: nothing went wrong but that the server does not answer; `whole` says what is done all the same.
+    """
+    if error is not None:
+        client.set_tag(run_id, _ENDED_BY, redacted(f"{type(error).__name__}: {error}", client.uri)[:500])
+    client.set_terminated(run_id, run_status(error))
+    if error is None:
+        client.deliver(whole)
+        client.patient = False
+
+
 @contextmanager
-def ending(client: MlflowClient, run_id: str) -> Iterator[None]:
-    """Closes a run as finished, killed or failed."""
+def ending(client: TrackingClient, run_id: str) -> Iterator[None]:
+    """Closes a run as finished, killed or failed; while it is open, a server that goes away is no reason to stop."""
+    client.patient = True
     try:
         yield
     except BaseException as error:
-        client.set_terminated(run_id, run_status(error))
+        close_run(client, run_id, error)
         raise
-    client.set_terminated(run_id, run_status(None))
-
-
-def _unreachable(uri: str, error: Exception) -> UserError:
-    return UserError(f"tracking.uri: MLflow cannot open {uri}: {str(error).splitlines()[0]}")
-
-
-def find_run(client: MlflowClient, experiment: str, tags: dict[str, str], finished: bool = False) -> Run | None:
-    """The newest run of an experiment that has these tags (and is finished), if there is one."""
-    found = client.get_experiment_by_name(experiment)
-    if found is None:
-        return None
-    wanted = [f"tags.`{name}` = '{value}'" for name, value in tags.items()]
-    if finished:
-        wanted.append("attributes.status = 'FINISHED'")
-    return next(iter(client.search_runs([found.experiment_id], " and ".join(wanted), max_results=1)), None)
-
-
-def resumable_run(folder: Path, uri: str | None, run_id: str | None) -> str | None:
-    """The id itself if that run is still in the tracking database (a user may have deleted it), else None."""
-    if run_id is None:
-        return None
-    import mlflow
-
-    try:
-        run = mlflow.MlflowClient(tracking_uri=uri or database_uri(folder)).get_run(run_id)
-    except Exception:
-        return None
-    return run_id if run.info.lifecycle_stage == "active" else None
-
-
-def git_commit(folder: Path) -> str:
-    """Commit of the checkout that holds `folder`, with "+changes" if files differ from it; "unknown" outside git.
-
-    Where mrhubo is installed without its checkout: its version. A commit found there would be that of another project.
-    """
-    if not (shipped_root() / "pyproject.toml").is_file():
-        return f"mrhubo {version('mrhubo')}"
-    try:
-        commit = subprocess.run(
-            ["git", "-C", str(folder), "rev-parse", "HEAD"], capture_output=True, text=True, check=True, timeout=10
-        ).stdout.strip()
-        dirty = subprocess.run(
-            ["git", "-C", str(folder), "status", "--porcelain", "--untracked-files=no"],
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=10,
-        ).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
-    return commit + ("+changes" if dirty else "")
-
-
-def library_versions() -> dict[str, str]:
-    """Versions of the libraries that decide the result."""
-    versions = {}
-    for name in _LIBRARIES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "absent"
-    return versions
+    close_run(client, run_id, None)

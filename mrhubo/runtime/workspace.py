@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import uuid
 from pathlib import Path
 from types import TracebackType
 
@@ -45,6 +46,23 @@ class Workspace:
         return run if isinstance(run, str) else None
 
     @property
+    def attempt(self) -> str | None:
+        """The mark of a start that was broken off before it could note its run."""
+        attempt = self._read().get("attempt")
+        return attempt if isinstance(attempt, str) else None
+
+    def new_attempt(self) -> str:
+        """Notes a mark for the run that is going to be made, and returns it."""
+        attempt = uuid.uuid4().hex
+        self._write({"attempt": attempt})
+        return attempt
+
+    @property
+    def unsent(self) -> Path:
+        """File for what a server did not take."""
+        return self.folder / "unsent.jsonl"
+
+    @property
     def checkpoints(self) -> Path:
         """Folder of the training's checkpoints."""
         return self.folder / "checkpoints"
@@ -68,9 +86,11 @@ class Workspace:
         """Notes that nothing is left to do, and drops the checkpoints."""
         self._write({"run_id": self.run_id, "finished": True})
         shutil.rmtree(self.checkpoints, ignore_errors=True)
+        self.unsent.unlink(missing_ok=True)
 
     def _clear(self) -> None:
         self._state_file.unlink(missing_ok=True)
+        self.unsent.unlink(missing_ok=True)
         shutil.rmtree(self.checkpoints, ignore_errors=True)
 
     def _read(self) -> dict[str, object]:

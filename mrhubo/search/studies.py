@@ -7,17 +7,16 @@ would have.
 
 from __future__ import annotations
 
-import os
-import platform
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import psutil
-
-from mrhubo.errors import UserError
+from mrhubo.config.secrets import redacted
+from mrhubo.errors import Unreachable, UserError, was_interrupted
 from mrhubo.files.storage import locked
+from mrhubo.runtime.database import sqlite_uri
+from mrhubo.runtime.processes import is_gone, this_process
 
 if TYPE_CHECKING:
     import optuna
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
 
 _HEARTBEAT, _GRACE = 30, 120
 """Seconds between two signs of life, and until a process on another machine is taken for dead."""
+_LOCKED = 120
+"""Seconds that a locked SQLite database is waited for."""
 _OWNER, _ERROR = "owner", "error"
 _FAILURES = 3
 """Trials that may fail one after the other before something is wrong with all of them."""
@@ -55,7 +56,7 @@ def open_study(
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-    database = url or f"sqlite:///{folder.resolve() / 'studies.db'}"
+    database = url or sqlite_uri(folder.resolve() / "studies.db")
     pruners = {
         "median": lambda: optuna.pruners.MedianPruner(n_startup_trials=5, n_warmup_steps=0),
         "halving": lambda: optuna.pruners.SuccessiveHalvingPruner(min_resource=1, reduction_factor=4),
@@ -65,7 +66,8 @@ def open_study(
         with locked(folder / "studies.lock", wait=True):  # two processes cannot make the tables at once
             beats: dict[str, Any] = {"heartbeat_interval": _HEARTBEAT, "grace_period": _GRACE}
             beats["heartbeat_stale_trial_callback"] = _retry
-            storage = optuna.storages.RDBStorage(database, **(beats if shared else {}))
+            patience = {"connect_args": {"timeout": _LOCKED}} if database.startswith("sqlite") else {}
+            storage = optuna.storages.RDBStorage(database, engine_kwargs=patience, **(beats if shared else {}))
             return optuna.create_study(
                 storage=storage,
                 study_name=name,
@@ -75,8 +77,8 @@ def open_study(
             )
     except Exception as error:  # SQLAlchemy's, its drivers', and ModuleNotFoundError for a driver that is not there
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        shown = re.sub(r"//([^:/@]*):[^@]*@", r"//\1:***@", database)  # logs are no place for a password
-        raise UserError(f"storage: the study's database {shown} cannot be opened: {reason}") from error
+        sentence = f"storage: the study's database {database} cannot be opened: {reason}"
+        raise UserError(redacted(sentence, database)) from error
 
 
 def _seeded_by_trial(kind: str, seed: int) -> BaseSampler:
@@ -141,15 +143,16 @@ def work_on(
 
     Raises:
         UserError: three trials in a row failed; the reason of the last.
+        Unreachable: the study's database or the tracking server does not answer any more.
     """
     failures = 0
 
     def guarded(trial: optuna.Trial) -> float:
         nonlocal failures
-        trial.set_user_attr(_OWNER, _process())
+        trial.set_user_attr(_OWNER, this_process())
         try:
             value = objective(trial)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, Unreachable):  # no fault of the trial
             _retry(study, study.trials[trial.number])
             raise
         except UserError as error:
@@ -161,20 +164,31 @@ def work_on(
         failures = 0
         return value
 
-    while not time_is_up():
-        _free_the_dead(study)
-        if remaining(study, trials) <= 0:
-            return
-        study.optimize(guarded, n_trials=1, catch=(_Failed,))
+    with _answering():
+        while not time_is_up():
+            _free_the_dead(study)
+            if remaining(study, trials) <= 0:
+                return
+            study.optimize(guarded, n_trials=1, catch=(_Failed,))
+
+
+@contextmanager
+def _answering() -> Iterator[None]:
+    """One sentence where the database goes away in the midst of the work."""
+    from optuna.exceptions import StorageInternalError
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        yield
+    except (StorageInternalError, SQLAlchemyError) as error:
+        if was_interrupted(error):
+            raise
+        reason = next(iter(str(error.__cause__ or error).splitlines()), "")
+        raise Unreachable(redacted(f"storage: the study's database does not answer any more: {reason}")) from error
 
 
 class _Failed(Exception):
     """A trial failed; the study goes on."""
-
-
-def _process() -> str:
-    """This process, so that another one on the same machine can see whether it lives."""
-    return f"{platform.node()} {os.getpid()} {psutil.Process().create_time()}"
 
 
 def _free_the_dead(study: Study) -> None:
@@ -182,22 +196,13 @@ def _free_the_dead(study: Study) -> None:
     from optuna.trial import TrialState
 
     for trial in open_trials(study):
-        node, _, rest = trial.user_attrs.get(_OWNER, "").partition(" ")
-        if node != platform.node() or _lives(rest):
+        if not is_gone(trial.user_attrs.get(_OWNER, "")):
             continue
         try:
             study.tell(trial.number, state=TrialState.FAIL)
         except (UpdateFinishedTrialError, ValueError):  # another process was faster
             continue
         _retry(study, trial)
-
-
-def _lives(process: str) -> bool:
-    number, _, born = process.partition(" ")
-    try:
-        return psutil.Process(int(number)).create_time() == float(born)
-    except (psutil.NoSuchProcess, ValueError):
-        return False
 
 
 def _retry(study: Study, trial: FrozenTrial) -> None:

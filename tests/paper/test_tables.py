@@ -15,8 +15,8 @@ from mrhubo.fitting.record import read_predictions
 from mrhubo.paper import trainings
 from mrhubo.paper.tables import METHODS, PAPER, Part, chart, parts, tables
 from mrhubo.reproduce import main
+from mrhubo.runtime.database import database_uri
 from mrhubo.runtime.progress import Reporter
-from mrhubo.runtime.tracking import database_uri
 
 pytestmark = pytest.mark.usefixtures("light_records")
 

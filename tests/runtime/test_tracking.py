@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from mrhubo.runtime.tracking import uninterrupted
+from mrhubo.runtime.processes import uninterrupted
 
 
 @pytest.fixture(autouse=True)

@@ -17,16 +17,18 @@ from mrhubo.body.prior_training.poses import load_training_poses, plausible_fram
 from mrhubo.config import BaselineConfig, S3LEConfig, to_plain
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, evaluate_clips, latencies, mean_score, run_metrics, score_clip, table
-from mrhubo.fitting.preparation import Prepared, prepare
+from mrhubo.fitting.measurement import refuse_useless
+from mrhubo.fitting.preparation import Prepared, make_places, prepare
 from mrhubo.fitting.record import log_predictions
 from mrhubo.fitting.references import make_references
 from mrhubo.rotation import stack_columns
 from mrhubo.runtime.locations import default_capture, project_root
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.tracking import ending, git_commit, log_all, open_client, start_run
+from mrhubo.runtime.provenance import git_commit
+from mrhubo.runtime.tracking import ending, log_all, open_client, start_run
 
 if TYPE_CHECKING:
-    from mlflow import MlflowClient
+    from mrhubo.runtime.client import TrackingClient
 
 _MAX_EXCESS_DEG = 10.0
 """Frames in which a joint is further outside its anatomical range are defects of the recording."""
@@ -61,6 +63,7 @@ class Baseline:
             UserError: a file is missing or cannot be used, or the config is wrong.
         """
         prepared, path = prepare(config), capture_of(config)
+        make_places(prepared)
         pose_FJ6 = load_training_poses(path)[0]
         generator = torch.Generator().manual_seed(config.s3le.seed)
         chosen = pose_FJ6[torch.randint(len(pose_FJ6), (2 * config.s3le.glue,), generator=generator)]
@@ -72,7 +75,7 @@ class Baseline:
         return cls(prepared, data, validation, test)
 
     @functools.cached_property
-    def client(self) -> MlflowClient:
+    def client(self) -> TrackingClient:
         """Where runs are kept."""
         tracking = self.prepared.config.tracking
         return open_client(self.prepared.tracking_dir, tracking.experiment, tracking.uri)
@@ -116,6 +119,8 @@ def run_baseline(config: BaselineConfig, report: Reporter = SILENT, parent: str 
         log_all(client, run, {"val/best_link_cm": best_link_cm, **run_metrics(scores, latency)})
         log_predictions(client, run, baseline.test, predictions)
         client.log_text(run, table(scores) + "\n", "test/clips.txt")
+        robot, remedy = baseline.prepared.body_map.robot, f"a lower s3le.lr than {config.s3le.lr:g} helps"
+        refuse_useless(baseline.test, predictions, robot, remedy)
     return table(scores)
 
 

@@ -39,7 +39,9 @@ from mrhubo.callbacks.progress import TrainingProgress
 from mrhubo.config import PriorConfig, changed_settings, fingerprint, to_plain, without_paths
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.tracking import git_commit, open_logger, resumable_run
+from mrhubo.runtime.provenance import git_commit
+from mrhubo.runtime.run_logger import RunLogger
+from mrhubo.runtime.tracking import ending, open_client, take_up_run
 from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
 from mrhubo.runtime.workspace import Workspace
 
@@ -47,6 +49,7 @@ _MEASURED_TRAINING, _MEASURED_HELD_OUT = 50_000, 5_000
 """Poses that the final measures take from the training clips and from those held out."""
 
 _SHOWN = {"val/joint_mm": "held-out joints mm", "val/geodesic_deg": "deg"}
+_EXPERIMENT = "body-prior"
 _EPOCH = 1_000
 """Steps between validations and checkpoints."""
 _ROTATION_DELTA, _POSITION_DELTA = 0.02, 0.002
@@ -164,42 +167,53 @@ def train(config: PriorConfig, report: Reporter = SILENT) -> BodyPrior:
     settings = to_plain(config)
     key = fingerprint({k: v for k, v in settings.items() if k not in ("output", "tracking_dir")})
     with Workspace(config.tracking_dir / "fits", "prior", key) as workspace, quiet_lightning():
-        tags = {"git_commit": git_commit(Path(__file__).parent)}
-        run_id = resumable_run(config.tracking_dir, None, workspace.run_id)
         name = ", ".join(f"{k}={v}" for k, v in changed_settings(config).items()) or "defaults"
-        logger = open_logger(config.tracking_dir, "body-prior", name, tags, run_id=run_id)
-        workspace.start(str(logger.run_id))
-        epoch = min(_EPOCH, config.steps)
-        trainer = lightning.Trainer(
-            max_epochs=-(-config.steps // epoch),  # max_steps would break exact resumption
-            logger=logger,
-            log_every_n_steps=100,
-            accelerator="auto",
-            devices=1,
-            gradient_clip_val=1.0,
-            enable_model_summary=False,
-            enable_progress_bar=False,
-            num_sanity_val_steps=0,
-            callbacks=[
-                TrainingProgress(config.steps, _SHOWN, report),
-                ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
-            ],
-        )
-        batches = RandomBatches(len(split.training), config.batch_size, epoch, config.seed)
-        in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
-        run_trainer(
-            trainer,
-            module,
-            workspace.last_checkpoint(),
-            DataLoader(PoseDataset(split.training), sampler=batches, batch_size=None),
-            DataLoader(PoseDataset(split.held_out), sampler=in_order, batch_size=None),
-        )
-        prior = module.prior.cpu().requires_grad_(False).eval()
-        measures = measure(prior, split.held_out_sample(), split.training_sample(config.seed), config.seed)
-        logger.log_metrics({f"held_out/{name}": value for name, value in measures.items()}, config.steps)
-        prior.save(config.output, _card(config, split, measures))
+        client = open_client(config.tracking_dir, _EXPERIMENT)
+        tags = {"git_commit": git_commit(Path(__file__).parent)}
+        run, _ = take_up_run(client, _EXPERIMENT, workspace, name, tags)
+        client.keep_in(workspace.unsent)
+        with ending(client, run.info.run_id):
+            logger = RunLogger(client, run.info.run_id)
+            logger.log_parameters(settings, run.data.params)
+            _fit(module, split, workspace, report, logger)
+            prior = module.prior.cpu().requires_grad_(False).eval()
+            if not all(bool(torch.isfinite(weights).all()) for weights in prior.state_dict().values()):
+                raise UserError(f"the training came to NaN; a lower lr than {config.lr:g} helps")
+            measures = measure(prior, split.held_out_sample(), split.training_sample(config.seed), config.seed)
+            logger.log_metrics({f"held_out/{name}": value for name, value in measures.items()}, config.steps)
+            prior.save(config.output, _card(config, split, measures))
         workspace.finish()
     return prior
+
+
+def _fit(module: PriorTraining, split: Split, workspace: Workspace, report: Reporter, logger: RunLogger) -> None:
+    """Lightning's trainer, from the last checkpoint if there is one."""
+    config = module.config
+    epoch = min(_EPOCH, config.steps)
+    trainer = lightning.Trainer(
+        max_epochs=-(-config.steps // epoch),  # max_steps would break exact resumption
+        logger=logger,
+        log_every_n_steps=100,
+        accelerator="auto",
+        devices=1,
+        gradient_clip_val=1.0,
+        enable_model_summary=False,
+        enable_progress_bar=False,
+        num_sanity_val_steps=0,
+        callbacks=[
+            TrainingProgress(config.steps, _SHOWN, report),
+            ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
+        ],
+    )
+    batches = RandomBatches(len(split.training), config.batch_size, epoch, config.seed)
+    in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
+    run_trainer(
+        trainer,
+        module,
+        workspace.last_checkpoint(),
+        DataLoader(PoseDataset(split.training), sampler=batches, batch_size=None),
+        DataLoader(PoseDataset(split.held_out), sampler=in_order, batch_size=None),
+    )
 
 
 def _card(config: PriorConfig, split: Split, measures: dict[str, float]) -> dict[str, Any]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from pathlib import Path
 
 from mrhubo.config import Config, changed_settings
-from mrhubo.runtime.tracking import database_uri
+from mrhubo.config.secrets import redacted
+from mrhubo.runtime.database import database_uri
 
 _SIZES = ("count", "max_steps", "seed")
 """Settings that lengthen or repeat a fit, rather than change what it does."""
@@ -25,7 +27,12 @@ def run_name(config: Config) -> str:
 
 
 def dashboard_command(folder: Path, config: Config) -> str:
-    """The command that opens the dashboard, on this machine only, light (one worker, no job runner)."""
-    uri = shlex.quote(config.tracking.uri or database_uri(folder))
-    command = f"{shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {uri} --host 127.0.0.1 --workers 1"
-    return f"MLFLOW_SERVER_ENABLE_JOB_EXECUTION=false {command}"
+    """The command that opens the dashboard, on this machine only, light (one worker, no job runner) and without
+    telemetry; of a server its address, which is the dashboard's.
+    """
+    uri = redacted(config.tracking.uri or database_uri(folder))
+    if uri.startswith(("http://", "https://")):
+        return re.sub(r"//[^/?#]*@", "//", uri)  # a browser asks for the user
+    command = f"{shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {shlex.quote(uri)}"
+    settings = "MLFLOW_SERVER_ENABLE_JOB_EXECUTION=false MLFLOW_DISABLE_TELEMETRY=true"
+    return f"{settings} {command} --host 127.0.0.1 --workers 1"

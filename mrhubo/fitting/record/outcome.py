@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from torch import Tensor
 
@@ -18,16 +21,33 @@ from mrhubo.fitting.record.recording import Recording
 from mrhubo.runtime.tracking import log_file
 from mrhubo.view import pictures, save_gif
 
+_TABLE = "test/clips.json"
+_DIGITS = 10
+"""After the point."""
+
 
 def log_measures(recording: Recording, measured: Measured, best_link_cm: float) -> None:
     """Metrics and a table of the test clips; `best_link_cm` is the best validation link error."""
-    client, run_id, networks = recording.client, recording.run_id, measured.networks
+    networks = measured.networks
     metrics = run_metrics(networks, measured.networks_latency)
     metrics |= mean_metrics(measured.retarget, measured.retarget_latency, "test/retarget")
     recording.logger.log_metrics({"val/best_link_cm": best_link_cm, **metrics})
-    rows = [dataclasses.asdict(score) for score in networks]
-    client.log_table(run_id, {key: [row[key] for row in rows] for key in rows[0]}, "test/clips.json")
-    client.log_text(run_id, measured.table + "\n", "test/clips.txt")
+    log_rows(recording, [dataclasses.asdict(score) for score in networks])
+    recording.client.log_text(recording.run_id, measured.table + "\n", "test/clips.txt")
+
+
+def log_rows(recording: Recording, rows: Sequence[Mapping[str, Any]]) -> None:
+    """A table that the dashboard shows; unlike MLflow's own `log_table` it replaces that of a broken-off start."""
+    values = [[_written(value) for value in row.values()] for row in rows]
+    recording.client.log_text(recording.run_id, json.dumps({"columns": list(rows[0]), "data": values}), _TABLE)
+    shown = json.dumps([{"path": _TABLE, "type": "table"}])
+    recording.client.set_tag(recording.run_id, "mlflow.loggedArtifacts", shown)
+
+
+def _written(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, _DIGITS) if math.isfinite(value) else None
+    return value
 
 
 def log_answers(recording: Recording, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mrhubo.config.faults import machine_fault
+from mrhubo.config.secrets import redacted
 from mrhubo.evaluation import Clip, Evaluation
 from mrhubo.fitting.record.recording import Recording
 from mrhubo.fitting.record.registry import register
@@ -28,6 +30,7 @@ def save_package(recording: Recording, retargeter: Retargeter, score: Evaluation
         "test_link_cm": f"{score.link_cm:.6f}",
     }
     folder = retargeter.save(package_dir(recording), provenance)
+    recording.whole = f"the package is whole: {folder}"
     recording.client.log_artifacts(recording.run_id, str(folder), "package")
     recording.client.log_artifact(recording.run_id, str(checkpoint), "checkpoint")
     return folder
@@ -38,7 +41,11 @@ def register_package(recording: Recording, retargeter: Retargeter, score: Evalua
 
     Returns:
         the version's URI, or why there is none: a server without a registry ends no fit.
+
+    Raises:
+        UserError: the server is away.
     """
+    recording.deliver()
     tags = {
         "run_id": recording.run_id,
         **recording.provenance,
@@ -49,4 +56,5 @@ def register_package(recording: Recording, retargeter: Retargeter, score: Evalua
     try:
         return register(recording.client, recording.run_id, package_dir(recording), retargeter, example_TJ33, tags)
     except Exception as error:  # MLflow's own, the network's, the database's
-        return f"not registered: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        reason = redacted(" ".join((machine_fault(error) or str(error)).split()), recording.client.uri)
+        return f"not registered: {type(error).__name__}: {reason[:200]}"

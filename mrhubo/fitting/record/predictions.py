@@ -17,18 +17,18 @@ from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.runtime.tracking import log_file
 
 if TYPE_CHECKING:
-    from mlflow import MlflowClient
+    from mrhubo.runtime.client import TrackingClient
 
 _ARTIFACT = "test/predictions.safetensors"
 
 
-def log_predictions(client: MlflowClient, run_id: str, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
+def log_predictions(client: TrackingClient, run_id: str, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
     """Writes joint angles (T, N) [rad] of every clip to a run."""
     answers = {clip.name: q_TN.float() for clip, q_TN in zip(clips, predictions, strict=True)}
     log_file(client, run_id, _ARTIFACT, lambda path: write_tensors(path, answers, {}))
 
 
-def read_predictions(client: MlflowClient, run_id: str) -> Mapping[str, Tensor]:
+def read_predictions(client: TrackingClient, run_id: str) -> Mapping[str, Tensor]:
     """Joint angles (T, N) [rad] by clip; empty if the run has none that can be read."""
     if _ARTIFACT not in {entry.path for entry in client.list_artifacts(run_id, str(Path(_ARTIFACT).parent))}:
         return {}

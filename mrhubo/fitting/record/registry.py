@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-import os
 import re
+import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,21 +15,24 @@ import numpy as np
 from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config.secrets import redacted
 from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter
 from mrhubo.rotation import matrix_to_axis_angle, orthonormal
+from mrhubo.runtime.database import database_uri, follow_if_possible
 from mrhubo.runtime.locations import default_tracking
-from mrhubo.runtime.tracking import database_uri, library_versions
+from mrhubo.runtime.names import model_name
+from mrhubo.runtime.provenance import library_versions
+from mrhubo.runtime.tracking import drop_half_models, set_up_mlflow
 
 if TYPE_CHECKING:
-    from mlflow import MlflowClient
+    from mlflow.entities import Run
+    from mlflow.entities.model_registry import ModelVersion
+
+    from mrhubo.runtime.client import TrackingClient
 
 _SCRIPT = Path(__file__).with_name("serving.py")
-
-
-def model_name(robot: str) -> str:
-    """Name of a robot's registered model."""
-    return f"mrhubo-{robot}"
+_LINK = "mlflow.modelVersions"
 
 
 def example_input(local_TJ33: Tensor) -> np.ndarray:
@@ -37,7 +41,7 @@ def example_input(local_TJ33: Tensor) -> np.ndarray:
 
 
 def register(
-    client: MlflowClient,
+    client: TrackingClient,
     run_id: str,
     package: Path,
     retargeter: Retargeter,
@@ -46,7 +50,8 @@ def register(
 ) -> str:
     """Makes a new version of the robot's model and returns its URI, `models:/mrhubo-nao/3`.
 
-    Only `client` is used, so that MLflow's global tracking URI stays as it is.
+    Only `client` is used, so that MLflow's global tracking URI stays as it is. What an earlier start of the same
+    run, which was broken off, has made whole is taken, and what it has left half is removed.
 
     Args:
         client: of the tracking database or server, whose registry it uses too.
@@ -59,28 +64,61 @@ def register(
     Raises:
         Exception: whatever MLflow raises where a server has no registry, or one that is too old.
     """
-    from mlflow.entities import LoggedModelOutput
-
     run, name = client.get_run(run_id), model_name(retargeter.body_map.robot.name)
+    for version in client.search_model_versions(f"name = '{name}' and run_id = '{run_id}'"):
+        model = re.search(r"/(m-[0-9a-f]+)/", version.source or "")
+        if version.tags == dict(tags):
+            return _linked(client, version, model[1] if model else None)
+    drop_half_models(client, run, linked=_LINK)
+    try:
+        return _new_version(client, run, name, package, retargeter, local_TJ33, tags)
+    except BaseException:
+        drop_half_models(client, run, linked=_LINK)
+        raise
+
+
+def _new_version(
+    client: TrackingClient,
+    run: Run,
+    name: str,
+    package: Path,
+    retargeter: Retargeter,
+    local_TJ33: Tensor,
+    tags: Mapping[str, str],
+) -> str:
+    from mlflow.entities import LoggedModelOutput
+    from mlflow.exceptions import MlflowException
+
+    run_id = run.info.run_id
     model = client.create_logged_model(run.info.experiment_id, name, run_id, tags=dict(tags))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model"
-        _save(path, package, retargeter, example_input(local_TJ33), model.model_id, run_id)
+        # A copy: MLflow takes the path for an address, in which some letters of a folder's name say something else.
+        copy = Path(shutil.copytree(package, Path(folder) / "package"))
+        _save(path, copy, retargeter, example_input(local_TJ33), model.model_id, run_id)
         client.log_model_artifacts(model.model_id, str(path))
     client.finalize_logged_model(model.model_id, "READY")
     client.log_outputs(run_id, [LoggedModelOutput(model.model_id, step=0)])
     if not client.search_registered_models(f"name = '{name}'"):
         about = f"Human poses to joint angles of {retargeter.body_map.robot.name}, made by mrhubo"
-        client.create_registered_model(name, description=about)
+        with contextlib.suppress(MlflowException):  # another process was faster; if not, there will be no version
+            client.create_registered_model(name, description=about)
     # Not "models:/<id>": the registry would look that up with MLflow's global tracking URI.
     source = model.artifact_location
     version = client.create_model_version(
         name, source, run_id, dict(tags), description=run.info.run_name, model_id=model.model_id
-    ).version
-    # The dashboard's link from the run to the version reads this tag, which MLflow's own register_model writes too.
-    link = json.dumps([{"name": name, "version": version}])
-    client.set_logged_model_tags(model.model_id, {"mlflow.modelVersions": link})
-    return f"models:/{name}/{version}"
+    )
+    return _linked(client, version, model.model_id)
+
+
+def _linked(client: TrackingClient, version: ModelVersion, model_id: str | None) -> str:
+    """The version's URI. The dashboard's link from the run to it reads a tag that MLflow's own register_model writes
+    too.
+    """
+    if model_id is not None:
+        link = json.dumps([{"name": version.name, "version": version.version}])
+        client.set_logged_model_tags(model_id, {_LINK: link})
+    return f"models:/{version.name}/{version.version}"
 
 
 def fetch_package(uri: str) -> Path:
@@ -92,7 +130,7 @@ def fetch_package(uri: str) -> Path:
     Raises:
         UserError: the URI is no such URI, the registry or the version does not exist, or it holds no package.
     """
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    set_up_mlflow()
     import mlflow
     from mlflow.artifacts import download_artifacts
     from mlflow.models import Model
@@ -106,6 +144,7 @@ def fetch_package(uri: str) -> Path:
         registry = mlflow.get_tracking_uri()
     elif (folder / "mlflow.db").is_file():
         registry = database_uri(folder)
+        follow_if_possible(folder)
     else:
         raise UserError(
             f"{uri}: there is no registry in {folder}; set MLFLOW_TRACKING_URI to the one that has the model"
@@ -118,7 +157,8 @@ def fetch_package(uri: str) -> Path:
     except KeyError as error:
         raise UserError(f"{uri}: is no model of mrhubo") from error
     except Exception as error:  # MLflow's own, the network's, the database's
-        raise UserError(f"{uri}: cannot be had from {registry}: {str(error).splitlines()[0]}") from error
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise UserError(redacted(f"{uri}: cannot be had from {registry}: {reason}", registry)) from error
 
 
 def _save(

@@ -22,7 +22,7 @@ from mrhubo.config import BaselineConfig, S3LEConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.rotation import matrix_to_axis_angle
-from mrhubo.runtime.tracking import database_uri
+from mrhubo.runtime.database import database_uri
 
 pytestmark = pytest.mark.usefixtures("light_records")
 

@@ -18,7 +18,8 @@ from mrhubo.fitting.record.registry import example_input, register
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 from mrhubo.rotation import axis_angle_to_matrix
-from mrhubo.runtime.tracking import database_uri, open_client, start_run
+from mrhubo.runtime.database import database_uri
+from mrhubo.runtime.tracking import open_client, start_run
 
 
 @pytest.fixture(scope="module")
