@@ -8,8 +8,10 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import UserError, shortened, was_interrupted
 
+_LONGEST = 4_000
+"""Letters of the longest sentence that is printed: some name what a stranger's file holds."""
 _INTERRUPTED = "interrupted; the same command resumes"
 
 
@@ -29,7 +31,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
             status = stop.code
         _flush()
     except UserError as error:
-        status = _end(f"error: {' '.join(str(error).split())}", 2)
+        status = _end(f"error: {shortened(' '.join(str(error).split()), _LONGEST)}", 2)
     except KeyboardInterrupt:
         status = _end(_INTERRUPTED, 130)
     except BrokenPipeError:

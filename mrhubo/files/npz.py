@@ -14,7 +14,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.lib import format as npy
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.archive import check_member, open_archive
 
 MAX_BYTES = 4 * 2**30
@@ -91,15 +91,15 @@ class NpzFile:
         if dtype.hasobject:
             raise UserError(f"{path}: '{key}' holds pickled Python objects, which are never opened; expected numbers")
         if dtype.kind not in kinds:
-            raise UserError(f"{path}: '{key}' has type {_shown(dtype)}; expected {_TYPES[kinds]}")
+            raise UserError(f"{path}: '{key}' has type {shortened(dtype)}; expected {_TYPES[kinds]}")
         size = math.prod(shape) * dtype.itemsize
         if size == 0 and kinds != "U":
-            raise UserError(f"{path}: '{key}' is empty: shape {_shown(shape)}")
+            raise UserError(f"{path}: '{key}' is empty: shape {shortened(shape)}")
         if (max_rows is not None and shape and shape[0] > max_rows) or size > max_bytes:
             most = f"{max_rows} frames and " if max_rows is not None else ""
             claimed = f"{size / 2**30:.3g} GiB" if size < 2**100 else "more than any disk holds"
             raise UserError(
-                f"{path}: '{key}' claims shape {_shown(shape)}, {claimed}; at most {most}{max_bytes / 2**30:.3g} GiB"
+                f"{path}: '{key}' claims shape {shortened(shape)}, {claimed}; at most {most}{max_bytes / 2**30:.3g} GiB"
                 " are read"
             )
         stored = self._archive.getinfo(f"{key}.npy").file_size
@@ -159,9 +159,3 @@ def _fill(handle: IO[bytes], content: bytearray) -> int:
         view[done : done + len(piece)] = piece
         done += len(piece)
     return done
-
-
-def _shown(value: object) -> str:
-    """As it is written, but short: a stranger chose it."""
-    text = str(value)
-    return text if len(text) <= 80 else text[:77] + "..."

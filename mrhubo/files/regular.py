@@ -32,7 +32,7 @@ def check_regular(path: Path, max_bytes: int = MAX_BYTES) -> int:
     """
     try:
         found = os.stat(path)
-    except (FileNotFoundError, NotADirectoryError) as error:
+    except FileNotFoundError as error:
         raise MissingFile(f"{path}: there is no such file") from error
     except (OSError, ValueError) as error:  # a name with a null byte is a ValueError
         raise UserError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error

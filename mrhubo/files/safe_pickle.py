@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.archive import check_member, open_archive
 from mrhubo.files.regular import open_regular
 from mrhubo.files.unpickler import RecordedObject, unpickle
@@ -77,8 +77,8 @@ def _to_array(value: Any, deepest: int) -> np.ndarray:
     if root == "scipy" and made in ("csc_matrix", "csr_matrix", "csc_array", "csr_array"):
         return _sparse(value.state, made.startswith("csc"), deepest - 1)
     if root == "chumpy":
-        return _chumpy(value.state, made[:40], deepest - 1)
-    raise UserError(f"expected an array, found a {value.kind[:80]}")
+        return _chumpy(value.state, shortened(made), deepest - 1)
+    raise UserError(f"expected an array, found a {shortened(value.kind)}")
 
 
 def _dense(value: RecordedObject) -> np.ndarray:
@@ -221,7 +221,7 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
     if isinstance(value, RecordedObject) and type(value).__name__ == "_rebuild_parameter" and value.args:
         value = value.args[0]
     if not isinstance(value, RecordedObject) or type(value).__name__ != "_rebuild_tensor_v2":
-        kind = value.kind[:80] if isinstance(value, RecordedObject) else type(value).__name__
+        kind = shortened(value.kind) if isinstance(value, RecordedObject) else type(value).__name__
         raise UserError(f"expected a tensor, found {kind}")
     try:
         reference, offset, shape, stride = value.args[:4]

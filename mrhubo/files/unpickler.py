@@ -16,7 +16,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from typing import Any, BinaryIO
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 
 _MAX_OPERATIONS = 500_000
 """Steps that a pickle may take; those of body models and checkpoints take some thousands."""
@@ -92,8 +92,7 @@ class _RestrictedUnpickler(pickle._Unpickler):
     def find_class(self, module: str, name: str) -> type[Any]:
         """The class that records what a name is called with."""
         if module.partition(".")[0] not in self.modules:
-            asked = f"{module}.{name}"
-            asked = asked if len(asked) <= 100 else asked[:97] + "..."
+            asked = shortened(f"{module}.{name}")
             raise UserError(f"it asks for '{asked}', which a file of this kind has no use for; nothing was run")
         if (module, name) == ("collections", "OrderedDict"):
             return OrderedDict
