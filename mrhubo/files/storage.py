@@ -164,7 +164,8 @@ def _reading(path: Path) -> Iterator[Any]:
     try:
         check_regular(path)
     except UserError as error:
-        raise DamagedFile(str(error)) from error
+        said = str(error).removeprefix(f"{path}: ")
+        raise DamagedFile(f"{path}: cannot be read as safetensors: {said}") from error
     try:
         with safe_open(path, framework="pt") as handle:
             yield handle

@@ -19,7 +19,9 @@ from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
 
-MotionLike: TypeAlias = Motion | Tensor | np.ndarray | Sequence[Any]
+ArrayLike: TypeAlias = Tensor | np.ndarray | Sequence[Any]
+"""Numbers as a torch or NumPy array, or as nested lists."""
+MotionLike: TypeAlias = Motion | ArrayLike
 """A motion, or local rotations of SMPL's joints 1..21 as an array or nested lists: matrices (..., 21, 3, 3), axis-angle
 [rad] (..., 63), as AMASS's `pose_body` has it, or 6D (..., 21, 6); any leading axes, none for a single pose."""
 MAX_TURN = 6 * math.pi
@@ -120,14 +122,14 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
     return Poses(torch.cat(poses) if poses else array.float(), leading, frame_rate)
 
 
-def check_frame_rate(frame_rate: float | None) -> None:
-    """Refuses what is neither None nor a positive number of frames per second."""
-    known = frame_rate is not None
+def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
+    """Refuses what is no positive number of frames per second; None is one that is not known, unless it is needed."""
+    known = needed or frame_rate is not None
     if known and not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
         raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
 
 
-def to_tensor(array: Any) -> Tensor:
+def to_tensor(array: ArrayLike) -> Tensor:
     """Numbers as a tensor, float32 or, where they come so, float64.
 
     Raises:
