@@ -23,7 +23,7 @@ from safetensors.torch import save
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.files.regular import check_regular, open_regular
+from mrhubo.files.regular import check_regular, open_regular, read_regular
 
 _CHECKSUM = "xxh3"
 
@@ -112,6 +112,38 @@ def checksum_file(path: Path) -> str:
         while piece := file.read(2**20):
             digest.update(piece)
     return digest.hexdigest()
+
+
+@contextmanager
+def checked_path(path: Path) -> Iterator[Path]:
+    """As `atomic_path`, with a checksum of the content in a file beside it, which `matches_checksum` reads.
+
+    That file is written first and holds the checksum of the former content too: whenever the process ends, it holds
+    that of what is there.
+
+    Raises:
+        UserError: the folder or the disk refuses a file.
+    """
+    with atomic_path(path) as temporary:
+        yield temporary
+        known = [checksum_file(temporary), *([checksum_file(path)] if path.is_file() else [])]
+        with atomic_path(_beside(path)) as aside:
+            aside.write_text("\n".join(known))
+
+
+def matches_checksum(path: Path) -> bool | None:
+    """Whether a file holds what `checked_path` wrote; None if no checksum is beside it.
+
+    Raises:
+        UserError: the file, or the one with its checksum, is no regular one or may not be read.
+    """
+    if not _beside(path).exists():
+        return None
+    return checksum_file(path) in read_regular(_beside(path), 1_000).decode("ascii", "replace").split()
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.name}.xxh3")
 
 
 def checksum_tensors(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
