@@ -11,6 +11,7 @@ docs/official-files.md.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ import numpy as np
 import torch
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, POINT_NAMES, Skeleton
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import check_regular
 from mrhubo.files.safe_pickle import MAX_BYTES, read_pickle, to_array
@@ -73,7 +74,7 @@ def open_skeleton(path: Path, betas: Sequence[float] = ()) -> Skeleton:
     if path.suffix == ".safetensors":
         return _read_saved(path)
     readers = {".npz": _read_npz, ".pkl": _read_pickle}
-    if path.is_dir():
+    if os.path.isdir(path):
         raise UserError(f"{path}: is a folder; name the body model in it, for instance SMPLX_NEUTRAL.npz")
     if path.suffix not in readers:
         raise UserError(f"{path}: expected a body model .npz (SMPL-X, SMPL-H, SMPL) or .pkl (SMPL, SMPL-H)")
@@ -130,7 +131,8 @@ def _read_pickle(path: Path) -> dict[str, np.ndarray]:
 
 
 def _missing(path: Path, key: str, found: set[str]) -> str:
-    return f"{path}: has no '{key}', so it is no body model; it holds: {', '.join(sorted(found)[:12]) or 'nothing'}"
+    holds = ", ".join(map(shortened, sorted(found)[:12])) or "nothing"
+    return f"{path}: has no '{key}', so it is no body model; it holds: {holds}"
 
 
 @np.errstate(all="ignore")  # what overflows is found out below

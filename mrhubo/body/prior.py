@@ -22,7 +22,7 @@ from mrhubo import rotation
 from mrhubo.body.decoder import Decoder, mlp_layers
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import SHIPPED_PRIOR
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.storage import checksum_tensors, read_tensors, write_tensors
 
 _JOINTS = len(POSED_JOINT_NAMES)
@@ -65,7 +65,8 @@ class BodyPrior(nn.Module):
             prior = cls(*sizes, metadata.get("activation", "silu"), encoder_hidden)
             prior.load_state_dict(tensors)
         except (KeyError, ValueError, RuntimeError) as error:
-            raise UserError(f"{path}: is no body prior that this version reads: {error}") from error
+            said = shortened(" ".join(str(error).split()), 300)
+            raise UserError(f"{path}: is no body prior that this version reads: {said}") from error
         if not all(bool(tensor.isfinite().all()) for tensor in prior.state_dict().values()):
             raise UserError(f"{path}: its weights hold NaN or infinite numbers")
         prior.metadata = metadata

@@ -135,7 +135,9 @@ def _convert(checkpoint: dict[str, Any], storages: dict[str, bytes], settings: d
             said = said if isinstance(said, int | float | str) else type(said).__name__
             raise UserError(f"does not fit its settings: {key} is {said!s:.40} there, {found} in the weights")
         if found > most:
-            raise UserError(f"has {key} {found}; VPoser v2 has 512 neurons and 32 latent numbers, at most {most} are read")
+            raise UserError(
+                f"has {key} {found}; VPoser v2 has 512 neurons and 32 latent numbers, at most {most} are read"
+            )
     prior = VPoser(hidden, latent)
     weights: dict[str, Tensor] = {}
     for ours, theirs, parts in (

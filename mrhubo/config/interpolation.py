@@ -131,7 +131,9 @@ class _Interpolation:
             return Node(self._variable(node, reference), node.source)
         key = _KEY.fullmatch(reference)
         if key is None:
-            raise self._error(node, f"{shortened(match[0])} is none of ${{key}}, ${{section.key}}, ${{.key}}, ${{key[0]}}")
+            raise self._error(
+                node, f"{shortened(match[0])} is none of ${{key}}, ${{section.key}}, ${{.key}}, ${{key[0]}}"
+            )
         path = re.findall(r"[^.\[\]]+", key[2])
         if key[1]:
             around, up = self.names[id(node)], len(key[1])

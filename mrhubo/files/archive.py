@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from mrhubo.errors import UserError
@@ -46,15 +46,15 @@ def open_archive(path: Path, otherwise: str, max_bytes: int = MAX_BYTES) -> Iter
         UserError: it is no regular file, no archive, or unpacks to too much.
     """
     packed = check_regular(path)
-    try:
-        file = _Directory(io.FileIO(path))
-        archive = zipfile.ZipFile(file)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # whatever zipfile makes of a stranger's bytes
-        raise UserError(f"{path}: {otherwise}") from error
-    file.limit = None
-    with file, archive:
+    with ExitStack() as stack:
+        try:
+            file = stack.enter_context(_Directory(io.FileIO(path)))
+            archive = stack.enter_context(zipfile.ZipFile(file))
+        except OSError as error:
+            raise UserError(f"{path}: cannot be read: {error.strerror or error}") from error
+        except Exception as error:  # whatever zipfile makes of a stranger's bytes
+            raise UserError(f"{path}: {otherwise}") from error
+        file.limit = None
         unpacked = sum(member.file_size for member in archive.infolist())
         if unpacked > max_bytes:
             raise UserError(f"{path}: unpacks to more than {max_bytes / 2**30:.3g} GiB, which are not read")

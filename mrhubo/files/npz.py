@@ -146,7 +146,7 @@ def _read_header(handle: IO[bytes]) -> _Header:
         shape, by_column, dtype = read(handle)
     if len(shape) > _MAX_AXES or min(shape, default=0) < 0:
         raise ValueError("no shape of an array")
-    return _Header(shape, dtype, by_column)
+    return _Header(tuple(map(int, shape)), dtype, bool(by_column))
 
 
 def _fill(handle: IO[bytes], content: bytearray) -> int:

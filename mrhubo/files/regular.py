@@ -67,7 +67,8 @@ def read_regular(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
     """
     with open_regular(path, max_bytes) as file:
         try:
-            return file.read(max_bytes)
+            # Not max_bytes: room for as many would be made at once.
+            return file.read(min(os.fstat(file.fileno()).st_size, max_bytes))
         except OSError as error:
             raise UserError(f"{path}: cannot be read: {error.strerror or error}") from error
 

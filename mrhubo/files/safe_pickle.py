@@ -230,7 +230,9 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
         if kind not in _TORCH_TYPES or not isinstance(key, str) or not isinstance(offset, int):
             raise UserError("a tensor's storage is of another type than numbers, or has no name")
         if key not in storages:
-            raise UserError(f"the numbers of a tensor are not in the file, or were saved by torch before 1.6: {_SAVE_ANEW}")
+            raise UserError(
+                f"the numbers of a tensor are not in the file, or were saved by torch before 1.6: {_SAVE_ANEW}"
+            )
         numbers = np.frombuffer(storages[key], dtype=_TORCH_TYPES[kind])
         last = offset + sum((n - 1) * s for n, s in zip(shape, stride, strict=True))
         if parts != _STORAGE_PARTS or math.prod(shape) == 0 or offset < 0:

@@ -214,7 +214,9 @@ def _counted(step: Callable[[Any], None]) -> Callable[[Any], None]:
 
 def _dispatch() -> dict[int, Callable[[Any], None]]:
     """The unpickler's table of steps, with ours in place of those of the same name."""
-    steps = {code: getattr(_RestrictedUnpickler, step.__name__, step) for code, step in pickle._Unpickler.dispatch.items()}
+    steps = {
+        code: getattr(_RestrictedUnpickler, step.__name__, step) for code, step in pickle._Unpickler.dispatch.items()
+    }
     steps[pickle.NEWOBJ[0]] = _RestrictedUnpickler.load_reduce
     return {code: _counted(step) for code, step in steps.items()}
 

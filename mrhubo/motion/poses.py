@@ -146,7 +146,12 @@ def to_tensor(array: ArrayLike) -> Tensor:
         exact = array.dtype.kind == "f" and array.dtype.itemsize >= 8
         with np.errstate(over="ignore"):
             array = torch.from_numpy(np.array(array, np.float64 if exact else np.float32))
-    if not isinstance(array, Tensor) or array.is_complex() or array.dtype == torch.bool or array.layout != torch.strided:
+    if (
+        not isinstance(array, Tensor)
+        or array.is_complex()
+        or array.dtype == torch.bool
+        or array.layout != torch.strided
+    ):
         kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray | Tensor) else type(given).__name__
         raise UserError(f"human motion: expected a Motion, or a NumPy or torch array of numbers, found {kind}")
     return array if array.dtype == torch.float64 else array.float()

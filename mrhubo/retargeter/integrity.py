@@ -102,7 +102,8 @@ def check_content(folder: Path, metadata: Mapping[str, str], robot: Robot, input
                     f"{folder}: header and URDF disagree on a limit of '{joint}': {header:.6g} and {own:.6g} rad; {_RENEW}"
                 )
     if metadata.get("robot") != robot.name:
-        raise UserError(f"{folder}: header and settings name two robots, '{metadata.get('robot')}' and '{robot.name}'")
+        names = f"'{shortened(metadata.get('robot'))}' and '{robot.name}'"
+        raise UserError(f"{folder}: header and settings name two robots, {names}; {_RENEW}")
     if _json(folder, metadata, "input_joints") != list(inputs):
         raise UserError(f"{folder}: header and settings read other human joints; {_RENEW}")
     try:

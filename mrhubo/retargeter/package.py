@@ -24,7 +24,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
 from mrhubo.motion import ArrayLike, MotionLike, read_poses, to_tensor
 from mrhubo.reference import DirectionProblem, angle_between
@@ -163,7 +163,9 @@ class Retargeter(nn.Module):
             wrong_T = ~(largest_T <= _LARGEST)
             if bool(wrong_T.any()):
                 frame = int(wrong_T.nonzero()[0, 0])
-                what = "numbers that no rotation has" if bool(largest_T[frame].isfinite()) else "NaN or infinite numbers"
+                what = (
+                    "numbers that no rotation has" if bool(largest_T[frame].isfinite()) else "NaN or infinite numbers"
+                )
                 raise UserError(f"human pose {number * _CHUNK + frame} holds {what}")
             yield part.to(self.device, torch.float32)
 
@@ -225,9 +227,10 @@ class Retargeter(nn.Module):
         network = build_network(config, body_map)
         threshold = check_content(folder, metadata, body_map.robot, network.features.input_joints)
         try:
-            network.load_state_dict(tensors)
+            network.load_state_dict({name: tensor for name, tensor in tensors.items() if tensor.is_floating_point()})
         except RuntimeError as error:
-            raise UserError(f"{folder}: weights and settings do not fit: {error}") from error
+            said = shortened(" ".join(str(error).split()), 300)
+            raise UserError(f"{folder}: weights and settings do not fit: {said}") from error
         check_weights(folder, network.state_dict(), body_map.robot)
         return cls(network, body_map, prior, config, threshold)
 

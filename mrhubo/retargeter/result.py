@@ -37,7 +37,9 @@ class RetargetResult:
 
     def with_leading(self, shape: tuple[int, ...], frame_rate: float | None) -> RetargetResult:
         """The same with other leading axes, for as many frames, and a frame rate."""
-        tensors = {name: getattr(self, name).unflatten(0, shape) if shape else getattr(self, name)[0] for name in _TENSORS}
+        tensors = {
+            name: getattr(self, name).unflatten(0, shape) if shape else getattr(self, name)[0] for name in _TENSORS
+        }
         return dataclasses.replace(self, **tensors, frame_rate=frame_rate)
 
     def save(self, path: Path | str) -> None:

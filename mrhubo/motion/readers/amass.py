@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MAX_TURN, Turns
@@ -42,6 +42,7 @@ _Y_UP_FROM_Z_UP = torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.
 """Turns a world whose z axis is up so that y is: a quarter turn about x."""
 
 
+@np.errstate(all="ignore")  # what overflows is found out below
 def read_amass(path: Path) -> Motion:
     """Reads `pose_body` (T, 63), or `poses` (T, 66 or more) with the root's three numbers first.
 
@@ -90,7 +91,7 @@ def _read_pose(file: NpzFile) -> tuple[str, Tensor]:
     path, keys = file.path, file.keys
     key = next((key for key in ("pose_body", "poses") if key in keys), None)
     if key is None:
-        found = ", ".join(sorted(keys)[:12]) or "nothing"
+        found = ", ".join(map(shortened, sorted(keys)[:12])) or "nothing"
         raise UserError(f"{path}: holds neither 'pose_body' nor 'poses', so it is no human motion; it holds: {found}")
     shape = file.shape(key, max_rows=MAX_FRAMES)
     widths = {63: "body without root"} if key == "pose_body" else _POSES_WIDTHS
@@ -109,9 +110,7 @@ def _read_pose(file: NpzFile) -> tuple[str, Tensor]:
             column = 3 * joint + int(np.argmax(np.where(np.isnan(numbers), np.inf, numbers)))
             value = float(pose_T63[frame, column])
             why = "is not finite" if not math.isfinite(value) else "is no axis-angle number in radians (degrees?)"
-            raise UserError(
-                f"{path}: '{key}' {why} in frame {start + frame}, number {first + column}: {value:g}"
-            )
+            raise UserError(f"{path}: '{key}' {why} in frame {start + frame}, number {first + column}: {value:g}")
         turns.add(torch.from_numpy(turn_TJ))
         local_TJ33[start : start + len(pose_T63)] = _matrices(pose_T63)
     if turns.are_degrees:
@@ -125,8 +124,7 @@ def _blocks(file: NpzFile, key: str, first: int, end: int) -> Iterator[tuple[int
     """Some columns of an array (T, ...), float64, block by block, each with the number of its first frame."""
     start = 0
     for block in file.blocks(key, _BLOCK, MAX_FRAMES):
-        with np.errstate(over="ignore", invalid="ignore"):
-            yield start, block[:, first:end].astype(np.float64)
+        yield start, block[:, first:end].astype(np.float64)
         start += len(block)
 
 
