@@ -33,6 +33,13 @@ def unknown_name(kind: str, name: str, available: Iterable[str], where: str = ""
     return f"{missing}; available: {listed(names)}"
 
 
+def shortened(text: object, most: int = 80) -> str:
+    """What a stranger wrote, fit for a sentence: not too long, and without letters that a terminal would obey."""
+    shown = str(text)
+    shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in shown[: most + 1])
+    return shown if len(shown) <= most else shown[: most - 3] + "..."
+
+
 def listed(names: Iterable[str]) -> str:
     """The first thirty names in order, with commas; ``none`` if there are none."""
     names = sorted(names)

@@ -11,6 +11,7 @@ docs/official-files.md.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +20,10 @@ import numpy as np
 import torch
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, POINT_NAMES, Skeleton
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import open_npz
-from mrhubo.files.safe_pickle import check_file, to_array, unpickle
+from mrhubo.files.regular import check_regular
+from mrhubo.files.safe_pickle import MAX_BYTES, read_pickle, to_array
 from mrhubo.files.storage import read_tensors, write_tensors
 
 SCHEMA = "mrhubo.skeleton/1"
@@ -29,6 +31,8 @@ _KEYS = ("v_template", "shapedirs", "J_regressor", "kintree_table")
 _PICKLE_MODULES = ("numpy", "scipy", "chumpy", "copy_reg", "copyreg", "_codecs", "__builtin__", "collections")
 _BODY = len(JOINT_NAMES)
 _MAX_BETA = 20.0
+_MAX_ARRAY = 2**29
+"""Largest array; SMPL-X's shape directions take 100 MB."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,8 @@ def open_skeleton(path: Path, betas: Sequence[float] = ()) -> Skeleton:
     if path.suffix == ".safetensors":
         return _read_saved(path)
     readers = {".npz": _read_npz, ".pkl": _read_pickle}
+    if os.path.isdir(path):
+        raise UserError(f"{path}: is a folder; name the body model in it, for instance SMPLX_NEUTRAL.npz")
     if path.suffix not in readers:
         raise UserError(f"{path}: expected a body model .npz (SMPL-X, SMPL-H, SMPL) or .pkl (SMPL, SMPL-H)")
     arrays = readers[path.suffix](path)
@@ -89,7 +95,12 @@ def _read_saved(path: Path) -> Skeleton:
     tensors, metadata = read_tensors(path)
     if metadata.get("schema") != SCHEMA:
         raise UserError(f"{path}: schema is '{metadata.get('schema')}', expected '{SCHEMA}' (a skeleton of mrhubo)")
-    return Skeleton(tensors["offsets"], tensors["point_offsets"])
+    try:
+        return Skeleton(tensors["offsets"], tensors["point_offsets"])
+    except KeyError as error:
+        raise UserError(f"{path}: is no skeleton of mrhubo: {error} is missing") from error
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from error
 
 
 def _read_npz(path: Path) -> dict[str, np.ndarray]:
@@ -97,22 +108,21 @@ def _read_npz(path: Path) -> dict[str, np.ndarray]:
         missing = [key for key in _KEYS if key not in file.keys]
         if missing:
             raise UserError(_missing(path, missing[0], file.keys))
-        return {key: file.read(key) for key in _KEYS}
+        return {key: file.read(key, max_bytes=_MAX_ARRAY) for key in _KEYS}
 
 
 def _read_pickle(path: Path) -> dict[str, np.ndarray]:
-    check_file(path)
+    check_regular(path, MAX_BYTES)
     try:
-        with open(path, "rb") as handle:
-            content = unpickle(handle, _PICKLE_MODULES)
-    except (OSError, UserError) as error:
+        content = read_pickle(path, _PICKLE_MODULES)
+    except UserError as error:
         raise UserError(f"{path}: cannot be read as a body model: {error}") from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: expected a dictionary, found {type(content).__name__}; it is no body model")
     arrays = {}
     for key in _KEYS:
         if key not in content:
-            raise UserError(_missing(path, key, {str(k) for k in content}))
+            raise UserError(_missing(path, key, {k for k in content if isinstance(k, str)}))
         try:
             arrays[key] = to_array(content[key])
         except UserError as error:
@@ -121,9 +131,11 @@ def _read_pickle(path: Path) -> dict[str, np.ndarray]:
 
 
 def _missing(path: Path, key: str, found: set[str]) -> str:
-    return f"{path}: has no '{key}', so it is no body model; it holds: {', '.join(sorted(found)[:12]) or 'nothing'}"
+    holds = ", ".join(map(shortened, sorted(found)[:12])) or "nothing"
+    return f"{path}: has no '{key}', so it is no body model; it holds: {holds}"
 
 
+@np.errstate(all="ignore")  # what overflows is found out below
 def _build(arrays: dict[str, np.ndarray], betas: Sequence[float]) -> Skeleton:
     regressor_JV, template_V3, shapes_V3S = (arrays[k] for k in ("J_regressor", "v_template", "shapedirs"))
     if regressor_JV.ndim != 2 or regressor_JV.shape[0] not in _KINDS:

@@ -11,6 +11,7 @@ Legend: B batch, J = 21 joints, Z = 32 latent numbers. Poses are 6D (two columns
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -21,7 +22,7 @@ from mrhubo import rotation
 from mrhubo.body.decoder import Decoder, mlp_layers
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import SHIPPED_PRIOR
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.storage import checksum_tensors, read_tensors, write_tensors
 
 _JOINTS = len(POSED_JOINT_NAMES)
@@ -60,10 +61,14 @@ class BodyPrior(nn.Module):
         try:
             sizes = int(metadata["hidden"]), int(metadata["latent"])
             encoder_hidden = int(metadata.get("encoder_hidden", sizes[0]))
+            _check_sizes(tensors, *sizes, encoder_hidden)
             prior = cls(*sizes, metadata.get("activation", "silu"), encoder_hidden)
             prior.load_state_dict(tensors)
         except (KeyError, ValueError, RuntimeError) as error:
-            raise UserError(f"{path}: is no body prior that this version reads: {error}") from error
+            said = shortened(" ".join(str(error).split()), 300)
+            raise UserError(f"{path}: is no body prior that this version reads: {said}") from error
+        if not all(bool(tensor.isfinite().all()) for tensor in prior.state_dict().values()):
+            raise UserError(f"{path}: its weights hold NaN or infinite numbers")
         prior.metadata = metadata
         return prior.requires_grad_(False).eval()
 
@@ -113,3 +118,11 @@ class BodyPrior(nn.Module):
     def reconstruction_error(self, pose_BJ6: Tensor) -> Tensor:
         """phi (B,): mean squared error of the 126 6D numbers between H and H~."""
         return (self.denoise(pose_BJ6) - pose_BJ6).square().mean(dim=(1, 2))
+
+
+def _check_sizes(tensors: Mapping[str, Tensor], hidden: int, latent: int, encoder_hidden: int) -> None:
+    """Refuses a header that claims a larger network than there are weights of, before that is made."""
+    weights = sum(tensor.numel() for tensor in tensors.values())
+    widest = max(hidden, encoder_hidden)
+    if min(hidden, latent, encoder_hidden) < 1 or widest * max(widest, latent) > weights:
+        raise ValueError(f"{weights:,} weights are not those of {hidden} hidden units and {latent} latent numbers")

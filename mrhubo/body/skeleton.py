@@ -20,6 +20,8 @@ from mrhubo.files.storage import checksum_tensors
 
 _LONGEST = 2.0
 """No bone is that long [m]; other units than metres are."""
+_SHORTEST = 1e-3
+"""Nor is one so short [m]."""
 _SIGNS = {"left": 1.0, "right": -1.0}
 SIDES: tuple[str, ...] = tuple(_SIGNS)
 """Sides of the body; what there is on both is called `left_` and `right_` and its name."""
@@ -155,8 +157,10 @@ class Skeleton(nn.Module):
         for name, given, default in (("offsets_J3", offsets_J3, ours), ("point_offsets_E3", point_offsets_E3, points)):
             if given is not None and given.shape != default.shape:
                 raise UserError(f"a skeleton's {name} must have the shape {tuple(default.shape)}, found {given.shape}")
-            if given is not None and not bool((given.abs() < _LONGEST).all()):
+            if given is not None and not (given.is_floating_point() and bool((given.abs() < _LONGEST).all())):
                 raise UserError(f"a skeleton's {name} must be finite and shorter than {_LONGEST:g} m")
+            if given is offsets_J3 is not None and bool((given.norm(dim=-1) < _SHORTEST).any()):
+                raise UserError(f"a skeleton's {name} must be longer than {1000 * _SHORTEST:g} mm")
             self.register_buffer(name, (default if given is None else given).float().clone(), persistent=False)
         identity = torch.eye(3).expand(1, len(POSED_JOINT_NAMES), 3, 3)
         self.register_buffer("rest_K3", self.keypoints(identity)[0], persistent=False)

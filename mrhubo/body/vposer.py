@@ -7,6 +7,7 @@ Its licence forbids commercial use and passing it on: see docs/official-files.md
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,14 @@ from mrhubo import rotation
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.files.regular import read_regular
 from mrhubo.files.safe_pickle import read_checkpoint, to_tensor
 
 _PREFIX = "vp_model."
 _JOINTS = len(POSED_JOINT_NAMES)
+_MAX_HIDDEN, _MAX_LATENT = 4_096, 1_024
+"""Sizes of the largest network that is made: the weights that are there tell one layer, the others follow."""
+_MAX_SETTINGS = 100_000
 _BATCH_NORM = ("weight", "bias", "running_mean", "running_var")
 # VPoser flattens its 6D row by row, (3, 2) for each joint; ours goes column after column.
 _ROWS_TO_COLUMNS = [6 * j + 2 * row + column for j in range(_JOINTS) for column in range(2) for row in range(3)]
@@ -79,9 +84,9 @@ class VPoser(BodyPrior):
 
 def _find(path: Path) -> tuple[Path, dict[str, Any]]:
     """The snapshot, and the settings beside it (none if there is no YAML)."""
-    if not path.exists():
+    if not os.path.lexists(path):
         raise UserError(f"{path}: there is no such file or folder; VPoser's is called V02_05")
-    if path.is_dir():
+    if os.path.isdir(path):
         snapshots = sorted(p for p in (path / "snapshots").glob("*") if p.suffix in (".ckpt", ".pt"))
         if not snapshots:
             raise UserError(f"{path}: holds no snapshot; expected snapshots/*.ckpt or *.pt, as in VPoser's V02_05")
@@ -91,12 +96,12 @@ def _find(path: Path) -> tuple[Path, dict[str, Any]]:
     settings = sorted(folder.glob("*.yaml")) if snapshot.parent.name == "snapshots" else []
     if not settings:
         return snapshot, {}
+    content = read_regular(settings[0], _MAX_SETTINGS)
     try:
-        content = yaml.safe_load(settings[0].read_text())
-        return snapshot, dict(content["model_params"])
-    except (yaml.YAMLError, OSError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        return snapshot, dict(yaml.safe_load(content)["model_params"])
+    except Exception as error:  # whatever YAML makes of a stranger's bytes
         raise UserError(
-            f"{settings[0]}: is no settings file of VPoser v2 (model_params with num_neurons and latentD): {error}"
+            f"{settings[0]}: is no settings file of VPoser v2 (model_params with num_neurons and latentD)"
         ) from error
 
 
@@ -105,7 +110,7 @@ def _convert(checkpoint: dict[str, Any], storages: dict[str, bytes], settings: d
     state = checkpoint.get("state_dict", checkpoint)
     if not isinstance(state, dict):
         raise UserError(f"expected a dictionary 'state_dict', found {type(state).__name__}")
-    names = {str(name).removeprefix(_PREFIX): value for name, value in state.items()}
+    names = {name.removeprefix(_PREFIX): value for name, value in state.items() if isinstance(name, str)}
     if any(name.startswith("bodyprior_") for name in names):
         raise UserError("is VPoser version 1; version 2 (V02_05) is needed")
 
@@ -124,9 +129,15 @@ def _convert(checkpoint: dict[str, Any], storages: dict[str, bytes], settings: d
     if first.ndim != 2:
         raise UserError(f"'{_PREFIX}decoder_net.0.weight' has shape {tuple(first.shape)}; expected (512, 32)")
     hidden, latent = first.shape
-    for key, found in (("num_neurons", hidden), ("latentD", latent)):
-        if settings.get(key, found) != found:
-            raise UserError(f"does not fit its settings: {key} is {settings[key]} there, {found} in the weights")
+    for key, found, most in (("num_neurons", hidden, _MAX_HIDDEN), ("latentD", latent, _MAX_LATENT)):
+        said = settings.get(key, found)
+        if said != found:
+            said = said if isinstance(said, int | float | str) else type(said).__name__
+            raise UserError(f"does not fit its settings: {key} is {said!s:.40} there, {found} in the weights")
+        if found > most:
+            raise UserError(
+                f"has {key} {found}; VPoser v2 has 512 neurons and 32 latent numbers, at most {most} are read"
+            )
     prior = VPoser(hidden, latent)
     weights: dict[str, Tensor] = {}
     for ours, theirs, parts in (

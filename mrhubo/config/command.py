@@ -16,8 +16,10 @@ from typing import NoReturn
 from mrhubo.config.faults import machine_fault
 from mrhubo.config.notices import show_warnings_plainly
 from mrhubo.config.secrets import redacted
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import UserError, shortened, was_interrupted
 
+_LONGEST = 4_000
+"""Letters of the longest sentence that is printed: some name what a stranger's file holds."""
 _ENDED_FROM_OUTSIDE = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # a scheduler, a shutdown, a terminal that was closed
@@ -49,7 +51,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
             status = stop.code
         _flush()
     except UserError as error:
-        status = _end(f"error: {' '.join(str(error).split())}", 2)
+        status = _end(f"error: {shortened(' '.join(str(error).split()), _LONGEST)}", 2)
     except KeyboardInterrupt:
         status = _interrupted()
     except BrokenPipeError:

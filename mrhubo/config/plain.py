@@ -70,7 +70,7 @@ def _escaped(value: Any) -> Any:
     if isinstance(value, list):
         return [_escaped(item) for item in value]
     if isinstance(value, str):
-        return re.sub(r"(\\*)\$\{", lambda found: found[1] * 2 + "\\${", value)
+        return re.sub(r"(?<!\\)(\\*)\$\{", lambda found: found[1] * 2 + "\\${", value)
     return value
 
 

@@ -28,9 +28,9 @@ class PriorConfig:
     """Peak learning rate of AdamW; cosine decay to 0."""
     weight_decay: float = bounded(1e-4, 0.0, 1.0)
     """Weight decay of AdamW."""
-    hidden: int = bounded(512, 8, 65_536)
+    hidden: int = bounded(512, 8, 8_192)
     """Width of the decoder's two hidden layers."""
-    encoder_hidden: int = bounded(1_024, 8, 65_536)
+    encoder_hidden: int = bounded(1_024, 8, 8_192)
     """Width of the encoder's two hidden layers."""
     latent: int = bounded(32, 1, 1_024)
     """Size of the latent."""

@@ -138,7 +138,7 @@ class ModelConfig:
 
     stages: int = bounded(2, 1, 2)
     """2 = human -> links -> joints (the paper), 1 = human -> joints directly."""
-    hidden: int = bounded(160, 1, 65_536)
+    hidden: int = bounded(160, 1, 8_192)
     """Width of the hidden layers, of each branch."""
     layers: int = bounded(4, 1, 64)
     """Hidden layers of each network (the paper's text: 1, its authors' code: 2)."""
@@ -240,7 +240,7 @@ class S3LEConfig:
     """How far their robot poses go beyond the limits, as a share of the range."""
     latent: int = bounded(64, 1, 1_024)
     """Size of the shared latent space."""
-    hidden: int = bounded(256, 1, 65_536)
+    hidden: int = bounded(256, 1, 8_192)
     """Width of the two hidden layers of every encoder and decoder."""
     steps: int = bounded(6_000, 2, 1_000_000_000)
     """Optimiser steps, the first half without self-made pairs."""

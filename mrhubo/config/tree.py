@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.files.regular import MissingFile, check_regular, read_regular
 
 MAX_BYTES = 1_000_000
 MAX_NODES = 100_000
@@ -36,6 +37,8 @@ class Source:
 
     name: str
     folder: Path
+    typed: bool = False
+    """Whether it is the command line, what the user himself has written."""
 
 
 @dataclass
@@ -57,6 +60,13 @@ class Node:
         """A sentence about this value, with its place in front if it has one."""
         return UserError(f"{self.where}: {sentence}" if self.where else sentence)
 
+    def walk(self) -> Iterator[Node]:
+        """This value and all in it."""
+        yield self
+        inner = self.content.values() if isinstance(self.content, dict) else self.content
+        for child in inner if isinstance(self.content, dict | list) else ():
+            yield from child.walk()
+
     def plain(self) -> Any:
         """The value without its origin."""
         if isinstance(self.content, dict):
@@ -68,7 +78,7 @@ class Node:
 
 def command_line() -> Source:
     """The source of what is typed: relative paths start from the current directory."""
-    return Source("command line", Path.cwd())
+    return Source("command line", Path.cwd(), typed=True)
 
 
 def scalar(text: str) -> Any:
@@ -87,17 +97,14 @@ def scalar(text: str) -> Any:
 def read_file(file: Path) -> Node:
     """The tree of a YAML file, a mapping at the top."""
     source = Source(str(file), Path(os.path.abspath(file)).parent)
+    if os.path.isdir(file):
+        raise UserError(f"{file} is a folder, not a YAML file")
     try:
-        with file.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except FileNotFoundError:
+        if check_regular(file) > MAX_BYTES:
+            raise UserError(f"{file} is larger than {MAX_BYTES // 1_000_000} MB, which no config is")
+        data = read_regular(file)
+    except MissingFile:
         raise UserError(_missing_file(file)) from None
-    except IsADirectoryError:
-        raise UserError(f"{file} is a folder, not a YAML file") from None
-    except (OSError, ValueError) as error:
-        raise UserError(f"{file} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > MAX_BYTES:
-        raise UserError(f"{file} is larger than {MAX_BYTES // 1_000_000} MB, which no config is")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from torch import Tensor
 
-from mrhubo.config import Config, fingerprint
-from mrhubo.errors import UserError
+from mrhubo.config import Config, EvaluationConfig, fingerprint
+from mrhubo.errors import UserError, unknown_name
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
 from mrhubo.motion import Motion, find_motions, read_folder
 from mrhubo.pairing import pose_settings
@@ -55,11 +55,19 @@ def load_motions(config: Config) -> Motions:
     """Reads and splits the motions of `evaluation`, or those that lie where motions lie by default.
 
     Raises:
-        UserError: no folder exists, a file cannot be used, or the split leaves validation or test empty.
+        UserError: no folder exists, a file cannot be used, a clip for validation is not there, or the split leaves
+            validation or test empty.
     """
-    folder = find_motions(config.evaluation.motions or default_motions())
+    try:
+        folder = find_motions(config.evaluation.motions or default_motions())
+    except UserError as error:
+        raise UserError(f"evaluation.motions: {error}") from error
     motions = read_folder(folder)
     names = set(config.evaluation.validation)
+    missing = sorted(names.difference(m.name for m in motions))
+    if missing and config.evaluation.validation != EvaluationConfig().validation:  # which names clips of two folders
+        known = unknown_name("clip", missing[0], [m.name for m in motions], str(folder))
+        raise UserError(f"evaluation.validation: {known}")
     validation = [m for m in motions if m.name in names]
     test = [m for m in motions if m.name not in names]
     if not validation or not test:

@@ -3,69 +3,124 @@
 from __future__ import annotations
 
 import math
-import zipfile
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.lib import format as npy
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
+from mrhubo.files.archive import check_member, open_archive
 
 MAX_BYTES = 4 * 2**30
 """Largest array that is read."""
 _TYPES = {"U": "text", "fiu": "numbers"}
+_MAX_AXES = 32
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What an .npy member claims to hold."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    by_column: bool
 
 
 class NpzFile:
     """An open .npz file whose arrays are read one by one."""
 
-    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
+    def __init__(self, path: Path, archive: ZipFile) -> None:
         self.path, self._archive = path, archive
         self.keys = {name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")}
 
-    def read(self, key: str, kinds: str = "fiu", max_rows: int | None = None) -> np.ndarray:
+    def shape(self, key: str, kinds: str = "fiu", max_rows: int | None = None) -> tuple[int, ...]:
+        """The shape that an array claims, whose header is found to be harmless; arguments as for `read`."""
+        return self._header(key, kinds, max_rows).shape
+
+    def read(self, key: str, kinds: str = "fiu", max_rows: int | None = None, max_bytes: int = MAX_BYTES) -> np.ndarray:
         """One array, whose header is found to be harmless before its content is read.
 
         Args:
             key: its name.
             kinds: numpy's letters of the types that will do.
             max_rows: most rows that are read.
+            max_bytes: most bytes that are read.
 
         Raises:
             UserError: it is damaged, too large, empty, of another type, or holds pickled objects.
         """
+        self._header(key, kinds, max_rows, max_bytes)
+        with self._reading(key, "its content is truncated or altered") as handle:
+            with warnings.catch_warnings(action="ignore"):
+                return npy.read_array(handle, allow_pickle=False)
+
+    def blocks(self, key: str, rows: int, max_rows: int | None = None) -> Iterator[np.ndarray]:
+        """The rows of an array (rows, columns) of numbers, so many at a time, so that they need not fit into memory.
+
+        Raises:
+            UserError: as for `read`, or it has not two axes.
+        """
+        header = self._header(key, "fiu", max_rows)
+        if len(header.shape) != 2:
+            raise UserError(f"{self.path}: '{key}' has shape {header.shape}; expected (rows, columns)")
+        if header.by_column:
+            whole = self.read(key, max_rows=max_rows)
+            yield from (whole[start : start + rows] for start in range(0, len(whole), rows))
+            return
+        count, columns = header.shape
+        with self._reading(key, "its content is truncated or altered") as handle:
+            _read_header(handle)
+            for start in range(0, count, rows):
+                size = min(rows, count - start) * columns * header.dtype.itemsize
+                content = bytearray(size)
+                if _fill(handle, content) < size:
+                    raise EOFError
+                yield np.frombuffer(content, header.dtype).reshape(-1, columns)
+
+    def _header(self, key: str, kinds: str, max_rows: int | None, max_bytes: int = MAX_BYTES) -> _Header:
         path = self.path
-        try:
-            with self._archive.open(f"{key}.npy") as handle:
-                shape, dtype = _read_header(handle)
-        except Exception as error:  # whatever zipfile, zlib and numpy make of a stranger's bytes
-            raise UserError(f"{path}: '{key}' cannot be read: {error or type(error).__name__}") from error
+        with self._reading(key, "its header is not one of an .npy array") as handle:
+            header = _read_header(handle)
+        shape, dtype = header.shape, header.dtype
         if dtype.hasobject:
             raise UserError(f"{path}: '{key}' holds pickled Python objects, which are never opened; expected numbers")
         if dtype.kind not in kinds:
-            raise UserError(f"{path}: '{key}' has type {dtype}; expected {_TYPES[kinds]}")
+            raise UserError(f"{path}: '{key}' has type {shortened(dtype)}; expected {_TYPES[kinds]}")
         size = math.prod(shape) * dtype.itemsize
         if size == 0 and kinds != "U":
-            raise UserError(f"{path}: '{key}' is empty: shape {shape}")
-        if (max_rows is not None and shape and shape[0] > max_rows) or size > MAX_BYTES:
+            raise UserError(f"{path}: '{key}' is empty: shape {shortened(shape)}")
+        if (max_rows is not None and shape and shape[0] > max_rows) or size > max_bytes:
             most = f"{max_rows} frames and " if max_rows is not None else ""
+            claimed = f"{size / 2**30:.3g} GiB" if size < 2**100 else "more than any disk holds"
             raise UserError(
-                f"{path}: '{key}' claims shape {shape}, {size / 2**30:.3g} GiB; "
-                f"at most {most}{MAX_BYTES / 2**30:g} GiB are read"
+                f"{path}: '{key}' claims shape {shortened(shape)}, {claimed}; at most {most}{max_bytes / 2**30:.3g} GiB"
+                " are read"
             )
         stored = self._archive.getinfo(f"{key}.npy").file_size
         if size > stored:
             raise UserError(
                 f"{path}: '{key}' claims shape {shape}, {size} bytes, but holds {stored}; the file is damaged"
             )
+        return header
+
+    @contextmanager
+    def _reading(self, key: str, otherwise: str) -> Iterator[IO[bytes]]:
+        """A member opened; whatever zipfile, zlib and numpy make of a stranger's bytes becomes our sentence, as theirs
+        advise to allow pickles.
+        """
         try:
-            with self._archive.open(f"{key}.npy") as handle:
-                return npy.read_array(handle, allow_pickle=False)
-        except Exception as error:  # as above: truncated or altered content
-            raise UserError(f"{path}: '{key}' cannot be read: {error or type(error).__name__}") from error
+            with self._archive.open(check_member(self._archive, f"{key}.npy")) as file:
+                yield file
+        except UserError:
+            raise
+        except Exception as error:
+            raise UserError(f"{self.path}: '{key}' cannot be read: {otherwise}") from error
 
 
 @contextmanager
@@ -75,25 +130,32 @@ def open_npz(path: Path) -> Iterator[NpzFile]:
     Raises:
         UserError: it is missing, not readable, or no .npz file.
     """
-    if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
-    try:
-        archive = zipfile.ZipFile(path)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # whatever zipfile makes of a stranger's bytes
-        raise UserError(f"{path}: is not an .npz file (a zip archive of arrays): {error}") from error
-    with archive:
+    with open_archive(path, "is not an .npz file (a zip archive of arrays)", 4 * MAX_BYTES) as archive:
         yield NpzFile(path, archive)
 
 
-def _read_header(handle: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and type that an .npy member claims to have."""
+def _read_header(handle: IO[bytes]) -> _Header:
+    """What an .npy member claims; ValueError where it is none, or one for records. NumPy's warning, that Python 2 wrote
+    the file, is no news to our users.
+    """
     version = npy.read_magic(handle)
-    if version == (1, 0):
-        shape, _, dtype = npy.read_array_header_1_0(handle)
-    elif version == (2, 0):
-        shape, _, dtype = npy.read_array_header_2_0(handle)
-    else:
-        raise ValueError(f"version {version} of the .npy format is for records")
-    return shape, dtype
+    if version not in ((1, 0), (2, 0)):
+        raise ValueError("another version of the format")
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    with warnings.catch_warnings(action="ignore"):
+        shape, by_column, dtype = read(handle)
+    if len(shape) > _MAX_AXES or min(shape, default=0) < 0:
+        raise ValueError("no shape of an array")
+    return _Header(tuple(map(int, shape)), dtype, bool(by_column))
+
+
+def _fill(handle: IO[bytes], content: bytearray) -> int:
+    """Reads until a buffer is full or the file ends; how many bytes came."""
+    view, done = memoryview(content), 0
+    while done < len(content):
+        piece = handle.read(min(len(content) - done, 2**20))
+        if not piece:
+            break
+        view[done : done + len(piece)] = piece
+        done += len(piece)
+    return done

@@ -6,6 +6,7 @@ data.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -22,6 +23,7 @@ from safetensors.torch import save
 from torch import Tensor
 
 from mrhubo.errors import UserError
+from mrhubo.files.regular import check_regular, open_regular, read_regular
 
 _CHECKSUM = "xxh3"
 
@@ -48,7 +50,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it was never made, nor perhaps its folder
+            temporary.unlink(missing_ok=True)
 
 
 def _sync_folder(folder: Path) -> None:
@@ -99,8 +102,48 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def checksum_file(path: Path) -> str:
-    """xxh3 of a file's bytes, 16 hex digits."""
-    return xxhash.xxh3_64(path.read_bytes()).hexdigest()
+    """xxh3 of a file's bytes, 16 hex digits.
+
+    Raises:
+        UserError: it is missing, no regular file, or may not be read.
+    """
+    digest = xxhash.xxh3_64()
+    with open_regular(path) as file:
+        while piece := file.read(2**20):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+@contextmanager
+def checked_path(path: Path) -> Iterator[Path]:
+    """As `atomic_path`, with a checksum of the content in a file beside it, which `matches_checksum` reads.
+
+    That file is written first and holds the checksum of the former content too: whenever the process ends, it holds
+    that of what is there.
+
+    Raises:
+        UserError: the folder or the disk refuses a file.
+    """
+    with atomic_path(path) as temporary:
+        yield temporary
+        known = [checksum_file(temporary), *([checksum_file(path)] if path.is_file() else [])]
+        with atomic_path(_beside(path)) as aside:
+            aside.write_text("\n".join(known))
+
+
+def matches_checksum(path: Path) -> bool | None:
+    """Whether a file holds what `checked_path` wrote; None if no checksum is beside it.
+
+    Raises:
+        UserError: the file, or the one with its checksum, is no regular one or may not be read.
+    """
+    if not _beside(path).exists():
+        return None
+    return checksum_file(path) in read_regular(_beside(path), 1_000).decode("ascii", "replace").split()
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.name}.xxh3")
 
 
 def checksum_tensors(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
@@ -151,10 +194,16 @@ def read_some_tensors(path: Path, names: Iterable[str]) -> tuple[dict[str, Tenso
 @contextmanager
 def _reading(path: Path) -> Iterator[Any]:
     try:
+        check_regular(path)
+    except UserError as error:
+        said = str(error).removeprefix(f"{path}: ")
+        raise DamagedFile(f"{path}: cannot be read as safetensors: {said}") from error
+    try:
         with safe_open(path, framework="pt") as handle:
             yield handle
-    except (OSError, SafetensorError, ValueError) as error:
-        raise DamagedFile(f"{path}: cannot be read as safetensors: {error}") from error
+    except Exception as error:  # whatever safetensors and torch make of a stranger's bytes
+        said = str(error) if isinstance(error, OSError | SafetensorError) else type(error).__name__
+        raise DamagedFile(f"{path}: cannot be read as safetensors: {said}") from error
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:

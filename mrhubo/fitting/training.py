@@ -6,17 +6,17 @@ The scale factor, where it is to be searched for, and the pairs are found and ma
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import lightning
 import torch
-from lightning.pytorch.callbacks import ModelCheckpoint
 from lightning.pytorch.loggers import Logger
 from torch import Tensor
 
-from mrhubo.callbacks import ClipMetrics, TrainingProgress
+from mrhubo.callbacks import BEST, LAST, CheckedFiles, Checkpoints, ClipMetrics, TrainingProgress, resumable
 from mrhubo.config import TrainerConfig
 from mrhubo.evaluation import Clip
 from mrhubo.fitting.datamodule import PairData
@@ -69,14 +69,15 @@ def train(
         prepared: the checked config; with `robot.scale: search` a `ScaleFactorSearch` must be among the callbacks.
         report: told of the steps.
         validation: clips that choose the checkpoint.
-        checkpoints: folder for `last.ckpt` and the best one, written at every validation.
-        resume: checkpoint to go on from, or None.
+        checkpoints: folder for `last.ckpt` and `best.ckpt`, see `Checkpoints`.
+        resume: the last checkpoint, to go on from, or None where there is none that can be read. One that does not fit
+            is passed over, with a sentence, and the best one is taken in its place, if that fits.
         logger: Lightning's logger, or False for none.
         ranks: the processes that train together (DDP), each on its share of every batch; default: this one alone.
         callbacks: more of them; they stand after the metrics of the validation clips.
 
     Raises:
-        UserError: a shard cannot be written, or the filter drops every pair.
+        UserError: a shard or a checkpoint cannot be written, or the filter drops every pair.
         KeyboardInterrupt: the user stopped it; the last checkpoint is there.
     """
     ranks = ranks or Ranks()
@@ -86,36 +87,36 @@ def train(
         network = build_network(prepared.config, prepared.body_map)
     data = PairData(prepared, network.features, report, ranks)
     module = RetargetModule(network, settings, prepared.config.model.detach_student)
-    saver = ModelCheckpoint(
-        dirpath=checkpoints,
-        filename="best",
-        monitor="val/link_cm",
-        mode="min",
-        save_last=True,
-        save_top_k=1,
-        save_on_train_epoch_end=True,
-        enable_version_counter=False,
-    )
+    saver = Checkpoints(checkpoints, "val/link_cm")
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
     progress = TrainingProgress(settings.max_steps, _SHOWN, report)
     with quiet_lightning():
         trainer = _trainer(
             settings, device_of(prepared.config).type, ranks, logger, [metrics, *callbacks, progress, saver]
         )
-        run_trainer(trainer, module, resume, datamodule=data)
-    best = torch.load(saver.best_model_path, map_location="cpu", weights_only=True)["state_dict"]
+        run_trainer(trainer, module, _start(resume, checkpoints, module, report), datamodule=data)
+    best = torch.load(checkpoints / BEST, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
     network.requires_grad_(False).eval()
-    score = saver.best_model_score
     return Training(
         data.prepared,
         network,
         data.pairs,
         data.filter,
         data.pairing,
-        Path(saver.best_model_path),
-        float("nan") if score is None else float(score),
+        checkpoints / BEST,
+        float("nan") if saver.best_score is None else saver.best_score,
     )
+
+
+def _start(resume: Path | None, checkpoints: Path, module: RetargetModule, report: Reporter) -> Path | None:
+    """The checkpoint that the training goes on from; says what is passed over, and what happens in place of that."""
+    if resume is None and not os.path.lexists(checkpoints / LAST):
+        return None
+    found, said = resumable(checkpoints, module)
+    for sentence in said:
+        report.say(f"{sentence}; the training goes on from {found.name if found else 'its beginning'}")
+    return found
 
 
 def _trainer(
@@ -137,4 +138,5 @@ def _trainer(
         enable_progress_bar=False,
         enable_model_summary=False,
         callbacks=callbacks,
+        plugins=[CheckedFiles()],
     )

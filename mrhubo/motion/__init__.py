@@ -2,10 +2,11 @@
 
 from mrhubo.motion.load import find_motions, read_folder, read_motion
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import MotionLike, Poses, read_poses
+from mrhubo.motion.poses import ArrayLike, MotionLike, Poses, read_poses, to_tensor
 from mrhubo.motion.writers.amass import write_motion
 
 __all__ = [
+    "ArrayLike",
     "Motion",
     "MotionLike",
     "Poses",
@@ -13,5 +14,6 @@ __all__ = [
     "read_folder",
     "read_motion",
     "read_poses",
+    "to_tensor",
     "write_motion",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,7 +30,8 @@ def read_folder(folder: Path) -> list[Motion]:
         UserError: the folder is missing or holds no motion, two files hold a motion of one name, or a file is bad.
     """
     folder = Path(folder)
-    if not folder.is_dir():
+    _refuse_file(folder)
+    if not os.path.isdir(folder):
         raise UserError(f"{folder}: there is no such folder")
     files = _motion_files(folder)
     if not files:
@@ -46,15 +48,24 @@ def find_motions(folders: Sequence[Path]) -> Path:
     """The first of some folders that exists and holds a motion file.
 
     Raises:
-        UserError: none does.
+        UserError: none does, or one of them is a file.
     """
-    for folder in folders:
-        if Path(folder).is_dir() and _motion_files(Path(folder)):
-            return Path(folder)
+    for folder in map(Path, folders):
+        _refuse_file(folder)
+        if os.path.isdir(folder) and _motion_files(folder):
+            return folder
     looked = ", ".join(str(folder) for folder in folders) or "no folder given"
     raise UserError(f"no .npz motion file found; looked in: {looked}")
 
 
+def _refuse_file(folder: Path) -> None:
+    if os.path.isfile(folder):
+        raise UserError(f"{folder}: is a file; name the folder that holds it: {folder.parent}")
+
+
 def _motion_files(folder: Path) -> list[Path]:
-    found = (file for file in folder.iterdir() if file.suffix == ".npz" and not file.name.startswith("."))
-    return sorted(file for file in found if not file.stem.endswith(_NO_MOTION) and file.is_file())
+    try:
+        found = [file for file in folder.iterdir() if file.suffix == ".npz" and not file.name.startswith(".")]
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be read: {error.strerror or error}") from error
+    return sorted(file for file in found if not file.stem.endswith(_NO_MOTION) and os.path.isfile(file))

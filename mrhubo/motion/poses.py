@@ -6,8 +6,9 @@ Legend: ... any leading axes, T frames (the leading axes as one), J = 21: SMPL's
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
@@ -18,11 +19,23 @@ from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
 
-MotionLike: TypeAlias = Motion | Tensor | np.ndarray
-"""A motion, or local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3), axis-angle [rad] (..., 63), as AMASS's
-`pose_body` has it, or 6D (..., 21, 6); any leading axes, none for a single pose."""
-MAX_TURN = 8 * math.pi
-"""No axis-angle number is that large [rad]; degrees are."""
+ArrayLike: TypeAlias = Tensor | np.ndarray | Sequence[Any]
+"""Numbers as a torch or NumPy array, or as nested lists."""
+MotionLike: TypeAlias = Motion | ArrayLike
+"""A motion, or local rotations of SMPL's joints 1..21 as an array or nested lists: matrices (..., 21, 3, 3), axis-angle
+[rad] (..., 63), as AMASS's `pose_body` has it, or 6D (..., 21, 6); any leading axes, none for a single pose."""
+MAX_TURN = 6 * math.pi
+"""No joint of a body turns three times [rad]; numbers in degrees say so."""
+_BEYOND_HALF, _BEYOND_FULL = 3.5, 6.6
+"""Turns [rad] beyond half a turn and beyond a whole one. Half of one tells all rotations; sources that follow a joint
+from frame to frame give more now and then, of some joint."""
+_SHARE_BEYOND_HALF, _SHARE_BEYOND_FULL = 0.15, 0.03
+"""Of all joints and frames. In degrees, CMU's clips exceed one of them even where they are scaled down until no joint
+turns more than 10; in radians none of their joints turns more than half a turn."""
+_MANY = 50
+"""Frames of an array from which on such shares say something."""
+_CHUNK = 16_384
+"""Frames that are checked and converted at a time."""
 _JOINTS = len(POSED_JOINT_NAMES)
 _SKEW = 1e-2
 """How far R^T R may be from the identity: half precision and rounded text still pass."""
@@ -42,6 +55,36 @@ class Poses:
     """Frames per second, where it is known."""
 
 
+@dataclass
+class Turns:
+    """How far the joints of a motion turn, counted block by block: tells degrees from radians."""
+
+    joints: int = 0
+    beyond_half: int = 0
+    beyond_full: int = 0
+    largest: float = 0.0
+
+    def add(self, turn_TJ: Tensor) -> None:
+        """Counts some frames' angles (T, J) [rad]."""
+        if turn_TJ.numel():
+            self.joints += turn_TJ.numel()
+            self.beyond_half += int((turn_TJ > _BEYOND_HALF).sum())
+            self.beyond_full += int((turn_TJ > _BEYOND_FULL).sum())
+            self.largest = max(self.largest, float(turn_TJ.max()))
+
+    @property
+    def are_degrees(self) -> bool:
+        """Whether so many joints turn so far as do in no motion of a person."""
+        half, full = _SHARE_BEYOND_HALF * self.joints, _SHARE_BEYOND_FULL * self.joints
+        return self.beyond_half > half or self.beyond_full > full
+
+    @property
+    def described(self) -> str:
+        """In words, for a sentence."""
+        share = 100 * self.beyond_half / self.joints
+        return f"{share:.0f}% of the joints would turn by more than half a turn, up to {self.largest:.3g} rad"
+
+
 def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
     """A motion or an array as poses; the form of an array is told by its last axes.
 
@@ -54,57 +97,110 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
             frame), or the frame rate is not positive.
     """
     if isinstance(motion, Motion):
-        array, frame_rate = motion.local_TJ33, motion.frame_rate
+        array, frame_rate = to_tensor(motion.local_TJ33), motion.frame_rate
     else:
-        array = _to_tensor(motion)
-    if frame_rate is not None and not (math.isfinite(frame_rate) and frame_rate > 0):
-        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
+        array = to_tensor(motion)
+    check_frame_rate(frame_rate)
     shape = tuple(array.shape)
-    if shape[-3:] == (_JOINTS, 3, 3):
-        leading, wrong, what = shape[:-3], _no_matrix(array), "a matrix that is no rotation"
-        pose = array
-    elif shape[-2:] == (_JOINTS, 6):
-        leading, wrong, what = shape[:-2], _no_sixd(array), "six numbers that are no rotation"
-        pose = stack_columns(array)
-    elif shape[-1:] == (3 * _JOINTS,):
-        array = array.unflatten(-1, (_JOINTS, 3))
-        leading, wrong, what = shape[:-1], (array.abs() > MAX_TURN).any(-1), "no axis-angle in radians (degrees?)"
-        pose = axis_angle_to_matrix(array)
-    else:
+    form = next((form for form in _FORMS if shape[-len(form.axes) :] == form.axes), None)
+    if form is None:
         raise UserError(
             f"human poses must have the shape (..., {_JOINTS}, 3, 3) (matrices), (..., {3 * _JOINTS}) (axis-angle, rad)"
             f" or (..., {_JOINTS}, 6) (6D), found {shape}"
         )
-    numbers = array.flatten(len(leading) + 1)
-    _refuse(~numbers.isfinite().all(-1), leading, "NaN or infinite numbers")
-    _refuse(wrong.any(-1), leading, what)
-    return Poses(pose.reshape(-1, _JOINTS, 3, 3).float(), leading, frame_rate)
+    leading = shape[: -len(form.axes)]
+    array = array.reshape(math.prod(leading), *form.axes)
+    poses, turns = [], Turns()
+    for first, part in enumerate(array.split(_CHUNK)):
+        _refuse(~part.flatten(1).isfinite().all(-1), first * _CHUNK, leading, "NaN or infinite numbers")
+        wrong_TJ, pose_TJ33 = form.read(part, turns)
+        _refuse(wrong_TJ.any(-1), first * _CHUNK, leading, form.wrong)
+        if pose_TJ33 is not part:
+            poses.append(pose_TJ33.float())
+    if turns.are_degrees and len(array) >= _MANY:
+        raise UserError(f"human poses are no axis-angle in radians (degrees?): {turns.described}")
+    return Poses(torch.cat(poses) if poses else array.float(), leading, frame_rate)
 
 
-def _to_tensor(array: Tensor | np.ndarray) -> Tensor:
+def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
+    """Refuses what is no positive number of frames per second; None is one that is not known, unless it is needed."""
+    known = needed or frame_rate is not None
+    if known and not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
+        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
+
+
+def to_tensor(array: ArrayLike) -> Tensor:
+    """Numbers as a tensor, float32 or, where they come so, float64.
+
+    Raises:
+        UserError: it is no NumPy or torch array of numbers, nor lists of numbers that make one.
+    """
+    given = array
+    if isinstance(array, list | tuple):
+        try:
+            array = np.array(array)
+        except Exception:  # ragged lists, tensors on other devices
+            array = None
     if isinstance(array, np.ndarray) and array.dtype.kind in "fiu":
-        array = torch.from_numpy(np.array(array))  # a copy: torch wants it writable and without negative strides
-    if not isinstance(array, Tensor) or array.is_complex() or array.dtype == torch.bool:
-        kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray | Tensor) else type(array).__name__
+        # a copy: torch wants it writable, without negative strides, and in this machine's order of bytes
+        exact = array.dtype.kind == "f" and array.dtype.itemsize >= 8
+        with np.errstate(over="ignore"):
+            array = torch.from_numpy(np.array(array, np.float64 if exact else np.float32))
+    if (
+        not isinstance(array, Tensor)
+        or array.is_complex()
+        or array.dtype == torch.bool
+        or array.layout != torch.strided
+    ):
+        kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray | Tensor) else type(given).__name__
         raise UserError(f"human motion: expected a Motion, or a NumPy or torch array of numbers, found {kind}")
     return array if array.dtype == torch.float64 else array.float()
 
 
-def _no_matrix(matrix: Tensor) -> Tensor:
-    """Which of the matrices (..., 21, 3, 3) are not orthonormal, or mirror."""
+@dataclass(frozen=True)
+class _Form:
+    """A form in which arrays hold rotations."""
+
+    axes: tuple[int, ...]
+    """The last axes."""
+    read: Callable[[Tensor, Turns], tuple[Tensor, Tensor]]
+    """Which joints (T, 21) are no rotation, and the matrices (T, 21, 3, 3); counts turns where it can."""
+    wrong: str
+    """What is wrong with those joints."""
+
+
+def _read_matrices(matrix: Tensor, _: Turns) -> tuple[Tensor, Tensor]:
+    """Those that are not orthonormal, or mirror, are wrong."""
     skew = (matrix.mT @ matrix - torch.eye(3).to(matrix)).abs().amax((-2, -1))
-    return (skew > _SKEW) | (torch.linalg.det(matrix) < 0)
+    return (skew > _SKEW) | (torch.linalg.det(matrix) < 0), matrix
 
 
-def _no_sixd(sixd: Tensor) -> Tensor:
-    """Which of the six numbers (..., 21, 6) hold a column that is zero, or two that are parallel."""
+def _read_sixd(sixd: Tensor, _: Turns) -> tuple[Tensor, Tensor]:
+    """Those that hold a column that is zero, or two that are parallel, are wrong."""
     first, second = sixd[..., :3], sixd[..., 3:]
-    return torch.linalg.cross(first, second).norm(dim=-1) <= _FLAT * first.norm(dim=-1) * second.norm(dim=-1)
+    parallel = torch.linalg.cross(first, second).norm(dim=-1) <= _FLAT * first.norm(dim=-1) * second.norm(dim=-1)
+    return parallel, stack_columns(sixd)
 
 
-def _refuse(wrong: Tensor, leading: tuple[int, ...], what: str) -> None:
-    """Raises for the first frame that is wrong; `wrong` has the leading axes, or one more for the joints."""
-    if bool(wrong.any()):
-        index = tuple(wrong.nonzero()[0].tolist()[: len(leading)])
+def _read_axis_angle(numbers: Tensor, turns: Turns) -> tuple[Tensor, Tensor]:
+    """Those that turn further than any joint of a body are wrong."""
+    rotvec = numbers.unflatten(-1, (_JOINTS, 3))
+    turn_TJ = rotvec.norm(dim=-1)
+    turns.add(turn_TJ)
+    return turn_TJ > MAX_TURN, axis_angle_to_matrix(rotvec)
+
+
+_FORMS = (
+    _Form((_JOINTS, 3, 3), _read_matrices, "a matrix that is no rotation"),
+    _Form((_JOINTS, 6), _read_sixd, "six numbers that are no rotation"),
+    _Form((3 * _JOINTS,), _read_axis_angle, "no axis-angle in radians (degrees?)"),
+)
+
+
+def _refuse(wrong_T: Tensor, first: int, leading: tuple[int, ...], what: str) -> None:
+    """Raises for the first frame that is wrong, of those from number `first` on."""
+    if bool(wrong_T.any()):
+        place = first + int(wrong_T.nonzero()[0, 0])
+        index = tuple(int(n) for n in np.unravel_index(place, leading)) if leading else ()
         frame = f" {index[0]}" if len(index) == 1 else f" {index}" if index else ""
         raise UserError(f"human pose{frame} holds {what}")

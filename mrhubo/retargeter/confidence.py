@@ -21,6 +21,6 @@ def confidence(phi_T: Tensor, phi_threshold: float, direction_error_deg_TD: Tens
             training's pairs.
         direction_error_deg_TD: angle [deg] between the robot's and the human's limb, hand and head directions.
     """
-    plausible_T = (phi_threshold / phi_T.clamp_min(1e-12)).clamp(max=1.0)
+    plausible_T = (phi_threshold / phi_T.clamp_min(1e-12)).clamp(0.0, 1.0)
     agreement_T = torch.exp(-(direction_error_deg_TD.mean(dim=1) / _AGREEMENT_DEG).square())
-    return plausible_T * agreement_T
+    return torch.nan_to_num(plausible_T * agreement_T, nan=0.0)  # what cannot be told is not trusted

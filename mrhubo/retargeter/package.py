@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import copy
 import json
+import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,19 +24,33 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
-from mrhubo.motion import MotionLike, read_poses
+from mrhubo.motion import ArrayLike, MotionLike, read_poses, to_tensor
 from mrhubo.reference import DirectionProblem, angle_between
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import confidence
+from mrhubo.retargeter.integrity import (
+    check_content,
+    check_files,
+    check_paths,
+    check_prior,
+    check_weights,
+    file_checksums,
+)
 from mrhubo.retargeter.networks import RetargetNetwork
-from mrhubo.retargeter.result import RetargetResult
+from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 
 SCHEMA = "mrhubo.retargeter/3"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
+_OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)
+"""Files beside the weights."""
+_CHUNK = 8_192
+"""Frames that are worked on at a time: each takes some 13 kB on the way."""
+_LARGEST = 2.0
+"""No number of a rotation matrix is larger than 1; those that come near to one may be a little."""
 POLISH = 1
 """Steps of optimisation that `retarget` makes after the networks, unless told otherwise."""
 
@@ -97,27 +113,32 @@ class Retargeter(nn.Module):
         return self.retarget(poses.local_TJ33, polish).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
-    def predict(self, local_TJ33: Tensor, polish: int = 0) -> Tensor:
+    def predict(self, local_TJ33: ArrayLike, polish: int = 0) -> Tensor:
         """Joint angles (T, N) [rad] of human poses; inside the limits.
 
         Args:
-            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21.
+            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21; an array of torch or NumPy, or lists.
             polish: Levenberg-Marquardt steps of the reference retargeter from the networks' answer, each frame on its
                 own; a step that does not bring the limbs nearer to the human's is not taken. 0: the networks alone.
 
         Raises:
-            UserError: the poses have another shape, or hold NaN or infinite numbers; `polish` is negative.
+            UserError: the poses have another shape, or hold NaN, infinite numbers or some that no rotation has;
+                `polish` is negative.
         """
-        local_TJ33 = self._checked(local_TJ33, polish)
+        return torch.cat([self._predict(part, polish) for part in self._parts(local_TJ33, polish)])
+
+    def _predict(self, local_TJ33: Tensor, polish: int) -> Tensor:
         human = self.body_map.human(local_TJ33) if polish and len(local_TJ33) else None
         return self._answer(local_TJ33, None if human is None else self.body_map.human_directions(human), polish)
 
     @torch.no_grad()
-    def retarget(self, local_TJ33: Tensor, polish: int = POLISH) -> RetargetResult:
+    def retarget(self, local_TJ33: ArrayLike, polish: int = POLISH) -> RetargetResult:
         """Joint angles, by default after a step of optimisation, with a confidence for each frame; arguments as for
         `predict`.
         """
-        local_TJ33 = self._checked(local_TJ33, polish)
+        return join_results([self._retarget(part, polish) for part in self._parts(local_TJ33, polish)])
+
+    def _retarget(self, local_TJ33: Tensor, polish: int) -> RetargetResult:
         human = self.body_map.human(local_TJ33)
         target_TD3 = self.body_map.human_directions(human)
         q_TN = self._answer(local_TJ33, target_TD3, polish)
@@ -128,19 +149,25 @@ class Retargeter(nn.Module):
         collision_T = self.collision.collides(q_TN, links)
         return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, collision_T)
 
-    def _checked(self, local_TJ33: Tensor, polish: int) -> Tensor:
-        """The poses as the networks want them: on their device, float32."""
-        if polish < 0:
+    def _parts(self, local_TJ33: ArrayLike, polish: int) -> Iterator[Tensor]:
+        """The poses as the networks want them, on their device, float32, so many at a time that all that is made of
+        them fits into memory.
+        """
+        if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
             raise UserError(f"polish must be 0 or more steps, found {polish}")
-        joints = len(POSED_JOINT_NAMES)
-        if local_TJ33.ndim != 4 or local_TJ33.shape[1:] != (joints, 3, 3):
-            raise UserError(
-                f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(local_TJ33.shape)}"
-            )
-        finite_T = torch.isfinite(local_TJ33).flatten(1).all(dim=1)
-        if not bool(finite_T.all()):
-            raise UserError(f"human pose {int((~finite_T).nonzero()[0, 0])} holds NaN or infinite numbers")
-        return local_TJ33.to(self.device, torch.float32)
+        given, joints = to_tensor(local_TJ33), len(POSED_JOINT_NAMES)
+        if given.ndim != 4 or given.shape[1:] != (joints, 3, 3):
+            raise UserError(f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}")
+        for number, part in enumerate(given.split(_CHUNK)):
+            largest_T = part.abs().flatten(1).amax(dim=1) if len(part) else part.new_zeros(0)
+            wrong_T = ~(largest_T <= _LARGEST)
+            if bool(wrong_T.any()):
+                frame = int(wrong_T.nonzero()[0, 0])
+                what = (
+                    "numbers that no rotation has" if bool(largest_T[frame].isfinite()) else "NaN or infinite numbers"
+                )
+                raise UserError(f"human pose {number * _CHUNK + frame} holds {what}")
+            yield part.to(self.device, torch.float32)
 
     def _answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int) -> Tensor:
         """Joint angles (T, N) [rad]; the human's directions (T, D, 3) are needed for steps of optimisation."""
@@ -170,6 +197,7 @@ class Retargeter(nn.Module):
             "output": "joint angles in rad, in the order of joint_names",
             "phi_threshold": repr(self.phi_threshold),
             **provenance,
+            **file_checksums(folder, _OTHERS),
         }
         write_tensors(folder / _WEIGHTS, self.network.state_dict(), metadata)
         return folder
@@ -179,22 +207,31 @@ class Retargeter(nn.Module):
         """Reads a package.
 
         Raises:
-            UserError: the folder is no package, a file is missing or damaged, or weights and settings do not fit.
+            UserError: the folder is no package, a file is missing or damaged, was edited or comes from another package,
+                or weights and settings do not fit.
         """
         folder = Path(folder)
-        if not (folder / _WEIGHTS).is_file():
+        if os.path.isfile(folder):
+            raise UserError(f"{folder}: is a file; a package is a folder: name {folder.parent}")
+        if not os.path.lexists(folder / _WEIGHTS):
             raise UserError(f"{folder}: is no package of a retargeter: {_WEIGHTS} is missing")
         tensors, metadata = read_tensors(folder / _WEIGHTS)
         if metadata.get("schema") != SCHEMA:
             raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
+        check_files(folder, _OTHERS, metadata)
         config = load_config(folder / _CONFIG)
-        prior, body_map = open_prior(config.body), build_body_map(config.robot, build_skeleton(config.body))
+        body = config.body
+        check_paths(folder, {_URDF: config.robot.urdf, _PRIOR: body.prior_path, _SKELETON: body.model_path})
+        prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))
+        check_prior(folder, metadata, prior)
         network = build_network(config, body_map)
+        threshold = check_content(folder, metadata, body_map.robot, network.features.input_joints)
         try:
-            network.load_state_dict(tensors)
-            threshold = float(metadata["phi_threshold"])
-        except (RuntimeError, KeyError, ValueError) as error:
-            raise UserError(f"{folder}: weights and settings do not fit: {error}") from error
+            network.load_state_dict({name: tensor for name, tensor in tensors.items() if tensor.is_floating_point()})
+        except RuntimeError as error:
+            said = shortened(" ".join(str(error).split()), 300)
+            raise UserError(f"{folder}: weights and settings do not fit: {said}") from error
+        check_weights(folder, network.state_dict(), body_map.robot)
         return cls(network, body_map, prior, config, threshold)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
 from torch import Tensor
 
 from mrhubo.files.joint_angles import write_joint_angles
@@ -35,8 +37,9 @@ class RetargetResult:
 
     def with_leading(self, shape: tuple[int, ...], frame_rate: float | None) -> RetargetResult:
         """The same with other leading axes, for as many frames, and a frame rate."""
-        names = ("q", "confidence", "direction_error_deg", "phi", "collision")
-        tensors = {name: getattr(self, name).unflatten(0, shape) if shape else getattr(self, name)[0] for name in names}
+        tensors = {
+            name: getattr(self, name).unflatten(0, shape) if shape else getattr(self, name)[0] for name in _TENSORS
+        }
         return dataclasses.replace(self, **tensors, frame_rate=frame_rate)
 
     def save(self, path: Path | str) -> None:
@@ -48,3 +51,12 @@ class RetargetResult:
         names = ("confidence", "direction_error_deg", "phi", "collision")
         more = {name: getattr(self, name).cpu().numpy() for name in names}
         write_joint_angles(path, self.q.cpu().numpy(), self.joint_names, self.frame_rate, more)
+
+
+_TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision")
+
+
+def join_results(parts: Sequence[RetargetResult]) -> RetargetResult:
+    """One result of those of a motion's parts, one after the other; without a frame rate."""
+    tensors = {name: torch.cat([getattr(part, name) for part in parts]) for name in _TENSORS}
+    return RetargetResult(**tensors, joint_names=parts[0].joint_names)

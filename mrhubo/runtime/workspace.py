@@ -14,6 +14,8 @@ from types import TracebackType
 
 import torch
 
+from mrhubo.errors import UserError
+from mrhubo.files.regular import check_regular, read_regular
 from mrhubo.files.storage import Locked, atomic_path, locked
 
 
@@ -71,6 +73,7 @@ class Workspace:
         """Checkpoint to resume from; one that cannot be read is passed over."""
         path = self.checkpoints / "last.ckpt"
         try:
+            check_regular(path)
             torch.load(path, map_location="cpu", weights_only=True)
         except Exception:
             return None
@@ -95,8 +98,8 @@ class Workspace:
 
     def _read(self) -> dict[str, object]:
         try:
-            state = json.loads(self._state_file.read_text())
-        except (OSError, ValueError):
+            state = json.loads(read_regular(self._state_file))
+        except (UserError, ValueError):
             return {}
         return state if isinstance(state, dict) else {}
 

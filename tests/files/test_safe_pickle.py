@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from mrhubo.body import VPoser, open_skeleton
 from mrhubo.errors import UserError
 from mrhubo.files.safe_pickle import RecordedObject, read_checkpoint, to_array, to_tensor, unpickle
+from tests.files.bounded import bounded
 
 MODULES = ("numpy", "scipy", "collections", "_codecs", "__builtin__")
 
@@ -136,3 +137,123 @@ def test_checkpoints_may_mention_lightning_but_not_the_system(tmp_path: Path) ->
         archive.writestr("a/data.pkl", pickle.dumps([1, 2]))
     with pytest.raises(UserError, match="expected a dictionary, found list"):
         read_checkpoint(path)
+
+
+HUGE = (160 * 10**9).to_bytes(8, "little")
+PAIRS = b"K\x01" + b"2\x86" * 60
+"""A pair of a pair of a pair ...: two bytes for each, and twice as long to hash."""
+BOMBS = {
+    "a place in the memo far away": b"\x80\x02]r\xff\xff\xff\x1f.",
+    "one that is a number in text": b"]p99999999999999999999\n.",
+    "bytes that are not there": b"\x80\x05\x8e" + HUGE + b".",
+    "an array of bytes that is not there": b"\x80\x05\x96" + HUGE + b".",
+    "a frame that is not there": b"\x80\x04\x95" + HUGE + b".",
+    "a key that takes for ever to hash": b"\x80\x02}" + PAIRS + b"K\x01s.",
+    "one of several": b"\x80\x02}(" + PAIRS + b"K\x01u.",
+    "one of a dictionary": b"\x80\x02(" + PAIRS + b"K\x01d.",
+    "one of an ordered dictionary": b"\x80\x02ccollections\nOrderedDict\n(](" + PAIRS + b"K\x01\x86etR.",
+    "a member of a set": b"\x80\x04\x8f(" + PAIRS + b"\x90.",
+    "one of a frozen set": b"\x80\x04(" + PAIRS + b"\x91.",
+    "lists without end": b"\x80\x02" + b"]" * 1_000_000 + b".",
+    "names without end": b"".join(b"cnumpy\nn%d\n" % n for n in range(20_000)) + b".",
+    "a number of many digits": b"I" + b"9" * 1_000_000 + b"\n.",
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_small_pickle_takes_little(name: str) -> None:
+    with bounded(120, 8):
+        try:
+            unpickle(io.BytesIO(BOMBS[name]), MODULES)
+        except UserError:
+            pass
+
+
+def record(module: str, name: str, *args: Any, state: Any = None) -> Any:
+    kind = type(name, (RecordedObject,), {"module": module, "__slots__": ()})
+    made = kind(*args)
+    made.state = state
+    return made
+
+
+DOUBLE = record("numpy", "dtype", "f8", state=(3, "<"))
+
+
+def dense(content: Any, shape: Any, dtype: Any = DOUBLE) -> Any:
+    return record("numpy", "_reconstruct", state=(1, shape, dtype, False, content))
+
+
+def nested(depth: int) -> Any:
+    """Arrays that select from arrays, each twice."""
+    found = dense(bytes(8), (1,))
+    for _ in range(depth):
+        found = record("chumpy", "Select", state={"a": found, "idxs": found, "preferred_shape": (1,)})
+    return found
+
+
+def pair(depth: int) -> Any:
+    found: Any = "f8"
+    for _ in range(depth):
+        found = (found, found)
+    return found
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        dense(160 * 10**9, (20 * 10**9,)),
+        dense(bytes(8), (10**12,)),
+        dense(bytes(8), (pair(60),)),
+        dense(bytes(8), (1,), record("numpy", "dtype", pair(60))),
+        record("scipy", "csc_matrix", state={"_shape": (10**6, 10**6), "data": 1, "indices": 1, "indptr": 1}),
+        record("scipy", "csc_matrix", state={"_shape": pair(60), "data": 1, "indices": 1, "indptr": 1}),
+        nested(60),
+        record("chumpy", "Ch", state={"x": pair(60)}),
+    ],
+)  # fmt: skip
+def test_a_small_record_makes_no_large_array(value: Any) -> None:
+    with bounded(20, 2), pytest.raises(UserError):
+        to_array(value)
+
+
+def test_an_array_of_itself_is_none() -> None:
+    value = record("chumpy", "Ch", state={})
+    value.state["x"] = value
+    with pytest.raises(UserError, match="arrays of arrays"):
+        to_array(value)
+
+
+@pytest.mark.parametrize("args", [(0, (pair(60),), (1,)), (0, (2,), (pair(60),)), (pair(60), (2,), (1,))])
+def test_a_small_record_makes_no_large_tensor(args: Any) -> None:
+    kind = type("FloatStorage", (RecordedObject,), {"module": "torch"})
+    value = record("torch", "_rebuild_tensor_v2", ("storage", kind, "0", "cpu", 2), *args)
+    with bounded(20, 2), pytest.raises(UserError):
+        to_tensor(value, {"0": bytes(8)})
+    reference = ("storage", kind, pair(60), "cpu", 2)
+    with bounded(20, 2), pytest.raises(UserError):
+        to_tensor(record("torch", "_rebuild_tensor_v2", reference, 0, (2,), (1,)), {"0": bytes(8)})
+
+
+def test_files_of_torch_before_1_6_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "old.pt"
+    for state, said in (
+        ({"bodyprior_enc_fc1.weight": torch.zeros(2, 63)}, "is VPoser version 1"),
+        ({"vp_model.decoder_net.0.weight": torch.zeros(4, 2)}, "torch before 1.6"),
+    ):
+        torch.save(state, path, _use_new_zipfile_serialization=False)
+        with pytest.raises(UserError, match=said) as caught:
+            VPoser.open(path)
+        assert str(caught.value).startswith(f"{path}: ")
+    path.write_bytes(bytes(257) + b"ustar" + bytes(1_000))
+    with pytest.raises(UserError, match="torch before 0.2"):
+        VPoser.open(path)
+    torch.jit.script(torch.nn.Linear(1, 1)).save(str(path))
+    with pytest.raises(UserError, match="is a TorchScript program"):
+        VPoser.open(path)
+
+
+def test_a_huge_layer_is_not_made_of_one_that_is_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.ckpt"
+    torch.save({"state_dict": {"vp_model.decoder_net.0.weight": torch.zeros(300_000, 1)}}, path)
+    with pytest.raises(UserError, match="has num_neurons 300000"):
+        VPoser.open(path)

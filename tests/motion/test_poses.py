@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from mrhubo.errors import UserError
-from mrhubo.motion import Motion, read_poses
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_sixd
+from mrhubo.motion import Motion, poses, read_poses
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, matrix_to_sixd
 
 LEADING = st.lists(st.integers(0, 3), max_size=3).map(tuple)
 
@@ -50,6 +51,50 @@ def test_views_and_whole_numbers_do_too() -> None:
     assert torch.equal(read_poses(turns[::-1]).local_TJ33, read_poses(turns).local_TJ33.flip(0))
 
 
+@pytest.mark.parametrize("dtype", [">f4", np.float16, np.longdouble, np.uint16, "<i2"])
+def test_any_type_of_number_and_lists_do_too(dtype: object) -> None:
+    turns = np.zeros((5, 63), dtype)
+    turns[:, 0] = np.arange(5)
+    expected = read_poses(np.asarray(turns, np.float64)).local_TJ33
+    for given in (turns, turns.tolist(), list(turns), tuple(map(tuple, turns))):
+        torch.testing.assert_close(read_poses(given).local_TJ33, expected)
+    motion = Motion("a", expected.tolist(), 30)  # type: ignore[arg-type]
+    assert torch.equal(read_poses(motion).local_TJ33, expected)
+
+
+def test_many_frames_in_degrees_are_told_from_radians(root: Path) -> None:
+    with np.load(root / "data" / "motions" / "wave.npz") as content:
+        turns = content["pose_body"]
+    read_poses(turns)
+    small = turns * 15 / np.linalg.norm(turns.reshape(-1, 21, 3), axis=-1).max()
+    with pytest.raises(UserError, match=r"no axis-angle in radians \(degrees\?\)"):
+        read_poses(small)
+
+
+@pytest.mark.parametrize("value", [1e200, 1e39, 3e38, 1e-200])
+def test_numbers_beyond_single_precision_are_named(value: float) -> None:
+    for array in (
+        torch.full((3, 21, 3, 3), value, dtype=torch.float64),
+        torch.full((3, 21, 6), value, dtype=torch.float64),
+    ):
+        with pytest.raises(UserError, match="human pose 0 holds"):
+            read_poses(array)
+
+
+@pytest.mark.parametrize("length", [3, 7, 8])
+def test_long_arrays_are_read_part_by_part(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
+    matrices = axis_angle_to_matrix(torch.randn(2, 7, 21, 3, generator=torch.Generator().manual_seed(0)))
+    forms = [matrices, matrix_to_sixd(matrices), matrix_to_axis_angle(matrices).flatten(2)]
+    whole = [read_poses(form).local_TJ33 for form in forms]
+    monkeypatch.setattr(poses, "_CHUNK", length)
+    for form, expected in zip(forms, whole, strict=True):
+        assert torch.equal(read_poses(form).local_TJ33, expected)
+    bad = matrices.clone()
+    bad[1, 5, 3] = torch.nan
+    with pytest.raises(UserError, match=r"human pose \(1, 5\) holds NaN"):
+        read_poses(bad)
+
+
 def identity(*leading: int) -> torch.Tensor:
     return torch.eye(3).expand(*leading, 21, 3, 3).clone()
 
@@ -73,7 +118,8 @@ MIRROR, STRETCH = torch.diag(torch.tensor([1.0, 1.0, -1.0])), 1.1 * torch.eye(3)
         (np.array([[None] * 63]), "found an array of object"),
         (np.zeros((2, 63), dtype=complex), "found an array of complex128"),
         (torch.zeros(2, 63, dtype=torch.bool), "found an array of torch.bool"),
-        ([[0.0] * 63], "expected a Motion.*found list"),
+        ([[0.0] * 63, [0.0] * 62], "expected a Motion.*found list"),
+        ("wave.npz", "expected a Motion.*found str"),
         (bad((9,), (4, 3), torch.nan), "human pose 4 holds NaN or infinite numbers"),
         (bad((2, 9), (1, 7, 3), torch.inf), r"human pose \(1, 7\) holds NaN"),
         (bad((), (3,), torch.nan), "human pose holds NaN"),
@@ -90,7 +136,7 @@ def test_what_is_no_pose_is_named(array: object, message: str) -> None:
         read_poses(array)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("rate", [0.0, -24.0, math.nan, math.inf])
+@pytest.mark.parametrize("rate", [0.0, -24.0, math.nan, math.inf, "24", [24.0]])
 def test_a_frame_rate_is_positive(rate: float) -> None:
     with pytest.raises(UserError, match="frame rate must be a positive number"):
         read_poses(identity(2), rate)

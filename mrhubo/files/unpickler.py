@@ -1,0 +1,224 @@
+"""Reading pickles of strangers without executing anything, in bounded time and memory.
+
+A pickle names functions and classes and has them called. Here no name is ever imported: each becomes a class of our
+own that records what it was called with. Names from modules that the kind of file has no business with are refused.
+
+Nor can a small file keep the reader busy or fill the memory: what it may do is counted, places in its memo are kept by
+name, nothing is made that is larger than the file, and nothing is hashed whose parts the file repeats (a pair of a pair
+of a pair ... is a few bytes, and takes for ever to hash).
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
+from typing import Any, BinaryIO
+
+from mrhubo.errors import UserError, shortened
+
+_MAX_OPERATIONS = 500_000
+"""Steps that a pickle may take; those of body models and checkpoints take some thousands."""
+_MAX_NAMES = 1_000
+"""Different functions and classes that it may name."""
+_LARGEST_INT_KEY = 2**63
+_MAX_TUPLE_KEY = 16
+
+
+class RecordedObject:
+    """What a pickled object was called, made with, and given as its state; it does nothing."""
+
+    __slots__ = ("args", "state")
+    module = ""
+    args: tuple[Any, ...]
+    state: Any
+
+    def __new__(cls, *args: Any, **_: Any) -> RecordedObject:
+        """Records what the pickle calls the class with."""
+        self = object.__new__(cls)
+        self.args, self.state = args, None
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Module and name."""
+        return f"{self.module}.{type(self).__name__}"
+
+
+def unpickle(file: BinaryIO | io.BufferedIOBase, modules: Iterable[str]) -> Any:
+    """What a pickle holds, with `RecordedObject` in place of every object that is not plain Python; sets come out
+    empty, as nothing here reads them.
+
+    Args:
+        file: an open binary file; what follows the pickle is left unread, or not, as it happens.
+        modules: top-level modules whose names the pickle may mention.
+
+    Raises:
+        UserError: it is no pickle, is truncated, mentions another module, or wants too much.
+    """
+    try:
+        return _RestrictedUnpickler(file, modules).load()
+    except UserError:
+        raise
+    except Exception as error:  # whatever the unpickler makes of a stranger's bytes
+        raise UserError("it is no readable pickle") from error
+
+
+class _Reader:
+    """Reads no more than there is: the unpickler asks for as many bytes as the file tells it to."""
+
+    def __init__(self, file: BinaryIO | io.BufferedIOBase) -> None:
+        self._file = file
+        here = file.tell()
+        self._left = file.seek(0, io.SEEK_END) - here
+        file.seek(here)
+        self.readline = file.readline
+
+    def read(self, size: int) -> bytes:
+        return self._file.read(min(size, self._left)) if size >= 0 else b""
+
+
+# The pure Python one: the other, in C, makes room for as many places as the highest number in the memo says.
+class _RestrictedUnpickler(pickle._Unpickler):
+    """Python's unpickler, whose steps that call, set or hash something are ours."""
+
+    dispatch: dict[int, Callable[[Any], None]] = {}
+
+    def __init__(self, file: BinaryIO | io.BufferedIOBase, modules: Iterable[str]) -> None:
+        super().__init__(_Reader(file), encoding="latin1")
+        self.modules, self.names, self.steps = tuple(modules), {}, 0
+
+    def find_class(self, module: str, name: str) -> type[Any]:
+        """The class that records what a name is called with."""
+        if module.partition(".")[0] not in self.modules:
+            asked = shortened(f"{module}.{name}")
+            raise UserError(f"it asks for '{asked}', which a file of this kind has no use for; nothing was run")
+        if (module, name) == ("collections", "OrderedDict"):
+            return OrderedDict
+        if (module, name) not in self.names:
+            if len(self.names) >= _MAX_NAMES:
+                raise UserError(f"it names more than {_MAX_NAMES:,} functions and classes")
+            self.names[module, name] = type(name, (RecordedObject,), {"module": module, "__slots__": ()})
+        return self.names[module, name]
+
+    def persistent_load(self, pid: Any) -> Any:
+        """torch's reference to a storage."""
+        return pid
+
+    def count(self) -> None:
+        """One more step."""
+        self.steps += 1
+        if self.steps > _MAX_OPERATIONS:
+            raise UserError(f"it takes more than {_MAX_OPERATIONS:,} steps, as no file of this kind does")
+
+    def _make(self, kind: Any, args: Any) -> None:
+        """Puts what a name that `find_class` gave makes of its arguments onto the stack."""
+        if kind is OrderedDict:
+            made: Any = OrderedDict()
+            _set(made, (tuple(pair) for pair in args[0]) if args else ())
+        elif isinstance(kind, type) and issubclass(kind, RecordedObject) and isinstance(args, tuple):
+            made = kind(*args)
+        else:
+            raise TypeError("a call of what is no name")
+        self.append(made)  # type: ignore[attr-defined] (set by load)
+
+    def load_reduce(self) -> None:
+        args, kind = self.stack.pop(), self.stack.pop()
+        self._make(kind, args)
+
+    def load_newobj_ex(self) -> None:
+        _, args, kind = self.stack.pop(), self.stack.pop(), self.stack.pop()
+        self._make(kind, args)
+
+    def load_obj(self) -> None:
+        kind, *args = self.pop_mark()
+        self._make(kind, tuple(args))
+
+    def load_inst(self) -> None:
+        module, name = (self.readline()[:-1].decode("ascii") for _ in range(2))
+        self._make(self.find_class(module, name), tuple(self.pop_mark()))
+
+    def load_build(self) -> None:
+        state, target = self.stack.pop(), self.stack[-1]
+        if isinstance(target, RecordedObject):
+            target.state = state
+
+    def load_append(self) -> None:
+        value, target = self.stack.pop(), self.stack[-1]
+        _extend(target, [value])
+
+    def load_appends(self) -> None:
+        values = self.pop_mark()
+        _extend(self.stack[-1], values)
+
+    def load_setitem(self) -> None:
+        value, key, target = self.stack.pop(), self.stack.pop(), self.stack[-1]
+        _set(target, [(key, value)])
+
+    def load_setitems(self) -> None:
+        items = self.pop_mark()
+        _set(self.stack[-1], zip(items[::2], items[1::2], strict=True))
+
+    def load_dict(self) -> None:
+        items, made = self.pop_mark(), {}
+        _set(made, zip(items[::2], items[1::2], strict=True))
+        self.append(made)  # type: ignore[attr-defined]
+
+    def load_additems(self) -> None:
+        self.pop_mark()
+
+    def load_frozenset(self) -> None:
+        self.pop_mark()
+        self.append(frozenset())  # type: ignore[attr-defined]
+
+    def load_bytearray8(self) -> None:
+        self.append(bytearray(self.read(int.from_bytes(self.read(8), "little"))))  # type: ignore[attr-defined]
+
+
+def _set(target: Any, pairs: Iterable[tuple[Any, Any]]) -> None:
+    """Entries of a dictionary; those of unknown mappings are passed over."""
+    if isinstance(target, RecordedObject):
+        return
+    if not isinstance(target, dict):
+        raise TypeError("entries of what is no dictionary")
+    for key, value in pairs:
+        simple = [key] if not isinstance(key, tuple) else key[: _MAX_TUPLE_KEY + 1]
+        if len(simple) > _MAX_TUPLE_KEY or not all(map(_is_simple, simple)):
+            raise UserError("it has a key that is neither text nor a number")
+        target[key] = value
+
+
+def _is_simple(key: Any) -> bool:
+    """Whether a key is hashed at once, however often the file repeats it."""
+    if isinstance(key, int):
+        return abs(key) <= _LARGEST_INT_KEY
+    return key is None or isinstance(key, str | bytes | float | RecordedObject | type)
+
+
+def _extend(target: Any, values: list[Any]) -> None:
+    """More items of a list; those of unknown lists and sets are passed over."""
+    if isinstance(target, list):
+        target.extend(values)
+    elif not isinstance(target, RecordedObject):
+        raise TypeError("items of what is no list")
+
+
+def _counted(step: Callable[[Any], None]) -> Callable[[Any], None]:
+    def take(unpickler: _RestrictedUnpickler) -> None:
+        unpickler.count()
+        step(unpickler)
+
+    return take
+
+
+def _dispatch() -> dict[int, Callable[[Any], None]]:
+    """The unpickler's table of steps, with ours in place of those of the same name."""
+    steps = {
+        code: getattr(_RestrictedUnpickler, step.__name__, step) for code, step in pickle._Unpickler.dispatch.items()
+    }
+    steps[pickle.NEWOBJ[0]] = _RestrictedUnpickler.load_reduce
+    return {code: _counted(step) for code, step in steps.items()}
+
+
+_RestrictedUnpickler.dispatch = _dispatch()

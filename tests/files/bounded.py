@@ -1,0 +1,22 @@
+"""How much memory and time something may take at most."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def bounded(megabytes: float, seconds: float) -> Iterator[None]:
+    """Fails where what Python and NumPy allocate inside peaks higher, or where it takes longer."""
+    tracemalloc.start()
+    start = time.monotonic()
+    try:
+        yield
+    finally:
+        took, peak = time.monotonic() - start, tracemalloc.get_traced_memory()[1] / 1e6
+        tracemalloc.stop()
+    assert peak < megabytes, f"took {peak:.0f} MB"
+    assert took < seconds, f"took {took:.1f} s"
