@@ -122,8 +122,19 @@ def _parse(path: Path, text: bytes) -> etree._Element:
             robot = etree.fromstring(text, etree.XMLParser(**options, recover=True))
             if robot is not None:
                 return robot
+        if (as_meant := _as_latin(text)) is not None:
+            return _parse(path, as_meant)
         reason = "it is empty" if not text.strip() else error
         raise UserError(f"robot.urdf: {path} is no well-formed XML: {reason}") from error
+
+
+def _as_latin(text: bytes) -> bytes | None:
+    """UTF-8 in place of Latin letters, such as those of an author's name; None if the text is UTF-8, or neither."""
+    try:
+        text.decode()
+    except UnicodeDecodeError:
+        return None if b"\0" in text else text.decode("latin-1").encode()
+    return None
 
 
 def _remove_namespaces(path: Path, robot: etree._Element) -> None:

@@ -294,8 +294,6 @@ def _material(document: Document, material: etree._Element, found: _Findings) ->
 def _list_unread(document: Document, element: etree._Element, name: str, found: _Findings) -> None:
     for path, attributes in _UNREAD[element.tag].items() if len(element) else ():
         part = element.find(path)
-        wrong = (
-            [] if part is None else [problem(part, word, count, infinite=True) for word, count in attributes.items()]
-        )
+        wrong = [] if part is None else [problem(part, word, n, infinite=True) for word, n in attributes.items()]
         if first := next((text for text in wrong if text is not None), None):
             found.left_out.append(f"{document.line(part)}: {name}: {first}")

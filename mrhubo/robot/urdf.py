@@ -9,6 +9,7 @@ import io
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ class Description:
     unread_collisions: frozenset[str] = field(default=frozenset(), repr=False, compare=False)
     """Links with a collision element that cannot be read."""
 
-    @property
+    @cached_property
     def kinematics(self) -> str:
         """Fingerprint of joints, limits and axes; looks and masses are not in it."""
         joints = []

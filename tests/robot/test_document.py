@@ -41,10 +41,11 @@ def written(folder: Path, content: str | bytes) -> Path:
         "\n\n  " + '<?xml version="1.0"?>' + PAIR,
         "\ufeff" + PAIR,
         PAIR.encode("utf-16"),
+        "<?xml version='1.0' encoding='utf-8'?><!-- by Jos\xe9 -->".encode("latin-1") + PAIR.encode(),
         "<?xml version='1.0'?><!-- by hand --><?tool x?>" + PAIR,
     ],
     ids=["plain", "packed", "default namespace", "prefix", "no name", "expanded xacro", "unexplained prefix",
-         "foreign joint", "blank lines first", "byte order mark", "utf-16", "comment"],
+         "foreign joint", "blank lines first", "byte order mark", "utf-16", "latin", "comment"],
 )  # fmt: skip
 def test_all_forms_of_one_robot_are_read_alike(tmp_path: Path, content: str | bytes) -> None:
     found = describe(written(tmp_path, content))
