@@ -159,7 +159,7 @@ class Skeleton(nn.Module):
                 raise UserError(f"a skeleton's {name} must have the shape {tuple(default.shape)}, found {given.shape}")
             if given is not None and not (given.is_floating_point() and bool((given.abs() < _LONGEST).all())):
                 raise UserError(f"a skeleton's {name} must be finite and shorter than {_LONGEST:g} m")
-            if given is offsets_J3 is not None and bool((given.norm(dim=-1) < _SHORTEST).any()):
+            if given is not None and given is offsets_J3 and bool((given.norm(dim=-1) < _SHORTEST).any()):
                 raise UserError(f"a skeleton's {name} must be longer than {1000 * _SHORTEST:g} mm")
             self.register_buffer(name, (default if given is None else given).float().clone(), persistent=False)
         identity = torch.eye(3).expand(1, len(POSED_JOINT_NAMES), 3, 3)

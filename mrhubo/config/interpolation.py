@@ -1,8 +1,8 @@
-"""Puts the values of other keys in the place of ``${key}``, in bounded time and memory.
+r"""Puts the values of other keys in the place of ``${key}``, in bounded time and memory.
 
     ${section.key}      the value of that key, whatever it is, or as part of a text
     ${.key} ${..key}    the same, from the section around, or the one around that
-    \\${                 what stands there: no interpolation
+    \${                 what stands there: no interpolation
     ${oc.env:NAME}      a variable of the environment, or ${oc.env:NAME,default}: on the command line alone
 
 A config may come from a stranger. So no file reads the environment, and texts that refer to texts that refer to texts

@@ -84,6 +84,11 @@ class _RestrictedUnpickler(pickle._Unpickler):
     """Python's unpickler, whose steps that call, set or hash something are ours."""
 
     dispatch: dict[int, Callable[[Any], None]] = {}
+    stack: list[Any]
+    append: Callable[[Any], None]
+    read: Callable[[int], bytes]
+    readline: Callable[[], bytes]
+    pop_mark: Callable[[], list[Any]]
 
     def __init__(self, file: BinaryIO | io.BufferedIOBase, modules: Iterable[str]) -> None:
         super().__init__(_Reader(file), encoding="latin1")
@@ -121,7 +126,7 @@ class _RestrictedUnpickler(pickle._Unpickler):
             made = kind(*args)
         else:
             raise TypeError("a call of what is no name")
-        self.append(made)  # type: ignore[attr-defined] (set by load)
+        self.append(made)
 
     def load_reduce(self) -> None:
         args, kind = self.stack.pop(), self.stack.pop()
@@ -163,17 +168,17 @@ class _RestrictedUnpickler(pickle._Unpickler):
     def load_dict(self) -> None:
         items, made = self.pop_mark(), {}
         _set(made, zip(items[::2], items[1::2], strict=True))
-        self.append(made)  # type: ignore[attr-defined]
+        self.append(made)
 
     def load_additems(self) -> None:
         self.pop_mark()
 
     def load_frozenset(self) -> None:
         self.pop_mark()
-        self.append(frozenset())  # type: ignore[attr-defined]
+        self.append(frozenset())
 
     def load_bytearray8(self) -> None:
-        self.append(bytearray(self.read(int.from_bytes(self.read(8), "little"))))  # type: ignore[attr-defined]
+        self.append(bytearray(self.read(int.from_bytes(self.read(8), "little"))))
 
 
 def _set(target: Any, pairs: Iterable[tuple[Any, Any]]) -> None:

@@ -5,6 +5,7 @@ Legend: ... any leading axes, T frames (the leading axes as one), J = 21: SMPL's
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -135,12 +136,10 @@ def to_tensor(array: ArrayLike) -> Tensor:
     Raises:
         UserError: it is no NumPy or torch array of numbers, nor lists of numbers that make one.
     """
-    given = array
+    kind = type(array).__name__
     if isinstance(array, list | tuple):
-        try:
+        with contextlib.suppress(Exception):  # ragged lists, tensors on other devices
             array = np.array(array)
-        except Exception:  # ragged lists, tensors on other devices
-            array = None
     if isinstance(array, np.ndarray) and array.dtype.kind in "fiu":
         # a copy: torch wants it writable, without negative strides, and in this machine's order of bytes
         exact = array.dtype.kind == "f" and array.dtype.itemsize >= 8
@@ -152,7 +151,7 @@ def to_tensor(array: ArrayLike) -> Tensor:
         or array.dtype == torch.bool
         or array.layout != torch.strided
     ):
-        kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray | Tensor) else type(given).__name__
+        kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray | Tensor) else kind
         raise UserError(f"human motion: expected a Motion, or a NumPy or torch array of numbers, found {kind}")
     return array if array.dtype == torch.float64 else array.float()
 

@@ -1,8 +1,8 @@
 """Whether the files of a package belong together: nothing was edited, exchanged or lost on the way.
 
-The header of the weights holds a checksum of every other file; its own is that of `write_tensors`. What it says of joints,
-limits and inputs is compared with what URDF and settings say, too, which is all that there is for packages made before
-the checksums came. A checksum notices accidents; whoever means to deceive can make it anew, so it is no signature.
+The header of the weights holds a checksum of every other file; its own is that of `write_tensors`. What it says of
+joints, limits and inputs is compared with what URDF and settings say, too, which is all that there is for packages made
+before the checksums came. A checksum notices accidents; whoever means to deceive can make it anew, so it is no signature.
 """
 
 from __future__ import annotations
@@ -98,9 +98,8 @@ def check_content(folder: Path, metadata: Mapping[str, str], robot: Robot, input
             raise UserError(f"{folder}: its header tells no limits of the joints ('{key}'); {_RENEW}")
         for joint, header, own in zip(names, said, limit_N.tolist(), strict=True):
             if not abs(header - own) <= _SAME_RAD:
-                raise UserError(
-                    f"{folder}: header and URDF disagree on a limit of '{joint}': {header:.6g} and {own:.6g} rad; {_RENEW}"
-                )
+                both = f"{header:.6g} and {own:.6g} rad"
+                raise UserError(f"{folder}: header and URDF disagree on a limit of '{joint}': {both}; {_RENEW}")
     if metadata.get("robot") != robot.name:
         names = f"'{shortened(metadata.get('robot'))}' and '{robot.name}'"
         raise UserError(f"{folder}: header and settings name two robots, {names}; {_RENEW}")

@@ -59,4 +59,4 @@ _TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision")
 def join_results(parts: Sequence[RetargetResult]) -> RetargetResult:
     """One result of those of a motion's parts, one after the other; without a frame rate."""
     tensors = {name: torch.cat([getattr(part, name) for part in parts]) for name in _TENSORS}
-    return RetargetResult(**tensors, joint_names=parts[0].joint_names)
+    return dataclasses.replace(parts[0], **tensors, frame_rate=None)

@@ -20,6 +20,7 @@ from mrhubo.body import JOINT_NAMES, KEYPOINT_NAMES, Skeleton, build_skeleton, o
 from mrhubo.body.skeleton import PARENTS
 from mrhubo.config import BodyConfig
 from mrhubo.errors import UserError
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.rotation import axis_angle_to_matrix
 
 VERTICES = 60
@@ -232,6 +233,22 @@ def test_altered_pickles_never_do_more_than_name_an_error(tmp_path: Path, chumpy
         assert str(path) in str(error)
     else:
         assert bool(skeleton.rest_K3.isfinite().all())
+
+
+def test_a_saved_skeleton_that_is_none_is_refused(tmp_path: Path) -> None:
+    path, good = tmp_path / "a.safetensors", Skeleton()
+    save_skeleton(path, good)
+    tensors, metadata = read_tensors(path)
+    for change, message in (
+        ({"offsets": torch.zeros(21, 3)}, "must be longer than 1 mm"),
+        ({"offsets": good.offsets_J3 * torch.nan}, "must be finite"),
+        ({"offsets": good.offsets_J3.bool()}, "must be finite"),
+        ({"offsets": good.offsets_J3[:3]}, "must have the shape"),
+        ({"offsets": None}, "is no skeleton of mrhubo: 'offsets' is missing"),
+    ):
+        write_tensors(path, {k: v for k, v in {**tensors, **change}.items() if v is not None}, metadata)
+        with pytest.raises(UserError, match=f"a.safetensors: .*{message}"):
+            open_skeleton(path)
 
 
 def test_other_endings_are_refused(tmp_path: Path) -> None:

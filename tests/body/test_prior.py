@@ -94,3 +94,12 @@ def test_files_that_are_no_prior_are_refused(tmp_path: Path) -> None:
     write_tensors(path, {k: v for k, v in tensors.items() if "encoder.0" not in k}, metadata)
     with pytest.raises(UserError, match="no body prior that this version reads"):
         BodyPrior.open(path)
+    for size in ("hidden", "latent", "encoder_hidden"):  # a network of that size would take terabytes
+        for number in ("1000000", "-1", "0", "many", "9" * 5_000):
+            write_tensors(path, tensors, {**metadata, size: number})
+            with pytest.raises(UserError, match="no body prior that this version reads"):
+                BodyPrior.open(path)
+    for value in (torch.nan, 1e300):
+        write_tensors(path, {**tensors, "decoder.0.bias": tensors["decoder.0.bias"].double() + value}, metadata)
+        with pytest.raises(UserError, match="its weights hold NaN or infinite numbers"):
+            BodyPrior.open(path)

@@ -121,7 +121,7 @@ def test_a_last_one_without_its_best_is_of_no_use(folder: Path) -> None:
     assert found is None and "is damaged" in said[0] and "best.ckpt, is not whole" in said[1]
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damage_is_noticed(folder: Path, past_its_best: Path, data: st.DataObject) -> None:
     content = bytearray((past_its_best / LAST).read_bytes())

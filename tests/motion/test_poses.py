@@ -56,8 +56,8 @@ def test_any_type_of_number_and_lists_do_too(dtype: object) -> None:
     turns = np.zeros((5, 63), dtype)
     turns[:, 0] = np.arange(5)
     expected = read_poses(np.asarray(turns, np.float64)).local_TJ33
-    for given in (turns, turns.tolist(), list(turns), tuple(map(tuple, turns))):
-        torch.testing.assert_close(read_poses(given).local_TJ33, expected)
+    for array in (turns, turns.tolist(), list(turns), tuple(map(tuple, turns))):
+        torch.testing.assert_close(read_poses(array).local_TJ33, expected)
     motion = Motion("a", expected.tolist(), 30)  # type: ignore[arg-type]
     assert torch.equal(read_poses(motion).local_TJ33, expected)
 

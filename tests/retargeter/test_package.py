@@ -17,7 +17,7 @@ from mrhubo.errors import UserError
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter, direction_error
-from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.retargeter import Retargeter, architecture, build_network, package
 from mrhubo.robot import build_body_map
 
 
@@ -247,3 +247,88 @@ def test_incomplete_or_foreign_packages_are_refused(folder: Path, tmp_path: Path
             Retargeter.load(folder)
         (folder / "away").rename(folder / name)
     Retargeter.load(folder)
+
+
+def test_arrays_and_lists_are_poses_everywhere(made: Retargeter) -> None:
+    pose, reference = human(3), OptimizationRetargeter(made.body_map)
+    for given in (pose.numpy(), pose.double(), pose.tolist(), pose.numpy().astype(">f8")):
+        torch.testing.assert_close(made.predict(given), made.predict(pose))
+        torch.testing.assert_close(made.retarget(given).q, made.retarget(pose).q, atol=1e-5, rtol=0)
+        torch.testing.assert_close(made(given).q, made(pose).q, atol=1e-5, rtol=0)
+    array = pose.numpy()
+    assert torch.equal(reference.retarget(array, 24).q_TN, reference.retarget(pose, 24.0).q_TN)
+    assert torch.equal(reference.solve_frames(array.tolist())[0], reference.solve_frames(pose)[0])
+    assert torch.equal(reference(array, 24.0).q, reference(pose, 24.0).q)
+    assert torch.equal(
+        reference.retarget_collision_free(array, 24.0).q_TN, reference.retarget_collision_free(pose, 24.0).q_TN
+    )
+    for entry in (
+        made.predict,
+        made.retarget,
+        made,
+        reference.solve_frames,
+        lambda pose: reference.retarget(pose, 24.0),
+    ):
+        for wrong in ("wave.npz", None, [[1.0], [1.0, 2.0]], np.array([["a"] * 63]), 7):
+            with pytest.raises(UserError, match="expected a Motion, or a NumPy or torch array of numbers, found"):
+                entry(wrong)  # type: ignore[operator, arg-type]
+    with pytest.raises(UserError, match="frame rate must be a positive number, found None"):
+        reference.retarget(pose, None)  # type: ignore[arg-type]
+    for polish in (-1, 1.5, "1", None, True):
+        with pytest.raises(UserError, match="polish must be 0 or more steps"):
+            made.predict(pose, polish)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [1e200, 1e39, 1e20, -3.0])
+def test_numbers_that_no_rotation_has_give_no_confidence(made: Retargeter, value: float) -> None:
+    pose = human(9).double()
+    pose[4, 3, 2, 1] = value
+    for entry in (made.predict, made.retarget, made):
+        with pytest.raises(
+            UserError, match="human pose 4 holds (numbers that no rotation has|a matrix that is no rotation)"
+        ):
+            entry(pose)
+    result = made.retarget(torch.zeros(3, 21, 3, 3))
+    assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
+
+
+def test_a_long_motion_is_worked_on_in_parts(made: Retargeter, monkeypatch: pytest.MonkeyPatch) -> None:
+    pose = human(23)
+    whole, longest = made.retarget(pose), []
+    inner = made.network.forward
+    monkeypatch.setattr(made.network, "forward", lambda x: longest.append(len(x)) or inner(x))
+    monkeypatch.setattr(package, "_CHUNK", 10)
+    found = made(Motion("a", pose, 30.0))
+    assert longest == [10, 10, 3] and found.frame_rate == 30.0
+    for name in ("q", "confidence", "phi", "collision", "direction_error_deg"):
+        torch.testing.assert_close(getattr(found, name), getattr(whole, name), atol=1e-4, rtol=1e-4)
+    pose[17, 3] = torch.nan
+    with pytest.raises(UserError, match="human pose 17 holds NaN"):
+        made.predict(pose)
+
+
+def test_networks_fit_into_memory(root: Path) -> None:
+    """Nothing of that size is made before it is refused."""
+    for overrides, count in (
+        (["model.hidden=8192", "model.layers=64"], "model.hidden: 8,192 units in each of 64 layers make 16,9"),
+        (["model.hidden=8192", "model.branches=false", "model.stages=1", "model.layers=3"], "make 134,"),
+    ):
+        config = load_config(root / "conf" / "nao.yaml", overrides)
+        with pytest.raises(UserError, match=count):
+            build_network(config, build_body_map(config.robot))
+    with pytest.raises(UserError, match="model.hidden must be a whole number from 1 to 8192, found 65536"):
+        load_config(root / "conf" / "nao.yaml", ["model.hidden=65536"])
+
+
+@pytest.mark.parametrize("branches", ["true", "false"])
+@pytest.mark.parametrize("stages", [1, 2])
+def test_weights_are_counted_right(root: Path, stages: int, branches: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    overrides = [f"model.stages={stages}", f"model.branches={branches}", "model.hidden=7", "model.layers=3"]
+    config = load_config(root / "conf" / "reachy.yaml", overrides)
+    body_map = build_body_map(config.robot)
+    count = sum(weights.numel() for weights in build_network(config, body_map).parameters())
+    monkeypatch.setattr(architecture, "_MAX_WEIGHTS", count)
+    build_network(config, body_map)
+    monkeypatch.setattr(architecture, "_MAX_WEIGHTS", count - 1)
+    with pytest.raises(UserError, match=f"make {count:,} weights"):
+        build_network(config, body_map)

@@ -228,9 +228,7 @@ def test_numpys_advice_and_warnings_are_not_passed_on(tmp_path: Path, recwarn: p
     assert [str(warning.message) for warning in recwarn] == []
 
 
-@pytest.mark.parametrize(
-    "shape", ["(%s, 63)" % ("9" * 400), "(0, %s)" % ("9" * 400), "(%d, %d)" % (2**70, 2**70), "(True, 63)"]
-)
+@pytest.mark.parametrize("shape", [f"({'9' * 400}, 63)", f"(0, {'9' * 400})", f"({2**70}, {2**70})", "(True, 63)"])
 def test_shapes_beyond_any_number_are_refused(tmp_path: Path, shape: str) -> None:
     header = b"{'descr': '<f4', 'fortran_order': False, 'shape': %s}\n" % shape.encode()
     members = {"pose_body.npy": _member(header, bytes(252)), "mocap_frame_rate.npy": _npy(RATE["mocap_frame_rate"])}
