@@ -27,7 +27,7 @@ SMALL = [
     "trainer.batch_size=64", "trainer.validate_every=20", "trainer.accelerator=cpu",
 ]  # fmt: skip
 SPACE = (
-    "name: tiny\ntrials: 3\nspace:\n  model.hidden: [8, 16, 32]\n  trainer.lr: {low: 0.001, high: 0.01, log: true}\n"
+    "name: tiny\ntrials: 4\nspace:\n  model.hidden: [8, 16, 32]\n  trainer.lr: {low: 0.001, high: 0.01, log: true}\n"
 )
 
 
@@ -84,7 +84,7 @@ def test_one_of_two_processes_dies(
     output = capfd.readouterr().out
     (study,) = studies_of(tmp_path / "runs")
     states = [trial.state.name for trial in study.trials]
-    assert states.count("COMPLETE") + states.count("PRUNED") == 3 and states.count("FAIL") == 1
+    assert states.count("COMPLETE") + states.count("PRUNED") == 4 and states.count("FAIL") == 1
     dead = next(trial for trial in study.trials if trial.state.name == "FAIL")
     if dead.params:
         assert any(trial.params == dead.params for trial in study.trials if trial.number > dead.number)

@@ -9,7 +9,7 @@ import torch
 import yaml
 from torch import Tensor
 
-from tests.chain import Motion, answer, load, read_tensors, write_tensors
+from tests.chain import Motion, answer, load, new_package, read_tensors, write_tensors
 from tests.invariance.rewrite import Change, rewrite, undo
 
 CLOSE = 1e-3
@@ -43,11 +43,13 @@ def changed_package(package: Path, change: Change, folder: Path) -> Path:
     Outputs are put into the new order. tanh is odd and mirrored limits have the opposite middle, so the last layer of a
     joint whose axis is negated is negated.
     """
-    rewrite(package / "config.yaml", change, folder)
+    written = rewrite(package / "config.yaml", change, folder.with_name(f"{folder.name} robot"))
     for name in ("body_prior.safetensors", "skeleton.safetensors"):
-        shutil.copy(package / name, folder)
+        shutil.copy(package / name, written.parent)
+    new_package(written, folder)
     robot = yaml.safe_load((package / "config.yaml").read_text())["robot"]["name"]
-    tensors, header = read_tensors(package / "retargeter.safetensors")
+    tensors, told = read_tensors(package / "retargeter.safetensors")
+    header = {**read_tensors(folder / "retargeter.safetensors")[1], "phi_threshold": told["phi_threshold"]}
     old = joints_of(package / "config.yaml")
     new = [old[i] for i in change.order or range(len(old))]
     signs = torch.tensor([-1.0 if name in change.negated else 1.0 for name in new])
