@@ -605,7 +605,7 @@ def relaxed(max_examples: int = 100) -> settings:
 
 
 @pytest.mark.parametrize("schema", [Outer, Config, Inner, SweepConfig])
-@relaxed(max_examples=60)
+@relaxed(max_examples=25)
 @given(data=st.data())
 def test_round_trip(tmp_path, schema, data):
     config = data.draw(st.builds(schema, **{key.field.name: values(key) for key in fields_of(schema)}))

@@ -19,6 +19,8 @@ from mrhubo.errors import UserError
 from mrhubo.files.storage import read_tensors
 from mrhubo.prior import main
 
+pytestmark = pytest.mark.usefixtures("light_records")
+
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
