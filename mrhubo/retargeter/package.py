@@ -117,7 +117,7 @@ class Retargeter(nn.Module):
         """Joint angles (T, N) [rad] of human poses; inside the limits.
 
         Args:
-            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21, of torch or NumPy or nested lists, or a motion.
+            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21: of torch or NumPy, nested lists, or a motion.
             polish: Levenberg-Marquardt steps of the reference retargeter from the networks' answer, each frame on its
                 own; a step that does not bring the limbs nearer to the human's is not taken. 0: the networks alone.
 
@@ -158,8 +158,8 @@ class Retargeter(nn.Module):
         given, joints = to_tensor(local_TJ33), len(POSED_JOINT_NAMES)
         if given.ndim != 4 or given.shape[1:] != (joints, 3, 3):
             raise UserError(
-                f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}; other forms are for"
-                " a call, retargeter(poses)"
+                f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}; other forms are"
+                " for a call, retargeter(poses)"
             )
         for number, part in enumerate(given.split(_CHUNK)):
             largest_T = part.abs().flatten(1).amax(dim=1) if len(part) else part.new_zeros(0)
