@@ -117,7 +117,7 @@ class Retargeter(nn.Module):
         """Joint angles (T, N) [rad] of human poses; inside the limits.
 
         Args:
-            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21: of torch or NumPy, nested lists, or a motion.
+            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21: an array, nested lists, or a motion.
             polish: Levenberg-Marquardt steps of the reference retargeter from the networks' answer, each frame on its
                 own; a step that does not bring the limbs nearer to the human's is not taken. 0: the networks alone.
 
