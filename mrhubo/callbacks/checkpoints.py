@@ -58,7 +58,8 @@ class Checkpoints(Checkpoint):
 
     def on_train_epoch_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Writes them; the best first, so that the last one knows no best that is not there."""
-        score = float(trainer.callback_metrics[self.monitor])
+        # The first process's, for all of several that train together.
+        score = float(trainer.strategy.broadcast(float(trainer.callback_metrics[self.monitor])))
         score = math.inf if math.isnan(score) else score
         if self.best_score is None or score < self.best_score:
             self.best_score = score

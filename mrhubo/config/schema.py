@@ -191,7 +191,8 @@ class EvaluationConfig:
     """Folders of AMASS-style .npz files; the first that exists is used. Default: the eleven CMU clips in
     `data/external/cmu/evaluation`, else the motions that ship with mrhubo."""
     validation: list[str] = field(default_factory=lambda: ["13_28", "54_16", "directing_traffic", "drinking"])
-    """Names of the clips of that folder that choose the checkpoint; the others are the test clips."""
+    """Names of the clips of that folder that choose the checkpoint, each of which must be there; the others are the
+    test clips. The default names those of both default folders."""
     smoothness: float = bounded(0.02, 0.0, 100.0)
     """Weight of the reference retargeter's temporal smoothness."""
 

@@ -2,11 +2,10 @@
 
 from mrhubo.motion.load import find_motions, read_folder, read_motion
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import ArrayLike, MotionLike, Poses, read_poses, to_tensor
+from mrhubo.motion.poses import MotionLike, Poses, read_poses, to_tensor
 from mrhubo.motion.writers.amass import write_motion
 
 __all__ = [
-    "ArrayLike",
     "Motion",
     "MotionLike",
     "Poses",

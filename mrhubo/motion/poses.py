@@ -20,9 +20,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
 
-ArrayLike: TypeAlias = Tensor | np.ndarray | Sequence[Any]
-"""Numbers as a torch or NumPy array, or as nested lists."""
-MotionLike: TypeAlias = Motion | ArrayLike
+MotionLike: TypeAlias = Motion | Tensor | np.ndarray | Sequence[Any]
 """A motion, or local rotations of SMPL's joints 1..21 as an array or nested lists: matrices (..., 21, 3, 3), axis-angle
 [rad] (..., 63), as AMASS's `pose_body` has it, or 6D (..., 21, 6); any leading axes, none for a single pose."""
 MAX_TURN = 6 * math.pi
@@ -97,10 +95,8 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
         UserError: it is neither, has another shape, holds NaN or infinite numbers or what is no rotation (says in which
             frame), or the frame rate is not positive.
     """
-    if isinstance(motion, Motion):
-        array, frame_rate = to_tensor(motion.local_TJ33), motion.frame_rate
-    else:
-        array = to_tensor(motion)
+    array = to_tensor(motion)
+    frame_rate = motion.frame_rate if isinstance(motion, Motion) else frame_rate
     check_frame_rate(frame_rate)
     shape = tuple(array.shape)
     form = next((form for form in _FORMS if shape[-len(form.axes) :] == form.axes), None)
@@ -130,12 +126,13 @@ def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
         raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
 
 
-def to_tensor(array: ArrayLike) -> Tensor:
-    """Numbers as a tensor, float32 or, where they come so, float64.
+def to_tensor(array: MotionLike) -> Tensor:
+    """Numbers, or a motion's rotations, as a tensor, float32 or, where they come so, float64.
 
     Raises:
         UserError: it is no NumPy or torch array of numbers, nor lists of numbers that make one.
     """
+    array = array.local_TJ33 if isinstance(array, Motion) else array
     kind = type(array).__name__
     if isinstance(array, list | tuple):
         with contextlib.suppress(Exception):  # ragged lists, tensors on other devices

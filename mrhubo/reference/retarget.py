@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
-from mrhubo.motion.poses import ArrayLike, MotionLike, check_frame_rate, read_poses, to_tensor
+from mrhubo.motion.poses import MotionLike, check_frame_rate, read_poses, to_tensor
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
 from mrhubo.reference.result import OptimizationResult
@@ -112,7 +112,7 @@ class OptimizationRetargeter(nn.Module):
         return self.solve_frames(local_TJ33)[0] if frame_rate is None else self.retarget(local_TJ33, frame_rate).q_TN
 
     @torch.no_grad()
-    def retarget(self, local_TJ33: ArrayLike, frame_rate: float) -> ReferenceResult:
+    def retarget(self, local_TJ33: MotionLike, frame_rate: float) -> ReferenceResult:
         """The robot's motion for human poses, local rotations (T, 21, 3, 3) at `frame_rate` frames per second.
 
         Raises:
@@ -130,7 +130,7 @@ class OptimizationRetargeter(nn.Module):
 
     @torch.no_grad()
     def retarget_collision_free(
-        self, local_TJ33: ArrayLike, frame_rate: float, q_TN: Tensor | None = None
+        self, local_TJ33: MotionLike, frame_rate: float, q_TN: Tensor | None = None
     ) -> ReferenceResult:
         """A motion in which the robot never touches itself, as near to the human's as that allows.
 
@@ -160,7 +160,7 @@ class OptimizationRetargeter(nn.Module):
         return self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2
 
     @torch.no_grad()
-    def solve_frames(self, local_BJ33: ArrayLike) -> tuple[Tensor, Tensor]:
+    def solve_frames(self, local_BJ33: MotionLike) -> tuple[Tensor, Tensor]:
         """The best joint angles (B, N) [rad] of independent human poses (B, 21, 3, 3), and their cost (B,).
 
         Raises:
@@ -170,7 +170,7 @@ class OptimizationRetargeter(nn.Module):
         q_BN, cost_BC = self._polish(*self._candidates(target_BD3), target_BD3)
         return q_BN, cost_BC.sum(dim=1)
 
-    def _targets(self, local_BJ33: ArrayLike) -> Tensor:
+    def _targets(self, local_BJ33: MotionLike) -> Tensor:
         local_BJ33, joints = to_tensor(local_BJ33), len(POSED_JOINT_NAMES)
         if local_BJ33.ndim != 4 or tuple(local_BJ33.shape[1:]) != (joints, 3, 3) or not len(local_BJ33):
             raise UserError(f"human motion: expected rotations of shape (frames, {joints}, 3, 3), one frame or more, "

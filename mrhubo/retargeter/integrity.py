@@ -2,7 +2,7 @@
 
 The header of the weights holds a checksum of every other file; its own is that of `write_tensors`. What it says of
 joints, limits and inputs is compared with what URDF and settings say, too, which is all that there is for packages made
-before the checksums came. A checksum notices accidents; whoever means to deceive can make it anew, so it is no signature.
+before the checksums came. A checksum notices accidents. Whoever means to deceive can make it anew: it is no signature.
 """
 
 from __future__ import annotations

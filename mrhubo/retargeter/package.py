@@ -26,7 +26,7 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
-from mrhubo.motion import ArrayLike, MotionLike, read_poses, to_tensor
+from mrhubo.motion import MotionLike, read_poses, to_tensor
 from mrhubo.reference import DirectionProblem, angle_between
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import confidence
@@ -113,11 +113,11 @@ class Retargeter(nn.Module):
         return self.retarget(poses.local_TJ33, polish).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
-    def predict(self, local_TJ33: ArrayLike, polish: int = 0) -> Tensor:
+    def predict(self, local_TJ33: MotionLike, polish: int = 0) -> Tensor:
         """Joint angles (T, N) [rad] of human poses; inside the limits.
 
         Args:
-            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21; an array of torch or NumPy, or lists.
+            local_TJ33: local rotations (T, 21, 3, 3) of SMPL's joints 1..21: an array, nested lists, or a motion.
             polish: Levenberg-Marquardt steps of the reference retargeter from the networks' answer, each frame on its
                 own; a step that does not bring the limbs nearer to the human's is not taken. 0: the networks alone.
 
@@ -132,7 +132,7 @@ class Retargeter(nn.Module):
         return self._answer(local_TJ33, None if human is None else self.body_map.human_directions(human), polish)
 
     @torch.no_grad()
-    def retarget(self, local_TJ33: ArrayLike, polish: int = POLISH) -> RetargetResult:
+    def retarget(self, local_TJ33: MotionLike, polish: int = POLISH) -> RetargetResult:
         """Joint angles, by default after a step of optimisation, with a confidence for each frame; arguments as for
         `predict`.
         """
@@ -149,7 +149,7 @@ class Retargeter(nn.Module):
         collision_T = self.collision.collides(q_TN, links)
         return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, collision_T)
 
-    def _parts(self, local_TJ33: ArrayLike, polish: int) -> Iterator[Tensor]:
+    def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
         """The poses as the networks want them, on their device, float32, so many at a time that all that is made of
         them fits into memory.
         """
@@ -157,7 +157,10 @@ class Retargeter(nn.Module):
             raise UserError(f"polish must be 0 or more steps, found {polish}")
         given, joints = to_tensor(local_TJ33), len(POSED_JOINT_NAMES)
         if given.ndim != 4 or given.shape[1:] != (joints, 3, 3):
-            raise UserError(f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}")
+            raise UserError(
+                f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}; other forms are"
+                " for a call, retargeter(poses)"
+            )
         for number, part in enumerate(given.split(_CHUNK)):
             largest_T = part.abs().flatten(1).amax(dim=1) if len(part) else part.new_zeros(0)
             wrong_T = ~(largest_T <= _LARGEST)

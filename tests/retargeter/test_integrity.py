@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from mrhubo.errors import UserError
 from mrhubo.files.storage import checksum_file, read_tensors, write_tensors
 from mrhubo.retargeter import Retargeter
-from mrhubo.retargeter.integrity import file_checksums
+from mrhubo.retargeter.integrity import check_content, check_files, file_checksums
 from tests.chain import ROOT, new_package
 
 WEIGHTS, OTHERS = (
@@ -28,6 +28,11 @@ WEIGHTS, OTHERS = (
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return new_package(ROOT / "conf" / "nao.yaml", tmp_path_factory.mktemp("made") / "package", "model.hidden=8")
+
+
+@pytest.fixture(scope="module")
+def opened(made: Path) -> Retargeter:
+    return Retargeter.load(made)
 
 
 @pytest.fixture
@@ -129,21 +134,10 @@ def test_a_file_of_another_package_is_named(folder: Path, tmp_path: Path, name: 
     [
         (lambda t, h: t.update({"limited.upper_N": t["limited.upper_N"] + 1}), "weights and URDF have other limits"),
         (lambda t, h: t.update({"limited.lower_N": t["limited.lower_N"] * torch.nan}), "NaN"),
-        (lambda t, h: t.update({"post.parts.0.last.bias": t["post.parts.0.last.bias"] * torch.nan}), "NaN"),
         (lambda t, h: t.update({"post.parts.0.last.bias": t["post.parts.0.last.bias"].double() + 1e300}), "infinite"),
         (lambda t, h: t.update({"post.parts.0.last.bias": t["post.parts.0.last.bias"].long()}), "do not fit"),
         (lambda t, h: h.update(phi_threshold="nan"), "phi_threshold"),
-        (lambda t, h: h.update(phi_threshold="1e30"), "phi_threshold"),
-        (lambda t, h: h.update(phi_threshold="much"), "phi_threshold"),
-        (lambda t, h: h.update(upper_rad=h["upper_rad"].replace("[", "[9")), "disagree on a limit of 'LShoulderPitch'"),
-        (lambda t, h: h.update(upper_rad="[NaN" + 7 * ", NaN" + "]"), "disagree on a limit"),
-        (lambda t, h: h.update(upper_rad="[1" + 400 * "0" + 7 * ", 1.0" + "]"), "tells no limits"),
-        (lambda t, h: h.update(lower_rad="7"), "tells no limits"),
-        (lambda t, h: h.update(joint_names="[" * 5_000), "tells nothing of 'joint_names'"),
-        (lambda t, h: h.pop("joint_names"), "tells nothing of 'joint_names'"),
         (lambda t, h: h.update(joint_names=json.dumps(json.loads(h["joint_names"])[::-1])), "in another order"),
-        (lambda t, h: h.update(files_xxh3="{}"), "does not tell the checksum of every file"),
-        (lambda t, h: h.update(files_xxh3="[1]"), "does not tell the checksum of every file"),
     ],
 )
 def test_a_header_or_weights_with_a_fresh_checksum_must_still_fit(
@@ -151,6 +145,35 @@ def test_a_header_or_weights_with_a_fresh_checksum_must_still_fit(
 ) -> None:
     rewrite(folder, change)
     refused(folder, message)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"phi_threshold": "1e30"}, "phi_threshold"),
+        ({"phi_threshold": "much"}, "phi_threshold"),
+        ({"upper_rad": "[9, 9, 9]"}, "tells no limits"),
+        ({"upper_rad": json.dumps([9.0] * 8)}, "disagree on a limit of 'LShoulderPitch'"),
+        ({"upper_rad": json.dumps([float("nan")] * 8)}, "disagree on a limit of 'LShoulderPitch'"),
+        ({"upper_rad": "[1" + 400 * "0" + 7 * ", 1.0" + "]"}, "tells no limits"),
+        ({"lower_rad": "7"}, "tells no limits"),
+        ({"joint_names": "[" * 5_000}, "tells nothing of 'joint_names'"),
+        ({"joint_names": ""}, "tells nothing of 'joint_names'"),
+        ({"input_joints": "[]"}, "other human joints"),
+        ({"robot": "oan"}, "name two robots, 'oan' and 'nao'"),
+        ({"files_xxh3": "{}"}, "does not tell the checksum of every file"),
+        ({"files_xxh3": "[1]"}, "does not tell the checksum of every file"),
+        ({"files_xxh3": "nothing"}, "tells nothing of 'files_xxh3'"),
+    ],
+)
+def test_what_a_header_says_is_compared(made: Path, opened: Retargeter, change: dict[str, str], message: str) -> None:
+    header = read_tensors(made / WEIGHTS)[1]
+    robot, inputs = opened.body_map.robot, opened.network.features.input_joints
+    check_files(made, OTHERS, header)
+    assert check_content(made, header, robot, inputs) == opened.phi_threshold
+    with pytest.raises(UserError, match=message):
+        check_files(made, OTHERS, header | change)
+        check_content(made, header | change, robot, inputs)
 
 
 @pytest.mark.parametrize(

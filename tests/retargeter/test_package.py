@@ -251,7 +251,7 @@ def test_incomplete_or_foreign_packages_are_refused(folder: Path, tmp_path: Path
 
 def test_arrays_and_lists_are_poses_everywhere(made: Retargeter) -> None:
     pose, reference = human(3), OptimizationRetargeter(made.body_map)
-    for given in (pose.numpy(), pose.double(), pose.tolist(), pose.numpy().astype(">f8")):
+    for given in (pose.numpy(), pose.double(), pose.tolist(), pose.numpy().astype(">f8"), Motion("a", pose, 24.0)):
         torch.testing.assert_close(made.predict(given), made.predict(pose))
         torch.testing.assert_close(made.retarget(given).q, made.retarget(pose).q, atol=1e-5, rtol=0)
         torch.testing.assert_close(made(given).q, made(pose).q, atol=1e-5, rtol=0)

@@ -29,7 +29,9 @@ def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
     """
     with open_npz(path) as file:
         poses, starts, names = file.read("poses"), file.read("clip_starts"), file.read("clip_ids", kinds="U")
-    if poses.ndim != 2 or poses.shape[1] != 66 or len(starts) != len(names) + 1 or starts[-1] != len(poses):
+    shaped = poses.ndim == 2 and poses.shape[1] == 66 and starts.ndim == names.ndim == 1
+    starts = starts.astype(np.int64)
+    if not shaped or len(starts) != len(names) + 1 or starts[-1] != len(poses) or (np.diff(starts) < 0).any():
         raise UserError(f"data: {path}: expected poses (F, 66) and clip_starts up to F, found poses {poses.shape}")
     if not np.isfinite(poses).all():
         raise UserError(f"data: {path}: poses holds NaN or infinite numbers")
