@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import filecmp
 import re
 import shutil
 import sqlite3
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -132,6 +134,13 @@ def _rewrite(database: sqlite3.Connection, old: str, new: str) -> None:
             database.create_function(f"rule{number}", 1, rule)
             database.execute(f"UPDATE {table} SET {column} = rule{number}({column}) WHERE {column} LIKE 'file:%'")
     database.commit()
+    _forget_places()
+
+
+def _forget_places() -> None:
+    """MLflow remembers the places of runs that this process has written to."""
+    remembered = getattr(sys.modules.get("mlflow.tracking._tracking_service.client"), "utils", None)
+    getattr(remembered, "_artifact_repos_cache", {}).clear()
 
 
 def _path(uri: str) -> Path:
@@ -144,13 +153,22 @@ def _make(file: Path, artifacts: Path) -> None:
         if not journal.with_name(journal.name.removesuffix("-journal")).exists():
             journal.unlink(missing_ok=True)
     if file.is_file() and _is_whole(file, artifacts):
-        return
+        return  # it holds nothing, but somebody may be reading it
     with atomic_path(file) as temporary:
         journal = temporary.with_name(f"{temporary.name}-journal")
         try:
             _create(temporary, artifacts)
         finally:
             journal.unlink(missing_ok=True)
+    _forget_connections(file)
+
+
+def _forget_connections(file: Path) -> None:
+    """This process may still be connected to a database that was there before and was deleted."""
+    store = sys.modules.get("mlflow.store.tracking.sqlalchemy_store")
+    known = getattr(getattr(store, "SqlAlchemyStore", None), "_engine_map", {}).get(sqlite_uri(file))
+    if known is not None:
+        known.dispose()
 
 
 def _create(file: Path, artifacts: Path) -> None:
@@ -161,14 +179,14 @@ def _create(file: Path, artifacts: Path) -> None:
 
 
 def _is_whole(file: Path, artifacts: Path) -> bool:
-    """Whether MLflow can open a database; tried on a copy, since trying changes it."""
+    """Whether MLflow can open a database as it is; tried on a copy, since it makes what is missing."""
     with tempfile.TemporaryDirectory() as folder:
         copy = shutil.copyfile(file, Path(folder) / file.name)
         try:
             _create(copy, artifacts)
         except Exception:  # MLflow's, SQLAlchemy's, Alembic's
             return False
-    return True
+        return filecmp.cmp(file, copy, shallow=False)
 
 
 def _holds_anything(file: Path) -> bool:

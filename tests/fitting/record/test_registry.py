@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,10 @@ def pose() -> torch.Tensor:
 
 @pytest.fixture(scope="module")
 def registered(
-    root: Path, pose: torch.Tensor, tmp_path_factory: pytest.TempPathFactory
+    root: Path, pose: torch.Tensor, empty_tracking: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Retargeter, str]:
     """Folder of the tracking database, the retargeter, and the URI of its second version."""
-    folder = tmp_path_factory.mktemp("registry")
+    folder = Path(shutil.copytree(empty_tracking, tmp_path_factory.mktemp("registry") / "mlruns"))
     config = load_config(root / "conf" / "nao.yaml", ["model.hidden=24"])
     body_map = build_body_map(config.robot)
     torch.manual_seed(0)
