@@ -110,7 +110,7 @@ def _is_ours(database: sqlite3.Connection, old: str, new: str) -> bool:
     if database.execute(f"{query} WHERE artifact_location = ? AND key = ? AND value = ?", (old, *_OURS)).fetchone():
         return True
     places = database.execute("SELECT artifact_uri FROM runs WHERE substr(artifact_uri, 1, ?) = ?", (len(old), old))
-    return any(_path(new + place[len(old) :]).exists() for (place,) in places)
+    return any(_is_there(new + place[len(old) :]) for (place,) in places)
 
 
 def _rewrite(database: sqlite3.Connection, old: str, new: str) -> None:
@@ -119,7 +119,7 @@ def _rewrite(database: sqlite3.Connection, old: str, new: str) -> None:
         if place is None or not place.startswith(f"{old}/"):
             return place
         found = new + place[len(old) :]
-        return place if _path(place).exists() and not _path(found).exists() else found
+        return place if _is_there(place) and not _is_there(found) else found
 
     def begun(place: str | None) -> str | None:
         """The new place of what is still to be written."""
@@ -143,8 +143,14 @@ def _forget_places() -> None:
     getattr(remembered, "_artifact_repos_cache", {}).clear()
 
 
-def _path(uri: str) -> Path:
-    return Path(unquote(urlsplit(uri).path))
+def local_path(uri: str) -> Path | None:
+    """The place that a file's address names; None of any other address."""
+    return Path(unquote(urlsplit(uri).path)) if uri.startswith("file:") else None
+
+
+def _is_there(uri: str) -> bool:
+    path = local_path(uri)
+    return path is not None and path.exists()
 
 
 def _make(file: Path, artifacts: Path) -> None:

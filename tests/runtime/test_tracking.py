@@ -14,6 +14,7 @@ from mlflow.exceptions import MlflowException
 
 from mrhubo.errors import Unreachable, UserError
 from mrhubo.runtime import client as clients
+from mrhubo.runtime import failures
 from mrhubo.runtime.client import TrackingClient
 from mrhubo.runtime.processes import this_process
 from mrhubo.runtime.tracking import ending, find_run, log_all, open_client, set_up_mlflow, start_run, take_up_run
@@ -170,7 +171,7 @@ def test_mlflow_gets_the_password_apart_from_the_address(tmp_path: Path, monkeyp
     """It prints and quotes addresses."""
     for name in ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD"):
         monkeypatch.setenv(name, "other")
-    monkeypatch.setattr(clients, "silence", lambda uri, seconds: None)
+    monkeypatch.setattr(failures, "silence", lambda uri, seconds: None)
     asked = []
     monkeypatch.setattr(TrackingClient, "get_experiment_by_name", lambda self, name: asked.append(self.uri) or raise_(Unreachable("x")))  # fmt: skip # noqa: E501
     with pytest.raises(Unreachable):
