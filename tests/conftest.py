@@ -109,6 +109,16 @@ def one_thread() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
+def empty_tracking(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with MLflow's database, to be copied: making one takes seconds."""
+    from mrhubo.runtime.tracking import open_client
+
+    folder = tmp_path_factory.mktemp("tracking")
+    open_client(folder, "mrhubo")
+    return folder
+
+
+@pytest.fixture(scope="session")
 def latent_problem() -> Callable[..., tuple[LatentProblem, Tensor]]:
     """Makes a robot's problem of latent inverse kinematics, and keypoints (200, K, 3) [m] that random poses of the
     robot ask for: `latent_problem("nao", w_prior=0.01)`.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import lightning
+import torch
 
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, mean_score, predict_clips, score_clip
@@ -23,14 +23,14 @@ class ClipMetrics(lightning.Callback):
         """Scores the network as it is now.
 
         Raises:
-            UserError: its answers are no numbers; the checkpoints are those of before.
+            UserError: its weights are no numbers (its answers always are); the checkpoints are those of before.
         """
         network = pl_module.network
         assert isinstance(network, RetargetNetwork)
+        if not all(bool(torch.isfinite(weights).all()) for weights in network.parameters()):
+            raise UserError(f"the training came to NaN by step {trainer.global_step:,}; a lower trainer.lr helps")
         predictions = predict_clips(network, self.clips)
         mean = mean_score(
             [score_clip(c, q, self.robot, self.key_links) for c, q in zip(self.clips, predictions, strict=True)]
         )
-        if not math.isfinite(mean.link_cm):
-            raise UserError(f"the training came to NaN by step {trainer.global_step:,}; a lower trainer.lr helps")
         pl_module.log_dict({"val/joint_rad": mean.joint_rad, "val/link_cm": mean.link_cm})

@@ -76,7 +76,7 @@ def _split(scheme: str, rest: str) -> tuple[str, list[str]]:
 
     def parameter(found: re.Match[str]) -> str:
         before, key, value = found.groups()
-        if not value or not (_SECRET_KEY.search(key) or _CONNECTION.search(unquote(value))):
+        if not value or not (value == HIDDEN or _SECRET_KEY.search(key) or _CONNECTION.search(unquote(value))):
             return found[0]
         secrets.append(value)
         return f"{before}{key}={HIDDEN}"

@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-import re
 import sys
 import tempfile
 import time
@@ -15,14 +14,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import requests
 from mlflow import MlflowClient
 from mlflow.entities import Metric
-from mlflow.exceptions import MlflowException
 
-from mrhubo.config.faults import machine_fault
 from mrhubo.config.secrets import redacted
 from mrhubo.errors import Unreachable, UserError, was_interrupted
+from mrhubo.runtime.failures import BUGS, may_pass, reason_of, silence
 from mrhubo.runtime.processes import uninterrupted
 
 _READS = (
@@ -40,12 +37,6 @@ _CREATES = (
     "delete_logged_model", "finalize_logged_model", "log_model_artifacts", "log_outputs", "set_logged_model_tags",
 )  # fmt: skip
 """Done now or not at all."""
-_FINAL = frozenset({
-    "RESOURCE_DOES_NOT_EXIST", "RESOURCE_ALREADY_EXISTS", "INVALID_PARAMETER_VALUE", "INVALID_STATE", "BAD_REQUEST",
-    "PERMISSION_DENIED", "UNAUTHENTICATED", "NOT_FOUND", "ENDPOINT_NOT_FOUND", "CUSTOMER_UNAUTHORIZED",
-})  # fmt: skip
-"""Answers that asking again does not change."""
-_BUGS = (TypeError, AttributeError, NameError, AssertionError)
 _PAUSES = (0.5, 2.0)
 """Seconds before a question is asked again."""
 _LOCKED_SECONDS = 120.0
@@ -54,8 +45,6 @@ _NEXT_TRY_SECONDS = 30.0
 """Between two attempts to send what was kept."""
 _SIGN_SECONDS = 3.0
 """How long a server that was away may take for a sign of life."""
-_SYSTEM = re.compile(r"\[Errno -?\d+\] ([^'\"()]+)")
-"""What the operating system says, in an error of a library."""
 
 
 class _Kept(NamedTuple):
@@ -116,7 +105,7 @@ class TrackingClient(MlflowClient):
         try:
             self._send()
         except Exception as error:
-            if was_interrupted(error) or isinstance(error, _BUGS):
+            if was_interrupted(error) or isinstance(error, BUGS):
                 raise
             done = f"{whole}; " if whole else ""
             raise Unreachable(
@@ -134,7 +123,7 @@ class TrackingClient(MlflowClient):
             try:
                 return self._do(call)
             except Exception as error:
-                if not _may_pass(error):
+                if not may_pass(error):
                     raise
                 if pause is None or self.away:
                     raise Unreachable(self._sentence(error)) from error
@@ -153,7 +142,7 @@ class TrackingClient(MlflowClient):
                 self._send()
             return self._do(call)
         except Exception as error:
-            if was_interrupted(error) or isinstance(error, (UserError, *_BUGS)):
+            if was_interrupted(error) or isinstance(error, (UserError, *BUGS)):
                 raise
             if not self.patient:
                 raise Unreachable(self._sentence(error)) from error
@@ -210,7 +199,7 @@ class TrackingClient(MlflowClient):
                 try:
                     self._do(self._kept[0].call)
                 except Exception as error:
-                    if _may_pass(error) or was_interrupted(error):
+                    if may_pass(error) or was_interrupted(error):
                         raise
                     refused.append((self._kept[0], error))
                 self._kept.pop(0)
@@ -228,45 +217,11 @@ class TrackingClient(MlflowClient):
                 file.write(kept.line)
 
     def _sentence(self, error: Exception) -> str:
-        return redacted(f"tracking.uri: MLflow at {self.uri} cannot be used: {_reason(error)}", self.uri)
-
-
-def silence(uri: str, seconds: float) -> str | None:
-    """Why a server does not answer; None if it does, whatever it says."""
-    try:
-        requests.get(uri, timeout=seconds, stream=True, allow_redirects=False).close()
-    except requests.exceptions.SSLError:  # somebody is there; MLflow knows whom to trust
-        return None
-    except requests.Timeout:
-        return f"nothing within {seconds:g} seconds"
-    except (requests.RequestException, ValueError) as error:
-        system = _SYSTEM.search(str(error))
-        return system[1].strip() if system else type(error).__name__
-    return None
+        return redacted(f"tracking.uri: MLflow at {self.uri} cannot be used: {reason_of(error)}", self.uri)
 
 
 def _warn(sentence: str) -> None:
     print(f"warning: {sentence}", file=sys.stderr, flush=True)
-
-
-def _may_pass(error: Exception) -> bool:
-    """Whether the same call may succeed later."""
-    if was_interrupted(error) or isinstance(error, (UserError, *_BUGS)):
-        return False
-    if isinstance(error, requests.HTTPError) and error.response is not None:
-        return error.response.status_code >= 500 or error.response.status_code in (408, 429)
-    return not (isinstance(error, MlflowException) and error.error_code in _FINAL)
-
-
-def _reason(error: Exception) -> str:
-    """What an error says, without the addresses of objects that libraries quote."""
-    text = machine_fault(error) or str(error)
-    system = _SYSTEM.search(text)
-    if system is not None and "://" in text:
-        return f"nobody answers ({system[1].strip()})"
-    if "timed out" in text or "timeout" in text:
-        return "nobody answers in time"
-    return next(iter(text.splitlines()), "") or type(error).__name__
 
 
 def _line(run_id: str, metrics: Any = (), *_: Any, **__: Any) -> str:

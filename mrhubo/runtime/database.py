@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import filecmp
 import re
 import shutil
 import sqlite3
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -108,7 +110,7 @@ def _is_ours(database: sqlite3.Connection, old: str, new: str) -> bool:
     if database.execute(f"{query} WHERE artifact_location = ? AND key = ? AND value = ?", (old, *_OURS)).fetchone():
         return True
     places = database.execute("SELECT artifact_uri FROM runs WHERE substr(artifact_uri, 1, ?) = ?", (len(old), old))
-    return any(_path(new + place[len(old) :]).exists() for (place,) in places)
+    return any(_is_there(new + place[len(old) :]) for (place,) in places)
 
 
 def _rewrite(database: sqlite3.Connection, old: str, new: str) -> None:
@@ -117,7 +119,7 @@ def _rewrite(database: sqlite3.Connection, old: str, new: str) -> None:
         if place is None or not place.startswith(f"{old}/"):
             return place
         found = new + place[len(old) :]
-        return place if _path(place).exists() and not _path(found).exists() else found
+        return place if _is_there(place) and not _is_there(found) else found
 
     def begun(place: str | None) -> str | None:
         """The new place of what is still to be written."""
@@ -132,10 +134,23 @@ def _rewrite(database: sqlite3.Connection, old: str, new: str) -> None:
             database.create_function(f"rule{number}", 1, rule)
             database.execute(f"UPDATE {table} SET {column} = rule{number}({column}) WHERE {column} LIKE 'file:%'")
     database.commit()
+    _forget_places()
 
 
-def _path(uri: str) -> Path:
-    return Path(unquote(urlsplit(uri).path))
+def _forget_places() -> None:
+    """MLflow remembers the places of runs that this process has written to."""
+    remembered = getattr(sys.modules.get("mlflow.tracking._tracking_service.client"), "utils", None)
+    getattr(remembered, "_artifact_repos_cache", {}).clear()
+
+
+def local_path(uri: str) -> Path | None:
+    """The place that a file's address names; None of any other address."""
+    return Path(unquote(urlsplit(uri).path)) if uri.startswith("file:") else None
+
+
+def _is_there(uri: str) -> bool:
+    path = local_path(uri)
+    return path is not None and path.exists()
 
 
 def _make(file: Path, artifacts: Path) -> None:
@@ -144,13 +159,22 @@ def _make(file: Path, artifacts: Path) -> None:
         if not journal.with_name(journal.name.removesuffix("-journal")).exists():
             journal.unlink(missing_ok=True)
     if file.is_file() and _is_whole(file, artifacts):
-        return
+        return  # it holds nothing, but somebody may be reading it
     with atomic_path(file) as temporary:
         journal = temporary.with_name(f"{temporary.name}-journal")
         try:
             _create(temporary, artifacts)
         finally:
             journal.unlink(missing_ok=True)
+    _forget_connections(file)
+
+
+def _forget_connections(file: Path) -> None:
+    """This process may still be connected to a database that was there before and was deleted."""
+    store = sys.modules.get("mlflow.store.tracking.sqlalchemy_store")
+    known = getattr(getattr(store, "SqlAlchemyStore", None), "_engine_map", {}).get(sqlite_uri(file))
+    if known is not None:
+        known.dispose()
 
 
 def _create(file: Path, artifacts: Path) -> None:
@@ -161,14 +185,14 @@ def _create(file: Path, artifacts: Path) -> None:
 
 
 def _is_whole(file: Path, artifacts: Path) -> bool:
-    """Whether MLflow can open a database; tried on a copy, since trying changes it."""
+    """Whether MLflow can open a database as it is; tried on a copy, since it makes what is missing."""
     with tempfile.TemporaryDirectory() as folder:
         copy = shutil.copyfile(file, Path(folder) / file.name)
         try:
             _create(copy, artifacts)
         except Exception:  # MLflow's, SQLAlchemy's, Alembic's
             return False
-    return True
+        return filecmp.cmp(file, copy, shallow=False)
 
 
 def _holds_anything(file: Path) -> bool:

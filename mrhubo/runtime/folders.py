@@ -51,6 +51,8 @@ def _make(setting: str, folder: Path, made: list[Path]) -> None:
     shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
     try:
         text.encode()
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            os.lstat(folder)  # a path that is too long is told at once
         reason = _obstacle(folder)
         if reason is None:
             _try(folder, made)

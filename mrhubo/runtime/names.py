@@ -83,7 +83,8 @@ def check_name(setting: str, name: str) -> None:
     }
     found = [fault for fault, there in faults.items() if there]
     if found:
-        shown = name if len(name) <= _SHORT else f"{name[:_SHORT]}..."
+        shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in name[:_SHORT])
+        shown += "..." if len(name) > _SHORT else ""
         raise UserError(f"{setting}: '{shown}' {found[0]}; folders are named after it, so take a short plain name")
 
 

@@ -104,7 +104,7 @@ def _check_address(uri: str) -> None:
     if re.fullmatch(r"(localhost|[\w-]+(\.[\w-]+)*):\d+(/\S*)?", uri):
         raise UserError(f"tracking.uri: {uri} does not say how to speak to the server; write http://{uri}")
     if uri.startswith(_WEB):
-        from mrhubo.runtime.client import silence
+        from mrhubo.runtime.failures import silence
 
         fault = silence(uri, _ANSWER_SECONDS)
         if fault is not None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import torch
 
+from mrhubo.callbacks import ClipMetrics
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, load_motions, mean_score, predict_clips, score_clip, solve_references
@@ -91,3 +93,19 @@ def test_reference_answers_are_kept_and_damaged_ones_made_again(root: Path, moti
     again, _ = solve_references(config, body_map, loaded, folder)
     assert victim.read_bytes() == content
     assert torch.equal(again[0].reference_TN, validation[0].reference_TN)
+
+
+@pytest.mark.parametrize("bound", ["tanh", "clamp"])
+def test_a_training_that_came_to_nan_ends(root: Path, bound: str) -> None:
+    config, body_map = setting(root, "model.hidden=8", f"model.bound_output={bound}")
+    network = build_network(config, body_map)
+    clip = Clip(Motion("a", torch.eye(3).expand(9, 21, 3, 3), 24.0), torch.zeros(9, 8))
+    metrics, logged = ClipMetrics([clip], body_map.robot, config.robot.key_links), []
+    module = SimpleNamespace(network=network, log_dict=logged.append)
+    metrics.on_train_epoch_end(SimpleNamespace(global_step=500), module)  # pyright: ignore[reportArgumentType]
+    assert set(logged[0]) == {"val/joint_rad", "val/link_cm"}
+    for weights in network.parameters():
+        weights.data.fill_(torch.nan)
+    with pytest.raises(UserError, match="came to NaN by step 1,000; a lower trainer.lr helps"):
+        metrics.on_train_epoch_end(SimpleNamespace(global_step=1000), module)  # pyright: ignore[reportArgumentType]
+    assert len(logged) == 1

@@ -98,7 +98,8 @@ def test_only_reached_poses_are_measured_on(
 
 
 @pytest.fixture()
-def runs(tmp_path: Path) -> tuple[Any, str]:
+def runs(tmp_path: Path, empty_tracking: Path) -> tuple[Any, str]:
+    shutil.copy(empty_tracking / "mlflow.db", tmp_path)
     client = open_client(tmp_path, "mrhubo")
     return client, start_run(client, "mrhubo", "fit", {}).info.run_id
 

@@ -104,3 +104,58 @@ def test_ctrl_c(tmp_path: Path):
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (130, "interrupted; the same command resumes\n")
+
+
+def test_sigterm_ends_as_an_interrupt_does():
+    body = "try:\n    print('go', flush=True)\n    time.sleep(60)\nfinally:\n    print('closed')"
+    process = subprocess.Popen(
+        [sys.executable, "-c", script(body)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None and process.stdout.readline() == "go\n"
+    process.terminate()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (143, "closed\n", "terminated; the same command resumes\n")
+
+
+def test_a_signal_that_is_ignored_stays_ignored():
+    body = "import signal\nos.kill(os.getpid(), signal.SIGHUP)\nprint('on')"
+    done = run(body, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))  # as nohup starts it
+    assert (done.returncode, done.stdout) == (0, "on\n")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_letter_that_the_terminal_does_not_know_is_escaped(encoding):
+    body = "print('Zü\\u30ca\\udcff'); raise UserError('ä\\u30ca')"
+    done = run(body, env={**os.environ, "PYTHONIOENCODING": encoding}, encoding=encoding)
+    assert done.returncode == 2 and done.stdout.startswith("Z") and done.stdout.endswith("\\udcff\n")
+    assert done.stderr.startswith("error: ") and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("open('/dev/full', 'wb', 0).write(b'x')", "No space left on device"),
+        ("os.mkdir('/tmp/' + 300 * 'n')", "File name too long"),
+        ("open('/dev/null/x')", "/dev/null/x: Not a directory"),
+    ],
+)
+def test_a_fault_of_the_machine_is_one_sentence(body, sentence):
+    done = run(body)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("error: ") and sentence in done.stderr
+
+
+@pytest.mark.parametrize("error", ["UserError", "ValueError"])
+def test_no_password_is_printed(error):
+    done = run(f"raise {error}('no http://anna:s3cret@host there')")
+    assert done.returncode in (1, 2) and "http://anna:***@host" in done.stderr and "s3cret" not in done.stdout
+
+
+def test_waiting_threads_do_not_spin_unless_the_user_wants_them_to():
+    body = "print(os.environ['OMP_WAIT_POLICY'], 'torch' in sys.modules)"
+    without = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
+    assert run(body, env=without).stdout == "PASSIVE False\n"
+    assert run(body, env={**without, "OMP_WAIT_POLICY": "ACTIVE"}).stdout == "ACTIVE False\n"

@@ -66,3 +66,23 @@ def test_two_processes_cannot_share_it(tmp_path: Path) -> None:
             pass
         with Workspace(tmp_path, "nao", "def"):
             pass
+
+
+def test_a_mark_is_noted_before_the_run_and_gives_way_to_it(tmp_path: Path) -> None:
+    with Workspace(tmp_path, "nao", "abc") as workspace:
+        assert workspace.attempt is None
+        mark = workspace.new_attempt()
+    with Workspace(tmp_path, "nao", "abc") as workspace:  # killed in between
+        assert workspace.attempt == mark and workspace.run_id is None
+        workspace.start("run1")
+        assert workspace.attempt is None and workspace.run_id == "run1"
+
+
+def test_a_mark_alone_removes_no_checkpoint(tmp_path: Path) -> None:
+    """The new run may not come about."""
+    with Workspace(tmp_path, "nao", "abc") as workspace:
+        workspace.start("run1")
+        workspace.checkpoints.mkdir()
+        torch.save({}, workspace.checkpoints / "last.ckpt")
+        workspace.new_attempt()
+        assert workspace.last_checkpoint() is not None

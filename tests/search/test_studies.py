@@ -9,7 +9,7 @@ from pathlib import Path
 import optuna
 import pytest
 
-from mrhubo.errors import UserError
+from mrhubo.errors import Unreachable, UserError
 from mrhubo.search import open_study, open_trials, remaining, work_on
 
 
@@ -91,3 +91,44 @@ def test_a_database_that_cannot_be_opened(tmp_path: Path, url: str) -> None:
     with pytest.raises(UserError, match="storage: the study's database") as error:
         open_study(tmp_path, url, "s", "random", 0)
     assert "secret" not in str(error.value)
+
+
+def test_a_server_that_is_away_fails_no_trial(tmp_path: Path) -> None:
+    """It ends this process's work, and the trial is drawn again."""
+
+    def away(trial: optuna.Trial) -> float:
+        objective(trial)
+        raise Unreachable("nobody answers")
+
+    study = open_study(tmp_path, None, "s", "random", 0)
+    with pytest.raises(Unreachable, match="nobody answers"):
+        work_on(study, away, 3)
+    assert len(study.trials) == 2 and remaining(study, 3) == 3
+    work_on(study, objective, 3)
+    assert study.trials[1].params == study.trials[0].params and remaining(study, 3) == 0
+
+
+def test_a_database_that_goes_away_is_named_without_its_password(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sqlalchemy.exc import OperationalError
+
+    study = open_study(tmp_path, None, "s", "random", 0)
+
+    def gone(*_: object, **__: object) -> None:
+        raise OperationalError("SELECT", {}, Exception("no connection to postgresql://anna:s3cret@host/db"))
+
+    monkeypatch.setattr(study._storage, "get_all_trials", gone)
+    with pytest.raises(
+        Unreachable, match=r"^storage: the study's database does not answer any more: .*\*\*\*"
+    ) as error:
+        work_on(study, objective, 3)
+    assert "s3cret" not in str(error.value)
+
+
+def test_a_study_lies_in_a_folder_of_any_name(tmp_path: Path) -> None:
+    folder = tmp_path / "q?x #5%41"
+    folder.mkdir()
+    work_on(open_study(folder, None, "s", "random", 0), objective, 1)
+    assert {path.name for path in folder.iterdir()} == {"studies.db", "studies.lock"}
+    assert [path.name for path in tmp_path.iterdir()] == [folder.name]

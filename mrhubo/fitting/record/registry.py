@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import yaml
 from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
@@ -19,7 +20,7 @@ from mrhubo.config.secrets import redacted
 from mrhubo.errors import UserError
 from mrhubo.retargeter import Retargeter
 from mrhubo.rotation import matrix_to_axis_angle, orthonormal
-from mrhubo.runtime.database import database_uri, follow_if_possible
+from mrhubo.runtime.database import database_uri, follow_if_possible, local_path
 from mrhubo.runtime.locations import default_tracking
 from mrhubo.runtime.names import model_name
 from mrhubo.runtime.provenance import library_versions
@@ -133,7 +134,6 @@ def fetch_package(uri: str) -> Path:
     set_up_mlflow()
     import mlflow
     from mlflow.artifacts import download_artifacts
-    from mlflow.models import Model
 
     match = re.fullmatch(r"models:/([^/@]+)(?:/(\d+)|@([^/]+))", uri)
     if not match:
@@ -152,9 +152,13 @@ def fetch_package(uri: str) -> Path:
     client = mlflow.MlflowClient(tracking_uri=registry)
     try:
         version = client.get_model_version(name, number) if number else client.get_model_version_by_alias(name, alias)
-        path = Path(download_artifacts(artifact_uri=version.source, tracking_uri=registry))
-        return path / Model.load(path).flavors["python_function"]["artifacts"]["package"]["path"]
-    except KeyError as error:
+        # MLflow does not find its way in folders whose names hold what means something in an address.
+        path = local_path(version.source or "")
+        if path is None or not path.is_dir():
+            path = Path(download_artifacts(artifact_uri=version.source, tracking_uri=registry))
+        model = yaml.safe_load((path / "MLmodel").read_text(encoding="utf-8"))
+        return path / model["flavors"]["python_function"]["artifacts"]["package"]["path"]
+    except (KeyError, TypeError) as error:
         raise UserError(f"{uri}: is no model of mrhubo") from error
     except Exception as error:  # MLflow's own, the network's, the database's
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__

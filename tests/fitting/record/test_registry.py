@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,10 @@ def pose() -> torch.Tensor:
 
 @pytest.fixture(scope="module")
 def registered(
-    root: Path, pose: torch.Tensor, tmp_path_factory: pytest.TempPathFactory
+    root: Path, pose: torch.Tensor, empty_tracking: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Retargeter, str]:
     """Folder of the tracking database, the retargeter, and the URI of its second version."""
-    folder = tmp_path_factory.mktemp("registry")
+    folder = Path(shutil.copytree(empty_tracking, tmp_path_factory.mktemp("registry") / "mlruns"))
     config = load_config(root / "conf" / "nao.yaml", ["model.hidden=24"])
     body_map = build_body_map(config.robot)
     torch.manual_seed(0)
@@ -128,3 +129,67 @@ def test_bad_poses_are_named(served: Any, pose: torch.Tensor) -> None:
     pose_T63[7, 5] = np.nan
     with pytest.raises(mlflow.MlflowException, match="human pose 7 holds NaN"):
         served.predict(pose_T63)
+
+
+@pytest.mark.parametrize("point", ["log_model_artifacts", "finalize_logged_model", "log_outputs", "create_model_version",
+                                   "set_logged_model_tags"])  # fmt: skip
+def test_a_start_that_was_killed_while_it_registered_leaves_one_version_in_the_end(
+    registered: tuple[Path, Retargeter, str],
+    tmp_path: Path,
+    pose: torch.Tensor,
+    monkeypatch: pytest.MonkeyPatch,
+    point: str,
+) -> None:
+    """Killed after the step is done; nothing tidies up, as after kill -9."""
+    folder, made, _ = registered
+    client = open_client(folder, "mrhubo")
+    run = start_run(client, "mrhubo", point, {}).info
+    package, tags = made.save(tmp_path / "package", {}), {"run_id": run.run_id}
+
+    class Killed(BaseException):
+        pass
+
+    with monkeypatch.context() as patch, pytest.raises(Killed):
+        whole = getattr(mlflow.MlflowClient, point)
+
+        def killed(*given: Any, **named: Any) -> None:
+            whole(*given, **named)
+            raise Killed
+
+        patch.setattr(mlflow.MlflowClient, point, killed)
+        patch.setattr(registry, "drop_half_models", lambda *_, **__: None)
+        register(client, run.run_id, package, made, pose[:4], tags)
+    uri = register(client, run.run_id, package, made, pose[:4], tags)
+    (version,) = client.search_model_versions(f"run_id = '{run.run_id}'")
+    (model,) = client.search_logged_models([run.experiment_id], f"source_run_id = '{run.run_id}'")
+    assert uri == f"models:/mrhubo-nao/{version.version}" and model.status == "READY"
+    assert model.tags["mlflow.modelVersions"] == f'[{{"name": "mrhubo-nao", "version": {version.version}}}]'
+    assert version.source == model.artifact_location
+
+
+def test_one_that_cannot_be_registered_leaves_no_half_model(
+    registered: tuple[Path, Retargeter, str], tmp_path: Path, pose: torch.Tensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, made, _ = registered
+    client = open_client(folder, "mrhubo")
+    run = start_run(client, "mrhubo", "a", {}).info
+
+    def refuse(*_: object, **__: object) -> None:
+        raise mlflow.MlflowException("no registry here")
+
+    monkeypatch.setattr(mlflow.MlflowClient, "create_model_version", refuse)
+    with pytest.raises(mlflow.MlflowException, match="no registry here"):
+        register(client, run.run_id, made.save(tmp_path / "package", {}), made, pose[:4], {})
+    assert not client.search_logged_models([run.experiment_id], f"source_run_id = '{run.run_id}'")
+
+
+def test_versions_are_found_after_a_move(
+    registered: tuple[Path, Retargeter, str], tmp_path: Path, pose: torch.Tensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, made, uri = registered
+    moved = Path(shutil.copytree(folder, tmp_path / "moved %41?"))
+    monkeypatch.setattr(registry, "default_tracking", lambda: moved)
+    monkeypatch.setattr(mlflow, "is_tracking_uri_set", lambda: False)
+    found = mrhubo.load(uri)
+    assert str(found.config.robot.urdf).startswith(str(moved))
+    torch.testing.assert_close(found(pose).q, made(pose).q)
