@@ -28,7 +28,8 @@ from mrhubo.pairing import ProportionTest
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap, ManualScale, build_body_map, varied
 from mrhubo.runtime.progress import Reporter
-from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.runs import start_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import quiet_lightning
 
 RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 24, poses: 12}"

@@ -16,7 +16,8 @@ from mrhubo.fitting.record.inputs import mlflow_datasets
 from mrhubo.fitting.record.naming import run_name
 from mrhubo.runtime.locations import project_root
 from mrhubo.runtime.provenance import git_commit, library_versions
-from mrhubo.runtime.tracking import close_run, log_file, open_client, take_up_run
+from mrhubo.runtime.runs import close_run, log_file, take_up_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.workspace import Workspace
 from mrhubo.view import save_png
 from mrhubo.view.pictures import Artist
