@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrhubo.config.secrets import redacted
 from mrhubo.errors import Unreachable, UserError, was_interrupted
-from mrhubo.runtime.names import key
+from mrhubo.runtime.names import key, writable
 from mrhubo.runtime.processes import is_gone, this_process
 from mrhubo.runtime.workspace import Workspace
 
@@ -35,9 +35,9 @@ def start_run(client: TrackingClient, experiment: str, name: str, tags: Mapping[
 
     found = client.get_experiment_by_name(experiment)
     assert found is not None
-    tags = {**tags, _PROCESS: this_process()}
+    tags = {name: writable(value) for name, value in {**tags, _PROCESS: this_process()}.items()}
     try:
-        return client.create_run(found.experiment_id, tags=tags, run_name=name[:_RUN_NAME])
+        return client.create_run(found.experiment_id, tags=tags, run_name=writable(name)[:_RUN_NAME])
     except MlflowException as error:
         raise Unreachable(redacted(f"tracking.uri: {client.uri} makes no run: {error}", client.uri)) from error
 
@@ -112,7 +112,7 @@ def log_all(
     from mlflow.entities import Metric, Param
 
     now = int(1000 * time.time())
-    written = [Param(key(name), redacted(str(value))) for name, value in (params or {}).items()]
+    written = [Param(key(name), writable(redacted(str(value)))) for name, value in (params or {}).items()]
     client.log_batch(run_id, [Metric(key(name), value, now, 0) for name, value in metrics.items()], written)
 
 
@@ -133,7 +133,8 @@ def close_run(client: TrackingClient, run_id: str, error: BaseException | None, 
         Unreachable: nothing went wrong but that the server does not answer; `whole` says what is done all the same.
     """
     if error is not None:
-        client.set_tag(run_id, _ENDED_BY, redacted(f"{type(error).__name__}: {error}", client.uri)[:500])
+        reason = redacted(f"{type(error).__name__}: {error}", client.uri)
+        client.set_tag(run_id, _ENDED_BY, writable(reason)[:500])
     client.set_terminated(run_id, run_status(error))
     if error is None:
         client.deliver(whole)

@@ -31,6 +31,8 @@ _SETTINGS = {
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "30",
 }
+_SHOWN = 60
+"""Letters of an experiment's name in a sentence."""
 _ANSWER_SECONDS = 5.0
 """How long a server may take for a first sign of life."""
 _WEB = ("http://", "https://")
@@ -105,13 +107,13 @@ def _check_address(uri: str) -> None:
         )
     if re.fullmatch(r"(localhost|[\w-]+(\.[\w-]+)*):\d+(/\S*)?", uri):
         raise UserError(f"tracking.uri: {uri} does not say how to speak to the server; write http://{uri}")
-    if uri.startswith(_WEB):
+    if not uri.startswith("sqlite"):
         from mrhubo.runtime.failures import silence
 
         fault = silence(uri, _ANSWER_SECONDS)
         if fault is not None:
             raise UserError(
-                redacted(f"tracking.uri: no MLflow server answers at {uri} ({fault}); start it, or leave tracking.uri"
+                redacted(f"tracking.uri: no server answers at {uri} ({fault}); start it, or leave tracking.uri"
                          " out to keep runs in tracking.dir", uri)
             )  # fmt: skip
 
@@ -134,11 +136,12 @@ def _open_experiment(client: TrackingClient, name: str, location: str | None) ->
         try:
             return client.create_experiment(name, artifact_location=location, tags=kind)
         except MlflowException as error:
-            if error.error_code != "RESOURCE_ALREADY_EXISTS":  # by another process, meanwhile
+            found = client.get_experiment_by_name(name)  # another process may have been faster
+            if found is None and error.error_code != "INVALID_PARAMETER_VALUE":
                 raise
-            found = client.get_experiment_by_name(name)
             if found is None:
-                raise
+                shown = name if len(name) < _SHOWN else f"{name[:_SHOWN]}..."
+                raise UserError(f"tracking.experiment: MLflow does not take '{shown}': {error}") from error
     if found.lifecycle_stage == "deleted":
         address = shlex.quote(redacted(client.uri))
         raise UserError(

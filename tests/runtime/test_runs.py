@@ -136,3 +136,11 @@ def test_runs_are_found_by_tags_of_any_text(opened: TrackingClient, value: str) 
     run = start_run(opened, "mrhubo", "a" * 400, {"sweep": value}).info
     found = find_run(opened, "mrhubo", {"sweep": value})
     assert found is not None and found.info.run_id == run.run_id and find_run(opened, "mrhubo", {"sweep": "x"}) is None
+
+
+def test_a_file_name_that_is_no_text_can_be_written(opened: TrackingClient) -> None:
+    run_id = start_run(opened, "mrhubo", "a\udcff", {"motions": "b\udcff"}).info.run_id
+    log_all(opened, run_id, {"test/c\udcff/link_cm": 1.0}, {"dir": "/d\udcff"})
+    found = opened.get_run(run_id)
+    assert found.data.tags["motions"] == "b\\udcff" and found.data.params == {"dir": "/d\\udcff"}
+    assert found.info.run_name == "a\\udcff" and list(found.data.metrics) == ["test/c_xDCFF_/link_cm"]

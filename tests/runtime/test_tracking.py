@@ -43,8 +43,10 @@ def test_a_deleted_experiment_is_named_and_how_to_get_it_back(folder: Path, open
 @pytest.mark.parametrize(
     ("uri", "sentence"),
     [
-        ("http://anna:s3cret@127.0.0.1:9", r"no MLflow server answers at http://anna:\*\*\*@127.0.0.1:9 \(Connection refused"),
-        ("https://127.0.0.1:9", "no MLflow server answers"),
+        ("http://anna:s3cret@127.0.0.1:9", r"no server answers at http://anna:\*\*\*@127.0.0.1:9 \(Connection refused"),
+        ("https://127.0.0.1:9", "no server answers"),
+        ("postgresql://anna:s3cret@127.0.0.1:9/db", r"no server answers at postgresql://anna:\*\*\*@127.0.0.1:9/db"),
+        ("mysql+pymysql://anna:s3cret@127.0.0.1:9/db", "Connection refused"),
         ("localhost:5000", "write http://localhost:5000"),
         ("10.0.0.1:5000/mlflow", "write http://10.0.0.1:5000/mlflow"),
         ("nonsense://anna:s3cret@host", r"MLflow cannot open nonsense://anna:\*\*\*@host"),
@@ -96,3 +98,19 @@ def test_make_dashboard_opens_what_is_there(
     with closing(sqlite3.connect(tmp_path / "mlruns" / "mlflow.db")) as database:
         places = {place for (place,) in database.execute("SELECT artifact_location FROM experiments")}
     assert (tmp_path / "mlruns" / "artifacts").as_uri() in places
+
+
+@pytest.mark.parametrize("name", ["", "n" * 600])
+def test_impossible_names_of_experiments_are_named(folder: Path, name: str) -> None:
+    with pytest.raises(UserError, match="^tracking.experiment: MLflow does not take '") as error:
+        open_client(folder, name)
+    assert len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize("name", ["../../up", "a 'b' \"c\"", "ナオ", "50%"])
+def test_other_names_of_experiments_are_taken(folder: Path, name: str) -> None:
+    before = sorted(folder.parent.rglob("*"))
+    open_client(folder, name)
+    found = open_client(folder, name).get_experiment_by_name(name)
+    assert found is not None and found.artifact_location == (folder / "artifacts").as_uri()
+    assert {path.name for path in set(folder.parent.rglob("*")) - set(before)} <= {"mlflow.lock"}
