@@ -9,6 +9,8 @@ PIP_ARGS ?=
 BIN := .venv/bin
 # Modules are compiled when they are first imported; compiling all of them here takes minutes.
 PIP_INSTALL = $(BIN)/python -m pip install --no-compile --disable-pip-version-check $(PIP_ARGS)
+# Makes the database if there is none yet, and lets it find its artifacts where the folder is now.
+OPEN := from mrhubo.config import run_command as run; from mrhubo.runtime.tracking import open_runs as runs; run(runs)
 ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 
 # Where this is set, every start compiles everything again: half a minute.
@@ -36,7 +38,8 @@ test: .venv/.test
 dashboard: export MLFLOW_SERVER_ENABLE_JOB_EXECUTION = false
 dashboard: export MLFLOW_DISABLE_TELEMETRY = true
 dashboard: .venv/.core
-	$(BIN)/mlflow ui --backend-store-uri sqlite:///mlruns/mlflow.db --host 127.0.0.1 --workers 1
+	@$(BIN)/python -c "$(OPEN)"
+	$(BIN)/python -m mlflow ui --backend-store-uri sqlite:///mlruns/mlflow.db --host 127.0.0.1 --workers 1
 
 # Stamps: an empty file each, written only when its step is complete, so that an interrupted one is repeated.
 .venv/.core: pyproject.toml .venv/.created

@@ -27,7 +27,8 @@ from mrhubo.pairing import make_filter
 from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
 from mrhubo.runtime.run_logger import RunLogger
-from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.runs import start_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import cosine_schedule
 
 

@@ -28,7 +28,7 @@ from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, varied
 from mrhubo.rotation import matrix_to_sixd
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.tracking import log_all, start_run
+from mrhubo.runtime.runs import log_all, start_run
 from mrhubo.search import open_study, open_trials
 from mrhubo.search.plots import study_plots
 from mrhubo.view import figure_sheet

@@ -6,6 +6,7 @@ Legend: T frames, J = 21 human joints, N robot joints.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from mrhubo.runtime.locations import default_motions
 from mrhubo.runtime.progress import SILENT, Reporter
 
 REFERENCE_SCHEMA = "mrhubo.reference/2"
+_NAME = 80
+"""Bytes of a motion's name that the name of a file begins with."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,8 @@ def solve_references(
         for done, motion in enumerate(everything):
             progress.update(done, motion.name)
             header = {**common, "motion_xxh3": motion.checksum}
-            path = folder / f"{config.robot.name}-{motion.name}-{fingerprint(header)}.safetensors"
+            short = os.fsencode(motion.name)[:_NAME].decode(errors="ignore")
+            path = folder / f"{config.robot.name}-{short}-{fingerprint(header)}.safetensors"
             try:
                 tensors, found = read_tensors(path)
                 reference = tensors["q"] if found == header else None

@@ -23,8 +23,9 @@ from mrhubo.runtime.locations import project_root
 from mrhubo.runtime.names import check_name
 from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.provenance import git_commit
+from mrhubo.runtime.runs import close_run, find_run, log_all, reopen, start_run
 from mrhubo.runtime.tables import markdown
-from mrhubo.runtime.tracking import close_run, find_run, log_all, open_client, reopen, start_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.workspace import Workspace
 from mrhubo.search import open_study, open_trials, override, read_space, remaining, work_on
 

@@ -17,7 +17,8 @@ from mrhubo.paper.tables import ALL_METHODS, BASELINE, METHODS, OUR_DEFAULT, Par
 from mrhubo.runtime.locations import default_capture, project_root
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.provenance import git_commit
-from mrhubo.runtime.tracking import ending, find_run, open_client, reopen, start_run
+from mrhubo.runtime.runs import ending, find_run, reopen, start_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.view.pictures import Artist, liveliness
 
 if TYPE_CHECKING:

@@ -156,7 +156,7 @@ class TrackingClient(MlflowClient):
         """Whether what was kept may go now; a server that is silent must not stop the work for long."""
         if time.monotonic() < self._next_try:
             return False
-        if self.uri.startswith(("http://", "https://")) and silence(self.uri, _SIGN_SECONDS) is not None:
+        if not self._local and silence(self.uri, _SIGN_SECONDS) is not None:
             self._next_try = time.monotonic() + _NEXT_TRY_SECONDS
             return False
         return True

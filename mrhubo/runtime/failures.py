@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import socket
 
 import requests
 from mlflow.exceptions import MlflowException
@@ -17,12 +18,16 @@ _FINAL = frozenset({
 """Answers that asking again does not change."""
 BUGS = (TypeError, AttributeError, NameError, AssertionError)
 """Errors of a program, which are nobody's bad day."""
+_PORTS = {"postgresql": 5432, "mysql": 3306, "mariadb": 3306, "mssql": 1433}
+"""Of database servers, where the address names none."""
 _SYSTEM = re.compile(r"\[Errno -?\d+\] ([^'\"()]+)")
 """What the operating system says, in an error of a library."""
 
 
 def silence(uri: str, seconds: float) -> str | None:
-    """Why a server does not answer; None if it does, whatever it says."""
+    """Why the server at an address does not answer; None if it does, whatever it says, or if there is none to ask."""
+    if not uri.startswith(("http://", "https://")):
+        return _silent_port(uri, seconds)
     try:
         requests.get(uri, timeout=seconds, stream=True, allow_redirects=False).close()
     except requests.exceptions.SSLError:  # somebody is there; MLflow knows whom to trust
@@ -32,6 +37,27 @@ def silence(uri: str, seconds: float) -> str | None:
     except (requests.RequestException, ValueError) as error:
         system = _SYSTEM.search(str(error))
         return system[1].strip() if system else type(error).__name__
+    return None
+
+
+def _silent_port(uri: str, seconds: float) -> str | None:
+    """The same of a database: MLflow would try for minutes to connect to it."""
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import ArgumentError
+
+    try:
+        url = make_url(uri)
+    except (ArgumentError, ValueError):
+        return None  # whoever opens it says what is wrong
+    port = url.port or next((port for name, port in _PORTS.items() if url.drivername.startswith(name)), None)
+    if url.host is None or port is None:
+        return None
+    try:
+        socket.create_connection((url.host, port), seconds).close()
+    except TimeoutError:
+        return f"nothing within {seconds:g} seconds"
+    except (OSError, UnicodeError) as error:
+        return getattr(error, "strerror", None) or str(error)
     return None
 
 

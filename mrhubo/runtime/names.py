@@ -54,7 +54,12 @@ def model_name(robot: str) -> str:
 
 def parameters(plain: Mapping[str, Any]) -> dict[str, str]:
     """Nested plain values as parameters: `robot/ranges/<joint>`; long values are cut, passwords left out."""
-    return {name: redacted(str(value))[:_VALUE] for name, value in _flat(plain, ())}
+    return {name: writable(redacted(str(value))[:_VALUE]) for name, value in _flat(plain, ())}
+
+
+def writable(text: str) -> str:
+    """Text that a database takes: what is no letter, as in a file name that is not UTF-8, becomes its number."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _flat(plain: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[tuple[str, Any]]:

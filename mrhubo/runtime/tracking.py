@@ -6,27 +6,20 @@ imported only when a run starts: it costs two seconds.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 import re
 import shlex
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mrhubo.config.secrets import HIDDEN, credentials, has_hidden, redacted
-from mrhubo.errors import Unreachable, UserError, was_interrupted
-from mrhubo.runtime.database import database_uri, open_database, sqlite_file
-from mrhubo.runtime.names import key
-from mrhubo.runtime.processes import is_gone, this_process
-from mrhubo.runtime.workspace import Workspace
+from mrhubo.errors import UserError, was_interrupted
+from mrhubo.runtime.database import NAME, database_uri, open_database, sqlite_file
+from mrhubo.runtime.runs import close_the_dead
 
 if TYPE_CHECKING:
-    from mlflow.entities import Run
-
     from mrhubo.runtime.client import TrackingClient
 
 _TALKATIVE = ("alembic", "mlflow.store", "mlflow.tracking", "mlflow.system_metrics", "mlflow.pyfunc")
@@ -38,13 +31,12 @@ _SETTINGS = {
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "30",
 }
+_SHOWN = 60
+"""Letters of an experiment's name in a sentence."""
 _ANSWER_SECONDS = 5.0
 """How long a server may take for a first sign of life."""
 _WEB = ("http://", "https://")
 _CREDENTIALS = ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD")
-_ATTEMPT, _PROCESS, _ENDED_BY = "attempt", "process", "ended_by"
-_RUN_NAME = 250
-"""Letters of a run's name that databases keep."""
 
 
 def open_client(folder: Path, experiment: str, uri: str | None = None) -> TrackingClient:
@@ -74,7 +66,7 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Tracki
             open_database(file, artifacts)
         client = TrackingClient(uri)
         location = artifacts.as_uri() if file is not None else None
-        _close_the_dead(client, _open_experiment(client, experiment, location))
+        close_the_dead(client, _open_experiment(client, experiment, location))
     except UserError:
         raise
     except Exception as error:  # MLflow's own, SQLAlchemy's, its drivers'
@@ -83,6 +75,18 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Tracki
         reason = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise UserError(redacted(f"tracking.uri: MLflow cannot open {uri}: {reason}", uri)) from error
     return client
+
+
+def open_runs(argv: Sequence[str]) -> None:
+    """Makes the tracking database of the current folder's `mlruns` ready for MLflow's own commands; `make dashboard`
+    calls it.
+
+    Raises:
+        UserError: the database cannot be used.
+    """
+    set_up_mlflow()
+    folder = Path("mlruns")
+    open_database(folder / NAME, folder / "artifacts")
 
 
 def set_up_mlflow() -> None:
@@ -103,13 +107,13 @@ def _check_address(uri: str) -> None:
         )
     if re.fullmatch(r"(localhost|[\w-]+(\.[\w-]+)*):\d+(/\S*)?", uri):
         raise UserError(f"tracking.uri: {uri} does not say how to speak to the server; write http://{uri}")
-    if uri.startswith(_WEB):
+    if not uri.startswith("sqlite"):
         from mrhubo.runtime.failures import silence
 
         fault = silence(uri, _ANSWER_SECONDS)
         if fault is not None:
             raise UserError(
-                redacted(f"tracking.uri: no MLflow server answers at {uri} ({fault}); start it, or leave tracking.uri"
+                redacted(f"tracking.uri: no server answers at {uri} ({fault}); start it, or leave tracking.uri"
                          " out to keep runs in tracking.dir", uri)
             )  # fmt: skip
 
@@ -132,11 +136,12 @@ def _open_experiment(client: TrackingClient, name: str, location: str | None) ->
         try:
             return client.create_experiment(name, artifact_location=location, tags=kind)
         except MlflowException as error:
-            if error.error_code != "RESOURCE_ALREADY_EXISTS":  # by another process, meanwhile
+            found = client.get_experiment_by_name(name)  # another process may have been faster
+            if found is None and error.error_code != "INVALID_PARAMETER_VALUE":
                 raise
-            found = client.get_experiment_by_name(name)
             if found is None:
-                raise
+                shown = name if len(name) < _SHOWN else f"{name[:_SHOWN]}..."
+                raise UserError(f"tracking.experiment: MLflow does not take '{shown}': {error}") from error
     if found.lifecycle_stage == "deleted":
         address = shlex.quote(redacted(client.uri))
         raise UserError(
@@ -144,149 +149,3 @@ def _open_experiment(client: TrackingClient, name: str, location: str | None) ->
             f" MLFLOW_TRACKING_URI={address} mlflow experiments restore --experiment-id {found.experiment_id}"
         )
     return found.experiment_id
-
-
-def _close_the_dead(client: TrackingClient, experiment_id: str) -> None:
-    """Runs that still count as running, though their process on this machine has ended (kill -9, no memory left)."""
-    for run in client.search_runs([experiment_id], "attributes.status = 'RUNNING'"):
-        process = run.data.tags.get(_PROCESS)
-        if process is not None and is_gone(process):
-            drop_half_models(client, run)
-            client.set_tag(run.info.run_id, _ENDED_BY, "its process ended without a word")
-            client.set_terminated(run.info.run_id, "KILLED")
-
-
-def drop_half_models(client: TrackingClient, run: Run, linked: str | None = None) -> None:
-    """Removes the models of a run that were never finished, and with `linked` those that lack this tag."""
-    query = f"source_run_id = '{run.info.run_id}'"
-    with contextlib.suppress(Exception):  # an old server knows no such models
-        for model in client.search_logged_models([run.info.experiment_id], query):
-            if model.status == "PENDING" or (linked is not None and linked not in model.tags):
-                client.delete_logged_model(model.model_id)
-
-
-def start_run(client: TrackingClient, experiment: str, name: str, tags: Mapping[str, str]) -> Run:
-    """A new run in an experiment that `open_client` has opened.
-
-    Raises:
-        Unreachable: the server or the database does not make one.
-    """
-    from mlflow.exceptions import MlflowException
-
-    found = client.get_experiment_by_name(experiment)
-    assert found is not None
-    tags = {**tags, _PROCESS: this_process()}
-    try:
-        return client.create_run(found.experiment_id, tags=tags, run_name=name[:_RUN_NAME])
-    except MlflowException as error:
-        raise Unreachable(redacted(f"tracking.uri: {client.uri} makes no run: {error}", client.uri)) from error
-
-
-def take_up_run(
-    client: TrackingClient, experiment: str, workspace: Workspace, name: str, tags: Mapping[str, str]
-) -> tuple[Run, bool]:
-    """The unfinished run of a workspace, or a new one; and whether it is new.
-
-    A start that was killed before it could note its run finds it again by a mark that was noted before.
-
-    Raises:
-        Unreachable: the server does not say whether the run is still there; nothing is removed then.
-    """
-    run = _active_run(client, workspace.run_id)
-    if run is None and workspace.attempt is not None:
-        run = find_run(client, experiment, {_ATTEMPT: workspace.attempt})
-    if run is None:
-        run = start_run(client, experiment, name, {**tags, _ATTEMPT: workspace.new_attempt()})
-        workspace.start(run.info.run_id)
-        return run, True
-    workspace.start(run.info.run_id)
-    reopen(client, run)
-    return run, False
-
-
-def reopen(client: TrackingClient, run: Run) -> None:
-    """Marks a run as running again, in this process."""
-    run_id = run.info.run_id
-    client.update_run(run_id, status="RUNNING")
-    client.set_tag(run_id, _PROCESS, this_process())
-    client.set_tag(run_id, "resumed", time.strftime("%Y-%m-%d %H:%M:%S"))
-    if _ENDED_BY in run.data.tags:
-        client.delete_tag(run_id, _ENDED_BY)
-    drop_half_models(client, run)
-
-
-def _active_run(client: TrackingClient, run_id: str | None) -> Run | None:
-    """The run of that id if it is still there: a user may have deleted it."""
-    from mlflow.exceptions import MlflowException
-
-    if run_id is None:
-        return None
-    try:
-        run = client.get_run(run_id)
-    except MlflowException as error:
-        if error.error_code != "RESOURCE_DOES_NOT_EXIST":
-            raise UserError(redacted(f"tracking.uri: {client.uri}: run {run_id}: {error}", client.uri)) from error
-        return None
-    return run if run.info.lifecycle_stage == "active" else None
-
-
-def find_run(client: TrackingClient, experiment: str, tags: Mapping[str, str], finished: bool = False) -> Run | None:
-    """The newest run of an experiment that has these tags (and is finished), if there is one."""
-    found = client.get_experiment_by_name(experiment)
-    if found is None:
-        return None
-    wanted = [f"tags.`{name}` = {_quoted(value)}" for name, value in tags.items()]
-    if finished:
-        wanted.append("attributes.status = 'FINISHED'")
-    return next(iter(client.search_runs([found.experiment_id], " and ".join(wanted), max_results=1)), None)
-
-
-def _quoted(value: str) -> str:
-    return f'"{value}"' if "'" in value else f"'{value}'"
-
-
-def log_all(
-    client: TrackingClient, run_id: str, metrics: Mapping[str, float], params: Mapping[str, Any] | None = None
-) -> None:
-    """Metrics and parameters in one go: one at a time, each costs about 20 ms on SQLite."""
-    from mlflow.entities import Metric, Param
-
-    now = int(1000 * time.time())
-    written = [Param(key(name), redacted(str(value))) for name, value in (params or {}).items()]
-    client.log_batch(run_id, [Metric(key(name), value, now, 0) for name, value in metrics.items()], written)
-
-
-def log_file(client: TrackingClient, run_id: str, name: str, write: Callable[[Path], object]) -> None:
-    """The artifact `name` (folder and file) of a run, made by `write`, which is given the path to write to."""
-    client.log_made(run_id, key(name), write)
-
-
-def run_status(error: BaseException | None) -> str:
-    """How a run ended that raised `error`: finished, killed by the user, or failed."""
-    return "FINISHED" if error is None else "KILLED" if was_interrupted(error) else "FAILED"
-
-
-def close_run(client: TrackingClient, run_id: str, error: BaseException | None, whole: str = "") -> None:
-    """Ends a run as finished, killed or failed, and sends what was kept.
-
-    Raises:
-        Unreachable: nothing went wrong but that the server does not answer; `whole` says what is done all the same.
-    """
-    if error is not None:
-        client.set_tag(run_id, _ENDED_BY, redacted(f"{type(error).__name__}: {error}", client.uri)[:500])
-    client.set_terminated(run_id, run_status(error))
-    if error is None:
-        client.deliver(whole)
-        client.patient = False
-
-
-@contextmanager
-def ending(client: TrackingClient, run_id: str) -> Iterator[None]:
-    """Closes a run as finished, killed or failed; while it is open, a server that goes away is no reason to stop."""
-    client.patient = True
-    try:
-        yield
-    except BaseException as error:
-        close_run(client, run_id, error)
-        raise
-    close_run(client, run_id, None)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _HEARTBEAT, _GRACE = 30, 120
 """Seconds between two signs of life, and until a process on another machine is taken for dead."""
+_ANSWER_SECONDS = 5.0
+"""How long a database server may take for a first sign of life."""
 _LOCKED = 120
 """Seconds that a locked SQLite database is waited for."""
 _OWNER, _ERROR = "owner", "error"
@@ -63,6 +65,12 @@ def open_study(
         "none": optuna.pruners.NopPruner,
     }
     try:
+        if url is not None:
+            from mrhubo.runtime.failures import silence
+
+            fault = silence(url, _ANSWER_SECONDS)
+            if fault is not None:
+                raise ConnectionError(f"no server answers there ({fault})")
         with locked(folder / "studies.lock", wait=True):  # two processes cannot make the tables at once
             beats: dict[str, Any] = {"heartbeat_interval": _HEARTBEAT, "grace_period": _GRACE}
             beats["heartbeat_stale_trial_callback"] = _retry

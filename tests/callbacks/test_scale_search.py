@@ -28,7 +28,8 @@ from mrhubo.pairing import ScaleFactorObjective
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap, ManualScale, build_body_map, varied
 from mrhubo.runtime.progress import Reporter
-from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.runs import start_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import quiet_lightning
 
 pytestmark = pytest.mark.usefixtures("light_records")

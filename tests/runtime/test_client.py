@@ -17,7 +17,8 @@ from mlflow.protos.databricks_pb2 import INVALID_PARAMETER_VALUE, TEMPORARILY_UN
 from mrhubo.errors import Unreachable
 from mrhubo.runtime import client as clients
 from mrhubo.runtime.client import TrackingClient
-from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.runs import start_run
+from mrhubo.runtime.tracking import open_client
 
 GONE = MlflowException(
     "API request to http://host:5000/api/2.0/mlflow/runs/log-batch failed with exception HTTPConnectionPool(host='host',"

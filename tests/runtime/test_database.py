@@ -15,7 +15,8 @@ from sqlalchemy.engine import create_engine, make_url
 from mrhubo.errors import UserError
 from mrhubo.runtime import database
 from mrhubo.runtime.database import database_uri, open_database, sqlite_file, sqlite_uri
-from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.runs import start_run
+from mrhubo.runtime.tracking import open_client
 
 LETTERS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="/\0"), min_size=1, max_size=20)
 

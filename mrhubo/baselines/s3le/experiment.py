@@ -25,7 +25,8 @@ from mrhubo.rotation import stack_columns
 from mrhubo.runtime.locations import default_capture, project_root
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.provenance import git_commit
-from mrhubo.runtime.tracking import ending, log_all, open_client, start_run
+from mrhubo.runtime.runs import ending, log_all, start_run
+from mrhubo.runtime.tracking import open_client
 
 if TYPE_CHECKING:
     from mrhubo.runtime.client import TrackingClient

@@ -14,7 +14,7 @@ from mrhubo.config import BaselineConfig, SweepConfig, load_config, to_yaml
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.sweeping import Sweep, SweepResult, SweepTrial
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.tracking import ending, log_all
+from mrhubo.runtime.runs import ending, log_all
 
 SPACE: dict[str, Any] = {
     "s3le.latent": [8, 16, 32, 64],

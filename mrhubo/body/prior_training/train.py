@@ -41,7 +41,8 @@ from mrhubo.errors import UserError
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.run_logger import RunLogger
-from mrhubo.runtime.tracking import ending, open_client, take_up_run
+from mrhubo.runtime.runs import ending, take_up_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
 from mrhubo.runtime.workspace import Workspace
 

@@ -18,7 +18,7 @@ from mrhubo.evaluation import Clip, mean_metrics, run_metrics
 from mrhubo.fitting.measurement import Measured
 from mrhubo.fitting.record.predictions import log_predictions
 from mrhubo.fitting.record.recording import Recording
-from mrhubo.runtime.tracking import log_file
+from mrhubo.runtime.runs import log_file
 from mrhubo.view import pictures, save_gif
 
 _TABLE = "test/clips.json"

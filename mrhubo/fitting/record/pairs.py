@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from mrhubo.fitting.preparation import prepare
 from mrhubo.fitting.record.recording import Recording
 from mrhubo.pairing import PairFilter
-from mrhubo.runtime.tracking import log_all
+from mrhubo.runtime.runs import log_all
 from mrhubo.view import phi_histogram
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from mrhubo.evaluation import Clip
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
-from mrhubo.runtime.tracking import log_file
+from mrhubo.runtime.runs import log_file
 
 if TYPE_CHECKING:
     from mrhubo.runtime.client import TrackingClient

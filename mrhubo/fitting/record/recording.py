@@ -15,8 +15,10 @@ from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.record.inputs import mlflow_datasets
 from mrhubo.fitting.record.naming import run_name
 from mrhubo.runtime.locations import project_root
+from mrhubo.runtime.names import writable
 from mrhubo.runtime.provenance import git_commit, library_versions
-from mrhubo.runtime.tracking import close_run, log_file, open_client, take_up_run
+from mrhubo.runtime.runs import close_run, log_file, take_up_run
+from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.workspace import Workspace
 from mrhubo.view import save_png
 from mrhubo.view.pictures import Artist
@@ -104,7 +106,7 @@ class Recording:
         self.client.deliver(self.whole)
 
     def _log_config(self) -> None:
-        self.client.log_text(self.run_id, to_yaml(without_secrets(self.prepared.config)), "config.yaml")
+        self.client.log_text(self.run_id, writable(to_yaml(without_secrets(self.prepared.config))), "config.yaml")
 
     def go_on_with(self, prepared: Prepared) -> None:
         """From here on the run is that of another config than it was opened with."""

@@ -24,7 +24,8 @@ from mrhubo.runtime.database import database_uri, follow_if_possible, local_path
 from mrhubo.runtime.locations import default_tracking
 from mrhubo.runtime.names import model_name
 from mrhubo.runtime.provenance import library_versions
-from mrhubo.runtime.tracking import drop_half_models, set_up_mlflow
+from mrhubo.runtime.runs import drop_half_models
+from mrhubo.runtime.tracking import set_up_mlflow
 
 if TYPE_CHECKING:
     from mlflow.entities import Run

@@ -20,7 +20,8 @@ from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.runtime.database import database_uri
-from mrhubo.runtime.tracking import open_client, start_run
+from mrhubo.runtime.runs import start_run
+from mrhubo.runtime.tracking import open_client
 
 
 @pytest.fixture(scope="module")
