@@ -1,31 +1,29 @@
-r"""Puts the values of other keys in the place of ``${key}``, in bounded time and memory.
+"""Puts the values of other keys in the place of ``${key}``: the rules and the work are OmegaConf's, within bounds.
 
-    ${section.key}      the value of that key, whatever it is, or as part of a text
-    ${.key} ${..key}    the same, from the section around, or the one around that
-    \${                 what stands there: no interpolation
-    ${oc.env:NAME}      a variable of the environment, or ${oc.env:NAME,default}: on the command line alone
-
-A config may come from a stranger. So no file reads the environment, and texts that refer to texts that refer to texts
-(each twice, say) end at a size, not when the memory does.
+A config may come from a stranger. OmegaConf works a reference out anew wherever it stands, so texts that refer to texts
+that refer to texts (each twice, say) take a time and a memory that double with each; how much all of them come to is
+counted beforehand. Of its resolvers, which may do anything, only ``${oc.env:NAME}`` is known, and only in what the user
+himself starts a command with: a config that belongs to a package reads no environment.
 """
 
 from __future__ import annotations
 
-import os
+import contextlib
 import re
+from collections.abc import Iterator
+from typing import Any
 
-from mrhubo.config.tree import MAX_NODES, Node, describe
+from mrhubo.config.tree import Node, describe
 from mrhubo.errors import UserError, shortened
 
-_MAX_TEXT = 10_000
-"""Letters of one text."""
-_MAX_LETTERS = 1_000_000
-"""Letters of all texts together."""
-_MAX_DEPTH = 50
+_MOST_LETTERS = 30_000
+"""Of all texts with references, everything put in their places, and of one such text before that."""
+_MOST_STEPS = 50
 """References that lead from one to the next."""
-_REFERENCE = re.compile(r"(?<!\\)(\\*)\$\{(?:([^${}]*)\})?")
-_KEY = re.compile(r"(\.*)([^.\[\]:\s]+(?:\.[^.\[\]:\s]+|\[[0-9]{1,9}\])*)")
-_ENVIRONMENT = re.compile(r"oc\.env:\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:,(.*))?", re.DOTALL)
+_REFERENCE = re.compile(r"\$\{([^${}]*)\}")
+_RESOLVER = re.compile(r"\s*[\w.]+\s*:")
+_ENVIRONMENT = re.compile(r"\s*oc\.env\s*:")
+Keys = tuple[str | int, ...]
 
 
 def has_interpolation(node: Node) -> bool:
@@ -33,166 +31,145 @@ def has_interpolation(node: Node) -> bool:
     return isinstance(node.content, str) and "${" in node.content
 
 
-def interpolate(root: Node) -> None:
+def interpolate(root: Node, environment: bool = True) -> None:
     """Puts values in the place of all references in a tree.
 
+    Args:
+        root: the tree.
+        environment: whether files may read variables of the environment; what is typed always may.
+
     Raises:
-        UserError: a key does not exist, refers to itself, or all of it becomes too large.
+        UserError: a key does not exist, refers to itself, all of it becomes too large, or a resolver is used that must
+            not be.
     """
-    if any(map(has_interpolation, root.walk())):
-        _Interpolation(root).resolve_all(root)
+    found = [(keys, node) for keys, node in _leaves(root, ()) if has_interpolation(node)]
+    if not found:
+        return
+    from omegaconf import OmegaConf
+
+    _Bounds(root, environment).check(found)
+    for keys, node in found:
+        with _blaming(keys, node):
+            OmegaConf.create({"value": node.content})  # its syntax
+    tree = OmegaConf.create(root.plain())
+    results: list[Any] = []
+    for keys, node in found:
+        with _blaming(keys, node):
+            value: Any = tree
+            for key in keys:
+                value = value[key]
+            results.append(OmegaConf.to_container(value, resolve=True) if OmegaConf.is_config(value) else value)
+    for (_, node), value in zip(found, results, strict=True):
+        _fill(node, value)
 
 
-class _Interpolation:
-    def __init__(self, root: Node) -> None:
-        self.root = root
-        self.names: dict[int, tuple[str, ...]] = {}
+class _Bounds:
+    """Counts what references come to without putting anything in their places."""
+
+    def __init__(self, root: Node, environment: bool) -> None:
+        self.root, self.environment = root, environment
+        self.known: dict[int, int] = {}
         self.active: list[int] = []
-        self.nodes = self.letters = 0
-        self._name(root, ())
 
-    def _name(self, node: Node, keys: tuple[str, ...]) -> None:
-        """Notes where each value stands."""
-        self.names[id(node)] = keys
-        for key, child in _children(node):
-            self._name(child, (*keys, key))
+    def check(self, found: list[tuple[Keys, Node]]) -> None:
+        """Refuses what is too large, or reads what it must not."""
+        letters = 0
+        for keys, node in found:
+            self._check_form(keys, node)
+        for keys, node in found:
+            letters += self._letters(keys, node)
+            if letters > _MOST_LETTERS:
+                raise _error(keys, node, f"all references together would make more than {_MOST_LETTERS:,} letters")
 
-    def resolve_all(self, root: Node) -> None:
-        """All values of the tree."""
-        for node in list(root.walk()):
-            self._resolve(node)
+    def _check_form(self, keys: Keys, node: Node) -> None:
+        text = str(node.content)
+        if len(text) > _MOST_LETTERS:
+            raise _error(keys, node, f"it has more than {_MOST_LETTERS:,} letters")
+        if re.search(r"\$\{[^{}]*\$\{", text):
+            raise _error(keys, node, "one reference inside another is not supported")
+        for match in _REFERENCE.finditer(text):
+            if not _RESOLVER.match(match[1]):
+                continue
+            if not _ENVIRONMENT.match(match[1]):
+                raise _error(keys, node, "of OmegaConf's resolvers only oc.env is supported")
+            if not self.environment and not node.source.typed:
+                raise _error(keys, node, "the environment is not read for a file that came with a package")
 
-    def _resolve(self, node: Node) -> None:
-        """A value alone; what it refers to first."""
-        if not has_interpolation(node) or id(node) not in self.names:  # or copied from one that is done
-            return
+    def _letters(self, keys: Keys, node: Node) -> int:
+        """Of a value with all that it refers to; what refers to itself or to nothing is for OmegaConf to name."""
         if id(node) in self.active:
-            raise self._error(node, "Recursive interpolation detected: it refers to itself")
-        if len(self.active) >= _MAX_DEPTH:
-            raise self._error(node, f"more than {_MAX_DEPTH} interpolations lead from one to the next")
-        self.active.append(id(node))
-        text = node.content
-        found = list(_REFERENCE.finditer(text))
-        whole = found[0] if len(found) == 1 and found[0][0] == text and not found[0][1] else None
-        if whole is not None:
-            self._copy(self._value(node, whole), node, node)
-        else:
-            self._set_text(node, "".join(self._parts(node, text, found)), node)
-        self.active.pop()
-        del self.names[id(node)]
+            return 0
+        if id(node) not in self.known:
+            if len(self.active) > _MOST_STEPS:
+                raise _error(keys, node, f"more than {_MOST_STEPS} references lead from one to the next")
+            self.active.append(id(node))
+            self.known[id(node)] = min(self._count(keys, node), _MOST_LETTERS + 1)
+            self.active.pop()
+        return self.known[id(node)]
 
-    def _parts(self, node: Node, text: str, found: list[re.Match[str]]) -> list[str]:
-        """The pieces of a text, values in place of references."""
-        parts, end, length = [], 0, 0
-        for match in found:
-            slashes = len(match[1])
-            parts += [text[end : match.start()], "\\" * (slashes // 2)]
-            if slashes % 2:
-                parts.append(match[0][slashes:])
-            else:
-                value = self._value(node, match)
-                if isinstance(value.content, dict | list):
-                    raise self._error(node, f"{shortened(match[0])} is {describe(value)}, which is no part of a text")
-                parts.append(str(value.content))
-            end = match.end()
-            length += sum(map(len, parts[-3:]))
-            if length > _MAX_TEXT:
-                raise self._error(node, f"it would have more than {_MAX_TEXT:,} letters")
-        return [*parts, text[end:]]
+    def _count(self, keys: Keys, node: Node) -> int:
+        inner = _children(node)
+        if inner:
+            return sum(self._letters((*keys, key), child) for key, child in inner)
+        letters = len(str(node.content)) + 1
+        if has_interpolation(node):
+            targets = (self._target(keys, match[1]) for match in _REFERENCE.finditer(node.content))
+            letters += sum(self._letters(*target) for target in targets if target is not None)
+        return letters
 
-    def _set_text(self, node: Node, text: str, asked: Node) -> None:
-        self.letters += len(text)
-        if len(text) > _MAX_TEXT or self.letters > _MAX_LETTERS:
-            raise self._error(asked, f"texts would have more than {_MAX_TEXT:,} letters, or {_MAX_LETTERS:,} together")
-        node.content, node.text = text, None
-
-    def _copy(self, value: Node, node: Node, asked: Node) -> None:
-        """Makes a value what another is; its place stays. `asked` is the reference, for sentences."""
-        self.nodes += 1
-        if self.nodes > MAX_NODES:
-            raise self._error(asked, f"all together would have more than {MAX_NODES:,} values")
-        content = value.content
-        if isinstance(content, dict):
-            node.content = {key: Node(None, node.source, node.line) for key in content}
-        elif isinstance(content, list):
-            node.content = [Node(None, node.source, node.line) for _ in content]
-        elif isinstance(content, str):
-            self._set_text(node, content, asked)
-        else:
-            node.content = content
-        node.text = str(content) if isinstance(content, int) and not isinstance(content, bool) else None
-        for (_, child), (_, other) in zip(_children(node), _children(value), strict=True):
-            self._copy(other, child, asked)
-
-    def _value(self, node: Node, match: re.Match[str]) -> Node:
-        """What a reference stands for, itself resolved."""
-        reference = (match[2] or "").strip()
-        if reference.startswith("oc."):
-            return Node(self._variable(node, reference), node.source)
-        key = _KEY.fullmatch(reference)
-        if key is None:
-            raise self._error(
-                node, f"{shortened(match[0])} is none of ${{key}}, ${{section.key}}, ${{.key}}, ${{key[0]}}"
-            )
-        path = re.findall(r"[^.\[\]]+", key[2])
-        if key[1]:
-            around, up = self.names[id(node)], len(key[1])
-            if up > len(around):
-                raise self._error(node, f"Interpolation key '{shortened(reference)}' not found")
-            path = [*around[: len(around) - up], *path]
-        found = self.root
-        for part in path:
-            self._resolve(found)
-            inner = _child(found, part)
-            if inner is None:
-                raise self._error(node, f"Interpolation key '{shortened(reference)}' not found")
-            found = inner
-        if found.text == "???" or found.content == "???":
-            raise self._error(node, f"'{shortened(reference)}' has no value yet")
-        self._resolve(found)
-        self._resolve_inside(found, node)
-        return found
-
-    def _resolve_inside(self, found: Node, node: Node) -> None:
-        for _, child in _children(found):
-            if child is node or id(child) in self.active:
-                raise self._error(node, "Recursive interpolation detected: it refers to what it is in")
-            self._resolve(child)
-            self._resolve_inside(child, node)
-
-    def _variable(self, node: Node, reference: str) -> str:
-        """A variable of the environment, for who types the command."""
-        match = _ENVIRONMENT.fullmatch(reference)
-        if match is None:
-            raise self._error(node, "of OmegaConf's resolvers only oc.env is known")
-        if not node.source.typed:
-            raise self._error(node, "the environment is read on the command line alone, not by a file")
-        name, default = match[1], match[2]
-        if name in os.environ:
-            return os.environ[name]
-        if default is None:
-            raise self._error(node, f"Environment variable '{name}' not found")
-        return default.strip()
-
-    def _error(self, node: Node, reason: str) -> UserError:
-        keys = self.names[id(node)]
-        name = "".join(f"[{key}]" if key.isdecimal() else f".{key}" for key in keys).lstrip(".")
-        return node.error(f"{name}, {describe(node)}, cannot be resolved: {reason}")
+    def _target(self, keys: Keys, reference: str) -> tuple[Keys, Node] | None:
+        """Where a reference leads to; a text on the way that is a reference itself stands for all that it makes."""
+        reference = reference.strip()
+        up = len(reference) - len(reference.lstrip("."))
+        found, place = self.root, list(keys[: len(keys) - up] if up else ())
+        path = [*map(str, place), *re.findall(r"[^.\[\]]+", reference[up:])]
+        for depth, part in enumerate(path):
+            inner = dict((str(key), child) for key, child in _children(found))
+            if part not in inner:
+                return (tuple(path[:depth]), found) if has_interpolation(found) else None
+            found = inner[part]
+        return tuple(path), found
 
 
-def _child(node: Node, key: str) -> Node | None:
-    """The value of a key of a mapping, or at a position of a list; None if there is none."""
-    if isinstance(node.content, dict):
-        return node.content.get(key)
-    if isinstance(node.content, list) and re.fullmatch("[0-9]{1,9}", key) and int(key) < len(node.content):
-        return node.content[int(key)]
-    return None
-
-
-def _children(node: Node) -> list[tuple[str, Node]]:
-    """The values in a mapping or a list, with their keys or positions as text."""
+def _children(node: Node) -> list[tuple[str | int, Node]]:
     if isinstance(node.content, dict):
         return list(node.content.items())
-    if isinstance(node.content, list):
-        return [(str(index), child) for index, child in enumerate(node.content)]
-    return []
+    return list(enumerate(node.content)) if isinstance(node.content, list) else []
+
+
+def _leaves(node: Node, keys: Keys) -> Iterator[tuple[Keys, Node]]:
+    if not isinstance(node.content, dict | list):
+        yield keys, node
+    for key, child in _children(node):
+        yield from _leaves(child, (*keys, key))
+
+
+def _fill(node: Node, value: Any) -> None:
+    node.text = str(value) if isinstance(value, int) and not isinstance(value, bool) else None
+    if isinstance(value, dict):
+        node.content = {str(key): Node(None, node.source, node.line) for key in value}
+        for key, item in value.items():
+            _fill(node.content[str(key)], item)
+    elif isinstance(value, list):
+        node.content = [Node(None, node.source, node.line) for _ in value]
+        for child, item in zip(node.content, value, strict=True):
+            _fill(child, item)
+    else:
+        node.content = value
+
+
+@contextlib.contextmanager
+def _blaming(keys: Keys, node: Node) -> Iterator[None]:
+    """Turns what OmegaConf raises into a sentence about this node."""
+    from omegaconf.errors import OmegaConfBaseException
+
+    try:
+        yield
+    except (OmegaConfBaseException, RecursionError, ValueError) as error:
+        reason = "it refers to itself" if isinstance(error, RecursionError) else str(error).strip().split("\n")[0]
+        raise _error(keys, node, shortened(reason, 200)) from None
+
+
+def _error(keys: Keys, node: Node, reason: str) -> UserError:
+    name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).lstrip(".")
+    return node.error(f"{shortened(name)}, {describe(node)}, cannot be resolved: {reason}")

@@ -17,16 +17,19 @@ from mrhubo.errors import UserError
 T = TypeVar("T")
 
 
-def load_config(file: Path | str | None, overrides: Sequence[str] = (), schema: type[T] = Config) -> T:
+def load_config(
+    file: Path | str | None, overrides: Sequence[str] = (), schema: type[T] = Config, environment: bool = True
+) -> T:
     """Read, override, put values in place of ``${key}``, check, build; raises `UserError` and nothing else.
 
     A relative path in the file is relative to the file, in an override to the current directory; both come out
-    absolute. An override replaces what the file says under its key. `where` tells the place of every value.
+    absolute. An override replaces what the file says under its key. `where` tells the place of every value. A file that
+    somebody else has written, as that of a package may be, is to be read without the `environment`.
     """
     root = Node({}, command_line()) if file is None else read_file(Path(file))
     for override in overrides:
         _replace(root, override, schema)
-    interpolate(root)
+    interpolate(root, environment)
     config = build(schema, root)
     keep_places(config, root)
     return config

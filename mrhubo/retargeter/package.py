@@ -222,7 +222,7 @@ class Retargeter(nn.Module):
         if metadata.get("schema") != SCHEMA:
             raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
         check_files(folder, _OTHERS, metadata)
-        config = load_config(folder / _CONFIG)
+        config = load_config(folder / _CONFIG, environment=False)
         body = config.body
         check_paths(folder, {_URDF: config.robot.urdf, _PRIOR: body.prior_path, _SKELETON: body.model_path})
         prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))

@@ -182,7 +182,7 @@ def test_what_a_header_says_is_compared(made: Path, opened: Retargeter, change: 
         ((("urdf: robot.urdf", "urdf: ../other.urdf"),), r"name '.*other.urdf' in place of its own robot.urdf"),
         ((("prior_path: body_prior.safetensors", "prior_path: /etc/passwd"),), "in place of its own body_prior"),
         ((("model_path: skeleton.safetensors", "model_path: null"),), "in place of its own skeleton"),
-        ((("name: nao", "name: ${oc.env:HOME}"),), "the environment is read on the command line alone"),
+        ((("name: nao", "name: ${oc.env:HOME}"),), "the environment is not read for a file"),
         ((("hidden: 8", "hidden: 8000"), ("layers: 4", "layers: 64")), "model.hidden: 8,000 units"),
     ],
 )
