@@ -139,7 +139,7 @@ def _check_axes(body_map: BodyMap, q_BN: Tensor) -> None:
             human = float(rest_3 @ torch.nn.functional.normalize(bone_3, dim=0))
             found = [(direction_BD3[:, i] * direction_BD3[:, j]).sum(-1) for direction_BD3 in (random_BD3, home_BD3)]
         if all(abs(float(cosine_B.mean()) - human) > 1.0 for cosine_B in found):
-            word = axis.name.removeprefix(f"{axis.part.name}_")
+            word = axis.part.words[axis.part.direction_names.index(axis.name)]
             warn(
                 f"robot.keypoints.{axis.part.name}: '{word}' points the other way than a human's, seen from {seen}; is "
                 f"it right in the frame of the link '{axis.link}'?"
