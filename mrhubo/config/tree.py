@@ -109,6 +109,8 @@ def read_file(file: Path) -> Node:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UserError(f"{file} is not a YAML file: byte {error.start} is not UTF-8 text") from None
+    if text.lstrip().startswith("<"):
+        raise UserError(f"{file} is XML, as a URDF is; a config is a YAML file that names the URDF under robot.urdf")
     node = parse(text, source)
     if node is None:
         raise UserError(f"{file} is empty")

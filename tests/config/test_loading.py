@@ -470,6 +470,7 @@ def test_wrong_comes_before_missing(tmp_path):
         (b"", "test.yaml is empty"),
         (b"# nothing\n", "test.yaml is empty"),
         (b"- a\n- b\n", "test.yaml, line 1: a config is a mapping of `key: value` lines, found a list"),
+        (b'\xef\xbb\xbf <?xml version="1.0"?><robot/>', "test.yaml is XML, as a URDF is; a config is a YAML file"),
         (b"hello", "test.yaml, line 1: a config is a mapping of `key: value` lines, found 'hello'"),
         (b"name: \xff\xfe", "test.yaml is not a YAML file: byte 6 is not UTF-8 text"),
         (b"name: \x00\x01", "test.yaml: not a text file: character 6 is not printable"),
