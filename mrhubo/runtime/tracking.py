@@ -93,6 +93,8 @@ def set_up_mlflow() -> None:
     """The settings without which MLflow misbehaves; those of the user stay."""
     for name, value in _SETTINGS.items():
         os.environ.setdefault(name, value)
+    import mlflow  # noqa: F401 (some versions set their loggers' levels when they are imported)
+
     for name in _TALKATIVE:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
