@@ -171,8 +171,7 @@ def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]
     package = str(Path(mrhubo.__file__).parent.parent)
     path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
-    said_already = "ignore:robot.manual.shift"  # by the process that starts them
-    command = [sys.executable, "-W", said_already, "-c", "from mrhubo.pairing.worker import main; main()"]
+    command = [sys.executable, "-c", "from mrhubo.pairing.worker import main; main()"]
     workers: list[subprocess.Popen[str]] = []
     try:
         for _ in range(count):
