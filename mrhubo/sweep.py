@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 
 from mrhubo.config import (
@@ -44,9 +43,6 @@ def main(argv: list[str]) -> None:
     given = {"trials": options.trials, "minutes": options.minutes}
     changes = [f"{name}={value}" for name, value in given.items() if value is not None]
     settings = load_config(find_config(options.sweep, "sweeps"), changes, SweepConfig)
-    # Several processes on one machine is what a sweep is for, and waiting threads that spin take the cores from the
-    # others: ten times slower with two processes on two cores. Read when torch is imported, below.
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     load_config(options.config, options.overrides)  # a mistake there is told before the slow imports below
     from mrhubo.fitting.sweeping import Sweep
     from mrhubo.fitting.trials import FitTrials

@@ -72,8 +72,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
 
 def _begin() -> None:
     """What has to be so before a command does anything, and before torch is imported."""
-    # Waiting threads that spin take the cores from those that work: on a busy machine a training is ten times slower.
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    _wait_briefly()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a letter that the terminal does not know is no reason to end
             stream.reconfigure(errors="backslashreplace")
@@ -81,6 +80,20 @@ def _begin() -> None:
         for number in _ENDED_FROM_OUTSIDE:
             if signal.getsignal(number) is signal.SIG_DFL:  # else whoever started us wants something else (nohup)
                 signal.signal(number, _terminate)
+
+
+def _wait_briefly() -> None:
+    """Lets torch's waiting threads spin for a moment only, unless the user has said how they are to wait.
+
+    As long as libgomp lets them, they take the cores from those that work: on a busy machine 0.6 steps of a training a
+    second in place of 13. Not at all (PASSIVE) costs half of the speed on an idle one: 18 in place of 37.
+    """
+    if "OMP_WAIT_POLICY" in os.environ:
+        return
+    if sys.platform == "linux":  # torch comes with libgomp there
+        os.environ.setdefault("GOMP_SPINCOUNT", "3000")
+    else:
+        os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:
