@@ -1,5 +1,5 @@
-"""The one exception that means "the user can fix this": printed as one sentence, exit code 2, no traceback; and the
-warning that means "look at this".
+"""The exceptions that mean "the user can fix this": printed as one sentence, exit code 2, no traceback; the warning
+that means "look at this"; and what sentences are made of.
 """
 
 from __future__ import annotations
@@ -9,6 +9,12 @@ from collections.abc import Iterable
 
 class UserError(Exception):
     """A mistake in a config, a file or a command line: what is wrong, where, and what to do about it."""
+
+
+class Unreachable(UserError):
+    """A server or a database did not answer, or refused: nothing is wrong with the work, and the same command goes on
+    when it does.
+    """
 
 
 class InputWarning(UserWarning):
@@ -35,9 +41,18 @@ def unknown_name(kind: str, name: str, available: Iterable[str], where: str = ""
 
 def shortened(text: object, most: int = 80) -> str:
     """What a stranger wrote, fit for a sentence: not too long, and without letters that a terminal would obey."""
-    shown = str(text)
-    shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in shown[: most + 1])
+    shown = printable(str(text)[: most + 1])
     return shown if len(shown) <= most else shown[: most - 3] + "..."
+
+
+def printable(text: str) -> str:
+    """The text with an escape for every letter that a terminal would obey."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def first_line(error: BaseException) -> str:
+    """What an error says, without what libraries write below it; its type, if it says nothing."""
+    return next(iter(str(error).strip().splitlines()), type(error).__name__)
 
 
 def listed(names: Iterable[str]) -> str:
@@ -102,9 +117,3 @@ def was_interrupted(error: BaseException | None) -> bool:
         seen.append(error)
         error = error.__cause__ or error.__context__
     return False
-
-
-class Unreachable(UserError):
-    """A server or a database did not answer, or refused: nothing is wrong with the work, and the same command goes on
-    when it does.
-    """

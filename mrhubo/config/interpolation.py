@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from mrhubo.config.tree import Node, describe
-from mrhubo.errors import UserError, shortened
+from mrhubo.errors import UserError, first_line, shortened
 
 _MOST_LETTERS = 30_000
 """Of all texts with references, everything put in their places, and of one such text before that."""
@@ -166,7 +166,7 @@ def _blaming(keys: Keys, node: Node) -> Iterator[None]:
     try:
         yield
     except (OmegaConfBaseException, RecursionError, ValueError) as error:
-        reason = "it refers to itself" if isinstance(error, RecursionError) else str(error).strip().split("\n")[0]
+        reason = "it refers to itself" if isinstance(error, RecursionError) else first_line(error)
         raise _error(keys, node, shortened(reason, 200)) from None
 
 

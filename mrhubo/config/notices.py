@@ -6,7 +6,12 @@ import sys
 import warnings
 from typing import TextIO
 
-from mrhubo.errors import InputWarning
+from mrhubo.errors import InputWarning, printable
+
+
+def print_warning(sentence: str) -> None:
+    """One line on stderr, ``warning: ...``."""
+    print(f"warning: {printable(sentence)}", file=sys.stderr, flush=True)
 
 
 def show_warnings_plainly() -> None:
@@ -30,8 +35,7 @@ def show_warnings_plainly() -> None:
         sentence = " ".join(str(message).split())
         if sentence not in shown and sys.stderr is not None:
             shown.add(sentence)
-            printable = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in sentence)
-            print(f"warning: {printable}", file=sys.stderr, flush=True)
+            print_warning(sentence)
 
     warnings.simplefilter("always", InputWarning)
     warnings.showwarning = show_plainly

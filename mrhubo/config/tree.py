@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from mrhubo.errors import UserError, unknown_name
+from mrhubo.errors import UserError, shortened, unknown_name
 from mrhubo.files.regular import MissingFile, check_regular, read_regular
 
 MAX_BYTES = 1_000_000
@@ -186,7 +186,7 @@ def describe(node: Node) -> str:
     if content is None:
         return "nothing"
     shown = repr(content) if isinstance(content, str) else node.text or str(content)
-    return shown if len(shown) <= 60 else shown[:57] + "..."
+    return shortened(shown, 60)
 
 
 def shown(node: Node) -> str:

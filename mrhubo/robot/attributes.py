@@ -6,6 +6,8 @@ import math
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
+from mrhubo.errors import shortened
+
 MOST_METRES = 1e3
 """Longest offset: no robot is a kilometre long, and float32 would lose its joints."""
 MOST_RADIANS = 1e4
@@ -54,5 +56,4 @@ def problem(
 
 def shown(element: etree._Element, attribute: str, what: str) -> str:
     """``<axis xyz="0 0 1 0"> must be three numbers``."""
-    text = str(element.get(attribute))
-    return f'<{element.tag} {attribute}="{text if len(text) <= 60 else text[:57] + "..."}"> {what}'
+    return f'<{element.tag} {attribute}="{shortened(element.get(attribute), 60)}"> {what}'

@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +16,7 @@ from typing import Any, NamedTuple
 from mlflow import MlflowClient
 from mlflow.entities import Metric
 
+from mrhubo.config.notices import print_warning
 from mrhubo.config.secrets import redacted
 from mrhubo.errors import Unreachable, UserError, was_interrupted
 from mrhubo.runtime.failures import BUGS, may_pass, reason_of, silence
@@ -147,7 +147,9 @@ class TrackingClient(MlflowClient):
             if not self.patient:
                 raise Unreachable(self._sentence(error)) from error
             if not self._kept:
-                _warn(f"{self._sentence(error)}; the work goes on, and what belongs to its run is kept for later")
+                print_warning(
+                    f"{self._sentence(error)}; the work goes on, and what belongs to its run is kept for later"
+                )
             self._next_try = time.monotonic() + _NEXT_TRY_SECONDS
             self._keep(_Kept(call, line))
             return None
@@ -175,7 +177,7 @@ class TrackingClient(MlflowClient):
                 if not (self._local and "locked" in str(error) and time.monotonic() < end) or was_interrupted(error):
                     raise
                 if not told:
-                    _warn(f"{self.uri} is locked by another process; waiting")
+                    print_warning(f"{self.uri} is locked by another process; waiting")
                 told = True
                 time.sleep(0.5)
 
@@ -218,10 +220,6 @@ class TrackingClient(MlflowClient):
 
     def _sentence(self, error: Exception) -> str:
         return redacted(f"tracking.uri: MLflow at {self.uri} cannot be used: {reason_of(error)}", self.uri)
-
-
-def _warn(sentence: str) -> None:
-    print(f"warning: {sentence}", file=sys.stderr, flush=True)
 
 
 def _line(run_id: str, metrics: Any = (), *_: Any, **__: Any) -> str:

@@ -9,7 +9,7 @@ import requests
 from mlflow.exceptions import MlflowException
 
 from mrhubo.config.faults import machine_fault
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import UserError, first_line, was_interrupted
 
 _FINAL = frozenset({
     "RESOURCE_DOES_NOT_EXIST", "RESOURCE_ALREADY_EXISTS", "INVALID_PARAMETER_VALUE", "INVALID_STATE", "BAD_REQUEST",
@@ -18,6 +18,8 @@ _FINAL = frozenset({
 """Answers that asking again does not change."""
 BUGS = (TypeError, AttributeError, NameError, AssertionError)
 """Errors of a program, which are nobody's bad day."""
+ANSWER_SECONDS = 5.0
+"""How long a server may take for a first sign of life, where nothing waits for it."""
 _PORTS = {"postgresql": 5432, "mysql": 3306, "mariadb": 3306, "mssql": 1433}
 """Of database servers, where the address names none."""
 _SYSTEM = re.compile(r"\[Errno -?\d+\] ([^'\"()]+)")
@@ -72,10 +74,11 @@ def may_pass(error: Exception) -> bool:
 
 def reason_of(error: Exception) -> str:
     """What an error says, without the addresses of objects that libraries quote."""
-    text = machine_fault(error) or str(error)
+    fault = machine_fault(error)
+    text = fault or str(error)
     system = _SYSTEM.search(text)
     if system is not None and "://" in text:
         return f"nobody answers ({system[1].strip()})"
     if "timed out" in text or "timeout" in text:
         return "nobody answers in time"
-    return next(iter(text.splitlines()), "") or type(error).__name__
+    return fault or first_line(error)

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 
 TEMPORARY = "TMPDIR"
 _PROBE = bytes(1 << 20)
@@ -48,7 +48,7 @@ def _temporary() -> Path:
 
 def _make(setting: str, folder: Path, made: list[Path]) -> None:
     text = str(folder)
-    shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+    shown = shortened(text, _SHOWN)
     try:
         text.encode()
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):

@@ -13,7 +13,7 @@ from typing import Any
 
 from mrhubo.config import fingerprint
 from mrhubo.config.secrets import redacted
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 
 _REFUSED = r"[^\w .-]"
 _LOOKS_ESCAPED = re.compile(rf"_(?=x[0-9A-F]*(?:_|{_REFUSED}))")
@@ -88,8 +88,7 @@ def check_name(setting: str, name: str) -> None:
     }
     found = [fault for fault, there in faults.items() if there]
     if found:
-        shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in name[:_SHORT])
-        shown += "..." if len(name) > _SHORT else ""
+        shown = shortened(name, _SHORT)
         raise UserError(f"{setting}: '{shown}' {found[0]}; folders are named after it, so take a short plain name")
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrhubo.config.secrets import HIDDEN, credentials, has_hidden, redacted
-from mrhubo.errors import UserError, was_interrupted
+from mrhubo.errors import UserError, first_line, shortened, was_interrupted
 from mrhubo.runtime.database import NAME, database_uri, open_database, sqlite_file
 from mrhubo.runtime.runs import close_the_dead
 
@@ -31,10 +31,6 @@ _SETTINGS = {
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "30",
 }
-_SHOWN = 60
-"""Letters of an experiment's name in a sentence."""
-_ANSWER_SECONDS = 5.0
-"""How long a server may take for a first sign of life."""
 _WEB = ("http://", "https://")
 _CREDENTIALS = ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD")
 
@@ -72,8 +68,7 @@ def open_client(folder: Path, experiment: str, uri: str | None = None) -> Tracki
     except Exception as error:  # MLflow's own, SQLAlchemy's, its drivers'
         if was_interrupted(error):
             raise
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise UserError(redacted(f"tracking.uri: MLflow cannot open {uri}: {reason}", uri)) from error
+        raise UserError(redacted(f"tracking.uri: MLflow cannot open {uri}: {first_line(error)}", uri)) from error
     return client
 
 
@@ -110,9 +105,9 @@ def _check_address(uri: str) -> None:
     if re.fullmatch(r"(localhost|[\w-]+(\.[\w-]+)*):\d+(/\S*)?", uri):
         raise UserError(f"tracking.uri: {uri} does not say how to speak to the server; write http://{uri}")
     if not uri.startswith("sqlite"):
-        from mrhubo.runtime.failures import silence
+        from mrhubo.runtime.failures import ANSWER_SECONDS, silence
 
-        fault = silence(uri, _ANSWER_SECONDS)
+        fault = silence(uri, ANSWER_SECONDS)
         if fault is not None:
             raise UserError(
                 redacted(f"tracking.uri: no server answers at {uri} ({fault}); start it, or leave tracking.uri"
@@ -142,8 +137,7 @@ def _open_experiment(client: TrackingClient, name: str, location: str | None) ->
             if found is None and error.error_code != "INVALID_PARAMETER_VALUE":
                 raise
             if found is None:
-                shown = name if len(name) < _SHOWN else f"{name[:_SHOWN]}..."
-                raise UserError(f"tracking.experiment: MLflow does not take '{shown}': {error}") from error
+                raise UserError(f"tracking.experiment: MLflow does not take '{shortened(name)}': {error}") from error
     if found.lifecycle_stage == "deleted":
         address = shlex.quote(redacted(client.uri))
         raise UserError(

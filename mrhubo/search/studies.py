@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrhubo.config.secrets import redacted
-from mrhubo.errors import Unreachable, UserError, was_interrupted
+from mrhubo.errors import Unreachable, UserError, first_line, was_interrupted
 from mrhubo.files.storage import locked
 from mrhubo.runtime.database import sqlite_uri
 from mrhubo.runtime.processes import is_gone, this_process
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 _HEARTBEAT, _GRACE = 30, 120
 """Seconds between two signs of life, and until a process on another machine is taken for dead."""
-_ANSWER_SECONDS = 5.0
-"""How long a database server may take for a first sign of life."""
 _LOCKED = 120
 """Seconds that a locked SQLite database is waited for."""
 _OWNER, _ERROR = "owner", "error"
@@ -66,9 +64,9 @@ def open_study(
     }
     try:
         if url is not None:
-            from mrhubo.runtime.failures import silence
+            from mrhubo.runtime.failures import ANSWER_SECONDS, silence
 
-            fault = silence(url, _ANSWER_SECONDS)
+            fault = silence(url, ANSWER_SECONDS)
             if fault is not None:
                 raise ConnectionError(f"no server answers there ({fault})")
         with locked(folder / "studies.lock", wait=True):  # two processes cannot make the tables at once
@@ -84,8 +82,7 @@ def open_study(
                 load_if_exists=True,
             )
     except Exception as error:  # SQLAlchemy's, its drivers', and ModuleNotFoundError for a driver that is not there
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        sentence = f"storage: the study's database {database} cannot be opened: {reason}"
+        sentence = f"storage: the study's database {database} cannot be opened: {first_line(error)}"
         raise UserError(redacted(sentence, database)) from error
 
 
@@ -191,7 +188,7 @@ def _answering() -> Iterator[None]:
     except (StorageInternalError, SQLAlchemyError) as error:
         if was_interrupted(error):
             raise
-        reason = next(iter(str(error.__cause__ or error).splitlines()), "")
+        reason = first_line(error.__cause__ or error)
         raise Unreachable(redacted(f"storage: the study's database does not answer any more: {reason}")) from error
 
 

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config.secrets import redacted
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, first_line
 from mrhubo.retargeter import Retargeter
 from mrhubo.rotation import matrix_to_axis_angle, orthonormal
 from mrhubo.runtime.database import database_uri, follow_if_possible, local_path
@@ -162,8 +162,7 @@ def fetch_package(uri: str) -> Path:
     except (KeyError, TypeError) as error:
         raise UserError(f"{uri}: is no model of mrhubo") from error
     except Exception as error:  # MLflow's own, the network's, the database's
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise UserError(redacted(f"{uri}: cannot be had from {registry}: {reason}", registry)) from error
+        raise UserError(redacted(f"{uri}: cannot be had from {registry}: {first_line(error)}", registry)) from error
 
 
 def _save(
