@@ -5,16 +5,16 @@ Lightning's own logger opens and closes runs by itself, and stops the training w
 
 from __future__ import annotations
 
-import time
 from argparse import Namespace
 from collections.abc import Mapping
 from typing import Any
 
 from lightning.pytorch.loggers.logger import Logger
-from mlflow.entities import Metric, Param
+from mlflow.entities import Param
 
 from mrhubo.runtime.client import TrackingClient
-from mrhubo.runtime.names import key, parameters
+from mrhubo.runtime.names import parameters
+from mrhubo.runtime.runs import log_all
 
 _AT_ONCE = 100
 """Parameters that MLflow takes in one go."""
@@ -39,9 +39,7 @@ class RunLogger(Logger):
 
     def log_metrics(self, metrics: Mapping[str, float], step: int | None = None) -> None:
         """All of them in one go."""
-        now = int(1000 * time.time())
-        found = [Metric(key(name), float(value), now, step or 0) for name, value in metrics.items()]
-        self.experiment.log_batch(self.run_id, found)
+        log_all(self.experiment, self.run_id, metrics, step=step or 0)
 
     def log_parameters(self, plain: Mapping[str, Any], there: Mapping[str, str]) -> None:
         """Nested plain values as parameters, but for those that are there: a start may have been killed anywhere."""

@@ -106,14 +106,18 @@ def _quoted(value: str) -> str:
 
 
 def log_all(
-    client: TrackingClient, run_id: str, metrics: Mapping[str, float], params: Mapping[str, Any] | None = None
+    client: TrackingClient,
+    run_id: str,
+    metrics: Mapping[str, float],
+    params: Mapping[str, Any] | None = None,
+    step: int = 0,
 ) -> None:
     """Metrics and parameters in one go: one at a time, each costs about 20 ms on SQLite."""
     from mlflow.entities import Metric, Param
 
     now = int(1000 * time.time())
     written = [Param(key(name), writable(redacted(str(value)))) for name, value in (params or {}).items()]
-    client.log_batch(run_id, [Metric(key(name), value, now, 0) for name, value in metrics.items()], written)
+    client.log_batch(run_id, [Metric(key(name), float(value), now, step) for name, value in metrics.items()], written)
 
 
 def log_file(client: TrackingClient, run_id: str, name: str, write: Callable[[Path], object]) -> None:
