@@ -23,7 +23,6 @@ from typing import Any
 
 import lightning
 import torch
-from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import Tensor
 from torch.utils.data import DataLoader
 
@@ -35,7 +34,7 @@ from mrhubo.body.prior_training.losses import orthonormality_penalty, pseudo_hub
 from mrhubo.body.prior_training.measures import measure, reconstruction
 from mrhubo.body.prior_training.poses import PoseDataset, RandomBatches, load_training_poses, plausible_frames
 from mrhubo.body.skeleton import Skeleton, mirror_pose
-from mrhubo.callbacks.progress import TrainingProgress
+from mrhubo.callbacks import CheckedFiles, Checkpoints, TrainingProgress
 from mrhubo.config import PriorConfig, changed_settings, fingerprint, to_plain, without_paths
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import SILENT, Reporter
@@ -203,8 +202,9 @@ def _fit(module: PriorTraining, split: Split, workspace: Workspace, report: Repo
         num_sanity_val_steps=0,
         callbacks=[
             TrainingProgress(config.steps, _SHOWN, report),
-            ModelCheckpoint(workspace.checkpoints, save_last=True, save_top_k=1, save_on_train_epoch_end=True),
+            Checkpoints(workspace.checkpoints, "val/joint_mm"),
         ],
+        plugins=[CheckedFiles()],
     )
     batches = RandomBatches(len(split.training), config.batch_size, epoch, config.seed)
     in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
