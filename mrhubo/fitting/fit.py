@@ -85,7 +85,6 @@ def _run_steps(
             report,
             validation,
             workspace.checkpoints,
-            workspace.last_checkpoint(),
             recording.logger,
             ranks,
             _search(prepared, report, validation, recording),
@@ -131,4 +130,4 @@ def _train_with_the_first(prepared: Prepared, workspace: Workspace, ranks: Ranks
     """What all ranks but the first do: pairs and training, in step with the first, which tells of them."""
     ranks.wait()  # the first has solved the references and readied the workspace
     validation, _ = make_references(prepared, SILENT)
-    train(prepared, SILENT, validation, workspace.checkpoints, workspace.last_checkpoint(), ranks=ranks)
+    train(prepared, SILENT, validation, workspace.checkpoints, ranks=ranks)

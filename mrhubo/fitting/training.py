@@ -58,7 +58,6 @@ def train(
     report: Reporter,
     validation: Sequence[Clip],
     checkpoints: Path,
-    resume: Path | None = None,
     logger: Logger | bool = False,
     ranks: Ranks | None = None,
     callbacks: Sequence[lightning.Callback] = (),
@@ -69,9 +68,9 @@ def train(
         prepared: the checked config; with `robot.scale: search` a `ScaleFactorSearch` must be among the callbacks.
         report: told of the steps.
         validation: clips that choose the checkpoint.
-        checkpoints: folder for `last.ckpt` and `best.ckpt`, see `Checkpoints`.
-        resume: the last checkpoint, to go on from, or None where there is none that can be read. One that does not fit
-            is passed over, with a sentence, and the best one is taken in its place, if that fits.
+        checkpoints: folder for `last.ckpt` and `best.ckpt`, see `Checkpoints`. From the last that is there the training
+            goes on. One that does not fit is passed over, with a sentence, and the best one is taken in its place, if
+            that fits.
         logger: Lightning's logger, or False for none.
         ranks: the processes that train together (DDP), each on its share of every batch; default: this one alone.
         callbacks: more of them; they stand after the metrics of the validation clips.
@@ -94,7 +93,7 @@ def train(
         trainer = _trainer(
             settings, device_of(prepared.config).type, ranks, logger, [metrics, *callbacks, progress, saver]
         )
-        run_trainer(trainer, module, _start(resume, checkpoints, module, report), datamodule=data)
+        run_trainer(trainer, module, _start(checkpoints, module, report), datamodule=data)
     best = torch.load(checkpoints / BEST, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
     network.requires_grad_(False).eval()
@@ -109,9 +108,9 @@ def train(
     )
 
 
-def _start(resume: Path | None, checkpoints: Path, module: RetargetModule, report: Reporter) -> Path | None:
+def _start(checkpoints: Path, module: RetargetModule, report: Reporter) -> Path | None:
     """The checkpoint that the training goes on from; says what is passed over, and what happens in place of that."""
-    if resume is None and not os.path.lexists(checkpoints / LAST):
+    if not os.path.lexists(checkpoints / LAST):
         return None
     found, said = resumable(checkpoints, module)
     for sentence in said:

@@ -38,7 +38,6 @@ class FitTrials:
                     SILENT,
                     validation,
                     workspace.checkpoints,
-                    workspace.last_checkpoint(),
                     recording.logger,
                     callbacks=[watch],
                 )

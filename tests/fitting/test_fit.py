@@ -77,7 +77,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
     hooks: dict[str, Callable[[], None]] = {}
     clip = Clip(Motion("wave", torch.eye(3).expand(9, 21, 3, 3), 24.0), torch.zeros(9, 8))
 
-    def train(prepared, report, validation, checkpoints, last, logger, *_: object) -> SimpleNamespace:
+    def train(prepared, report, validation, checkpoints, logger, *_: object) -> SimpleNamespace:
         checkpoints.mkdir(exist_ok=True)
         logger.log_metrics({"train/loss": 1.0}, 1)
         hooks.get("train", lambda: None)()

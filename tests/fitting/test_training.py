@@ -32,14 +32,14 @@ def test_a_checkpoint_of_another_layout_is_passed_over_with_a_sentence(root: Pat
     body_map = build_body_map(config.robot)
     module = RetargetModule(build_network(config, body_map), config.trainer)
     last, report = tmp_path / "last.ckpt", Heard()
-    assert _start(None, tmp_path, module, report) is None and report.said == []
+    assert _start(tmp_path, module, report) is None and report.said == []
     config.model.hidden = 16
     other = RetargetModule(build_network(config, body_map), config.trainer)
     torch.save({"state_dict": other.state_dict(), "pytorch-lightning_version": lightning.__version__}, last)
     for content in (None, b"junk"):
         if content is not None:
             last.write_bytes(content)
-        assert _start(last if content is None else None, tmp_path, module, report) is None
+        assert _start(tmp_path, module, report) is None
         (sentence,) = report.said
         why = "it is of another version, or of a network of another layout" if content is None else "it cannot be read"
         assert sentence == f"{last} is passed over: {why}; the training goes on from its beginning"
