@@ -2,10 +2,11 @@
 
 from mrhubo.motion.load import find_motions, read_folder, read_motion
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import MotionLike, Poses, read_poses, to_tensor
+from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
 from mrhubo.motion.writers.amass import write_motion
 
 __all__ = [
+    "NOT_FINITE",
     "Motion",
     "MotionLike",
     "Poses",
@@ -13,6 +14,7 @@ __all__ = [
     "read_folder",
     "read_motion",
     "read_poses",
+    "refuse_frames",
     "to_tensor",
     "write_motion",
 ]

@@ -38,6 +38,7 @@ _CHUNK = 16_384
 _JOINTS = len(POSED_JOINT_NAMES)
 _SKEW = 1e-2
 """How far R^T R may be from the identity: half precision and rounded text still pass."""
+NOT_FINITE = "NaN or infinite numbers"
 _FLAT = 1e-4
 """Sine of the angle between the two columns of 6D numbers, under which they leave the third open."""
 
@@ -108,10 +109,10 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
     leading = shape[: -len(form.axes)]
     array = array.reshape(math.prod(leading), *form.axes)
     poses, turns = [], Turns()
-    for first, part in enumerate(array.split(_CHUNK)):
-        _refuse(~part.flatten(1).isfinite().all(-1), first * _CHUNK, leading, "NaN or infinite numbers")
+    for number, part in enumerate(array.split(_CHUNK)):
+        refuse_frames(~part.flatten(1).isfinite().all(-1), NOT_FINITE, number * _CHUNK, leading)
         wrong_TJ, pose_TJ33 = form.read(part, turns)
-        _refuse(wrong_TJ.any(-1), first * _CHUNK, leading, form.wrong)
+        refuse_frames(wrong_TJ.any(-1), form.wrong, number * _CHUNK, leading)
         if pose_TJ33 is not part:
             poses.append(pose_TJ33.float())
     if turns.are_degrees and len(array) >= _MANY:
@@ -193,10 +194,21 @@ _FORMS = (
 )
 
 
-def _refuse(wrong_T: Tensor, first: int, leading: tuple[int, ...], what: str) -> None:
-    """Raises for the first frame that is wrong, of those from number `first` on."""
+def refuse_frames(wrong_T: Tensor, what: str, first: int = 0, leading: tuple[int, ...] | None = None) -> None:
+    """Refuses poses of which some frames are wrong; names the first of them.
+
+    Args:
+        wrong_T: which frames (T,) are wrong.
+        what: what these hold.
+        first: number of the first of them among all frames.
+        leading: the leading axes that all frames had as they were given; default: one.
+
+    Raises:
+        UserError: one is wrong.
+    """
     if bool(wrong_T.any()):
         place = first + int(wrong_T.nonzero()[0, 0])
-        index = tuple(int(n) for n in np.unravel_index(place, leading)) if leading else ()
+        leading = (place + 1,) if leading is None else leading
+        index = tuple(map(int, np.unravel_index(place, leading))) if leading else ()
         frame = f" {index[0]}" if len(index) == 1 else f" {index}" if index else ""
         raise UserError(f"human pose{frame} holds {what}")

@@ -26,7 +26,7 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
-from mrhubo.motion import MotionLike, read_poses, to_tensor
+from mrhubo.motion import NOT_FINITE, MotionLike, read_poses, refuse_frames, to_tensor
 from mrhubo.reference import DirectionProblem, angle_between
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import confidence
@@ -163,13 +163,8 @@ class Retargeter(nn.Module):
             )
         for number, part in enumerate(given.split(_CHUNK)):
             largest_T = part.abs().flatten(1).amax(dim=1) if len(part) else part.new_zeros(0)
-            wrong_T = ~(largest_T <= _LARGEST)
-            if bool(wrong_T.any()):
-                frame = int(wrong_T.nonzero()[0, 0])
-                what = (
-                    "numbers that no rotation has" if bool(largest_T[frame].isfinite()) else "NaN or infinite numbers"
-                )
-                raise UserError(f"human pose {number * _CHUNK + frame} holds {what}")
+            refuse_frames(~largest_T.isfinite(), NOT_FINITE, number * _CHUNK)
+            refuse_frames(largest_T > _LARGEST, "numbers that no rotation has", number * _CHUNK)
             yield part.to(self.device, torch.float32)
 
     def _answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int) -> Tensor:
