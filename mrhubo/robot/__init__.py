@@ -7,7 +7,7 @@ from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, varied
 from mrhubo.robot.model import LinkPoses, Robot
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
-from mrhubo.robot.urdf import link_poses, load_urdf
+from mrhubo.robot.urdf import link_poses
 
 __all__ = [
     "ROBOT_COLOR",
@@ -23,7 +23,6 @@ __all__ = [
     "align_pose",
     "build_body_map",
     "link_poses",
-    "load_urdf",
     "read_collision_geometry",
     "read_geometry",
     "read_keypoints",

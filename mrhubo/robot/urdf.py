@@ -83,21 +83,12 @@ class Description:
         return chain
 
 
-def load_urdf(path: Path) -> yourdfpy.URDF:
-    """The parsed URDF with its scene graph (for poses of all links), without meshes.
-
-    Raises:
-        UserError: the file is missing, too large, or no URDF.
-    """
-    return _parsed(read_tree(path), scene=True)
-
-
-def _parsed(tree: Tree, scene: bool) -> yourdfpy.URDF:
-    """What yourdfpy makes of a tree; `scene`: its graph of all links, which takes long where they are many."""
+def _parsed(tree: Tree) -> yourdfpy.URDF:
+    """What yourdfpy makes of a tree, without its graph of all links, which takes long where they are many."""
     try:
         return yourdfpy.URDF.load(
             io.BytesIO(etree.tostring(tree.robot)),
-            build_scene_graph=scene,
+            build_scene_graph=False,
             build_collision_scene_graph=False,
             load_meshes=False,
             load_collision_meshes=False,
@@ -161,7 +152,7 @@ def describe(path: Path) -> Description:
             and is taken as fixed).
     """
     tree = read_tree(path)
-    parsed = _parsed(tree, scene=False)
+    parsed = _parsed(tree)
     read = {joint.name: joint for joint in parsed.robot.joints}
     joints = {name: _joint(element, read.get(name)) for name, element in tree.joints.items()}
     above = {joint.child: joint for joint in joints.values()}
