@@ -11,8 +11,14 @@ from mrhubo.errors import shortened
 MOST_METRES = 1e3
 """Longest offset: no robot is a kilometre long, and float32 would lose its joints."""
 MOST_RADIANS = 1e4
-_EXPRESSION = "is an expression, not a number: this is a xacro file; expand it, `xacro FILE > robot.urdf`"
 _WORDS = {1: "one number", 3: "three numbers"}
+
+
+def expression_in(text: str, wanted: str) -> str | None:
+    """What to say of a text that only xacro can turn into what is wanted, such as ``number``; None of any other."""
+    if "${" in text or "$(" in text:
+        return f"is an expression, not a {wanted}: this is a xacro file; expand it, `xacro FILE > robot.urdf`"
+    return None
 
 
 def read_numbers(text: str, count: int, most: float = math.inf, infinite: bool = False) -> list[float] | str:
@@ -24,8 +30,8 @@ def read_numbers(text: str, count: int, most: float = math.inf, infinite: bool =
         most: the largest size of one.
         infinite: whether infinity will do.
     """
-    if "${" in text or "$(" in text:
-        return _EXPRESSION
+    if (expression := expression_in(text, "number")) is not None:
+        return expression
     try:
         numbers = [float(word) for word in text.split()]
     except ValueError:

@@ -14,7 +14,7 @@ from pathlib import Path
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.errors import UserError, unknown_name
-from mrhubo.robot.attributes import MOST_METRES, MOST_RADIANS, problem, read_numbers, shown
+from mrhubo.robot.attributes import MOST_METRES, MOST_RADIANS, expression_in, problem, read_numbers, shown
 from mrhubo.robot.document import Document, read_document
 from mrhubo.robot.joint import ROTARY
 
@@ -137,8 +137,8 @@ def _check_joint(document: Document, name: str, joint: etree._Element, links: di
     if kind is None:
         raise UserError(f"{place} has no type; write one of {', '.join(_KINDS)}")
     if kind not in _KINDS:
-        if isinstance(wrong := read_numbers(kind, 1), str) and "xacro" in wrong:
-            raise UserError(f"{place}: {shown(joint, 'type', wrong.replace('a number', 'a type'))}")
+        if (expression := expression_in(kind, "type")) is not None:
+            raise UserError(f"{place}: {shown(joint, 'type', expression)}")
         raise UserError(f"{place} has an unknown type: {unknown_name('joint type', kind, _KINDS)}")
     for end in ("parent", "child"):
         element = joint.find(end)
