@@ -110,7 +110,7 @@ class Retargeter(nn.Module):
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
                 frame), `polish` is negative, or the frame rate is not positive.
         """
-        poses = read_poses(motion, frame_rate)
+        poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         return self.retarget(poses.local_TJ33, polish).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
@@ -157,7 +157,7 @@ class Retargeter(nn.Module):
         """
         if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
             raise UserError(f"polish must be 0 or more steps, found {polish}")
-        given, joints = to_tensor(local_TJ33), len(POSED_JOINT_NAMES)
+        given, joints = to_tensor(local_TJ33, self.body_map.skeleton), len(POSED_JOINT_NAMES)
         if given.ndim != 4 or given.shape[1:] != (joints, 3, 3):
             raise UserError(
                 f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}; other forms are"
