@@ -39,7 +39,7 @@ class ReferenceResult:
     q_TN: Tensor
     """Joint angles [rad], inside the limits."""
     residual_deg_TD: Tensor
-    """Angle between the robot's and the human's direction."""
+    """Angle between the robot's and the human's measured directions (`BodyMap.measured`)."""
     at_limit_share: float
     """Share of all joint angles that are at a limit (within 0.001 rad)."""
     jumps: int
@@ -97,7 +97,7 @@ class OptimizationRetargeter(nn.Module):
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
                 frame), or the frame rate is not positive.
         """
-        poses = read_poses(motion, frame_rate)
+        poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
         clips = local_TJ33.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [local_TJ33]
         answers = [self._solve(clip_TJ33, poses.frame_rate) for clip_TJ33 in clips if len(clip_TJ33)]
@@ -174,15 +174,16 @@ class OptimizationRetargeter(nn.Module):
         return q_BN, cost_BC.sum(dim=1)
 
     def _targets(self, local_BJ33: MotionLike) -> Tensor:
-        local_BJ33, joints = to_tensor(local_BJ33), len(POSED_JOINT_NAMES)
+        local_BJ33, joints = to_tensor(local_BJ33, self.body_map.skeleton), len(POSED_JOINT_NAMES)
         if local_BJ33.ndim != 4 or tuple(local_BJ33.shape[1:]) != (joints, 3, 3) or not len(local_BJ33):
             raise UserError(f"human motion: expected rotations of shape (frames, {joints}, 3, 3), one frame or more, "
                             f"found {tuple(local_BJ33.shape)}")  # fmt: skip
         local_BJ33 = local_BJ33.to(self.problem.device, torch.float32)
         target_BD3 = self.body_map.human_directions(local_BJ33)
+        measured_BD3 = target_BD3[:, self.body_map.measured]
         for wrong_B, what in (
             (~local_BJ33.isfinite().flatten(1).all(dim=1), "has numbers that are NaN or infinite"),
-            (((target_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has a matrix that is no rotation"),
+            (((measured_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has a matrix that is no rotation"),
         ):
             if bool(wrong_B.any()):
                 frames = torch.nonzero(wrong_B)[:, 0]
@@ -210,9 +211,10 @@ class OptimizationRetargeter(nn.Module):
     ) -> ReferenceResult:
         problem = self.problem
         robot = self.body_map.robot
-        robot_TD3 = self.body_map.robot_directions(robot.forward(q_TN))
+        robot_TD3, columns = self.body_map.robot_directions(robot.forward(q_TN)), self.body_map.measured
+        off_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
         return ReferenceResult(
-            q_TN, torch.rad2deg(angle_between(robot_TD3, target_TD3)), float(at_limit_share(robot, q_TN).mean()),
+            q_TN, off_TD, float(at_limit_share(robot, q_TN).mean()),
             count_jumps(problem, q_TN, target_TD3, frame_rate),
             torch.zeros(len(q_TN), dtype=torch.bool) if rests_T is None else rests_T.cpu(),
         )  # fmt: skip
@@ -225,6 +227,7 @@ def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
     """
     scale = frame_rate / _REFERENCE_RATE
     turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
-    human_XD = angle_between(target_TD3[1:], target_TD3[:-1])
-    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC).amax(dim=1) * scale
+    columns = problem.body_map.measured
+    human_XD = angle_between(target_TD3[1:, columns], target_TD3[:-1, columns])
+    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC[columns]).amax(dim=1) * scale
     return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())
