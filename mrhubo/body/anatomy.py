@@ -6,7 +6,9 @@ other two axes: R = twist . swing. Angles are those of a left joint; right ones 
 Sources: American Academy of Orthopaedic Surgeons, "Joint Motion: Method of Measuring and Recording" (1965), for the
 ranges; widened by 10 to 15 degrees, because one generic skeleton stands for all people and SMPL's rest pose is not the
 anatomical zero, and, for shoulder, hip and spine, which move together with collars and pelvis, by what athletes do.
-Elbow's oblique axis: the training data's, which is a pure hinge.
+
+The shoulder's swings are about oblique axes: the ranges were set for an arm that is turned about itself by 29 degrees
+more than SMPL's (`arm_axes`).
 
 Legend: B batch, J = 21 joints; the three angles are (twist, first swing, second swing).
 """
@@ -20,8 +22,8 @@ from mrhubo import rotation
 from mrhubo.body.skeleton import PAIRED_JOINTS, POSED_JOINT_NAMES, SIDE_OF, SIDES
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-ELBOW_AXIS = (0.0, -0.871, 0.491)
-"""Hinge of the left elbow: turning about it by a positive angle flexes."""
+ELBOW_AXIS = (0.0, -1.0, 0.0)
+"""Hinge of the left elbow, SMPL's: turning about it by a positive angle flexes."""
 KNEE_AXIS = _X
 """Hinge of the knees: turning about it by a positive angle flexes."""
 
@@ -39,9 +41,9 @@ _RANGES: dict[str, tuple[_Entry, _Entry, _Entry]] = {
     "neck": ((_Y, (-50, 50)), (_X, (-45, 45)), (_Z, (-40, 40))),
     "head": ((_Y, (-60, 60)), (_X, (-60, 80)), (_Z, (-60, 60))),
     "collar": ((_X, (-30, 30)), (_Y, (-30, 30)), (_Z, (-20, 45))),
-    "shoulder": ((_X, (-110, 110)), (_Y, (-140, 65)), (_Z, (-115, 105))),
-    "elbow": ((ELBOW_AXIS, (-10, 160)), (_X, (-25, 25)), ((0.0, 0.491, 0.871), (-25, 25))),
-    "wrist": ((_X, (-110, 110)), (_Y, (-45, 45)), (_Z, (-90, 90))),
+    "shoulder": ((_X, (-140, 80)), ((0.0, 0.871, 0.491), (-140, 65)), ((0.0, -0.491, 0.871), (-115, 105))),
+    "elbow": ((ELBOW_AXIS, (-10, 160)), (_X, (-25, 25)), (_Z, (-25, 25))),
+    "wrist": ((_X, (-80, 140)), (_Y, (-45, 45)), (_Z, (-90, 90))),
 }
 
 

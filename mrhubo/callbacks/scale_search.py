@@ -240,7 +240,7 @@ class ScaleFactorSearch(lightning.Callback):
 def _reachable(body_map: BodyMap, q_FN: Tensor, local_FJ33: Tensor, count: int) -> Tensor:
     """`count` frames, evenly spaced among those in which every limb of the robot points where the human's does."""
     robot_FD3 = body_map.robot_directions(body_map.robot.forward(q_FN))
-    off_F = angle_between(robot_FD3, body_map.human_directions(local_FJ33)).amax(dim=1)
+    off_F = angle_between(robot_FD3, body_map.human_directions(local_FJ33))[:, body_map.measured].amax(dim=1)
     reached = (off_F < _REACHED_RAD).nonzero()[:, 0]
     if len(reached) < count:
         reached = off_F.argsort()[:count].sort().values

@@ -53,6 +53,8 @@ class PriorConfig:
     """Frames with a joint further outside its anatomical range than this are dropped."""
     missing_share: float = bounded(0.5, 0.0, 1.0)
     """Share of the poses whose wrists (and of those whose collars, toes) get random angles, which the data lacks."""
+    rest_share: float = bounded(0.2, 0.0, 1.0)
+    """Share of the poses whose legs, trunk and collars are put at rest, as a robot without them reads a pose."""
     held_out: float = bounded(0.05, 0.001, 0.5)
     """Share of the clips held out for validation."""
     seed: int = bounded(0, 0, 2**32 - 1)

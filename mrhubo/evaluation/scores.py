@@ -100,7 +100,9 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
     def collision_share(q_TN: Tensor, poses: LinkPoses) -> float:
         return float(shapes.collides(q_TN, poses).float().mean()) if shapes.pairs else float("nan")
 
-    jerk, human_jerk = (float(direction_jerk(d, clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3))
+    jerk, human_jerk = (
+        float(direction_jerk(d[:, body_map.measured], clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3)
+    )
     return Evaluation(
         **vars(score_clip(clip, q_TN, robot, key_links)),
         limb_deg=mean(error_TD, "arm"),

@@ -37,7 +37,7 @@ class ReferenceResult:
     q_TN: Tensor
     """Joint angles [rad], inside the limits."""
     residual_deg_TD: Tensor
-    """Angle between the robot's and the human's direction."""
+    """Angle between the robot's and the human's measured directions (`BodyMap.measured`)."""
     at_limit_share: float
     """Share of all joint angles that are at a limit (within 0.001 rad)."""
     jumps: int
@@ -177,9 +177,10 @@ class OptimizationRetargeter(nn.Module):
                             f"found {tuple(local_BJ33.shape)}")  # fmt: skip
         local_BJ33 = local_BJ33.to(self.problem.device, torch.float32)
         target_BD3 = self.body_map.human_directions(local_BJ33)
+        measured_BD3 = target_BD3[:, self.body_map.measured]
         for wrong_B, what in (
             (~local_BJ33.isfinite().flatten(1).all(dim=1), "has numbers that are NaN or infinite"),
-            (((target_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has a matrix that is no rotation"),
+            (((measured_BD3.norm(dim=-1) - 1).abs() > 1e-3).any(dim=1), "has a matrix that is no rotation"),
         ):
             if bool(wrong_B.any()):
                 frames = torch.nonzero(wrong_B)[:, 0]
@@ -207,9 +208,9 @@ class OptimizationRetargeter(nn.Module):
     ) -> ReferenceResult:
         problem = self.problem
         robot = self.body_map.robot
-        robot_TD3 = self.body_map.robot_directions(robot.forward(q_TN))
+        robot_TD3, columns = self.body_map.robot_directions(robot.forward(q_TN)), self.body_map.measured
         return ReferenceResult(
-            q_TN, torch.rad2deg(angle_between(robot_TD3, target_TD3)), float(at_limit_share(robot, q_TN).mean()),
+            q_TN, torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns])), float(at_limit_share(robot, q_TN).mean()),
             count_jumps(problem, q_TN, target_TD3, frame_rate),
             torch.zeros(len(q_TN), dtype=torch.bool) if rests_T is None else rests_T.cpu(),
         )  # fmt: skip
@@ -222,6 +223,7 @@ def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
     """
     scale = frame_rate / _REFERENCE_RATE
     turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
-    human_XD = angle_between(target_TD3[1:], target_TD3[:-1])
-    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC).amax(dim=1) * scale
+    columns = problem.body_map.measured
+    human_XD = angle_between(target_TD3[1:, columns], target_TD3[:-1, columns])
+    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC[columns]).amax(dim=1) * scale
     return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())

@@ -147,7 +147,8 @@ class Retargeter(nn.Module):
         target_TD3 = self.body_map.human_directions(human)
         q_TN = self._answer(local_TJ33, target_TD3, polish)
         links = self.body_map.robot.forward(q_TN)
-        error_deg_TD = torch.rad2deg(angle_between(self.body_map.robot_directions(links), target_TD3))
+        robot_TD3, columns = self.body_map.robot_directions(links), self.body_map.measured
+        error_deg_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
         phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(human.local_BJ33))
         trust_T = confidence(phi_T, self.phi_threshold, error_deg_TD)
         collision_T = self.collision.collides(q_TN, links)

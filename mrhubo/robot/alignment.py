@@ -14,20 +14,22 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
+from mrhubo.robot.bending import bend_axis
 from mrhubo.robot.body_map import BodyMap
-from mrhubo.robot.parts import LimbPart, OrientedPart
+from mrhubo.robot.parts import BendPart, LimbPart, OrientedPart
 
 
 def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> Tensor:
     """Local rotations (B, 21, 3, 3) of the poses whose `BodyMap.human_directions` are the given ones.
 
-    A limb turns about the axis across its old and new direction, so that no twist is added. An oriented part turns at
+    A limb turns about the axis across its old and new direction, so that no twist is added; then, if the robot has a
+    bend axis, about itself, until its own axis is where that and the limb that bends have it. An oriented part turns at
     its joint; joints that share its turn (neck and head) do so in equal parts.
 
     Args:
         body_map: the robot's body map.
         local_BJ33: local rotations (B, 21, 3, 3) of the poses to start from.
-        direction_BD3: unit directions (B, D, 3), as of `BodyMap.robot_directions`.
+        direction_BD3: directions (B, D, 3), as of `BodyMap.robot_directions` or `BodyMap.human_directions`.
     """
     pose = _Pose(local_BJ33, body_map.skeleton.global_rotations(local_BJ33))
     rest_K3 = body_map.skeleton.rest_K3
@@ -36,7 +38,7 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> 
     from_pelvis: dict[str, Tensor] = {}
     """All directions, by the part from which they are seen: a part is turned before others are seen from it."""
     for part in body_map.keypoints.parts:
-        if not part.seen_from:
+        if not part.seen_from or not set(part.direction_names) <= column.keys():
             continue
         if part.seen_from not in from_pelvis:
             from_pelvis[part.seen_from] = direction_BD3 @ pose.of(view_joint[part.seen_from]).mT
@@ -46,6 +48,12 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> 
             start, end = (KEYPOINT_NAMES.index(name) for name in (part.start, part.end))
             bone_3 = torch.nn.functional.normalize(rest_K3[end] - rest_K3[start], dim=0)
             pose.turn(joint, _shortest_turn(pose.of(joint) @ bone_3, wanted[0]))
+        elif isinstance(part, BendPart):
+            limbs = (limb.direction_names[0] for limb in body_map.keypoints.parts if limb.name in part.limbs)
+            upper, lower = (from_pelvis[part.seen_from][:, column[name]] for name in limbs)
+            axis_B3 = bend_axis(upper, lower, wanted[0])[0]
+            own_B3 = pose.of(joint) @ pose.of(joint).new_tensor(part.rest)
+            pose.turn(joint, _turn_about(upper, own_B3, axis_B3))
         elif isinstance(part, OrientedPart):
             orientation_B33 = part.turn(*wanted)
             for shares, name in zip(range(len(part.turned_by), 1, -1), part.turned_by, strict=False):
@@ -83,6 +91,16 @@ class _Pose:
         for joint, turned in self._turned.items():
             found[:, joint - 1] = self.of(PARENTS[joint]).mT @ turned
         return found
+
+
+def _turn_about(axis_B3: Tensor, start_B3: Tensor, end_B3: Tensor) -> Tensor:
+    """Rotations (B, 3, 3) about unit axes that take the half-plane of one vector to that of another; none where a vector
+    is 0 or along the axis.
+    """
+    sine_B = (axis_B3 * torch.linalg.cross(start_B3, end_B3)).sum(-1)
+    along_B = (start_B3 * axis_B3).sum(-1) * (end_B3 * axis_B3).sum(-1)
+    cosine_B = (start_B3 * end_B3).sum(-1) - along_B
+    return rotation.axis_angle_to_matrix(axis_B3 * torch.atan2(sine_B, cosine_B)[:, None])
 
 
 def _shortest_turn(start_B3: Tensor, end_B3: Tensor) -> Tensor:

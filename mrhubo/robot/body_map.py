@@ -18,6 +18,7 @@ from mrhubo.robot.checks import check_body_map, check_key_links
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.directions import Directions
 from mrhubo.robot.entries import check_names
+from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot
@@ -78,7 +79,7 @@ class BodyMap(nn.Module):
         return body_map
 
     @property
-    def directions(self) -> tuple[Limb | Axis, ...]:
+    def directions(self) -> tuple[Limb | Axis | BendAxis, ...]:
         """The directions that robot and human share."""
         return self.shared.all
 
@@ -86,6 +87,11 @@ class BodyMap(nn.Module):
     def direction_names(self) -> tuple[str, ...]:
         """Names of the directions, in the order of the table of body parts."""
         return self.shared.names
+
+    @property
+    def measured(self) -> list[int]:
+        """Which of the directions a robot's answer is measured by: all but bend axes."""
+        return self.shared.measured_columns
 
     @property
     def keypoint_names(self) -> tuple[str, ...]:
@@ -113,8 +119,8 @@ class BodyMap(nn.Module):
         return HumanPose.of(local_BJ33, self.skeleton)
 
     def human_directions(self, human: HumanPose | Tensor) -> Tensor:
-        """Unit directions (B, D, 3) of human poses, or of their local rotations (B, 21, 3, 3), in human axes of the
-        parts from which they are seen.
+        """Directions (B, D, 3) of human poses, or of their local rotations (B, 21, 3, 3), in human axes of the parts
+        from which they are seen. Their length is how much they count: 1, but for bend axes, which count 0 to 1.
         """
         return self.shared.of_human(human if isinstance(human, HumanPose) else self.human(human))
 

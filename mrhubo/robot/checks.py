@@ -122,7 +122,7 @@ def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tup
     """Refuses a part that does not move with what carries it, and a limb that does not run outwards."""
     tree, ends, by_part = _Tree(body_map.robot), body_map.keypoints.ends, {limb.part.name: limb for limb in limbs}
     inward = {x.part.name for x in limbs if x.part.seen_from and tree.is_inward(x, ends[x.part.seen_from])}
-    for part in body_map.keypoints.parts:
+    for part in (part for part in body_map.keypoints.parts if part.name in by_part or part.name in ends):
         limb, carrier = by_part.get(part.name), part.hangs_on
         if carrier in ends:
             name, link = (limb.part.start, limb.start.link) if limb else (part.name, ends[part.name].link)

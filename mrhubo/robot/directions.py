@@ -1,9 +1,10 @@
 """Unit directions that a robot and a human share, each seen from the part that its row of the table names.
 
 Directions are in human axes (x left, y up, z forward) of that part, so neither proportions nor the way a base faces
-matter.
+matter. The length of a human's direction is how much it counts: 1 for limbs and oriented parts, 0 to 1 for bend axes.
 
-Legend: B batch, D directions, E of them limbs, A of them axes, V parts from which they are seen, L robot links.
+Legend: B batch, D directions, E of them limbs, A of them axes (of oriented parts, then bend axes), V parts from which
+they are seen, L robot links.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from torch import Tensor, nn
 from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, Skeleton, keypoint_indices
 from mrhubo.frames import human_axes
+from mrhubo.robot.bending import BendAxis, bend_axis, find_bend_axes
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb
 from mrhubo.robot.model import LinkPoses, Robot
 
@@ -51,12 +53,20 @@ class Directions(nn.Module):
         """Looks links and human joints up."""
         super().__init__()
         self.skeleton, self.keypoints = skeleton, keypoints
-        self.all = keypoints.directions
+        rows = [*keypoints.directions, *find_bend_axes(robot, keypoints)]
+        self.all = tuple(sorted(rows, key=lambda d: keypoints.parts.index(d.part)))
         self.names = tuple(d.name for d in self.all)
         limbs = [(i, d) for i, d in enumerate(self.all) if isinstance(d, Limb)]
         axes = [(i, d) for i, d in enumerate(self.all) if isinstance(d, Axis)]
+        bends = [(i, d) for i, d in enumerate(self.all) if isinstance(d, BendAxis)]
         self.limb_columns = [i for i, _ in limbs]
         """Which of the directions are limbs."""
+        self.bend_columns = [i for i, _ in bends]
+        """Which are bend axes."""
+        self.measured_columns = [i for i, _ in sorted((*limbs, *axes), key=lambda row: row[0])]
+        """Which are limbs or belong to oriented parts: those that a robot's answer is measured by."""
+        limb_of = {d.part.name: place for place, (_, d) in enumerate(limbs)}
+        self._bent_limbs = [[limb_of[d.part.limbs[which]] for _, d in bends] for which in (0, 1)]
         self.views = tuple(dict.fromkeys(d.part.seen_from for d in self.all if d.part.seen_from))
         """The parts from which directions are seen."""
         self.view_links = tuple(keypoints.ends[name].link for name in self.views)
@@ -65,17 +75,18 @@ class Directions(nn.Module):
         self._view_joints = [joint_of[name] for name in self.views]
         self._view_rows = [robot.link_index(link) for link in self.view_links]
         self._bones = [keypoint_indices([d.part.start for _, d in limbs]), keypoint_indices([d.name for _, d in limbs])]
-        self._axis_joints = [joint_of[d.part.name] for _, d in axes]
+        self._axis_joints = [joint_of[d.part.name] for _, d in (*axes, *bends)]
+        self._bends = len(bends)
         ends = [[d.start for _, d in limbs], [d.end for _, d in limbs]]
         tensors = {
             "limb_links_2E": torch.tensor([[robot.link_index(point.link) for point in points] for points in ends]),
             "limb_offsets_2E3": torch.tensor([[point.offset_3 for point in points] for points in ends]).reshape(
                 2, -1, 3
             ),
-            "axis_links_A": torch.tensor([robot.link_index(d.link) for _, d in axes], dtype=torch.long),
-            "axes_A3": torch.stack([d.axis_3 for _, d in axes]) if axes else torch.zeros(0, 3),
-            "rest_A3": torch.tensor([d.rest for _, d in axes]).reshape(-1, 3),
-            "order_D": torch.tensor([i for i, _ in (*limbs, *axes)]).argsort(),
+            "axis_links_A": torch.tensor([robot.link_index(d.link) for _, d in (*axes, *bends)], dtype=torch.long),
+            "axes_A3": torch.stack([d.axis_3 for _, d in (*axes, *bends)]) if axes or bends else torch.zeros(0, 3),
+            "rest_A3": torch.tensor([*(d.rest for _, d in axes), *(d.part.rest for _, d in bends)]).reshape(-1, 3),
+            "order_D": torch.tensor([i for i, _ in (*limbs, *axes, *bends)]).argsort(),
             "view_axes_V33": torch.stack([human_axes(keypoints.ends[name].axes_23) for name in self.views]),
             "view_D": torch.tensor(views),
         }
@@ -108,11 +119,17 @@ class Directions(nn.Module):
         return (vectors_BX3[..., None, :] @ torch.stack(list(views), dim=1).index_select(1, view_X))[..., 0, :]
 
     def of_human(self, human: HumanPose) -> Tensor:
-        """Unit directions (B, D, 3) of human poses, in human axes of the parts from which they are seen."""
+        """Directions (B, D, 3) of human poses, in human axes of the parts from which they are seen; their length is
+        how much they count.
+        """
         keypoints, rotations = human.keypoint_BK3, human.rotation_BJ33
         starts, ends = self._bones
         limbs = torch.nn.functional.normalize(keypoints[:, ends] - keypoints[:, starts], dim=-1)
         axes = (rotations[:, self._axis_joints] @ self.rest_A3.to(rotations)[..., None])[..., 0]
+        if self._bends:
+            upper_BX3, lower_BX3 = (limbs[:, places] for places in self._bent_limbs)
+            bend_BX3, needed_BX = bend_axis(upper_BX3, lower_BX3, axes[:, -self._bends :])
+            axes = torch.cat((axes[:, : -self._bends], bend_BX3 * needed_BX[..., None]), dim=1)
         pelvis_BD3 = torch.cat((limbs, axes), dim=1).index_select(1, self.order_D)
         return self.seen(pelvis_BD3, [rotations[:, joint] for joint in self._view_joints])
 

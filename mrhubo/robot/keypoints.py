@@ -12,7 +12,7 @@ from torch import Tensor
 
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.entries import End, Point, read_end, read_point
-from mrhubo.robot.parts import PARTS, BodyPart, LimbPart, OrientedPart
+from mrhubo.robot.parts import PARTS, BendPart, BodyPart, LimbPart, OrientedPart
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Keypoints:
 
     @cached_property
     def directions(self) -> tuple[Limb | Axis, ...]:
-        """What robot and human share, in the table's order."""
+        """Limbs and axes that robot and human share, in the table's order."""
         found: list[Limb | Axis] = []
         for part in self.parts:
             if isinstance(part, LimbPart):
@@ -116,12 +116,11 @@ def read_keypoints(entries: Mapping[str, Any], table: Sequence[BodyPart] = PARTS
         point = carriers.get(oriented[name].hangs_on or "")
         if point and point not in points:
             raise UserError(f"robot.keypoints.{name}: needs '{point}' too")
+    there = {limb.name for limb in limbs if limb.end in points} | ends.keys()
     parts = tuple(
         part
         for part in table
-        if (
-            part.name in ends if isinstance(part, OrientedPart) else part in limbs and part.direction_names[0] in points
-        )
+        if part.name in there or (isinstance(part, BendPart) and {part.hangs_on, part.bent} <= there)
     )
     found = Keypoints(parts, points, ends)
     for part in parts:

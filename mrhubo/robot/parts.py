@@ -1,7 +1,7 @@
 """The parts of a human body that a robot can have: one table, from which all else follows.
 
 A limb runs from one point to another and has one direction; an oriented part (a hand, the head) is fixed to one link
-and has two. Directions are seen from the part that carries them: those of arms and head from the chest, so that neither
+and has two; a bend axis says about which axis a limb bends. Directions are seen from the part that carries them: those of arms and head from the chest, so that neither
 the way a base faces nor a bent back matters.
 
 A row says everything about a part: no other module knows one by its name. Rows stand in the order of the directions,
@@ -18,10 +18,11 @@ import torch
 from torch import Tensor
 
 Vector = tuple[float, float, float]
-Region = Literal["trunk", "arm", "hand", "head", "leg", "foot"]
-"""What a part belongs to: measures are means over a region."""
+Region = Literal["trunk", "arm", "hand", "head", "leg", "foot", "bend"]
+"""What a part belongs to: measures are means over a region. What is in "bend" guides, but is not measured."""
 
-_LEFT, _RIGHT, _UP, _FORWARD = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+_LEFT, _RIGHT, _FORWARD = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+_UP, _DOWN = (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
 """Directions of the human frame (`mrhubo.frames`)."""
 
 
@@ -102,17 +103,52 @@ class OrientedPart(BodyPart):
         return _columns(first, second) @ _columns(*torch.tensor(self.rest).to(first)).T
 
 
+@dataclass(frozen=True, kw_only=True)
+class BendPart(BodyPart):
+    """The axis about which a limb bends against the one that carries it, fixed to the carrying limb: an elbow's hinge.
+
+    Where the joint is bent, the two limbs' directions tell it, and nothing more need be said. Where it is straight, only
+    how the carrying limb is turned about itself tells it; without that a straight arm leaves the robot's elbow open.
+    """
+
+    bent: str
+    """The limb that bends; `hangs_on` carries it."""
+    rest: Vector
+    """Where the axis points on a human at rest, human frame; turning about it by a positive angle bends the joint."""
+
+    @property
+    def limbs(self) -> tuple[str, str]:
+        """The limb that carries, and the one that bends."""
+        return self.hangs_on or "", self.bent
+
+    @property
+    def direction_names(self) -> tuple[str, ...]:
+        """The part's own name."""
+        return (self.name,)
+
+    @property
+    def outer_points(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+
 def _columns(first: Tensor, second: Tensor) -> Tensor:
     return torch.stack((first, second, torch.linalg.cross(first, second)), dim=-1)
 
 
-def _arm(side: str) -> tuple[LimbPart, LimbPart]:
+_BEND_WEIGHT = 2e-3
+"""Of a bend axis, small against a limb's 1: it decides where limbs leave the choice, and does not turn them away."""
+
+
+def _arm(side: str, elbow_axis: Vector) -> tuple[LimbPart, BendPart, LimbPart]:
     shoulder, elbow, wrist = (f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist"))
-    upper, collar = f"{side}_upper_arm", f"{side}_collar"
+    upper, collar, forearm = f"{side}_upper_arm", f"{side}_collar", f"{side}_forearm"
     return (
         LimbPart(name=upper, joint=shoulder, region="arm", hangs_on="chest", seen_from="chest",
                  start=shoulder, end=elbow, inputs=(collar, shoulder), lengthened_by="upper_arm"),
-        LimbPart(name=f"{side}_forearm", joint=elbow, region="arm", hangs_on=upper, seen_from="chest",
+        BendPart(name=f"{side}_elbow_axis", joint=shoulder, region="bend", hangs_on=upper, seen_from="chest",
+                 bent=forearm, rest=elbow_axis, inputs=(collar, shoulder), weight=_BEND_WEIGHT),
+        LimbPart(name=forearm, joint=elbow, region="arm", hangs_on=upper, seen_from="chest",
                  start=elbow, end=wrist, inputs=(collar, elbow), lengthened_by="forearm"),
     )  # fmt: skip
 
@@ -134,8 +170,8 @@ HEAD = OrientedPart(
 
 PARTS: tuple[BodyPart, ...] = (
     CHEST,
-    *_arm("left"),
-    *_arm("right"),
+    *_arm("left", _DOWN),
+    *_arm("right", _UP),
     _hand("left", _LEFT),
     _hand("right", _RIGHT),
     HEAD,

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.baselines.s3le.model import S3LE
-from mrhubo.baselines.s3le.training import S3LEData, make_data, train_s3le
+from mrhubo.baselines.s3le.training import S3LEData, human_directions, make_data, train_s3le
 from mrhubo.body.prior_training.poses import load_training_poses, plausible_frames
 from mrhubo.config import BaselineConfig, S3LEConfig, to_plain
 from mrhubo.errors import UserError
@@ -91,7 +91,7 @@ class Baseline:
 
     def answer(self, model: S3LE, settings: S3LEConfig, local_TJ33: Tensor) -> Tensor:
         """Joint angles (T, N) of human poses (T, 21, 3, 3)."""
-        codes = model.human_codes(self.prepared.body_map.human_directions(local_TJ33))
+        codes = model.human_codes(human_directions(self.prepared.body_map, local_TJ33))
         return model.answer(codes, settings.neighbours, settings.width, self.data.collision)
 
     def validation_link_cm(self, model: S3LE, settings: S3LEConfig) -> float:

@@ -49,7 +49,7 @@ def make_data(body_map: BodyMap, local_GJ33: Tensor, settings: S3LEConfig, repor
     random_UN = robot.sample(settings.random_poses, generator)
     random_UN = random_UN[~collision.collides(random_UN)]
     return S3LEData(
-        body_map.human_directions(local_GJ33),
+        human_directions(body_map, local_GJ33),
         torch.cat(answers),
         random_UN,
         _directions(body_map, random_UN),
@@ -57,8 +57,14 @@ def make_data(body_map: BodyMap, local_GJ33: Tensor, settings: S3LEConfig, repor
     )
 
 
+def human_directions(body_map: BodyMap, local_BJ33: Tensor) -> Tensor:
+    """What S3LE sees of human poses (B, 21, 3, 3): unit directions (B, D, 3)."""
+    return body_map.human_directions(local_BJ33)[:, body_map.measured]
+
+
 def _directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
-    return torch.cat([body_map.robot_directions(body_map.robot.forward(part)) for part in q_BN.split(8_192)])
+    found = [body_map.robot_directions(body_map.robot.forward(part)) for part in q_BN.split(8_192)]
+    return torch.cat(found)[:, body_map.measured]
 
 
 def train_s3le(body_map: BodyMap, data: S3LEData, settings: S3LEConfig, report: Reporter = SILENT) -> S3LE:
@@ -73,7 +79,7 @@ def train_s3le(body_map: BodyMap, data: S3LEData, settings: S3LEConfig, report: 
     robot = body_map.robot
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(settings.seed)
-        model = S3LE(len(body_map.directions), robot.lower_N, robot.upper_N, settings.hidden, settings.latent)
+        model = S3LE(len(body_map.measured), robot.lower_N, robot.upper_N, settings.hidden, settings.latent)
     free_GN = data.robot_GN[~data.collision.collides(data.robot_GN)]
     feasible_FN = torch.cat((free_GN, data.random_UN))
     optimizer = torch.optim.Adam(model.parameters(), settings.lr, fused=True)

@@ -20,6 +20,8 @@ _MISSING: dict[str, tuple[_Triple, _Triple]] = {
 }
 """Joints that never move in the data: standard deviation and limit of added angles about x, y, z [deg]."""
 
+_READ = ("shoulder", "elbow", "wrist", "neck", "head")
+
 
 def add_missing_motion(pose_BJ6: Tensor, share: float) -> Tensor:
     """Gives wrists, collars and toes plausible angles that the data lacks; each pair in a random share of the poses.
@@ -45,6 +47,20 @@ def _random_turns(pose_BJ6: Tensor, std_deg: _Triple, limit_deg: _Triple, share:
 
 def _pair(part: str) -> list[int]:
     return [POSED_JOINT_NAMES.index(f"{side}_{part}") for side in ("left", "right")]
+
+
+def stand_at_rest(pose_BJ6: Tensor, share: float) -> Tensor:
+    """Puts all but arms and head of a random share of the poses at rest, the arms' directions and hands kept: poses as a
+    robot with arms and a head reads them (`mrhubo.robot.alignment`), whose measure is their reconstruction.
+    """
+    rest = torch.zeros(len(POSED_JOINT_NAMES), dtype=torch.bool)
+    rest[[i for i, name in enumerate(POSED_JOINT_NAMES) if not name.endswith(_READ)]] = True
+    identity = pose_BJ6.new_tensor([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    collar, shoulder = (rotation.sixd_to_matrix(pose_BJ6[:, _pair(part)]) for part in ("collar", "shoulder"))
+    found = torch.where(rest.to(pose_BJ6.device)[:, None], identity, pose_BJ6)
+    found[:, _pair("shoulder")] = rotation.matrix_to_sixd(collar @ shoulder)
+    chosen = torch.rand(len(pose_BJ6), 1, 1, device=pose_BJ6.device) < share
+    return torch.where(chosen, found, pose_BJ6)
 
 
 def add_noise(pose_BJ6: Tensor, share: float) -> Tensor:

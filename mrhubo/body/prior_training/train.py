@@ -29,7 +29,7 @@ from torch.utils.data import DataLoader
 from mrhubo import rotation
 from mrhubo.body import anatomy
 from mrhubo.body.prior import BodyPrior
-from mrhubo.body.prior_training.augmentation import add_missing_motion, add_noise
+from mrhubo.body.prior_training.augmentation import add_missing_motion, add_noise, stand_at_rest
 from mrhubo.body.prior_training.losses import orthonormality_penalty, pseudo_huber, sliced_wasserstein
 from mrhubo.body.prior_training.measures import measure, reconstruction
 from mrhubo.body.prior_training.poses import PoseDataset, RandomBatches, load_training_poses, plausible_frames
@@ -77,6 +77,7 @@ class PriorTraining(lightning.LightningModule):
         flip = torch.rand(len(pose_BJ6), 1, 1, device=pose_BJ6.device) < 0.5
         pose_BJ6 = torch.where(flip, mirror_pose(pose_BJ6), pose_BJ6)
         pose_BJ6 = add_missing_motion(pose_BJ6, self.config.missing_share)
+        pose_BJ6 = stand_at_rest(pose_BJ6, self.config.rest_share)
         seen_BJ6 = add_noise(pose_BJ6, self.config.noise_share)
         mean, log_std = self.prior.posterior(seen_BJ6)
         z_BZ = mean + log_std.exp() * torch.randn_like(mean)

@@ -31,9 +31,6 @@ MAX_FLEXION = np.radians(150.0)
 """Largest flexion of the elbow [rad]."""
 MAX_TWIST = np.radians(100.0)
 """Largest pronation or supination of the forearm [rad], from thumb-up."""
-_ELBOW_TILT = np.radians(30.0)
-"""The elbow's axis in SMPL's rest pose, palms down, is turned about the upper arm by this much: the forearm bends
-forward and up. So it is in the mocap that the body prior knows (CMU), which has the forearm's twist in the wrist."""
 _LAG_S = {"torso": 0.0, "head": 0.02, "shoulder": 0.05, "elbow": 0.09, "wrist": 0.14}
 """Overlapping action: how much later than its key each part arrives [s]."""
 _SPINE_SHARES = {"spine1": 0.35, "spine2": 0.35, "spine3": 0.30}
@@ -170,13 +167,12 @@ def _arm(keys: Sequence[Key], side: str, times_T: np.ndarray, sway: _Sway) -> di
     twist_T, bend_T, tilt_T = (wrist_T3 + np.radians(sway((1.5, 1.0, 0.7), 0.37))).T
 
     collar = _collar(humerus.as_matrix()[:, :, 0], sway.breath_T)
-    unturned = Rotation.from_euler("x", _ELBOW_TILT)
     hand = Rotation.from_euler("XZY", np.stack((twist_T, -bend_T, -tilt_T), axis=-1))
     return {
         "collar": collar,
-        "shoulder": collar.inv() * humerus * unturned,
-        "elbow": unturned.inv() * Rotation.from_euler("y", -flexion_T[:, None]) * unturned,
-        "wrist": unturned.inv() * hand,
+        "shoulder": collar.inv() * humerus,
+        "elbow": Rotation.from_euler("y", -flexion_T[:, None]),
+        "wrist": hand,
     }
 
 
