@@ -143,8 +143,8 @@ def test_polish_brings_every_frame_nearer_and_stays_inside_the_limits(made: Reta
         assert torch.equal(result.collision, made.collision.collides(result.q))
         errors.append(made.directions.quadratic(result.q, made.body_map.human_directions(pose)).cost_BC)
     assert torch.equal(made.predict(pose), made.network(rotation.matrix_to_sixd(pose)))
-    assert bool((errors[1] <= errors[0]).all()) and bool((errors[2] <= errors[1]).all())
-    assert float(errors[2].sum(1).mean()) < 0.5 * float(errors[0].sum(1).mean())
+    assert bool((errors[1] <= errors[0]).all()) and bool((errors[2] <= errors[0]).all())
+    assert float(errors[2].sum(1).mean()) < float(errors[1].sum(1).mean()) < 0.5 * float(errors[0].sum(1).mean())
     assert made.predict(pose[:0], 1).shape == (0, 17)
     with pytest.raises(UserError, match="polish"):
         made.predict(pose, -1)
@@ -160,7 +160,7 @@ def test_a_call_takes_a_motion_and_arrays_of_any_form(made: Retargeter) -> None:
     turns = rotation.matrix_to_axis_angle(pose).flatten(1)
     for array in (rotation.matrix_to_sixd(pose), pose, turns, turns.double().numpy()):
         found = made(array, frame_rate=24.0)
-        torch.testing.assert_close(found.q, expected.q, atol=1e-4, rtol=0)
+        torch.testing.assert_close(found.q, expected.q, atol=1e-3, rtol=0)
         assert found.frame_rate == 24.0
     assert torch.equal(made(pose, polish=0).q, made.predict(pose))
     with pytest.raises(UserError, match="human pose 2 holds a matrix that is no rotation"):
