@@ -2,29 +2,24 @@
 
     |q_t - q_(t-1)| <= step        for every joint, from each frame to the next
 
-First the nearest motion that keeps to it, then the best one near that: an augmented Lagrangian around the frames that
-were too fast, whose last thousandths the nearest motion takes away again.
+First the nearest motion that keeps to it, then the best one near that (`bounded`), whose last millionths the nearest
+motion takes away again.
 
-Legend: T frames, X steps between them, N joints, D directions.
+Legend: T frames, N joints, D directions.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import torch
 from torch import Tensor
 
-from mrhubo.reference.refine import motion_cost, refine_around, widen
+from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
-from mrhubo.reference.terms import Smoothness, StepPenalty
+from mrhubo.reference.terms import Smoothness
 
-_WEIGHT = 30.0
-"""Of the penalty [1/rad^2]: some ten times a frame's own curvature, so that few rounds are enough."""
-_ROUNDS, _SWEEPS, _TOLERANCE = 4, 6, 1e-3
-_ENOUGH = 1e-3
-"""Steps that are too long by no more than this share of the bound are left to the projection."""
+_SWEEPS, _TOLERANCE = 12, 1e-3
 _AROUND_S = 0.5
 """Frames this near in time [s] to those that were too fast may change."""
 _FLOAT = 4e-7
@@ -84,17 +79,7 @@ def keep_speed(
     free_T = widen(changed_TN.any(dim=1), around)
     if fixed_T is not None:
         free_T, nearest_TN = free_T & ~fixed_T, torch.where(fixed_T[:, None], q_TN, nearest_TN)
-    penalty = StepPenalty(step_N, torch.zeros_like(q_TN[1:]), _WEIGHT)
-    found_TN = nearest_TN
-    for _ in range(_ROUNDS):
-        firm = dataclasses.replace(smoothness, penalty=penalty)
-        found_TN = refine_around(problem, found_TN, target_TD3, firm, free_T, _SWEEPS, _TOLERANCE)
-        moved_XN = found_TN.diff(dim=0)
-        if not bool((moved_XN.abs() > (1 + _ENOUGH) * step_N).any()):
-            break
-        penalty = penalty.shifted(moved_XN)
+    found_TN = refine_around(problem, nearest_TN, target_TD3, smoothness, free_T, _SWEEPS, _TOLERANCE, step_N)
     found_TN = nearest_slow(found_TN, step_N)
-    costs = [motion_cost(problem, motion_TN, target_TD3, smoothness) for motion_TN in (found_TN, nearest_TN)]
-    found_TN = torch.where((costs[0] < costs[1])[problem.blocks.block_N], found_TN, nearest_TN)
     concerned_C = changed_TN.any(dim=0).float() @ problem.blocks.joints_NC > 0
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)
