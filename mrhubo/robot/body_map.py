@@ -94,6 +94,11 @@ class BodyMap(nn.Module):
         return self.shared.measured_columns
 
     @property
+    def measured_names(self) -> tuple[str, ...]:
+        """Their names, in order: those of the columns of `RetargetResult.direction_error_deg`."""
+        return tuple(self.direction_names[i] for i in self.measured)
+
+    @property
     def keypoint_names(self) -> tuple[str, ...]:
         """Names of the target keypoints."""
         return self.scale.keypoint_names
