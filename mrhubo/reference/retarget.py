@@ -209,8 +209,9 @@ class OptimizationRetargeter(nn.Module):
         problem = self.problem
         robot = self.body_map.robot
         robot_TD3, columns = self.body_map.robot_directions(robot.forward(q_TN)), self.body_map.measured
+        off_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
         return ReferenceResult(
-            q_TN, torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns])), float(at_limit_share(robot, q_TN).mean()),
+            q_TN, off_TD, float(at_limit_share(robot, q_TN).mean()),
             count_jumps(problem, q_TN, target_TD3, frame_rate),
             torch.zeros(len(q_TN), dtype=torch.bool) if rests_T is None else rests_T.cpu(),
         )  # fmt: skip

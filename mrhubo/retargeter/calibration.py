@@ -6,7 +6,7 @@ turned at random. So it is known which answers are good. No human motion is need
 robot's set-up takes. What is wrong and looks right, another plausible pose, no signal tells; there is none of it here,
 so confidence says nothing about it.
 
-Legend: B poses, C branches, S = 5 signals.
+Legend: B poses, C branches, S = 4 signals.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from mrhubo.retargeter.spoiling import bent_backwards, dislocated, shaken
 if TYPE_CHECKING:
     from mrhubo.retargeter.package import Retargeter
 
-POSES = 4_000
+POSES = 2_000
 _SHARES = {"whole": 0.6, "noise": 0.2, "backwards": 0.1, "dislocated": 0.1}
 """What becomes of the poses."""
 _NOISE_DEG = (2.0, 30.0)
@@ -77,7 +77,7 @@ def calibrate(retargeter: Retargeter, poses: int = POSES, seed: int = 0) -> Conf
 
 @torch.enable_grad()
 def fit_weights(signal_XS: Tensor, good_X: Tensor) -> Weights:
-    """Weights of a logistic regression of what is good (X,) on signals (X, 5), none negative (Nelder's
+    """Weights of a logistic regression of what is good (X,) on signals (X, S), none negative (Nelder's
     logit link; weights are softplus of what is fitted), with a small ridge.
     """
     signal_XS, good_X = signal_XS.double(), good_X.double()

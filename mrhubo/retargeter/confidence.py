@@ -1,21 +1,19 @@
 """How far to trust an answer, frame by frame and for each branch of the robot (an arm, the head).
 
 A confidence is a probability: that the branch's limbs point within `GOOD_DEG` degrees of where the person's pointed.
-Five signals tell, each of which only lowers it:
+Four signals tell, each of which only lowers it:
 
 miss        the answer's limbs point elsewhere than the input's: what the robot cannot do, or what went wrong
 implausible the directions are no human's: phi of what the robot reads (`mrhubo.robot.plausibility`), beyond that of the
             prior's own poses
 excess      joints of the pose that the robot reads leave their anatomical range
-moved       the steps of optimisation led far from the networks' answer: so far off is one pose in thousands of those
-            that they know
 shake       limbs change their course faster than a person's can: noise; only where a frame rate is known
 
 They are put together by a logistic function whose weights a fit finds on poses of the body prior, whole and spoilt
 (`mrhubo.retargeter.calibration`); without one, by weights that were found for NAO. A frame's confidence is that of its
 least certain branch.
 
-Legend: T frames, D directions, C branches, J = 21 human joints.
+Legend: T frames, D directions, C branches, S = 4 signals.
 """
 
 from __future__ import annotations
@@ -37,9 +35,9 @@ from mrhubo.robot.plausibility import Reading, turned_joints
 
 GOOD_DEG = 15.0
 """Mean angle [deg] of a branch's limbs to the person's up to which an answer is good: one sees the same gesture."""
-SIGNALS = ("miss", "implausible", "excess", "moved", "shake")
-_EXCESS_DEG, _MOVED_DEG, _SHAKE_DEG = 30.0, 30.0, 10.0
-"""What makes 1 of these signals. Of a miss, GOOD_DEG does, and half of that nothing yet: so much is left to the input."""
+SIGNALS = ("miss", "implausible", "excess", "shake")
+_EXCESS_DEG, _SHAKE_DEG = 30.0, 10.0
+"""What makes 1 of these signals. Of a miss, GOOD_DEG does, and half of that nothing yet, as inputs err too."""
 _ACCELERATION = 60.0
 """Angular acceleration of limbs [rad/s^2] that people reach now and then; in 24 frames a second 0.9 of ten frames of
 lively mocap stay below it. A course that bends faster is noise, or nearly so."""
@@ -84,7 +82,6 @@ class Signals:
     miss_deg: Tensor
     phi: Tensor
     excess_deg: Tensor
-    moved_deg: Tensor
     shake_deg: Tensor | None
     """None where no frame rate is known."""
 
@@ -93,7 +90,6 @@ def find_signals(
     branches: Sequence[Branch],
     human_TD3: Tensor,
     robot_TD3: Tensor,
-    network_TD3: Tensor,
     reading: Reading,
     shake_TD: Tensor | None,
 ) -> Signals:
@@ -103,21 +99,18 @@ def find_signals(
         branches: the robot's.
         human_TD3: directions of the human poses, as of `BodyMap.human_directions`.
         robot_TD3: of the robot's answers, as of `BodyMap.robot_directions`.
-        network_TD3: of the networks' answers, before steps of optimisation.
         reading: what the robot reads of the human poses.
         shake_TD: `shake` of the human's directions.
     """
-    miss_TD, moved_TD = angle_between(robot_TD3, human_TD3), angle_between(robot_TD3, network_TD3)
 
     def over(angle_TD: Tensor) -> Tensor:
         means = [angle_TD[:, list(branch.columns)].mean(dim=1) for branch in branches]
         return torch.rad2deg(torch.stack(means, dim=1))
 
     return Signals(
-        over(miss_TD),
+        over(angle_between(robot_TD3, human_TD3)),
         torch.stack([reading.phi(branch.joints) for branch in branches], dim=1),
         torch.rad2deg(torch.stack([reading.excess(branch.joints) for branch in branches], dim=1)),
-        over(moved_TD),
         None if shake_TD is None else over(shake_TD),
     )
 
@@ -148,11 +141,10 @@ class Weights:
     miss: float
     implausible: float
     excess: float
-    moved: float
     shake: float
 
     def logit(self, signal_XS: Tensor) -> Tensor:
-        """Logits (...) of signals (..., 5), in the order of SIGNALS."""
+        """Logits (...) of signals (..., S), in the order of SIGNALS."""
         weight_S = signal_XS.new_tensor([getattr(self, name) for name in SIGNALS])
         return self.certain - signal_XS @ weight_S
 
@@ -201,14 +193,13 @@ def _weights(content: Mapping[str, float]) -> Weights:
 
 
 def scaled(signals: Signals, usual_phi: float) -> Tensor:
-    """Signals (T, C, 5) in the order of SIGNALS, 0 where all is well, about 1 where it is not."""
+    """Signals (T, C, S) in the order of SIGNALS, 0 where all is well, about 1 where it is not."""
     shaken = torch.zeros_like(signals.miss_deg) if signals.shake_deg is None else signals.shake_deg
     return torch.stack(
         (
             (2 * signals.miss_deg / GOOD_DEG - 1).clamp_min(0.0),
             torch.log(signals.phi.clamp_min(_TINY) / usual_phi).clamp_min(0.0),
             signals.excess_deg / _EXCESS_DEG,
-            signals.moved_deg / _MOVED_DEG,
             shaken / _SHAKE_DEG,
         ),
         dim=-1,
@@ -217,7 +208,7 @@ def scaled(signals: Signals, usual_phi: float) -> Tensor:
 
 STANDARD = ConfidenceModel(
     usual_phi=0.07,
-    moving=Weights(certain=3.0, miss=2.5, implausible=2.5, excess=1.5, moved=3.0, shake=1.0),
-    still=Weights(certain=2.5, miss=2.5, implausible=2.5, excess=1.5, moved=3.0, shake=0.0),
+    moving=Weights(certain=2.9, miss=2.7, implausible=3.0, excess=1.9, shake=1.0),
+    still=Weights(certain=2.3, miss=2.5, implausible=2.7, excess=1.7, shake=0.0),
 )
 """Of a retargeter that was never calibrated: what NAO's is, rounded."""

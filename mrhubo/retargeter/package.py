@@ -30,6 +30,7 @@ from mrhubo.motion import NOT_FINITE, MotionLike, read_poses, refuse_frames, to_
 from mrhubo.reference import DirectionProblem, angle_between
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, Signals, branches_of, find_signals, shake
+from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.integrity import (
     check_confidence,
     check_content,
@@ -44,7 +45,7 @@ from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.robot.plausibility import read
 
-SCHEMA = "mrhubo.retargeter/3"
+SCHEMA = "mrhubo.retargeter/4"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
 _OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)
@@ -165,16 +166,11 @@ class Retargeter(nn.Module):
         target_TD3 = self.body_map.human_directions(local_TJ33)
         q_TN = self._answer(local_TJ33, target_TD3, polish)
         robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
-        return self._signals(local_TJ33, target_TD3, robot_TD3, shake_TD, polish), robot_TD3
+        return self._signals(target_TD3, robot_TD3, shake_TD), robot_TD3
 
-    def _signals(
-        self, local_TJ33: Tensor, target_TD3: Tensor, robot_TD3: Tensor, shake_TD: Tensor | None, polish: int
-    ) -> Signals:
-        network_TD3 = robot_TD3
-        if polish:
-            network_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(self._predict(local_TJ33, 0)))
+    def _signals(self, target_TD3: Tensor, robot_TD3: Tensor, shake_TD: Tensor | None) -> Signals:
         reading = read(self.body_map, self.prior, target_TD3)
-        return find_signals(self.branches, target_TD3, robot_TD3, network_TD3, reading, shake_TD)
+        return find_signals(self.branches, target_TD3, robot_TD3, reading, shake_TD)
 
     def _retarget(self, local_TJ33: Tensor, polish: int, frame_rate: float | None) -> RetargetResult:
         human = self.body_map.human(local_TJ33)
@@ -184,7 +180,7 @@ class Retargeter(nn.Module):
         robot_TD3, columns = self.body_map.robot_directions(links), self.body_map.measured
         error_deg_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
         shake_TD = None if frame_rate is None else shake(target_TD3, frame_rate)
-        signals = self._signals(local_TJ33, target_TD3, robot_TD3, shake_TD, polish)
+        signals = self._signals(target_TD3, robot_TD3, shake_TD)
         trust_TC = self.confidence(signals)
         return RetargetResult(
             q_TN,
@@ -217,7 +213,11 @@ class Retargeter(nn.Module):
 
     def _answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int) -> Tensor:
         """Joint angles (T, N) [rad]; the human's directions (T, D, 3) are needed for steps of optimisation."""
-        q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
+        features = self.network.features
+        if target_TD3 is not None and isinstance(features, DirectionFeatures):
+            q_TN = self.network.joints(features.of(target_TD3))
+        else:
+            q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
         if not polish or not len(q_TN) or target_TD3 is None:
             return q_TN
         return self.directions.minimise(q_TN, target_TD3, steps=polish)[0]
@@ -239,7 +239,7 @@ class Retargeter(nn.Module):
             "lower_rad": json.dumps(robot.lower_N.tolist()),
             "upper_rad": json.dumps(robot.upper_N.tolist()),
             "input": "SMPL body joints 1..21, local rotations, 6D (first two columns, column after column)",
-            "input_joints": json.dumps(self.network.features.input_joints),
+            "seen": json.dumps(self.network.features.names),
             "output": "joint angles in rad, in the order of joint_names",
             "phi_threshold": repr(self.phi_threshold),
             "confidence": self.confidence.to_json(),
@@ -272,7 +272,7 @@ class Retargeter(nn.Module):
         prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))
         check_prior(folder, metadata, prior)
         network = build_network(config, body_map)
-        threshold = check_content(folder, metadata, body_map.robot, network.features.input_joints)
+        threshold = check_content(folder, metadata, body_map.robot, network.features.names)
         try:
             network.load_state_dict({name: tensor for name, tensor in tensors.items() if tensor.is_floating_point()})
         except RuntimeError as error:

@@ -59,7 +59,7 @@ def read_pose(body_map: BodyMap, direction_BD3: Tensor) -> Tensor:
     `BodyMap.human_directions`.
     """
     rest_BJ33 = torch.eye(3).to(direction_BD3).expand(len(direction_BD3), len(POSED_JOINT_NAMES), 3, 3)
-    return align_pose(body_map, rest_BJ33, direction_BD3)
+    return align_pose(body_map, rest_BJ33, direction_BD3, hinged=True)
 
 
 def read(body_map: BodyMap, prior: BodyPrior, direction_BD3: Tensor) -> Reading:
