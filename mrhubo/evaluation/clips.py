@@ -23,7 +23,7 @@ from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_motions
 from mrhubo.runtime.progress import SILENT, Reporter
 
-REFERENCE_SCHEMA = "mrhubo.reference/2"
+REFERENCE_SCHEMA = "mrhubo.reference/3"
 _NAME = 80
 """Bytes of a motion's name that the name of a file begins with."""
 
@@ -106,6 +106,7 @@ def solve_references(
         "robot": fingerprint(directions),
         "skeleton": body_map.skeleton.checksum,
         "kinematics": body_map.robot.description.kinematics,
+        "velocity": repr(body_map.robot.velocity_N.tolist()),
         "smoothness": repr(config.evaluation.smoothness),
     }
     retargeter = OptimizationRetargeter(body_map, smoothness=config.evaluation.smoothness)

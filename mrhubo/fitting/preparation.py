@@ -40,7 +40,8 @@ class Prepared(PairSetup):
         for key in ("dir", "workers"):
             plain["pairs"].pop(key)
         clips = {motion.name: motion.checksum for motion in self.motions.all}
-        evaluation = [sorted(m.name for m in self.motions.validation), self.config.evaluation.smoothness]
+        velocity = self.body_map.robot.velocity_N.tolist()  # of the references, as the smoothness
+        evaluation = [sorted(m.name for m in self.motions.validation), self.config.evaluation.smoothness, velocity]
         return fingerprint([plain, self.store.header, clips, evaluation])
 
 

@@ -9,6 +9,7 @@ from mrhubo.reference.metrics import (
     joint_error,
     link_error,
 )
+from mrhubo.reference.polish import Polish
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult
 from mrhubo.reference.solve import DirectionProblem
@@ -18,6 +19,7 @@ __all__ = [
     "DirectionProblem",
     "OptimizationResult",
     "OptimizationRetargeter",
+    "Polish",
     "ReferenceResult",
     "angle_between",
     "at_limit_share",

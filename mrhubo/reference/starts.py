@@ -21,11 +21,11 @@ class StartPool(nn.Module):
 
     q_UN: Tensor
 
-    def __init__(self, problem: DirectionProblem, starts: int, seed: int) -> None:
-        """`starts` per frame; `seed` of the poses."""
+    def __init__(self, problem: DirectionProblem, starts: int, seed: int, poses: int = _POOL) -> None:
+        """`starts` per frame; `seed` and number of the poses."""
         super().__init__()
         self.starts = starts
-        q_UN = problem.robot.sample(_POOL, torch.Generator().manual_seed(seed))
+        q_UN = problem.robot.sample(poses, torch.Generator().manual_seed(seed))
         self.register_buffer("q_UN", q_UN, persistent=False)
         directions_UD3 = problem.body_map.robot_directions(problem.robot.forward(q_UN))
         posture, blocks, weight_D = problem.posture, problem.blocks, problem.directions.weight_D

@@ -94,6 +94,11 @@ class BodyMap(nn.Module):
         return self.shared.measured_columns
 
     @property
+    def measured_names(self) -> tuple[str, ...]:
+        """Their names, in order: those of the columns of `RetargetResult.direction_error_deg`."""
+        return tuple(self.direction_names[i] for i in self.measured)
+
+    @property
     def keypoint_names(self) -> tuple[str, ...]:
         """Names of the target keypoints."""
         return self.scale.keypoint_names
@@ -164,7 +169,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     links = [*keypoints.links, *config.key_links, *(manual.links if manual else [])]
     description = describe(config.urdf)
     check_names(config, description)
-    robot = Robot(description, config.joints, links, config.ranges, config.hold, config.name)
+    robot = Robot(description, config.joints, links, config.ranges, config.hold, config.name, config.max_speed)
     body_map = BodyMap.of(robot, keypoints, skeleton, manual)
     check_key_links(robot, config.key_links)
     return body_map

@@ -38,6 +38,8 @@ class Joint:
     mimic: Mimic | None
     limited_by: str = "the URDF's limits"
     """What `lower` and `upper` are, for messages."""
+    velocity: float | None = None
+    """What the URDF gives as the largest speed [rad/s, or m/s], whatever it may mean (`limits.joint_speed`)."""
 
     @property
     def rotary(self) -> bool:

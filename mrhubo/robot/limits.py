@@ -1,4 +1,4 @@
-"""The limits of joints [rad]: what a URDF gives, what it means, and what is left of it."""
+"""The limits of joints [rad, rad/s]: what a URDF gives, what it means, and what is left of it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ _MOST = 14.0
 """Widest range, and largest limit: a little over two turns. More is in degrees, or means none."""
 _SLACK = 1e-4
 """How far a joint that mimics another may leave its own limits: what rounded multipliers make of rounded limits."""
+MAX_SPEED = 12.0
+"""No joint turns faster [rad/s], whatever its URDF gives: 0.5 rad in 1/24 s, from where on a step counts as a jump
+(`reference.metrics`); people's arms rarely reach it. Many files give no speed (0), or one that no motor has."""
 
 
 def with_soft_limits(joint: Joint, safety_controller: etree._Element | None) -> Joint:
@@ -98,6 +101,31 @@ def _too_wide(lower: float, upper: float) -> bool:
 
 def _turns(lower: float, upper: float) -> str:
     return f"{lower:g} .. {upper:g}, which is {(upper - lower) / math.tau:.0f} turns from end to end"
+
+
+def joint_speed(joints: Mapping[str, Joint], name: str, most: float) -> float:
+    """How fast a joint may turn [rad/s]: the least of `most`, of what the URDF gives it, and of what it gives those
+    that mimic it. What is missing, 0 or negative tells no speed; what is too fast to be true is more than `most`.
+
+    Args:
+        joints: all joints of the robot.
+        name: the joint, one that mimics none.
+        most: no joint turns faster.
+
+    Raises:
+        UserError: `most` is no positive number.
+    """
+    if not (math.isfinite(most) and most > 0):
+        raise UserError(f"robot.max_speed: must be a positive number of rad/s, found {most}")
+    speeds = [most]
+    for joint in joints.values():
+        try:
+            source = drive(joints, joint.name)
+        except UserError:  # told where it matters
+            continue
+        if joint.velocity is not None and joint.velocity > 0 and source.joint == name and abs(source.multiplier) > 1e-9:
+            speeds.append(joint.velocity / abs(source.multiplier))
+    return min(speeds)
 
 
 def held_angle(joint: Joint, wanted: float | None) -> float:

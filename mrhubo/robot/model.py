@@ -25,7 +25,7 @@ from mrhubo.robot.chain import build_chain, chain_joints, chain_xml
 from mrhubo.robot.entries import check_names
 from mrhubo.robot.joint import Joint, Mimic, drive
 from mrhubo.robot.keypoints import Keypoints, read_keypoints
-from mrhubo.robot.limits import held_angle, joint_range, narrow_to_mimics
+from mrhubo.robot.limits import MAX_SPEED, held_angle, joint_range, joint_speed, narrow_to_mimics
 from mrhubo.robot.urdf import Description, describe
 
 _MOST_LISTED = 5
@@ -46,6 +46,8 @@ class Robot(nn.Module):
     """Lower joint limits [rad]."""
     upper_N: Tensor
     """Upper joint limits [rad]."""
+    velocity_N: Tensor
+    """How fast the joints may turn [rad/s]: the URDF's limits, those of what mimics them, and `max_speed`."""
     select_AN: Tensor
     constant_A: Tensor
     _frames: Tensor
@@ -60,6 +62,7 @@ class Robot(nn.Module):
         ranges: Mapping[str, list[float]] | None = None,
         hold: Mapping[str, float] | None = None,
         name: str | None = None,
+        max_speed: float = MAX_SPEED,
     ) -> None:
         """Reads the URDF and prepares the kinematics of `joints` and of the extra `links`.
 
@@ -70,6 +73,7 @@ class Robot(nn.Module):
             ranges: [lower, upper] in rad, narrower than the URDF's limits, by joint.
             hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
             name: short name; default: the URDF file's.
+            max_speed: no joint turns faster [rad/s], whatever the URDF gives.
 
         Raises:
             UserError: the URDF cannot be used, or a joint or link does not exist (with the nearest name).
@@ -108,6 +112,8 @@ class Robot(nn.Module):
             warnings.warn(f"{self.urdf}: {found}", InputWarning, stacklevel=2)
         self.register_buffer("lower_N", _inward([low for low, _ in limits], torch.inf), persistent=False)
         self.register_buffer("upper_N", _inward([high for _, high in limits], -torch.inf), persistent=False)
+        speeds = [joint_speed(description.joints, j, max_speed) for j in self.joint_names]
+        self.register_buffer("velocity_N", _inward(speeds, -torch.inf), persistent=False)
         self.moving_links = tuple(description.joint(j).child for j in self.joint_names)
         self.links = tuple(dict.fromkeys((*self.moving_links, *(description.check_link(x) for x in links))))
         self.held = {j.name: held_angle(j, hold.get(j.name)) for j in description.joints.values() if j.kind != "fixed"}
@@ -166,6 +172,7 @@ class Robot(nn.Module):
         ranges: Mapping[str, list[float]] | None = None,
         hold: Mapping[str, float] | None = None,
         name: str | None = None,
+        max_speed: float = MAX_SPEED,
     ) -> Robot:
         """A robot that knows which of its links stand for which part of a human body.
 
@@ -177,13 +184,14 @@ class Robot(nn.Module):
             ranges: [lower, upper] in rad, narrower than the URDF's limits, by joint.
             hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
             name: short name; default: the URDF file's.
+            max_speed: no joint turns faster [rad/s], whatever the URDF gives.
 
         Raises:
             UserError: the URDF cannot be used; a joint, link or body part does not exist (with the nearest name).
         """
         parts = read_keypoints(keypoints)
         known = urdf if isinstance(urdf, Description) else Path(urdf)
-        robot = cls(known, joints, [*parts.links, *key_links], ranges, hold, name)
+        robot = cls(known, joints, [*parts.links, *key_links], ranges, hold, name, max_speed)
         robot.keypoints, robot.key_links = parts, tuple(key_links)
         return robot
 
@@ -199,8 +207,9 @@ class Robot(nn.Module):
             description = describe(robot.urdf)
             check_names(robot, description)
             return cls.from_urdf(
-                description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name
-            )
+                description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name,
+                robot.max_speed,
+            )  # fmt: skip
 
     def link_index(self, link: str) -> int:
         """Position of a link in `links`."""

@@ -28,7 +28,7 @@ _READ: dict[str, dict[str, int]] = {
     "parent": {"link": 0},
     "child": {"link": 0},
     "axis": {"xyz": 3},
-    "limit": {"lower": 1, "upper": 1},
+    "limit": {"lower": 1, "upper": 1, "velocity": 1},
     "mimic": {"joint": 0, "multiplier": 1, "offset": 1},
 }
 """What is read of a joint, and how many numbers it has."""
@@ -47,7 +47,7 @@ _UNREAD: dict[str, dict[str, dict[str, int]]] = {
         "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1},
     },
 }
-"""What need not be read: a broken number there is told, and that is all."""
+"""What a robot can do without: a broken number there is told, and that is all."""
 
 
 @dataclass(frozen=True)

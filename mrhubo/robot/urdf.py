@@ -49,7 +49,7 @@ class Description:
 
     @cached_property
     def kinematics(self) -> str:
-        """Fingerprint of joints, limits and axes; looks and masses are not in it."""
+        """Fingerprint of joints, limits of their angles, and axes; looks, masses and speeds are not in it."""
         joints = []
         for j in self.joints.values():
             mimic = None if j.mimic is None else [j.mimic.joint, j.mimic.multiplier, j.mimic.offset]
@@ -174,7 +174,8 @@ def _joint(element: etree._Element, read: yourdfpy.urdf.Joint | None) -> Joint:
     limit = read.limit if kind != "continuous" else None
     lower, upper = (None, None) if limit is None else (limit.lower, limit.upper)
     axis_3 = axis_3 / max(np.linalg.norm(axis_3), 1e-9)
-    joint = Joint(name, kind, parent, child, origin_44, axis_3, lower, upper, _mimic(read))
+    velocity = None if read.limit is None else read.limit.velocity
+    joint = Joint(name, kind, parent, child, origin_44, axis_3, lower, upper, _mimic(read), velocity=velocity)
     return with_soft_limits(joint, element.find("safety_controller"))
 
 

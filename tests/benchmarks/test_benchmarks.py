@@ -23,7 +23,17 @@ from mrhubo.pairing import lbfgs
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
-SCRIPTS = ["pair_pictures", "pair_quality", "pairing", "prior", "prior_experiments", "reference", "retarget", "scaling"]
+SCRIPTS = [
+    "pair_pictures",
+    "pair_quality",
+    "pairing",
+    "polish",
+    "prior",
+    "prior_experiments",
+    "reference",
+    "retarget",
+    "scaling",
+]
 SCRIPTS += ["training"]
 LIBRARIES = ["common", "levenberg_marquardt"]
 Run = Callable[..., str]
@@ -159,14 +169,27 @@ def test_reference(run: Run, clips: Path) -> None:
     assert [row[0] for row in rows(text, "output")] == ["q", "q_cf, from q"]
 
 
-def test_retarget(run: Run, root: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A retargeter that has learned nothing."""
     config = load_config(root / "conf" / "nao.yaml", ["model.hidden=8"])
     body_map = build_body_map(config.robot)
     torch.manual_seed(0)
-    package = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
-    folder = package.save(tmp_path / "package", {"run_id": "abc"})
-    ((_, one, twenty),) = rows(run("retarget", folder, "--frames", "1,20", "--rounds", 2), "commit")
+    made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
+    return made.save(tmp_path_factory.mktemp("package"), {"run_id": "abc"})
+
+
+def test_retarget(run: Run, package: Path) -> None:
+    ((_, one, twenty),) = rows(run("retarget", package, "--frames", "1,20", "--rounds", 2), "commit")
     assert 0 < float(one.split()[0]) < 1_000 and 0 < float(twenty.split()[0]) < 1_000
+
+
+def test_polish(run: Run, package: Path, tmp_path: Path) -> None:
+    np.savez(tmp_path / "poses.npz", poses=0.3 * np.random.default_rng(0).standard_normal((40, 66)))
+    found = rows(run("polish", package, tmp_path / "poses.npz", "--every", 2), "steps")
+    assert [row[0] for row in found] == ["0", "1", "3", "10"]
+    excess = [float(row[1]) for row in found]
+    assert excess[0] > 1 > excess[-1] > -1
 
 
 def test_retarget_compares_two_checkouts(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ import yourdfpy
 from torch import Tensor, nn
 
 from mrhubo.config import load_config
-from mrhubo.reference import DirectionJacobian, OptimizationRetargeter
+from mrhubo.reference import DirectionJacobian, OptimizationRetargeter, Polish
 from mrhubo.reference.collision_free import CollisionFreeProblem
 from mrhubo.reference.retarget import StartPool
 from mrhubo.reference.solve import DirectionProblem
@@ -37,6 +37,7 @@ def make(root: Path, config: str) -> dict[str, nn.Module]:
         "body map": body_map,
         "jacobian": DirectionJacobian(body_map),
         "problem": DirectionProblem(body_map),
+        "polish": Polish(DirectionProblem(body_map)),
         "collision-free problem": CollisionFreeProblem(body_map),
         "starts": StartPool(retargeter.problem, 3, 0),
         "retargeter": retargeter,

@@ -1,4 +1,4 @@
-"""What a URDF's limits mean: soft ones, degrees, none at all, and those of joints that mimic others."""
+"""What a URDF's limits mean: soft ones, degrees, none at all, those of joints that mimic others, and speeds."""
 
 from __future__ import annotations
 
@@ -153,3 +153,47 @@ def test_what_mimics_a_joint_that_is_not_sampled_changes_nothing(pair: Pair, rec
     arms = [name for name in JOINTS if name != "l_elbow"]
     robot = Robot(pair(mimicking(-3.0)).urdf, arms, ["l_hand", "r_hand"])
     assert robot.held["l_elbow"] == 0.0 and not recwarn.list and math.isfinite(robot.held["neck"])
+
+
+def speed_of(config: RobotConfig, name: str = "l_roll") -> float:
+    return float(build_body_map(config).robot.velocity_N[config.joints.index(name)])
+
+
+@pytest.mark.parametrize(
+    ("told", "speed"),
+    [("3", 3.0), ("0", 12.0), ("-1", 12.0), ("1e9", 12.0), ("inf", 12.0), ("180", 12.0), ("fast", 12.0), (None, 12.0)],
+)
+def test_a_speed_is_the_urdfs_where_it_tells_one(pair: Pair, told: str | None, speed: float) -> None:
+    attribute = "" if told is None else f'velocity="{told}"'
+    config = pair(within("l_roll", 'velocity="1"', attribute))
+    if told == "fast":  # a number that nothing needs
+        with pytest.warns(InputWarning, match='velocity="fast"> is no number'):
+            assert speed_of(config) == speed
+    else:
+        assert speed_of(config) == speed
+
+
+def test_the_narrower_of_the_urdfs_speed_and_the_settings_counts(pair: Pair) -> None:
+    assert speed_of(pair(max_speed=0.5)) == 0.5 and speed_of(pair(max_speed=100.0)) == 1.0
+    config = pair()
+    assert float(Robot(config.urdf, config.joints, max_speed=0.5).velocity_N.max()) == 0.5
+    for speed in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(UserError, match="robot.max_speed: must be a positive number of rad/s"):
+            Robot(config.urdf, config.joints, max_speed=speed)
+
+
+def test_a_joint_is_as_slow_as_what_mimics_it(pair: Pair) -> None:
+    """Nothing of a mimicking joint counts but its speed; it may be turned by twice the angle, or a half of it."""
+    for multiplier, speed in ((0.9, 1.0), (2.0, 0.5), (-2.0, 0.5)):
+        joints = [name for name in JOINTS if name != "l_elbow"]
+        ranges = {"l_yaw": [-0.4, 0.4]}
+        config = pair(
+            within("r_elbow", "<axis", f'<mimic joint="l_yaw" multiplier="{multiplier}" offset="-1"/><axis'),
+            joints=joints, ranges=ranges,
+        )  # fmt: skip
+        assert speed_of(config, "l_yaw") == pytest.approx(speed)
+
+
+def test_a_speed_changes_no_pair(pair: Pair) -> None:
+    robots = [build_body_map(pair(within("l_roll", 'velocity="1"', f'velocity="{v}"'))).robot for v in (3, 1)]
+    assert robots[0].description.kinematics == robots[1].description.kinematics
