@@ -17,12 +17,15 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 _ITERATIONS = 30
-_GAP = 1e-6
+_GAP = 1e-5
 """Mean product of a bound's slack [rad] and its multiplier at which the minimum is near enough."""
 _APART = 0.995
 """How much of the way to the nearest bound a step of the method goes at most."""
 _SLACK = 0.05
 """Least slack [rad] to begin with."""
+_GIVE = 1e-6
+"""How far a bound gives way [rad] for each unit of its multiplier: so there is a minimum, too, where bounds leave no room
+between them (a joint that must run all the way from one settled frame to another)."""
 
 
 @dataclass(frozen=True)
@@ -64,60 +67,94 @@ def solve_factored(factor: np.ndarray, right_TM: np.ndarray) -> np.ndarray:
     return cho_solve_banded((factor, True), right_TM.ravel(), check_finite=False).reshape(right_TM.shape)
 
 
-def bounded_minimum(
-    matrix: Banded,
-    right_TM: np.ndarray,
-    move_KTM: np.ndarray,
-    step_KXM: np.ndarray,
-    free_T: np.ndarray,
-    bounded_X: np.ndarray,
-) -> np.ndarray:
+@dataclass(frozen=True)
+class Bounds:
+    """What moves (T, M) [rad] are bounded by."""
+
+    move_KTM: np.ndarray
+    """Lower and upper bound of each move [rad]."""
+    step_KXM: np.ndarray
+    """The same of the differences of moves."""
+    free_T: np.ndarray
+    """1 in frames that move, 0 in those that stay."""
+    counts_X: np.ndarray
+    """1 where the bounds of differences count, 0 where they do not."""
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper bounds of `apply`."""
+        (low, high), (short, long) = self.move_KTM, self.step_KXM
+        return np.concatenate([-low.ravel(), high.ravel(), -short.ravel(), long.ravel()])
+
+    def apply(self, x_TM: np.ndarray) -> np.ndarray:
+        """All that is bounded from above, one after the other."""
+        step_XM = self.counts_X[:, None] * np.diff(x_TM, axis=0)
+        return np.concatenate([-x_TM.ravel(), x_TM.ravel(), -step_XM.ravel(), step_XM.ravel()])
+
+    def transposed(self, y: np.ndarray) -> np.ndarray:
+        """The transpose of `apply`, for frames that move (T, M)."""
+        (low, high), (short, long) = self._parted(y)
+        return self.free_T[:, None] * (high - low + _spread(long - short, -1.0))
+
+    def stiffness(self, stiff: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The transpose of `apply`, times a diagonal matrix, times `apply`: its diagonal (T, M), and its entries
+        between a frame and the next (X, M).
+        """
+        move_KTM, step_KXM = self._parted(stiff)
+        step_XM, free_T1 = step_KXM.sum(0), self.free_T[:, None]
+        return free_T1 * (move_KTM.sum(0) + _spread(step_XM, 1.0)), -step_XM * free_T1[1:] * free_T1[:-1]
+
+    def _parted(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        move, step = y[: self.move_KTM.size], y[self.move_KTM.size :]
+        return move.reshape(self.move_KTM.shape), step.reshape(self.step_KXM.shape) * self.counts_X[:, None]
+
+
+@dataclass(frozen=True)
+class _System:
+    """The linear system of one iteration."""
+
+    bounds: Bounds
+    factor: np.ndarray
+    slope_TM: np.ndarray
+    """Derivative of the Lagrangian by the moves."""
+    lack: np.ndarray
+    """What bounds and slacks differ by."""
+    slack: np.ndarray
+    dual: np.ndarray
+
+    def direction(self, product: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Changes of moves, slacks and multipliers that bring slack * dual down by `product`, slope and lack to 0."""
+        soft = self.slack + _GIVE * self.dual
+        push = (self.dual * self.lack - product) / soft
+        dx_TM = solve_factored(self.factor, -self.slope_TM - self.bounds.transposed(push))
+        moved = self.bounds.apply(dx_TM)
+        d_dual = push + self.dual / soft * moved
+        return dx_TM, _GIVE * d_dual - self.lack - moved, d_dual
+
+
+def bounded_minimum(matrix: Banded, right_TM: np.ndarray, bounds: Bounds) -> np.ndarray:
     """The moves (T, M) [rad].
 
     Args:
         matrix: A; its rows of frames that stay are those of the identity.
         right_TM: b; 0 in frames that stay.
-        move_KTM: lower and upper bound of each move [rad].
-        step_KXM: the same of the differences of moves.
-        free_T: 1 in frames that move, 0 in those that stay.
-        bounded_X: 1 where the bounds of differences count, 0 where they do not.
+        bounds: kept to but for millionths.
     """
-    x_TM, free_T1, bounded_X1 = np.zeros_like(right_TM), free_T[:, None], bounded_X[:, None]
-    sizes = (move_KTM.size, step_KXM.size)
-
-    def apply(x_TM: np.ndarray) -> np.ndarray:
-        """All that is bounded from above, one after the other."""
-        step_XM = bounded_X1 * np.diff(x_TM, axis=0)
-        return np.concatenate([(-x_TM).ravel(), x_TM.ravel(), (-step_XM).ravel(), step_XM.ravel()])
-
-    def transposed(y: np.ndarray) -> np.ndarray:
-        move, step = y[: sizes[0]].reshape(move_KTM.shape), y[sizes[0] :].reshape(step_KXM.shape)
-        return free_T1 * (move[1] - move[0] + _spread(bounded_X1 * (step[1] - step[0])))
-
-    upper = np.concatenate([-move_KTM[0].ravel(), move_KTM[1].ravel(), -step_KXM[0].ravel(), step_KXM[1].ravel()])
+    x_TM, upper = np.zeros_like(right_TM), bounds.upper
     slack = np.maximum(upper, _SLACK)
     dual = (np.abs(right_TM).mean() + 1e-3) * slack.mean() / slack
     for _ in range(_ITERATIONS):
-        gap = float(slack @ dual) / len(slack)
-        lack = apply(x_TM) + slack - upper
+        gap, lack = float(slack @ dual) / len(slack), bounds.apply(x_TM) + slack - _GIVE * dual - upper
         if gap < _GAP and np.abs(lack).max() < _GAP:
             break
-        slope_TM = matrix.times(x_TM) - right_TM + transposed(dual)
-        stiff = dual / slack
-        move, step = stiff[: sizes[0]].reshape(move_KTM.shape).sum(0), stiff[sizes[0] :].reshape(step_KXM.shape).sum(0)
-        step = bounded_X1 * step
-        factor = matrix.factor(free_T1 * (move + _neighbours(step)), -step * free_T1[1:] * free_T1[:-1])
-
-        def direction(product: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            """Changes of x, slacks and multipliers that bring their products to 0 where it is slack * dual."""
-            dx_TM = solve_factored(factor, -slope_TM - transposed((dual * lack - product) / slack))
-            d_slack = -lack - apply(dx_TM)
-            return dx_TM, d_slack, (-product - dual * d_slack) / slack
-
-        _, d_slack, d_dual = direction(slack * dual)
-        reach = min(_reach(slack, d_slack), _reach(dual, d_dual))
-        centre = float((slack + reach * d_slack) @ (dual + reach * d_dual)) / len(slack)
-        dx_TM, d_slack, d_dual = direction(slack * dual + d_slack * d_dual - gap * (centre / gap) ** 3)
+        slope_TM = matrix.times(x_TM) - right_TM + bounds.transposed(dual)
+        factor = matrix.factor(*bounds.stiffness(dual / (slack + _GIVE * dual)))
+        system = _System(bounds, factor, slope_TM, lack, slack, dual)
+        _, d_slack, d_dual = system.direction(slack * dual)
+        length = min(_reach(slack, d_slack), _reach(dual, d_dual))
+        centre = float((slack + length * d_slack) @ (dual + length * d_dual)) / len(slack)
+        product = slack * dual + d_slack * d_dual - gap * (centre / gap) ** 3
+        dx_TM, d_slack, d_dual = system.direction(product)
         length = min(1.0, _APART * min(_reach(slack, d_slack), _reach(dual, d_dual)))
         x_TM, slack, dual = x_TM + length * dx_TM, slack + length * d_slack, dual + length * d_dual
     return x_TM
@@ -129,11 +166,6 @@ def _reach(value: np.ndarray, change: np.ndarray) -> float:
     return min(1.0, float((-value[falls] / change[falls]).min())) if falls.any() else 1.0
 
 
-def _spread(step_XM: np.ndarray) -> np.ndarray:
-    """The transpose of taking differences."""
-    return np.pad(step_XM, ((1, 0), (0, 0))) - np.pad(step_XM, ((0, 1), (0, 0)))
-
-
-def _neighbours(step_XM: np.ndarray) -> np.ndarray:
-    """The sum of what belongs to the steps before and after each frame."""
-    return np.pad(step_XM, ((1, 0), (0, 0))) + np.pad(step_XM, ((0, 1), (0, 0)))
+def _spread(step_XM: np.ndarray, sign: float) -> np.ndarray:
+    """(T, M): what belongs to the step to each frame, plus `sign` times what belongs to the one from it."""
+    return np.pad(step_XM, ((1, 0), (0, 0))) + sign * np.pad(step_XM, ((0, 1), (0, 0)))

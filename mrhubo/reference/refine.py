@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.reference.bounded import Banded, bounded_minimum, solve_factored
+from mrhubo.reference.bounded import Banded, Bounds, bounded_minimum, solve_factored
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
 
@@ -44,8 +44,8 @@ def refine(
 
     Gauss-Newton on all frames at once: the system is banded. Joints at a limit that the descent would push beyond it
     are frozen for the step. A block's step counts only if the block's cost falls; damping is raised in the frames whose
-    own share of the cost rose, and lowered in the others if the step counted. A block ends when a step turns none of its
-    joints by `tolerance` [rad], or six steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
+    own share of the cost rose, and lowered in the others if the step counted. A block ends when a step turns none of
+    its joints by `tolerance` [rad], or six steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
 
     With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad.
     """
@@ -151,13 +151,18 @@ def _motion_step(
             if bound is None:
                 step_TM = solve_factored(system.factor(), right_TM)
             else:
-                moved_XM, most_M = q_TN.diff(dim=0)[:, joints_M], bound.step_N[joints_M]
-                limits = torch.stack((problem.lower_N - q_TN, problem.upper_N - q_TN))[..., joints_M]
-                steps = torch.stack((-most_M - moved_XM, most_M - moved_XM))
-                masks = (free_TN[:, 0], bound.counts_X & (free_TN[1:, 0] | free_TN[:-1, 0]))
-                step_TM = bounded_minimum(system, right_TM, *map(_array, (limits, steps, *masks)))
+                bounds = _bounds(problem, q_TN, free_TN[:, 0], bound, joints_M)
+                step_TM = bounded_minimum(system, right_TM, bounds)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
+
+
+def _bounds(problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, bound: StepBound, joints_M: Tensor) -> Bounds:
+    moved_XM, most_M = q_TN.diff(dim=0)[:, joints_M], bound.step_N[joints_M]
+    moves = torch.stack((problem.lower_N - q_TN, problem.upper_N - q_TN))[..., joints_M]
+    steps = torch.stack((-most_M - moved_XM, most_M - moved_XM))
+    counts_X = bound.counts_X & (free_T[1:] | free_T[:-1])
+    return Bounds(_array(moves), _array(steps), _array(free_T), _array(counts_X))
 
 
 def _array(tensor: Tensor) -> np.ndarray:

@@ -66,16 +66,16 @@ def quick(retargeters: dict[str, OptimizationRetargeter]) -> tuple[DirectionProb
 
 def test_the_best_slow_motion_is_better_than_the_nearest_one(quick: tuple[DirectionProblem, Tensor, Tensor]) -> None:
     problem, q_TN, target_TD3 = quick
-    step_N, smoothness = torch.full((8,), 0.06), Smoothness(0.02)
+    step_N, smoothness = torch.full((8,), 0.09), Smoothness(0.02)
     nearest_TN = nearest_slow(q_TN, step_N)
     assert float((nearest_TN - q_TN).abs().max()) > 0.1
-    found_TN = keep_speed(problem, q_TN, target_TD3, smoothness, step_N, around=10)
+    found_TN = keep_speed(problem, q_TN, target_TD3, smoothness, step_N, around=5)
     assert bool((found_TN.diff(dim=0).abs() <= step_N + 1e-6).all())
     assert bool(((found_TN >= problem.lower_N) & (found_TN <= problem.upper_N)).all())
     nearest_C, found_C = (motion_cost(problem, motion, target_TD3, smoothness) for motion in (nearest_TN, found_TN))
     assert float(found_C[0]) < 0.9 * float(nearest_C[0])
     assert torch.equal(found_TN[:, 4:], q_TN[:, 4:])  # the other arm was slow enough
-    far_T = (nearest_TN != q_TN).any(dim=1).nonzero()[0] - 10
+    far_T = (nearest_TN != q_TN).any(dim=1).nonzero()[0] - 5
     assert int(far_T) > 2 and torch.equal(found_TN[: int(far_T)], q_TN[: int(far_T)])
 
 
@@ -91,4 +91,4 @@ def test_settled_frames_stay(quick: tuple[DirectionProblem, Tensor, Tensor]) -> 
     assert torch.equal(found_TN[:28], q_TN[:28] + 0.01) and not torch.equal(found_TN[28:], q_TN[28:] + 0.01)
     step_N = torch.full((8,), float(q_TN[:29].diff(dim=0).abs().max()))
     found_TN = keep_speed(problem, q_TN, target_TD3, Smoothness(0.02), step_N, around=40, fixed_T=fixed_T)
-    assert float((found_TN[:28] - q_TN[:28]).abs().max()) < 5e-3
+    assert bool((found_TN.diff(dim=0).abs() <= step_N + 1e-6).all()) and torch.equal(found_TN[:28], q_TN[:28])

@@ -13,7 +13,6 @@ from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.terms import (
     DirectionTerm,
     PostureTerm,
-    Quadratic,
     SelfCollisionTerm,
     Smoothness,
     State,
