@@ -142,9 +142,9 @@ def bounded_minimum(matrix: Banded, right_TM: np.ndarray, bounds: Bounds) -> np.
     """
     x_TM, upper = np.zeros_like(right_TM), bounds.upper
     slack = np.maximum(upper, _SLACK)
-    dual = (np.abs(right_TM).mean() + 1e-3) * slack.mean() / slack
+    dual = (10 * np.abs(right_TM).max() + 1e-3) * slack.mean() / slack
     for _ in range(_ITERATIONS):
-        gap, lack = float(slack @ dual) / len(slack), bounds.apply(x_TM) + slack - _GIVE * dual - upper
+        gap, lack = float((slack * dual).mean()), bounds.apply(x_TM) + slack - _GIVE * dual - upper
         if gap < _GAP and np.abs(lack).max() < _GAP:
             break
         slope_TM = matrix.times(x_TM) - right_TM + bounds.transposed(dual)
@@ -152,7 +152,7 @@ def bounded_minimum(matrix: Banded, right_TM: np.ndarray, bounds: Bounds) -> np.
         system = _System(bounds, factor, slope_TM, lack, slack, dual)
         _, d_slack, d_dual = system.direction(slack * dual)
         length = min(_reach(slack, d_slack), _reach(dual, d_dual))
-        centre = float((slack + length * d_slack) @ (dual + length * d_dual)) / len(slack)
+        centre = float(((slack + length * d_slack) * (dual + length * d_dual)).mean())
         product = slack * dual + d_slack * d_dual - gap * (centre / gap) ** 3
         dx_TM, d_slack, d_dual = system.direction(product)
         length = min(1.0, _APART * min(_reach(slack, d_slack), _reach(dual, d_dual)))
