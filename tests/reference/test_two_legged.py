@@ -55,7 +55,7 @@ def waist(table: tuple[BodyPart, ...]) -> tuple[BodyPart, ...]:
 
 def write_urdf(path: Path, root: str = "pelvis") -> Path:
     """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs."""
-    limit = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
+    limit = '<limit lower="{}" upper="{}" effort="1" velocity="10"/>'
 
     def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float, high: float) -> str:
         return (f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
