@@ -26,8 +26,8 @@ _BENT = math.radians(10.0)
 _ENOUGH = 10
 """Frames in which it must."""
 _PURE = math.radians(6.0)
-"""How far a hinge's axis may stray; four degrees are left of hinges where a motion was resampled. Elbows of fitted bodies
-are ball joints, and stray by tens of degrees."""
+"""How far a hinge's axis may stray; four degrees are left of hinges where a motion was resampled. Elbows of fitted
+bodies are ball joints, and stray by tens of degrees."""
 _ACROSS = math.radians(10.0)
 """How far a hinge's axis may be from a right angle with the bone."""
 
