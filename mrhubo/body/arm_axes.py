@@ -18,12 +18,12 @@ from mrhubo import rotation
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, SIDES
 
 CMU_ELBOW_AXIS = (0.0, -0.871, 0.491)
-"""About which the left elbow of the CMU recordings bends, in the upper arm's frame: a hinge, exact to the last digit."""
+"""About which the left elbow of the CMU recordings bends, in the upper arm's frame: a pure hinge."""
 
 
 def cmu_to_smpl_arms(local_BJ33: Tensor) -> Tensor:
-    """Local rotations (B, 21, 3, 3) with both arms turned about their bones so that elbows bend about SMPL's axis; hands
-    keep their orientation, and every limb its direction.
+    """Local rotations (B, 21, 3, 3) with both arms turned about their bones, so that elbows bend about SMPL's axis;
+    limbs keep their directions, and hands their orientation.
     """
     _, y, z = CMU_ELBOW_AXIS
     turn_33 = rotation.axis_angle_to_matrix(local_BJ33.new_tensor([math.atan2(-z, -y), 0.0, 0.0]))

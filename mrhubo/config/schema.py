@@ -113,6 +113,9 @@ class PairsConfig:
     optimisation. They teach what to do with poses that the robot cannot reach. 0 = robot poses only (the paper)."""
     reverse_spread: float = bounded(1.1, 0.1, 3.0)
     """Standard deviation of the latents that those human poses are decoded from."""
+    random_share: float = bounded(0.5, 0.0, 1.0)
+    """Share of those human poses that are drawn joint by joint instead, every direction of a limb alike, and not from
+    the prior. They teach what no motion of the prior's data shows."""
     shard_size: int = bounded(2_500, 100, 1_000_000)
     """Pairs per file."""
     amortiser_steps: int = bounded(6_000, 10, 1_000_000)
@@ -152,10 +155,11 @@ class ModelConfig:
     """Give each part of the robot that turns apart from the others (an arm, the head) networks of its own, which see
     the human joints of that part alone. False = one network for the whole robot (the paper)."""
     input_joints: list[str] | None = None
-    """Human joints that are read; default: those between the chest and the keypoints that the robot has."""
-    input_frame: str = choice("chest", "chest", "local")
-    """`chest` turns the joints' local rotations into rotations relative to the chest before the first layer; `local`
-    feeds them as they are (the paper)."""
+    """Human joints that are read, with `input_frame: local`; default: those between the chest and the robot's
+    keypoints."""
+    input_frame: str = choice("directions", "directions", "local")
+    """What of a human pose the networks see: `directions` = where limbs, hands and head point, seen from the chest, the
+    same however a file shares turns out among joints; `local` = the joints' local rotations (the paper)."""
     bound_output: str = choice("tanh", "tanh", "clamp")
     """How outputs are kept inside the joint limits: `tanh` squashes, `clamp` learns unbounded and cuts off."""
     detach_student: bool = True

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from torch import Tensor
 
+from mrhubo.body import Skeleton
 from mrhubo.config import Config, EvaluationConfig, fingerprint
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
@@ -54,8 +55,9 @@ class Motions:
         return [*self.validation, *self.test]
 
 
-def load_motions(config: Config) -> Motions:
-    """Reads and splits the motions of `evaluation`, or those that lie where motions lie by default.
+def load_motions(config: Config, skeleton: Skeleton | None = None) -> Motions:
+    """Reads and splits the motions of `evaluation`, or those that lie where motions lie by default; their rotations are
+    for a skeleton (`Motion.for_skeleton`), by default ours.
 
     Raises:
         UserError: no folder exists, a file cannot be used, a clip for validation is not there, or the split leaves
@@ -65,7 +67,8 @@ def load_motions(config: Config) -> Motions:
         folder = find_motions(config.evaluation.motions or default_motions())
     except UserError as error:
         raise UserError(f"evaluation.motions: {error}") from error
-    motions = read_folder(folder)
+    skeleton = skeleton or Skeleton()
+    motions = [motion.for_skeleton(skeleton) for motion in read_folder(folder)]
     names = set(config.evaluation.validation)
     missing = sorted(names.difference(m.name for m in motions))
     if missing and config.evaluation.validation != EvaluationConfig().validation:  # which names clips of two folders

@@ -74,7 +74,8 @@ def prepare(config: Config, search: bool = False) -> Prepared:
     """
     setup = prepare_pairs(config, search)
     build_network(config, setup.body_map)
-    return Prepared(config, setup.body_map, setup.prior, setup.store, load_motions(config), tracking_dir(config))
+    motions = load_motions(config, setup.body_map.skeleton)
+    return Prepared(config, setup.body_map, setup.prior, setup.store, motions, tracking_dir(config))
 
 
 def make_places(setup: PairSetup, *more: Path) -> None:

@@ -3,6 +3,7 @@
 from mrhubo.motion.load import find_motions, read_folder, read_motion
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
+from mrhubo.motion.resharing import reshare
 from mrhubo.motion.writers.amass import write_motion
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "read_motion",
     "read_poses",
     "refuse_frames",
+    "reshare",
     "to_tensor",
     "write_motion",
 ]

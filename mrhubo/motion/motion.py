@@ -7,11 +7,13 @@ Legend: T frames, J = 21: SMPL's joints 1..21, in SMPL's order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import xxhash
 from torch import Tensor
 
+from mrhubo.body.rest_directions import is_ours, to_family
+from mrhubo.body.skeleton import Skeleton
 from mrhubo.rotation import matrix_to_sixd
 
 
@@ -22,7 +24,8 @@ class Motion:
     name: str
     """File name without its ending, and without AMASS's `_poses` or `_stageii`."""
     local_TJ33: Tensor
-    """Rotations (T, 21, 3, 3) of SMPL's joints 1..21, each relative to its parent, float32."""
+    """Rotations (T, 21, 3, 3) of SMPL's joints 1..21, each relative to its parent, float32; they refer to the rest pose
+    of our own skeleton, whatever the file's did."""
     frame_rate: float
     """Frames per second."""
     description: str = ""
@@ -38,8 +41,22 @@ class Motion:
     """What the reader took the file for, in words."""
     notes: tuple[str, ...] = ()
     """What the reader left out, a sentence each."""
+    family: str = ""
+    """The family of body models (a key of `mrhubo.body.rest_directions.FAMILIES`) to whose rest pose the file's
+    rotations referred; empty where that was our own."""
     confidence_TJ: Tensor | None = None
     """How sure the source is of each joint (T, 21), 0..1; None where it does not say."""
+
+    def for_skeleton(self, skeleton: Skeleton) -> Motion:
+        """The motion with rotations for a skeleton: itself for our own, or one with our rest pose.
+
+        A body model's skeleton has its own rest pose. The rotations are then as the file has them: exact where the file
+        is of that model, and of that person where the model is given the file's `betas` and gender.
+        """
+        if not self.family or is_ours(skeleton):
+            return self
+        source = f"{self.source.split('; rotations')[0]}; rotations refer to the rest pose of the given body model"
+        return replace(self, local_TJ33=to_family(self.local_TJ33, self.family), family="", source=source)
 
     def __len__(self) -> int:
         return len(self.local_TJ33)

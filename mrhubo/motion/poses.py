@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
@@ -85,18 +85,20 @@ class Turns:
         return f"{share:.0f}% of the joints would turn by more than half a turn, up to {self.largest:.3g} rad"
 
 
-def read_poses(motion: MotionLike, frame_rate: float | None = None) -> Poses:
+def read_poses(motion: MotionLike, frame_rate: float | None = None, skeleton: Skeleton | None = None) -> Poses:
     """A motion or an array as poses; the form of an array is told by its last axes.
 
     Args:
         motion: see `MotionLike`.
         frame_rate: frames per second of an array; a `Motion` has its own.
+        skeleton: whose rest pose the rotations shall refer to (`Motion.for_skeleton`); default: ours. An array's refer
+            to whichever skeleton it is given for.
 
     Raises:
         UserError: it is neither, has another shape, holds NaN or infinite numbers or what is no rotation (says in which
             frame), or the frame rate is not positive.
     """
-    array = to_tensor(motion)
+    array = to_tensor(motion, skeleton)
     frame_rate = motion.frame_rate if isinstance(motion, Motion) else frame_rate
     check_frame_rate(frame_rate)
     shape = tuple(array.shape)
@@ -127,13 +129,15 @@ def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
         raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
 
 
-def to_tensor(array: MotionLike) -> Tensor:
-    """Numbers, or a motion's rotations, as a tensor, float32 or, where they come so, float64.
+def to_tensor(array: MotionLike, skeleton: Skeleton | None = None) -> Tensor:
+    """Numbers, or a motion's rotations (for a skeleton, as for `read_poses`), as a tensor, float32 or, where they come
+    so, float64.
 
     Raises:
         UserError: it is no NumPy or torch array of numbers, nor lists of numbers that make one.
     """
-    array = array.local_TJ33 if isinstance(array, Motion) else array
+    if isinstance(array, Motion):
+        array = (array.for_skeleton(skeleton) if skeleton is not None else array).local_TJ33
     kind = type(array).__name__
     if isinstance(array, list | tuple):
         with contextlib.suppress(Exception):  # ragged lists, tensors on other devices

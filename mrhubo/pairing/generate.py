@@ -1,5 +1,5 @@
 """Pairs of robot and human pose, shard by shard: forward, from random robot poses (algorithm 1 of MR.HuBo), and
-reverse, from human poses of the prior.
+reverse, from human poses of the prior and from such as are drawn joint by joint.
 
 Forward pairs never hold a human pose that the robot cannot reach. Reverse pairs do, as the reference retargeter answers
 any pose; no human motion is needed for them either.
@@ -18,9 +18,11 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import poses_at_once, solve_quasi_newton
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import PairsConfig
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.lbfgs import solve_lbfgs
+from mrhubo.pairing.random_poses import random_poses
 from mrhubo.pairing.store import PairStore
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
@@ -95,42 +97,54 @@ class PairGenerator:
             # Forward shards count upwards from 0, reverse ones downwards from -1.
             seed = _shard_seed(self.settings.seed, index if direction == "forward" else -1 - index)
             generator = torch.Generator().manual_seed(seed)
-            z_BZ, q_BN = self._draw(direction, generator)
+            drawn, q_BN = self._draw(direction, generator)
             with torch.no_grad():
                 poses = self.robot.forward(q_BN)
                 upright = direction == "reverse"
                 target_BK3 = (self.body_map.upright_keypoints if upright else self.body_map.targets)(poses)
                 orientation_BM6 = self.robot.moving_orientations(poses)
-            if z_BZ is None:
-                z_BZ = self.solve(target_BK3)
             size = poses_at_once(self.device)
-            directions = self.body_map.robot_directions(poses).split(size)
-            chunks = zip(z_BZ.split(size), target_BK3.split(size), directions, strict=True)
-            parts = [self._measure(z, target, limbs, direction) for z, target, limbs in chunks]
+            z_BZ, human_BJ33 = drawn or self._decoded(self.solve(target_BK3))
+            directions = self.body_map.robot_directions(poses)
+            chunks = zip(*(x.split(size) for x in (z_BZ, human_BJ33, target_BK3, directions)), strict=True)
+            parts = [self._measure(*chunk, direction) for chunk in chunks]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
     @torch.no_grad()
-    def _draw(self, direction: str, generator: torch.Generator) -> tuple[Tensor | None, Tensor]:
-        """Latents (B, Z), which forward pairs have yet to be given, and joint angles (B, N)."""
-        count = self.settings.shard_size
+    def _draw(self, direction: str, generator: torch.Generator) -> tuple[tuple[Tensor, Tensor] | None, Tensor]:
+        """Latents (B, Z) and poses (B, 21, 3, 3), which forward pairs have yet to be given; joint angles (B, N)."""
+        settings, count = self.settings, self.settings.shard_size
         if direction == "forward":
             return None, self.robot.sample(count, generator)
-        z_BZ = self.settings.reverse_spread * torch.randn(count, self.prior.latent, generator=generator)
-        z_BZ = z_BZ.to(self.device)
-        poses = [self.prior.decode_matrices(part) for part in z_BZ.split(poses_at_once(self.device))]
-        return z_BZ, self.reference.solve_frames(torch.cat(poses))[0]
+        random = round(settings.random_share * count)
+        z_BZ = settings.reverse_spread * torch.randn(count - random, self.prior.latent, generator=generator)
+        z_BZ, human_BJ33 = self._decoded(z_BZ.to(self.device))
+        random_BJ33 = random_poses(self.body_map.keypoints.parts, random, generator).to(self.device)
+        sixd = rotation.matrix_to_sixd(random_BJ33).split(poses_at_once(self.device))
+        z_BZ = torch.cat((z_BZ, *(self.prior.encode(part) for part in sixd)))
+        human_BJ33 = torch.cat((human_BJ33, random_BJ33))
+        return (z_BZ, human_BJ33), self.reference.solve_frames(human_BJ33)[0]
 
     @torch.no_grad()
-    def _measure(self, z_BZ: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str) -> dict[str, Tensor]:
-        """Human poses of latents, and how good they are; the measures are those of the latents, before alignment."""
-        matrices = self.prior.decode_matrices(z_BZ)
+    def _decoded(self, z_BZ: Tensor) -> tuple[Tensor, Tensor]:
+        """Latents (B, Z), and their poses (B, 21, 3, 3)."""
+        parts = [self.prior.decode_matrices(part) for part in z_BZ.split(poses_at_once(self.device))]
+        return z_BZ, torch.cat(parts) if parts else z_BZ.new_zeros(0, len(POSED_JOINT_NAMES), 3, 3)
+
+    @torch.no_grad()
+    def _measure(
+        self, z_BZ: Tensor, matrices: Tensor, target_BK3: Tensor, direction_BD3: Tensor, direction: str
+    ) -> dict[str, Tensor]:
+        """The pairs' human poses, and how good these are; the measures are those of the poses (B, 21, 3, 3) that are
+        given, before alignment.
+        """
         found_BJ6 = pose_BJ6 = rotation.matrix_to_sixd(matrices)
         if direction == "forward":
             points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
             if self.settings.align:
                 pose_BJ6 = rotation.matrix_to_sixd(align_pose(self.body_map, matrices, direction_BD3))
-        else:  # the prior's humans bend their backs; only what the robot has is compared, on an upright human
+        else:  # these humans bend their backs; only what the robot has is compared, on an upright human
             points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(matrices))
         distance_BK = (points_BK3 - target_BK3).norm(dim=-1)
         prior_B = z_BZ.square().sum(-1)

@@ -1,9 +1,9 @@
 """How well a scale factor theta turns robot poses into the human poses that they were made for.
 
 For pairs (q, H) of the reference retargeter, the distance between g_theta(q), the human pose that pairing would give q,
-and H: the mean geodesic distance of the arm joints' rotations. Figuera, Park, Ahn: MR.HuBo, IROS 2024, section III-D.
-They are compared in the frame in which the network reads them: collars and spine can make up for a shoulder, so that
-what is near in local rotations may be far as seen from the chest.
+and H. Figuera, Park, Ahn: MR.HuBo, IROS 2024, section III-D: the mean geodesic distance of the arm joints' rotations.
+Where the network reads directions, poses are compared by those of arms and hands instead: collars and spine can make up
+for a shoulder, so that what is near in local rotations may be far as seen from the chest.
 
 Legend: C scale factors, P pairs, K keypoints, J = 21 human joints, Z latent numbers.
 """
@@ -19,8 +19,9 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import nearest_samples, poses_at_once, solve_quasi_newton
-from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import ManualScaleConfig, PairsConfig
+from mrhubo.reference import angle_between
 from mrhubo.robot import BodyMap, ManualScale
 from mrhubo.runtime.threads import use_threads
 
@@ -38,7 +39,9 @@ class ScaleFactorObjective:
         arms = {part.joint for part in body_map.keypoints.parts if part.region in ("arm", "hand")}
         names = [name for name in body_map.input_joints() if name in arms]
         self.arm_joints = [POSED_JOINT_NAMES.index(name) for name in names]
-        """Positions of the joints that count."""
+        """Positions of the joints that count, for a network that reads rotations."""
+        self.arm_directions = [i for i in body_map.measured if body_map.directions[i].part.joint in arms]
+        """Positions of the directions that count, for one that reads directions."""
 
     @torch.no_grad()
     def human_poses(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
@@ -64,18 +67,16 @@ class ScaleFactorObjective:
     @torch.no_grad()
     def distances(self, local_CPJ33: Tensor) -> Tensor:
         """Distance (C, P) [rad] of human poses to those that the robot poses imitate."""
-        found, wanted = (self._arms(pose) for pose in (local_CPJ33, self.local_PJ33))
-        return rotation.geodesic_distance(found, wanted.expand_as(found)).mean(dim=-1)
-
-    def _arms(self, local_XJ33: Tensor) -> Tensor:
-        """Rotations (..., arm joints, 3, 3) of poses (..., 21, 3, 3)."""
-        matrices = rotation.orthonormal(local_XJ33)
         if self.frame == "local":
-            return matrices[..., self.arm_joints, :, :]
-        turned = self.body_map.skeleton.global_rotations(matrices.flatten(0, -4))
-        chest = turned[:, [JOINT_NAMES.index("spine3")]].transpose(-1, -2)
-        seen = chest @ turned[:, [1 + joint for joint in self.arm_joints]]
-        return seen.unflatten(0, local_XJ33.shape[:-3])
+            found, wanted = (
+                rotation.orthonormal(x)[..., self.arm_joints, :, :] for x in (local_CPJ33, self.local_PJ33)
+            )
+            return rotation.geodesic_distance(found, wanted.expand_as(found)).mean(dim=-1)
+        found, wanted = (
+            self.body_map.human_directions(x.flatten(0, -4)).unflatten(0, x.shape[:-3])[..., self.arm_directions, :]
+            for x in (local_CPJ33, self.local_PJ33)
+        )
+        return angle_between(found, wanted.expand_as(found)).mean(dim=-1)
 
     def measure(self, configs: Sequence[ManualScaleConfig]) -> Tensor:
         """Mean distance (C,) [rad] of scale factors over the pairs."""

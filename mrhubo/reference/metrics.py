@@ -42,8 +42,8 @@ def link_error(robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence
 def direction_error(
     body_map: BodyMap, q_TN: Tensor, human: HumanPose | Tensor, poses: LinkPoses | None = None
 ) -> Tensor:
-    """Angle (T, D) [degrees] between the robot's measured directions (`BodyMap.measured`) and those of human poses, or of
-    their local rotations (T, 21, 3, 3).
+    """Angle (T, D) [degrees] between the robot's measured directions (`BodyMap.measured`) and those of human poses, or
+    of their local rotations (T, 21, 3, 3).
 
     `poses` are the robot's link poses at q, if they are there already.
     """

@@ -95,7 +95,7 @@ class OptimizationRetargeter(nn.Module):
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
                 frame), or the frame rate is not positive.
         """
-        poses = read_poses(motion, frame_rate)
+        poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
         clips = local_TJ33.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [local_TJ33]
         answers = [self._solve(clip_TJ33, poses.frame_rate) for clip_TJ33 in clips if len(clip_TJ33)]
@@ -171,7 +171,7 @@ class OptimizationRetargeter(nn.Module):
         return q_BN, cost_BC.sum(dim=1)
 
     def _targets(self, local_BJ33: MotionLike) -> Tensor:
-        local_BJ33, joints = to_tensor(local_BJ33), len(POSED_JOINT_NAMES)
+        local_BJ33, joints = to_tensor(local_BJ33, self.body_map.skeleton), len(POSED_JOINT_NAMES)
         if local_BJ33.ndim != 4 or tuple(local_BJ33.shape[1:]) != (joints, 3, 3) or not len(local_BJ33):
             raise UserError(f"human motion: expected rotations of shape (frames, {joints}, 3, 3), one frame or more, "
                             f"found {tuple(local_BJ33.shape)}")  # fmt: skip
@@ -209,8 +209,9 @@ class OptimizationRetargeter(nn.Module):
         problem = self.problem
         robot = self.body_map.robot
         robot_TD3, columns = self.body_map.robot_directions(robot.forward(q_TN)), self.body_map.measured
+        off_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
         return ReferenceResult(
-            q_TN, torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns])), float(at_limit_share(robot, q_TN).mean()),
+            q_TN, off_TD, float(at_limit_share(robot, q_TN).mean()),
             count_jumps(problem, q_TN, target_TD3, frame_rate),
             torch.zeros(len(q_TN), dtype=torch.bool) if rests_T is None else rests_T.cpu(),
         )  # fmt: skip

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from mrhubo.config import Config, ModelConfig
 from mrhubo.errors import UserError
 from mrhubo.reference import DirectionJacobian
-from mrhubo.retargeter.features import PoseFeatures
+from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures, RotationFeatures
 from mrhubo.retargeter.networks import Branch, RetargetNetwork
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, Robot
 
 _MAX_WEIGHTS = 100_000_000
 """Weights of all networks together; training takes sixteen bytes for each. The defaults make some hundred thousand."""
@@ -19,14 +19,26 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
     """An untrained network for a config's robot and `model` section.
 
     Raises:
-        UserError: an input joint does not exist, or a branch would see none.
+        UserError: an input joint does not exist or is named for networks that see no joints, or a branch would see
+            none.
     """
     model, robot, blocks = config.model, body_map.robot, DirectionJacobian(body_map).blocks
-    turned = [direction for directions, _ in blocks for direction in directions]
-    features = PoseFeatures(model.input_joints or body_map.input_joints(turned), model.input_frame)
+    turned = sorted(direction for directions, _ in blocks for direction in directions)
+    features: PoseFeatures
+    if model.input_frame == "local":
+        features = RotationFeatures(model.input_joints or body_map.input_joints(turned))
+        own = [body_map.input_joints(directions) for directions, _ in blocks]
+    elif model.input_joints is not None:
+        raise UserError(
+            f"model.input_joints: is of no use with model.input_frame={model.input_frame}, which reads directions of"
+            " body parts; leave it out, or set model.input_frame=local"
+        )
+    else:
+        features = DirectionFeatures(body_map, turned)
+        own = [tuple(body_map.direction_names[i] for i in sorted(directions)) for directions, _ in blocks]
     joints = tuple(range(len(robot.joint_names)))
-    branches = _branches(body_map, blocks, features.input_joints) if model.branches else []
-    _check_size(model, branches or [Branch(tuple(range(features.size // 6)), joints)])
+    branches = _branches(robot, [joints for _, joints in blocks], own, features.names) if model.branches else []
+    _check_size(model, features, branches or [Branch(tuple(range(len(features.names))), joints)])
     return RetargetNetwork(
         features,
         robot.lower_N,
@@ -40,11 +52,12 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
     )
 
 
-def _check_size(model: ModelConfig, branches: Sequence[Branch]) -> None:
+def _check_size(model: ModelConfig, features: PoseFeatures, branches: Sequence[Branch]) -> None:
     """Refuses networks of more weights than a memory holds, before they are made."""
     weights = 0
     for branch in branches:
-        inputs, links, joints = 6 * len(branch.inputs), 6 * len(branch.joints), len(branch.joints)
+        inputs, joints = features.width * len(branch.inputs), len(branch.joints)
+        links = 6 * joints
         sizes = [(inputs, links), (links, joints)] if model.stages == 2 else [(inputs, joints)]
         for size_in, size_out in sizes:
             inner = (model.layers - 1) * model.hidden * (model.hidden + 1)
@@ -56,15 +69,23 @@ def _check_size(model: ModelConfig, branches: Sequence[Branch]) -> None:
         )
 
 
-def _branches(body_map: BodyMap, blocks: Sequence[tuple[set[int], set[int]]], inputs: Sequence[str]) -> list[Branch]:
-    """Of each branch its joints and its human joints; a human joint that belongs to no branch is seen by all."""
-    own = [body_map.input_joints(directions) for directions, _ in blocks]
+def _branches(
+    robot: Robot, blocks: Sequence[set[int]], own: Sequence[Sequence[str]], inputs: Sequence[str]
+) -> list[Branch]:
+    """Of each branch its joints and its inputs; an input that belongs to no branch is seen by all.
+
+    Args:
+        robot: for the names of its joints.
+        blocks: the joints of each branch.
+        own: the inputs that tell about each branch.
+        inputs: those that there are.
+    """
     shared = set(inputs).difference(*own)
     found = []
-    for names, (_, joints) in zip(own, blocks, strict=True):
+    for names, joints in zip(own, blocks, strict=True):
         seen = tuple(i for i, name in enumerate(inputs) if name in names or name in shared)
         if not seen:
-            moved = ", ".join(body_map.robot.joint_names[n] for n in sorted(joints))
+            moved = ", ".join(robot.joint_names[n] for n in sorted(joints))
             raise UserError(
                 f"model.input_joints: nothing tells the angles of {moved}; add one of {', '.join(names)}, or set"
                 " model.branches to false"

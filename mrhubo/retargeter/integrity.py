@@ -103,8 +103,8 @@ def check_content(folder: Path, metadata: Mapping[str, str], robot: Robot, input
     if metadata.get("robot") != robot.name:
         names = f"'{shortened(metadata.get('robot'))}' and '{robot.name}'"
         raise UserError(f"{folder}: header and settings name two robots, {names}; {_RENEW}")
-    if _json(folder, metadata, "input_joints") != list(inputs):
-        raise UserError(f"{folder}: header and settings read other human joints; {_RENEW}")
+    if _json(folder, metadata, "seen") != list(inputs):
+        raise UserError(f"{folder}: header and settings read other things of a human pose; {_RENEW}")
     try:
         threshold = float(metadata["phi_threshold"])
     except (KeyError, ValueError):

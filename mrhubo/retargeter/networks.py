@@ -1,6 +1,6 @@
 """The two networks: human pose -> link orientations (pre), link orientations -> joint angles (post).
 
-Legend: B batch, J input joints, F = 6 J input features, M robot links, N robot joints.
+Legend: B batch, I inputs, F numbers of all of them, M robot links, N robot joints.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Branch:
     """A part of the robot that turns apart from the others, such as an arm."""
 
     inputs: tuple[int, ...]
-    """Positions of its human joints among the input joints."""
+    """Positions of what it sees among the inputs."""
     joints: tuple[int, ...]
     """Its robot joints, as columns of q."""
 
@@ -144,12 +144,13 @@ class RetargetNetwork(nn.Module):
         super().__init__()
         self.features, self.stages, joints = features, stages, len(lower_N)
         net = ResidualMLP if residual else mlp
-        branches = branches or [Branch(tuple(range(features.size // 6)), tuple(range(joints)))]
+        branches = branches or [Branch(tuple(range(len(features.names))), tuple(range(joints)))]
 
         def branched(columns_in: list[list[int]], columns_out: list[list[int]]) -> nn.Module:
             return Branched(columns_in, columns_out, lambda a, b: net(a, hidden, layers, b))
 
-        inputs, links = ([_sixfold(b.inputs) for b in branches], [_sixfold(b.joints) for b in branches])
+        inputs = [_columns(b.inputs, features.width) for b in branches]
+        links = [_columns(b.joints, 6) for b in branches]
         angles = [list(b.joints) for b in branches]
         self.pre = branched(inputs, links) if stages == 2 else None
         self.post = branched(links if stages == 2 else inputs, angles)
@@ -163,10 +164,13 @@ class RetargetNetwork(nn.Module):
 
     def forward(self, pose_BJ6: Tensor) -> Tensor:
         """Joint angles (B, N) [rad], inside the limits, of human poses (B, 21, 6)."""
-        features = self.features(pose_BJ6)
-        return self.limited(self.post(self.links(features) if self.pre is not None else features))
+        return self.joints(self.features(pose_BJ6))
+
+    def joints(self, features_BF: Tensor) -> Tensor:
+        """Joint angles (B, N) [rad], inside the limits, of features (B, F)."""
+        return self.limited(self.post(self.links(features_BF) if self.pre is not None else features_BF))
 
 
-def _sixfold(columns: Sequence[int]) -> list[int]:
-    """The columns of the 6D numbers of these rotations."""
-    return [6 * column + i for column in columns for i in range(6)]
+def _columns(places: Sequence[int], width: int) -> list[int]:
+    """The columns of these inputs, each of which has so many numbers."""
+    return [width * place + i for place in places for i in range(width)]

@@ -30,6 +30,7 @@ from mrhubo.motion import NOT_FINITE, MotionLike, read_poses, refuse_frames, to_
 from mrhubo.reference import DirectionProblem, Polish, angle_between
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import confidence
+from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.integrity import (
     check_content,
     check_files,
@@ -42,7 +43,7 @@ from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 
-SCHEMA = "mrhubo.retargeter/3"
+SCHEMA = "mrhubo.retargeter/4"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
 _OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)
@@ -111,7 +112,7 @@ class Retargeter(nn.Module):
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
                 frame), `polish` is negative, or the frame rate is not positive.
         """
-        poses = read_poses(motion, frame_rate)
+        poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         return self.retarget(poses.local_TJ33, polish).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
@@ -160,7 +161,7 @@ class Retargeter(nn.Module):
         """
         if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
             raise UserError(f"polish must be 0 or more steps, found {polish}")
-        given, joints = to_tensor(local_TJ33), len(POSED_JOINT_NAMES)
+        given, joints = to_tensor(local_TJ33, self.body_map.skeleton), len(POSED_JOINT_NAMES)
         if given.ndim != 4 or given.shape[1:] != (joints, 3, 3):
             raise UserError(
                 f"human poses must have the shape (frames, {joints}, 3, 3), found {tuple(given.shape)}; other forms are"
@@ -174,7 +175,11 @@ class Retargeter(nn.Module):
 
     def _answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int) -> Tensor:
         """Joint angles (T, N) [rad]; the human's directions (T, D, 3) are needed for steps of optimisation."""
-        q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
+        features = self.network.features
+        if target_TD3 is not None and isinstance(features, DirectionFeatures):
+            q_TN = self.network.joints(features.of(target_TD3))
+        else:
+            q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
         if not polish or not len(q_TN) or target_TD3 is None:
             return q_TN
         return self._polish(q_TN, target_TD3, polish)
@@ -196,7 +201,7 @@ class Retargeter(nn.Module):
             "lower_rad": json.dumps(robot.lower_N.tolist()),
             "upper_rad": json.dumps(robot.upper_N.tolist()),
             "input": "SMPL body joints 1..21, local rotations, 6D (first two columns, column after column)",
-            "input_joints": json.dumps(self.network.features.input_joints),
+            "seen": json.dumps(self.network.features.names),
             "output": "joint angles in rad, in the order of joint_names",
             "phi_threshold": repr(self.phi_threshold),
             **provenance,
@@ -228,7 +233,7 @@ class Retargeter(nn.Module):
         prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))
         check_prior(folder, metadata, prior)
         network = build_network(config, body_map)
-        threshold = check_content(folder, metadata, body_map.robot, network.features.input_joints)
+        threshold = check_content(folder, metadata, body_map.robot, network.features.names)
         try:
             network.load_state_dict({name: tensor for name, tensor in tensors.items() if tensor.is_floating_point()})
         except RuntimeError as error:

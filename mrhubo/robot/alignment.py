@@ -94,8 +94,8 @@ class _Pose:
 
 
 def _turn_about(axis_B3: Tensor, start_B3: Tensor, end_B3: Tensor) -> Tensor:
-    """Rotations (B, 3, 3) about unit axes that take the half-plane of one vector to that of another; none where a vector
-    is 0 or along the axis.
+    """Rotations (B, 3, 3) about unit axes that take the half-plane of one vector to that of another; none where a
+    vector is 0 or along the axis.
     """
     sine_B = (axis_B3 * torch.linalg.cross(start_B3, end_B3)).sum(-1)
     along_B = (start_B3 * axis_B3).sum(-1) * (end_B3 * axis_B3).sum(-1)

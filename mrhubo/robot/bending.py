@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from mrhubo.robot.model import Robot
 
 _PLANE_DEG = (3.0, 12.0)
-"""Below the first bend the upper arm's turn alone tells the axis, from the second on the plane of the limbs alone. Motion
-capture is some two degrees exact, so the plane of limbs with less than five between them says little."""
+"""Below the first bend the upper arm's turn alone tells the axis, from the second on the plane of the limbs alone.
+Motion capture is some two degrees exact, so the plane of limbs with less than five between them says little."""
 _NEEDED_DEG = (8.0, 25.0)
 """Up to the first bend the axis counts in full, from the second on not at all: the limbs say everything."""
 _PROBES, _SEED, _TURN = 64, 0, 1e-3

@@ -14,11 +14,11 @@ from mrhubo.body.skeleton import Skeleton
 from mrhubo.config import RobotConfig, with_places
 from mrhubo.errors import UserError
 from mrhubo.robot.auto_scale import AutoScale
+from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.checks import check_body_map, check_key_links
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.directions import Directions
 from mrhubo.robot.entries import check_names
-from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot

@@ -1,8 +1,8 @@
 """The parts of a human body that a robot can have: one table, from which all else follows.
 
 A limb runs from one point to another and has one direction; an oriented part (a hand, the head) is fixed to one link
-and has two; a bend axis says about which axis a limb bends. Directions are seen from the part that carries them: those of arms and head from the chest, so that neither
-the way a base faces nor a bent back matters.
+and has two; a bend axis says about which axis a limb bends. Directions are seen from the part that carries them: those
+of arms and head from the chest, so that neither the way a base faces nor a bent back matters.
 
 A row says everything about a part: no other module knows one by its name. Rows stand in the order of the directions,
 and a part after the one that it hangs on.
@@ -107,8 +107,8 @@ class OrientedPart(BodyPart):
 class BendPart(BodyPart):
     """The axis about which a limb bends against the one that carries it, fixed to the carrying limb: an elbow's hinge.
 
-    Where the joint is bent, the two limbs' directions tell it, and nothing more need be said. Where it is straight, only
-    how the carrying limb is turned about itself tells it; without that a straight arm leaves the robot's elbow open.
+    Where the joint is bent, the two limbs' directions tell it, and nothing more need be said. Where it is straight,
+    only how the carrying limb is turned about itself tells it; else a straight arm leaves the robot's elbow open.
     """
 
     bent: str

@@ -50,8 +50,8 @@ def _pair(part: str) -> list[int]:
 
 
 def stand_at_rest(pose_BJ6: Tensor, share: float) -> Tensor:
-    """Puts all but arms and head of a random share of the poses at rest, the arms' directions and hands kept: poses as a
-    robot with arms and a head reads them (`mrhubo.robot.alignment`), whose measure is their reconstruction.
+    """Puts all but arms and head of a random share of the poses at rest; the arms keep their directions. So a robot
+    with arms and a head reads a pose (`mrhubo.robot.alignment`).
     """
     rest = torch.zeros(len(POSED_JOINT_NAMES), dtype=torch.bool)
     rest[[i for i, name in enumerate(POSED_JOINT_NAMES) if not name.endswith(_READ)]] = True

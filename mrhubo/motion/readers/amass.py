@@ -17,10 +17,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MAX_TURN, Turns
+from mrhubo.motion.readers.family import find_family
 from mrhubo.rotation import axis_angle_to_matrix
 
 MAX_FRAMES = 2_000_000
@@ -49,6 +51,8 @@ def read_amass(path: Path) -> Motion:
     The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up, other files
     of this kind y; the one that the body's own up axis follows is taken, and turned to y.
 
+    Rotations refer to the rest pose of the body model that the file says it is of; they are told in our skeleton's.
+
     Raises:
         UserError: the file is missing, damaged, hostile, too large, or not a motion.
     """
@@ -59,6 +63,9 @@ def read_amass(path: Path) -> Motion:
         description = _read_description(file, notes)
         root_rotation_T33, root_position_T3, up = _read_root(file, key, len(local_TJ33), notes)
         betas = _read_betas(file, notes)
+        family, rest = find_family(file, betas)
+    for part in local_TJ33.split(_BLOCK) if family else ():
+        part.copy_(from_family(part, family))
     name = motion_name(path)
     return Motion(
         name=name,
@@ -68,7 +75,8 @@ def read_amass(path: Path) -> Motion:
         root_rotation_T33=root_rotation_T33,
         root_position_T3=root_position_T3,
         betas=betas,
-        source=f"SMPL-family .npz with '{key}'{up}",
+        source=f"SMPL-family .npz with '{key}'{up}; {rest}",
+        family=family,
         notes=tuple(notes),
     )
 

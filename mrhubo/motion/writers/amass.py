@@ -12,6 +12,10 @@ import numpy as np
 
 from mrhubo.files.storage import atomic_path
 
+REST_KEY, OWN_REST = "rest_directions", "mrhubo"
+"""The key that says to which rest pose rotations refer, and its text where that is our own skeleton's: other programs
+want to hear of a body model they know (`surface_model_type`)."""
+
 
 def write_motion(
     path: Path,
@@ -23,7 +27,8 @@ def write_motion(
 ) -> None:
     """Writes a motion with AMASS's keys, as float32, atomically; the same numbers give the same bytes.
 
-    ``pose_body_T63`` and ``root_orient_T3``: axis-angle [rad] of joints 1..21 and of the pelvis; ``trans_T3``: place of
+    ``pose_body_T63`` and ``root_orient_T3``: axis-angle [rad] of joints 1..21, which refer to our skeleton's rest pose,
+    and of the pelvis; ``trans_T3``: place of
     the pelvis [m]; ``frame_rate``: frames per second.
     """
     frames = len(pose_body_T63)
@@ -39,6 +44,7 @@ def write_motion(
         "betas": np.zeros(16, dtype="<f4"),
         "gender": np.asarray("neutral", dtype="<U7"),
         "surface_model_type": np.asarray("smplx", dtype="<U5"),
+        REST_KEY: np.asarray(OWN_REST, dtype="<U6"),
         "description": np.asarray(description, dtype=f"<U{max(1, len(description))}"),
     }
     with atomic_path(Path(path)) as temporary, open(temporary, "wb") as handle:

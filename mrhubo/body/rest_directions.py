@@ -1,0 +1,112 @@
+"""Where the limbs of a body model point at rest, and rotations that refer to one rest pose told in another's.
+
+A rotation of a file turns a limb from where the file's own body has it at rest. Ours is a T-pose along the axes; in
+SMPL-X's the left upper arm droops by 16 and the right by 8 degrees. Taken for ours, such rotations put every limb by so
+much beside where the person had it. With G a joint's rotation relative to the pelvis, b a limb's direction at rest, and
+T the shortest turn from our direction to theirs,
+
+    G_ours = G_theirs T,    so that    G_ours b_ours = G_theirs b_theirs.
+
+Joints that turn no limb of the table (spine, collars, wrists, ankles) keep their rotation relative to the pelvis.
+
+Legend: B batch, J = 21: SMPL's joints 1..21. Frame: x to the body's left, y up, z forward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from mrhubo.body.skeleton import PARENTS, POSED_JOINT_NAMES, Skeleton
+from mrhubo.rotation import axis_angle_to_matrix
+
+_SAME = 5e-3
+"""Sine of an angle (0.3 degrees) between two directions up to which they are the same: those of the table are rounded
+to 0.01."""
+
+_END = {
+    f"{side}_{joint}": f"{side}_{end}"
+    for side in ("left", "right")
+    for joint, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+}
+"""The joint at the end of each limb, by the joint that turns it."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """A family of body models: limb directions of its mean body at rest, by the joint that turns the limb."""
+
+    name: str
+    """For a sentence."""
+    directions: dict[str, tuple[float, float, float]]
+
+
+_SMPL = {
+    "left_shoulder": (0.99, -0.05, -0.11),
+    "right_shoulder": (-0.99, -0.05, -0.08),
+    "left_elbow": (1.00, 0.04, 0.00),
+    "right_elbow": (-1.00, 0.03, -0.02),
+    "left_hip": (0.09, -1.00, -0.01),
+    "right_hip": (-0.10, -0.99, -0.02),
+    "left_knee": (-0.03, -0.99, -0.11),
+    "right_knee": (0.04, -0.99, -0.11),
+}
+_SMPLX = {
+    "left_shoulder": (0.95, -0.27, -0.16),
+    "right_shoulder": (-0.99, -0.13, -0.10),
+    "left_elbow": (1.00, 0.09, -0.01),
+    "right_elbow": (-1.00, -0.02, -0.06),
+    "left_hip": (0.14, -0.99, -0.02),
+    "right_hip": (-0.12, -0.99, -0.05),
+    "left_knee": (-0.11, -0.99, -0.08),
+    "right_knee": (0.04, -1.00, -0.05),
+}
+# Read off, to two digits, from the joints of humanoids that others made of the mean bodies and publish: SMPL's from
+# github.com/ZhengyiLuo/PHC, phc/data/assets/mjcf/smpl_humanoid.xml; SMPL-X's from
+# github.com/SMPLOlympics/SMPLOlympics, phc/data/assets/mjcf/smplx_humanoid.xml. SMPL-H has SMPL's body.
+FAMILIES: dict[str, Family] = {
+    "smpl": Family("SMPL", _SMPL),
+    "smplh": Family("SMPL-H", _SMPL),
+    "smplx": Family("SMPL-X", _SMPLX),
+}
+"""By the names that AMASS's `surface_model_type` has for them."""
+
+
+def from_family(local_BJ33: Tensor, family: str) -> Tensor:
+    """Local rotations (B, 21, 3, 3) that refer to our skeleton, of those that refer to a family's mean body."""
+    turn_J33 = _turns(FAMILIES[family]).to(local_BJ33)
+    return _above(turn_J33).mT @ local_BJ33 @ turn_J33
+
+
+def to_family(local_BJ33: Tensor, family: str) -> Tensor:
+    """Local rotations (B, 21, 3, 3) that refer to a family's mean body, of those that refer to our skeleton."""
+    turn_J33 = _turns(FAMILIES[family]).to(local_BJ33)
+    return _above(turn_J33) @ local_BJ33 @ turn_J33.mT
+
+
+def is_ours(skeleton: Skeleton) -> bool:
+    """Whether a skeleton's limbs point at rest where ours do, however long they are."""
+    rows = [POSED_JOINT_NAMES.index(end) for end in _END.values()]
+    theirs, ours = (
+        torch.nn.functional.normalize(s.offsets_J3[rows].double().cpu(), dim=1) for s in (skeleton, Skeleton())
+    )
+    return bool(((theirs - ours).norm(dim=1) < _SAME).all())
+
+
+def _turns(family: Family) -> Tensor:
+    """The shortest turns (21, 3, 3), float64, from our rest directions to a family's; the identity where no limb is."""
+    ours = dict(zip(POSED_JOINT_NAMES, Skeleton().offsets_J3.double(), strict=True))
+    turns = torch.eye(3, dtype=torch.float64).repeat(len(POSED_JOINT_NAMES), 1, 1)
+    for joint, direction in family.directions.items():
+        start, end = ours[_END[joint]], torch.tensor(direction, dtype=torch.float64)
+        axis = torch.linalg.cross(start, end)
+        angle = torch.atan2(axis.norm(), start @ end)
+        turns[POSED_JOINT_NAMES.index(joint)] = axis_angle_to_matrix(axis / axis.norm().clamp_min(1e-12) * angle)
+    return turns
+
+
+def _above(turn_J33: Tensor) -> Tensor:
+    """The turns (21, 3, 3) of the joints' parents; the pelvis's is the identity."""
+    return torch.cat((torch.eye(3).to(turn_J33)[None], turn_J33))[list(PARENTS[1:])]
