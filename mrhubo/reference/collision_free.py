@@ -14,10 +14,11 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
+from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.starts import StartPool
-from mrhubo.reference.terms import SelfCollisionTerm
-from mrhubo.reference.trajectory import best_path, refine
+from mrhubo.reference.terms import SelfCollisionTerm, Smoothness
+from mrhubo.reference.trajectory import best_path
 from mrhubo.robot import BodyMap
 
 _WEIGHTS = (1e3, 1e4)
@@ -72,22 +73,11 @@ def avoid_collisions(
 def _refine_around(
     problem: CollisionFreeProblem, q_TN: Tensor, close_T: Tensor, target_TD3: Tensor, pull: float
 ) -> Tensor:
-    """`refine` for the frames within half a second of those in `close_T`; the others stay.
-
-    Of a stretch of frames that stay, only the first and the last matter to the others, so the rest is left out; what
-    the smoothness then costs between those two is constant.
-    """
-    near_T, kept_T = (_widen(close_T, reach) for reach in (_REACH, _REACH + 1))
-    part_TN = q_TN[kept_T]
+    """`refine` for the frames within half a second of those in `close_T`; the others stay."""
     for problem.contact.weight in _WEIGHTS:
-        part_TN = refine(problem, part_TN, target_TD3[kept_T], pull, _SWEEPS, _TOLERANCE, ~near_T[kept_T])[0]
-    found_TN = q_TN.clone()
-    found_TN[kept_T] = part_TN
-    return found_TN
-
-
-def _widen(mask_T: Tensor, frames: int) -> Tensor:
-    return torch.nn.functional.max_pool1d(mask_T[None].float(), 2 * frames + 1, 1, frames)[0] > 0
+        near_T = widen(close_T, _REACH)
+        q_TN = refine_around(problem, q_TN, target_TD3, Smoothness(pull), near_T, _SWEEPS, _TOLERANCE)
+    return q_TN
 
 
 def _start_again(
@@ -95,7 +85,7 @@ def _start_again(
 ) -> Tensor:
     """The best path (T, N) through new candidates in the frames that touch and near them, elsewhere what there was."""
     count = pool.starts
-    around_T = _widen(touching_T, _REACH)
+    around_T = widen(touching_T, _REACH)
     candidates_TSN = q_TN[:, None].repeat(1, count + 1, 1)
     cost_TSC = problem.quadratic(q_TN, target_TD3).cost_BC[:, None].repeat(1, count + 1, 1)
     target_XD3 = target_TD3[around_T]

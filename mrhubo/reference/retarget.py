@@ -23,8 +23,10 @@ from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisio
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
+from mrhubo.reference.speed import speed_bound
 from mrhubo.reference.starts import StartPool
-from mrhubo.reference.trajectory import pick, smooth_motion
+from mrhubo.reference.terms import Smoothness
+from mrhubo.reference.trajectory import MotionTask, pick, smooth_motion
 from mrhubo.robot import BodyMap, Robot
 
 _REFERENCE_RATE = 24.0
@@ -121,11 +123,12 @@ class OptimizationRetargeter(nn.Module):
         check_frame_rate(frame_rate, needed=True)
         target_TD3 = self._targets(local_TJ33)
         candidates_TSN, cost_TSC = self._candidates(target_TD3)
-        pull = self._pull(frame_rate)
-        if pull == 0 or len(target_TD3) == 1:
+        smoothness = self._smoothness(frame_rate)
+        if smoothness.pull == 0 or len(target_TD3) == 1:
             q_TN = self._polish(candidates_TSN, cost_TSC, target_TD3)[0]
         else:
-            q_TN = smooth_motion(self.problem, candidates_TSN, cost_TSC, target_TD3, pull)
+            task = MotionTask(target_TD3, smoothness, *speed_bound(self.body_map.robot.velocity_N, frame_rate))
+            q_TN = smooth_motion(self.problem, candidates_TSN, cost_TSC, task)
         return self._result(q_TN, target_TD3, frame_rate)
 
     @torch.no_grad()
@@ -145,7 +148,7 @@ class OptimizationRetargeter(nn.Module):
         if q_TN is None:
             q_TN = self.retarget(local_TJ33, frame_rate).q_TN
         target_TD3 = self._targets(local_TJ33)
-        pull = self._pull(frame_rate)
+        pull = self._smoothness(frame_rate).pull
         q_TN, rests_T = avoid_collisions(self._free_problem, self._pool, q_TN.to(target_TD3), target_TD3, pull)
         return self._result(q_TN, target_TD3, frame_rate, rests_T)
 
@@ -155,9 +158,9 @@ class OptimizationRetargeter(nn.Module):
             self._free = CollisionFreeProblem(self.body_map)
         return self._free
 
-    def _pull(self, frame_rate: float) -> float:
+    def _smoothness(self, frame_rate: float) -> Smoothness:
         """Weight of |q_t - q_(t-1)|^2: that of the squared velocity, with the reference rate as the unit of time."""
-        return self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2
+        return Smoothness(self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2)
 
     @torch.no_grad()
     def solve_frames(self, local_BJ33: MotionLike) -> tuple[Tensor, Tensor]:

@@ -69,6 +69,11 @@ class DirectionProblem(nn.Module):
         assert model is not None
         return model
 
+    def cost(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
+        """What each block costs (B, C) at joint angles (B, N) [rad]."""
+        chunks = zip(q_BN.split(self.chunk), target_BD3.split(self.chunk), strict=True)
+        return torch.cat([self.quadratic(*chunk).cost_BC for chunk in chunks])
+
     def frozen(self, q_BN: Tensor, gradient_BN: Tensor, bounds: tuple[Tensor, Tensor] | None = None) -> Tensor:
         """Active set (B, N): joints at a limit that the gradient's descent would push beyond it; limits are the joints'
         or `bounds`.

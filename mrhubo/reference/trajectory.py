@@ -1,42 +1,103 @@
 """From candidates per frame to one smooth motion: the best path through them, then all frames refined together.
 
-    cost(q_1 .. q_T) = sum_t cost_t(q_t)  +  pull * sum_t |q_t - q_(t-1)|^2        (`terms.smoothness`)
+    cost(q_1 .. q_T) = sum_t cost_t(q_t)  +  pull * sum_t |q_t - q_(t-1)|^2  + ...        (`terms.smoothness`)
 
 Blocks of joints (see `solve`) share no term, so each has its own path, its own damping and its own accepted steps.
 
-Legend: T frames, S candidates per frame, D directions, N joints, C blocks.
+Legend: T frames, X those of a part, L that are settled, S candidates per frame, D directions, N joints, C blocks.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass, replace
+
 import torch
-from scipy.linalg import solveh_banded
 from torch import Tensor
 
+from mrhubo.reference.refine import refine
 from mrhubo.reference.solve import DirectionProblem
-from mrhubo.reference.terms import Quadratic, add_pull, pull_diagonal
+from mrhubo.reference.speed import keep_speed, nearest_slow
+from mrhubo.reference.terms import Smoothness
 
 _PART = 512
-_PATIENCE = 5.0
+_WINDOW, _AHEAD = 4096, 1024
+"""Frames that are worked on together, and how many of them only serve to look ahead."""
 _JUMP = 0.5
 _REACH = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
 
 
-def smooth_motion(
-    problem: DirectionProblem, candidates_TSN: Tensor, cost_TSC: Tensor, target_TD3: Tensor, pull: float
+@dataclass(frozen=True)
+class MotionTask:
+    """What a motion is to follow, and how."""
+
+    target_TD3: Tensor
+    """The human's directions."""
+    smoothness: Smoothness
+    """Of the joints."""
+    step_N: Tensor
+    """The longest step of a joint from one frame to the next [rad]."""
+    around: int
+    """Frames this near to those that were too fast may change."""
+    sweeps: int = 100
+    tolerance: float = 3e-4
+    """How long a motion is refined, as for `refine`."""
+
+    def at(self, part: slice) -> MotionTask:
+        """The same for some frames alone."""
+        frame_X = torch.arange(len(self.target_TD3), device=self.target_TD3.device)[part]
+        return replace(self, target_TD3=self.target_TD3[part], smoothness=self.smoothness.at(frame_X))
+
+
+def smooth_motion(problem: DirectionProblem, candidates_TSN: Tensor, cost_TSC: Tensor, task: MotionTask) -> Tensor:
+    """The cheapest motion (T, N) [rad] that is found from candidates (T, S, N) with their blocks' costs (T, S, C);
+    without a step that is too long.
+
+    Long motions are worked on in windows, so that memory is bounded, and hard frames do not hold up those that are far
+    away. Each begins where the one before has been settled, and looks ahead much further than one frame still matters
+    to another: joints that nothing else determines forget within sqrt(pull / ridge of the posture) frames, less than a
+    second at any frame rate.
+    """
+    frames, found, settled = len(candidates_TSN), [candidates_TSN[:0, 0]], 0
+    while settled < frames:
+        before_LN = torch.cat(found[-2:])[-task.smoothness.reach :]
+        part = slice(settled - len(before_LN), settled + _WINDOW)
+        motion_XN = _smooth_window(problem, candidates_TSN[part], cost_TSC[part], task.at(part), before_LN)
+        used = _WINDOW - _AHEAD if settled + _WINDOW < frames else _WINDOW
+        found.append(motion_XN[len(before_LN) :][:used])
+        settled += used
+    return nearest_slow(torch.cat(found), task.step_N)
+
+
+def _smooth_window(
+    problem: DirectionProblem, candidates_TSN: Tensor, cost_TSC: Tensor, task: MotionTask, before_LN: Tensor
 ) -> Tensor:
-    """The cheapest motion (T, N) [rad] that is found from candidates (T, S, N) with their blocks' costs (T, S, C)."""
-    path_TN, path_cost_TC = best_path(candidates_TSN, cost_TSC, problem.blocks.joints_NC, pull)
-    motion_TN, cost_C = refine(problem, path_TN, target_TD3, pull)
+    """`smooth_motion` of one window, whose first frames are settled (L, N)."""
+    smoothness, target_TD3, joints_NC = task.smoothness, task.target_TD3, problem.blocks.joints_NC
+    fixed_T = torch.arange(len(candidates_TSN), device=candidates_TSN.device) < len(before_LN)
+
+    def polish(path_TN: Tensor) -> tuple[Tensor, Tensor]:
+        return refine(problem, path_TN, target_TD3, smoothness, task.sweeps, task.tolerance, fixed_T)
+
+    settled = _settled(candidates_TSN, cost_TSC, before_LN)
+    path_TN, path_cost_TC = best_path(*settled, joints_NC, smoothness.pull)
+    motion_TN, cost_C = polish(path_TN)
     more_TSN, more_cost_TSC = _bridge(problem, path_TN, path_cost_TC, target_TD3)
     if more_TSN.shape[1]:
         candidates_TSN, cost_TSC = torch.cat((candidates_TSN, more_TSN), 1), torch.cat((cost_TSC, more_cost_TSC), 1)
-        other_TN = best_path(candidates_TSN, cost_TSC, problem.blocks.joints_NC, pull)[0]
+        other_TN = best_path(*_settled(candidates_TSN, cost_TSC, before_LN), joints_NC, smoothness.pull)[0]
         if bool(((other_TN - path_TN).abs() > _JUMP).any()):
-            other_TN, other_cost_C = refine(problem, other_TN, target_TD3, pull)
+            other_TN, other_cost_C = polish(other_TN)
             motion_TN = torch.where((other_cost_C < cost_C)[problem.blocks.block_N], other_TN, motion_TN)
-    return motion_TN
+    return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+
+
+def _settled(candidates_TSN: Tensor, cost_TSC: Tensor, before_LN: Tensor) -> tuple[Tensor, Tensor]:
+    """The candidates and their costs, the first frames' all the same."""
+    first = len(before_LN)
+    if not first:
+        return candidates_TSN, cost_TSC
+    settled_LSN = before_LN[:, None].expand(-1, candidates_TSN.shape[1], -1)
+    return torch.cat((settled_LSN, candidates_TSN[first:])), torch.cat((0 * cost_TSC[:first], cost_TSC[first:]))
 
 
 def best_path(candidates_TSN: Tensor, cost_TSC: Tensor, joints_NC: Tensor, pull: float) -> tuple[Tensor, Tensor]:
@@ -87,78 +148,3 @@ def _bridge(
         path_TN[source_TS[across_TS]], target_TD3[frame_X], steps=12, tolerance=1e-2
     )
     return found_TSN, cost_TSC
-
-
-def refine(
-    problem: DirectionProblem,
-    q_TN: Tensor,
-    target_TD3: Tensor,
-    pull: float,
-    sweeps: int = 100,
-    tolerance: float = 3e-4,
-    fixed_T: Tensor | None = None,
-) -> tuple[Tensor, Tensor]:
-    """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
-
-    Gauss-Newton on all frames at once: the system is block-tridiagonal, solved as a banded one. Joints at a limit that
-    the descent would push beyond it are frozen for the step. A block's step counts only if the block's cost falls;
-    damping is raised in the frames whose own share of the cost rose. A block ends when a step turns none of its joints
-    by `tolerance` [rad], or five steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
-    """
-    model = _motion_quadratic(problem, q_TN, target_TD3, pull)
-    cost_C = model.cost_BC.double().sum(0)
-    damping_TC = torch.full_like(model.cost_BC, 1e-3)
-    failures_C = torch.zeros_like(cost_C)
-    for _ in range(sweeps):
-        running_N = (failures_C < _PATIENCE)[problem.blocks.block_N]
-        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC[:, problem.blocks.block_N], pull, fixed_T)
-        trial_TN = torch.where(running_N, torch.clamp(trial_TN, problem.lower_N, problem.upper_N), q_TN)
-        trial = _motion_quadratic(problem, trial_TN, target_TD3, pull)
-        trial_cost_C = trial.cost_BC.double().sum(0)
-        better_C = trial_cost_C < cost_C
-        moved_C = ((trial_TN - q_TN).abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
-        settled_C = better_C & (moved_C < tolerance)
-        failures_C = torch.where(better_C, torch.where(settled_C, _PATIENCE, 0), failures_C + 1)
-        damping_TC = torch.where(trial.cost_BC > model.cost_BC, damping_TC * 10, damping_TC * 0.1).clamp(1e-3, 1e6)
-        q_TN = torch.where(better_C[problem.blocks.block_N], trial_TN, q_TN)
-        cost_C = torch.where(better_C, trial_cost_C, cost_C)
-        model = model.where(better_C, problem.blocks.block_N, trial)
-        if bool((failures_C >= _PATIENCE).all()):
-            break
-    return q_TN, cost_C
-
-
-def _motion_quadratic(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, pull: float) -> Quadratic:
-    """The model of each frame, with the pull in gradients and in costs (half of a step's in each of its two frames)."""
-    chunks = zip(q_TN.split(problem.chunk), target_TD3.split(problem.chunk), strict=True)
-    parts = [problem.quadratic(*chunk) for chunk in chunks]
-    model = Quadratic(
-        torch.cat([part.cost_BC for part in parts]),
-        torch.cat([part.gradient_BN for part in parts]),
-        torch.cat([part.hessian_BNN for part in parts]),
-    )
-    return add_pull(model, q_TN, pull, problem.blocks.joints_NC)
-
-
-def _motion_step(
-    problem: DirectionProblem, q_TN: Tensor, model: Quadratic, damping_TN: Tensor, pull: float, fixed_T: Tensor | None
-) -> Tensor:
-    """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints."""
-    frames, joints = q_TN.shape
-    free_TN = ~problem.frozen(q_TN, model.gradient_BN)
-    if fixed_T is not None:
-        free_TN &= ~fixed_T[:, None]
-    both_TNN = free_TN[:, :, None] & free_TN[:, None, :]
-    system_TNN = (model.hessian_BNN * both_TNN).double().cpu().numpy()
-    diagonal_TN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1)
-    diagonal_TN = diagonal_TN + pull_diagonal(frames, pull, diagonal_TN) + damping_TN * (diagonal_TN + 0.01)
-    # Lower banded form: row k holds the entries k below the diagonal; the next frame's same joint is `joints` below.
-    banded = np.zeros((joints + 1, frames, joints))
-    banded[0] = torch.where(free_TN, diagonal_TN, torch.ones_like(diagonal_TN)).cpu().numpy()
-    for k in range(1, joints):
-        banded[k, :, : joints - k] = np.diagonal(system_TNN, offset=-k, axis1=1, axis2=2)
-    banded[joints, :-1] = -pull * (free_TN[1:] & free_TN[:-1]).cpu().numpy()
-    right = -(model.gradient_BN * free_TN).double().cpu().numpy()
-    step = solveh_banded(banded.reshape(joints + 1, -1), right.ravel(), lower=True, overwrite_ab=True, overwrite_b=True,
-                         check_finite=False)  # fmt: skip
-    return torch.from_numpy(step.reshape(frames, joints)).to(q_TN)

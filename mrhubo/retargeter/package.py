@@ -22,6 +22,7 @@ from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
+from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError, shortened
@@ -134,7 +135,7 @@ class Retargeter(nn.Module):
 
     def _predict(self, local_TJ33: Tensor, polish: int) -> Tensor:
         human = self.body_map.human(local_TJ33) if polish and len(local_TJ33) else None
-        return self._answer(local_TJ33, None if human is None else self.body_map.human_directions(human), polish)
+        return self.answer(local_TJ33, None if human is None else self.body_map.human_directions(human), polish)
 
     @torch.no_grad()
     def retarget(self, local_TJ33: MotionLike, polish: int = POLISH) -> RetargetResult:
@@ -146,7 +147,17 @@ class Retargeter(nn.Module):
     def _retarget(self, local_TJ33: Tensor, polish: int) -> RetargetResult:
         human = self.body_map.human(local_TJ33)
         target_TD3 = self.body_map.human_directions(human)
-        q_TN = self._answer(local_TJ33, target_TD3, polish)
+        return self._judge(self.answer(local_TJ33, target_TD3, polish), human, target_TD3)
+
+    @torch.no_grad()
+    def judge(self, q_TN: Tensor, local_TJ33: Tensor) -> RetargetResult:
+        """What `retarget` tells about its own answers, for any joint angles (T, N) [rad] and human poses (T, 21, 3, 3),
+        both on the retargeter's device, float32.
+        """
+        human = self.body_map.human(local_TJ33)
+        return self._judge(q_TN, human, self.body_map.human_directions(human))
+
+    def _judge(self, q_TN: Tensor, human: HumanPose, target_TD3: Tensor) -> RetargetResult:
         links = self.body_map.robot.forward(q_TN)
         robot_TD3, columns = self.body_map.robot_directions(links), self.body_map.measured
         error_deg_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
@@ -173,8 +184,16 @@ class Retargeter(nn.Module):
             refuse_frames(largest_T > _LARGEST, "numbers that no rotation has", number * _CHUNK)
             yield part.to(self.device, torch.float32)
 
-    def _answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int) -> Tensor:
-        """Joint angles (T, N) [rad]; the human's directions (T, D, 3) are needed for steps of optimisation."""
+    @torch.no_grad()
+    def answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int = 0) -> Tensor:
+        """Joint angles (T, N) [rad] for poses that are known to be good, on the retargeter's device, float32.
+
+        Args:
+            local_TJ33: human poses (T, 21, 3, 3).
+            target_TD3: their directions (`BodyMap.human_directions`), or others that shall be imitated in their place;
+                needed for steps of optimisation. Networks that see directions see these.
+            polish: as for `predict`.
+        """
         features = self.network.features
         if target_TD3 is not None and isinstance(features, DirectionFeatures):
             q_TN = self.network.joints(features.of(target_TD3))

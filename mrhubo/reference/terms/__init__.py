@@ -3,7 +3,7 @@
 from mrhubo.reference.terms.directions import DirectionTerm
 from mrhubo.reference.terms.posture import PostureTerm
 from mrhubo.reference.terms.self_collision import SelfCollisionTerm
-from mrhubo.reference.terms.smoothness import add_pull, pull_diagonal
+from mrhubo.reference.terms.smoothness import Smoothness, StepPenalty
 from mrhubo.reference.terms.term import Quadratic, State, Term
 
 __all__ = [
@@ -11,8 +11,8 @@ __all__ = [
     "PostureTerm",
     "Quadratic",
     "SelfCollisionTerm",
+    "Smoothness",
     "State",
+    "StepPenalty",
     "Term",
-    "add_pull",
-    "pull_diagonal",
 ]

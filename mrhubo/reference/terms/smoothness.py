@@ -1,35 +1,133 @@
-"""A motion's joints move slowly:  pull * sum_t |q_t - q_(t-1)|^2
+"""The terms of a motion's cost that couple frames: joints move slowly, evenly, and never faster than they can.
 
-The one term that couples frames. Half of a step's cost is counted in each of its two frames.
+    pull * sum_t |q_t - q_(t-1)|^2                                          velocity
+    sum_t jerk_t * |q_t - 3 q_(t-1) + 3 q_(t-2) - q_(t-3)|^2                its second derivative in time
+    sum_t weight * max(0, |q_t - q_(t-1)| - step + shift_t)^2               the limit, softly
 
-Legend: T frames, N joints, C blocks.
+The third is the penalty of an augmented Lagrangian (M. R. Hestenes, "Multiplier and gradient methods", 1969): where a
+step stays too long, its shift grows, until it does not. Whatever a term costs in several frames, each of them bears the
+same share of it.
+
+Legend: T frames, X steps between them, Y = T - 3 differences of third order, N joints, C blocks.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
-from mrhubo.reference.terms.term import Quadratic
+_THIRD = (-1.0, 3.0, -3.0, 1.0)
 
 
-def add_pull(model: Quadratic, q_TN: Tensor, pull: float, joints_NC: Tensor) -> Quadratic:
-    """The model of every frame with the term's cost and gradient, for joint angles (T, N) [rad].
+@dataclass(frozen=True)
+class StepPenalty:
+    """What steps cost that are longer than they may be."""
 
-    Its Hessian couples frames, so it is none of a frame's own: `pull_diagonal`, and -pull between a joint and the same
-    joint of the next frame.
-    """
-    moved_TN = torch.nn.functional.pad(q_TN.diff(dim=0), (0, 0, 1, 1))
-    pulls_TC = pull / 2 * moved_TN.square() @ joints_NC
-    return Quadratic(
-        model.cost_BC + pulls_TC[1:] + pulls_TC[:-1],
-        model.gradient_BN + pull * (moved_TN[:-1] - moved_TN[1:]),
-        model.hessian_BNN,
-    )
+    step_N: Tensor
+    """How far a joint may turn from one frame to the next [rad]."""
+    shift_XN: Tensor
+    """By how much less than that a step is free of cost [rad]."""
+    weight: float
+    """[1/rad^2]."""
+
+    def excess(self, moved_XN: Tensor) -> Tensor:
+        """What is too much of each step (X, N) [rad], with its sign."""
+        return moved_XN.sign() * (moved_XN.abs() - self.step_N + self.shift_XN).clamp(min=0)
+
+    def shifted(self, moved_XN: Tensor) -> StepPenalty:
+        """The same with shifts that have learned from the steps (X, N) [rad] of a minimum."""
+        return StepPenalty(self.step_N, self.excess(moved_XN).abs(), self.weight)
 
 
-def pull_diagonal(frames: int, pull: float, like: Tensor) -> Tensor:
-    """Half of the diagonal (T, 1) of the term's Hessian: a frame has two neighbours, the first and the last one."""
-    neighbours_T1 = like.new_full((frames, 1), 2.0)
-    neighbours_T1[0], neighbours_T1[-1] = 1.0, 1.0
-    return pull * neighbours_T1
+@dataclass(frozen=True)
+class Smoothness:
+    """The terms above."""
+
+    pull: float
+    """[1/rad^2]."""
+    jerk_YN: Tensor | None = None
+    """[1/rad^2]; None: it costs nothing."""
+    penalty: StepPenalty | None = None
+
+    @property
+    def reach(self) -> int:
+        """How many frames before it a frame is coupled to."""
+        return 1 if self.jerk_YN is None else 3
+
+    def at(self, frame_X: Tensor) -> Smoothness:
+        """The same for some frames alone (X,), by their numbers."""
+        jerk, penalty = self.jerk_YN, self.penalty
+        if penalty is not None:
+            penalty = dataclasses.replace(penalty, shift_XN=penalty.shift_XN[frame_X[1:] - 1])
+        if jerk is not None:
+            jerk = jerk[frame_X[3:] - 3]
+        return Smoothness(self.pull, jerk, penalty)
+
+    def costs(self, q_TN: Tensor, joints_NC: Tensor) -> Tensor:
+        """What each frame bears (T, C), for joint angles (T, N) [rad]."""
+        moved_XN = q_TN.diff(dim=0)
+        cost_XN = self.pull * moved_XN.square()
+        if self.penalty is not None:
+            cost_XN = cost_XN + self.penalty.weight * self.penalty.excess(moved_XN).square()
+        cost_TN = _shared(cost_XN, 1)
+        if self.jerk_YN is not None and len(self.jerk_YN):
+            cost_TN = cost_TN + _shared(self.jerk_YN * q_TN.diff(n=3, dim=0).square(), 3)
+        return cost_TN @ joints_NC.to(q_TN)
+
+    def gradient(self, q_TN: Tensor) -> Tensor:
+        """Half of the gradient (T, N)."""
+        moved_XN = q_TN.diff(dim=0)
+        force_XN = self.pull * moved_XN
+        if self.penalty is not None:
+            force_XN = force_XN + self.penalty.weight * self.penalty.excess(moved_XN)
+        gradient_TN = _spread(force_XN, (-1.0, 1.0))
+        if self.jerk_YN is not None and len(self.jerk_YN):
+            gradient_TN = gradient_TN + _spread(self.jerk_YN * q_TN.diff(n=3, dim=0), _THIRD)
+        return gradient_TN
+
+    def hessian(self, q_TN: Tensor) -> list[Tensor]:
+        """Half of the Gauss-Newton Hessian: its diagonal (T, N), then its entries between each frame and the next (T - 1,
+        N), the one after that (T - 2, N), and so on.
+        """
+        moved_XN = q_TN.diff(dim=0)
+        weight_XN = torch.full_like(moved_XN, self.pull)
+        if self.penalty is not None:
+            weight_XN = weight_XN + self.penalty.weight * (self.penalty.excess(moved_XN) != 0)
+        bands = _bands(weight_XN, (-1.0, 1.0))
+        if self.jerk_YN is not None and len(self.jerk_YN):
+            more = _bands(self.jerk_YN, _THIRD)
+            bands = [bands[0] + more[0], bands[1] + more[1], *more[2:]]
+        return bands
+
+
+def _shared(cost_XN: Tensor, order: int) -> Tensor:
+    """Each frame's share (T, N) of what differences of some order (T - order, N) cost."""
+    padded = torch.nn.functional.pad(cost_XN / (order + 1), (0, 0, order, order))
+    return padded.unfold(0, order + 1, 1).sum(-1)
+
+
+def _spread(force_XN: Tensor, row: tuple[float, ...]) -> Tensor:
+    """The transpose of taking differences: (T, N) of (X, N), each with the coefficients of `row` in its frames."""
+    order = len(row) - 1
+    return _sum(torch.nn.functional.pad(c * force_XN, (0, 0, i, order - i)) for i, c in enumerate(row))
+
+
+def _bands(weight_XN: Tensor, row: tuple[float, ...]) -> list[Tensor]:
+    """The diagonals of the differences' matrix D in D^T diag(weight) D."""
+    order = len(row) - 1
+    return [
+        _sum(
+            torch.nn.functional.pad(row[i] * row[i + lag] * weight_XN, (0, 0, i, order - lag - i))
+            for i in range(order - lag + 1)
+        )
+        for lag in range(order + 1)
+    ]
+
+
+def _sum(parts: Iterable[Tensor]) -> Tensor:
+    return functools.reduce(torch.add, parts)

@@ -1,0 +1,100 @@
+"""No joint turns faster than it can: a hard bound on the steps of a motion.
+
+    |q_t - q_(t-1)| <= step        for every joint, from each frame to the next
+
+First the nearest motion that keeps to it, then the best one near that: an augmented Lagrangian around the frames that
+were too fast, whose last thousandths the nearest motion takes away again.
+
+Legend: T frames, X steps between them, N joints, D directions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import torch
+from torch import Tensor
+
+from mrhubo.reference.refine import motion_cost, refine_around, widen
+from mrhubo.reference.solve import DirectionProblem
+from mrhubo.reference.terms import Smoothness, StepPenalty
+
+_WEIGHT = 30.0
+"""Of the penalty [1/rad^2]: some ten times a frame's own curvature, so that few rounds are enough."""
+_ROUNDS, _SWEEPS, _TOLERANCE = 4, 6, 1e-3
+_ENOUGH = 1e-3
+"""Steps that are too long by no more than this share of the bound are left to the projection."""
+_AROUND_S = 0.5
+"""Frames this near in time [s] to those that were too fast may change."""
+_FLOAT = 4e-7
+"""Rounding of a difference of two angles of up to 2 pi [rad], float32."""
+
+
+def speed_bound(velocity_N: Tensor, frame_rate: float) -> tuple[Tensor, int]:
+    """How far joints may turn (N,) [rad] from one frame to the next, less what rounding of the angles may add; and how
+    many frames away from those that were too fast are still worth changing.
+    """
+    step_N = velocity_N / frame_rate
+    return torch.maximum(step_N - 2 * _FLOAT, step_N / 2), math.ceil(_AROUND_S * frame_rate)
+
+
+def nearest_slow(q_TN: Tensor, step_N: Tensor) -> Tensor:
+    """The motion (T, N) [rad] without a step longer than `step_N` (N,) whose largest distance from `q_TN` is least.
+
+    It is the mean of the least and the greatest of all motions that keep to the bound, above and below the given one:
+    E. J. McShane, "Extension of range of functions", 1934. Nothing leaves the range that the joint had. Joints that
+    keep to the bound stay as they are, to the bit.
+    """
+    too_fast_N = (q_TN.diff(dim=0).abs() > step_N).any(dim=0)
+    if not bool(too_fast_N.any()):
+        return q_TN
+    path_TM, step_M = q_TN[:, too_fast_N].double(), step_N[too_fast_N].double()
+    ramp_TM = torch.arange(len(q_TN), device=q_TN.device).double()[:, None] * step_M
+
+    def least_above(path_TM: Tensor) -> Tensor:
+        """max over s of path_s - step |t - s|."""
+        before_TM = (path_TM + ramp_TM).cummax(dim=0).values - ramp_TM
+        after_TM = (path_TM - ramp_TM).flip(0).cummax(dim=0).values.flip(0) + ramp_TM
+        return torch.maximum(before_TM, after_TM)
+
+    found_TN = q_TN.clone()
+    found_TN[:, too_fast_N] = ((least_above(path_TM) - least_above(-path_TM)) / 2).to(q_TN)
+    return found_TN
+
+
+def keep_speed(
+    problem: DirectionProblem,
+    q_TN: Tensor,
+    target_TD3: Tensor,
+    smoothness: Smoothness,
+    step_N: Tensor,
+    around: int,
+    fixed_T: Tensor | None = None,
+) -> Tensor:
+    """The best motion (T, N) [rad] near another that keeps to the bound; one that keeps to it stays, to the bit.
+
+    Blocks of joints without a step that is too long stay too, and so do frames that are more than `around` away from
+    those that the nearest slow motion changes, and those in `fixed_T` (T,), whose steps are short enough.
+    """
+    nearest_TN = nearest_slow(q_TN, step_N)
+    changed_TN = nearest_TN != q_TN
+    if not bool(changed_TN.any()):
+        return q_TN
+    free_T = widen(changed_TN.any(dim=1), around)
+    if fixed_T is not None:
+        free_T, nearest_TN = free_T & ~fixed_T, torch.where(fixed_T[:, None], q_TN, nearest_TN)
+    penalty = StepPenalty(step_N, torch.zeros_like(q_TN[1:]), _WEIGHT)
+    found_TN = nearest_TN
+    for _ in range(_ROUNDS):
+        firm = dataclasses.replace(smoothness, penalty=penalty)
+        found_TN = refine_around(problem, found_TN, target_TD3, firm, free_T, _SWEEPS, _TOLERANCE)
+        moved_XN = found_TN.diff(dim=0)
+        if not bool((moved_XN.abs() > (1 + _ENOUGH) * step_N).any()):
+            break
+        penalty = penalty.shifted(moved_XN)
+    found_TN = nearest_slow(found_TN, step_N)
+    costs = [motion_cost(problem, motion_TN, target_TD3, smoothness) for motion_TN in (found_TN, nearest_TN)]
+    found_TN = torch.where((costs[0] < costs[1])[problem.blocks.block_N], found_TN, nearest_TN)
+    concerned_C = changed_TN.any(dim=0).float() @ problem.blocks.joints_NC > 0
+    return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)
