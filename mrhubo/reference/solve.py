@@ -120,8 +120,7 @@ class DirectionProblem(nn.Module):
     def step(
         self, q_BN: Tensor, model: Quadratic, damping_BN: Tensor, bounds: tuple[Tensor, Tensor] | None = None
     ) -> Tensor:
-        """Damped Gauss-Newton step (B, N) [rad] of the joints that are not frozen at a limit (`frozen`); the others stay.
-        """
+        """Damped Gauss-Newton step (B, N) [rad] of the joints that are not `frozen` at a limit; the others stay."""
         free_BN = (~self.frozen(q_BN, model.gradient_BN, bounds)).to(q_BN)
         diagonal_BN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1)
         system_BNN = model.hessian_BNN * (free_BN[:, :, None] * free_BN[:, None, :])

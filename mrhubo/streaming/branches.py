@@ -79,7 +79,7 @@ class Branches:
         )  # fmt: skip
         (moved_BN, other_BN), (cost_BC, other_cost_BC) = both_YN.chunk(2), cost_YC.chunk(2)
         weight_BC = (target_BD3.norm(dim=-1) * problem.directions.weight_D) @ problem.blocks.directions_DC
-        excess_BC = ((cost_BC.sqrt() - other_cost_BC.sqrt()) / weight_BC.clamp_min(1e-9).sqrt())
+        excess_BC = (cost_BC.sqrt() - other_cost_BC.sqrt()) / weight_BC.clamp_min(1e-9).sqrt()
         worse_BC = torch.where(
             excess_BC > math.radians(self.settings.worse_deg), state.worse_BC + passed_B[:, None], 0.0
         )
@@ -91,7 +91,7 @@ class Branches:
     def _steps(
         self, q_YN: Tensor, target_YD3: Tensor, pull_Y: Tensor, bounds: tuple[Tensor, Tensor]
     ) -> tuple[Tensor, Tensor]:
-        """Levenberg-Marquardt steps (Y, N) of cost plus pull, inside bounds, and the cost of each block (Y, C) alone."""
+        """Answers (Y, N) after steps on cost plus pull, inside bounds, and what each block costs (Y, C) without pull."""
         problem, centre_YN = self.problem, q_YN
         block_N, joints_NC = problem.blocks.block_N, problem.blocks.joints_NC
         model = problem.quadratic(q_YN, target_YD3)

@@ -1,8 +1,8 @@
 """Joints that follow a goal within limits of angle, speed and acceleration, at any times.
 
-With speed v after a step of time h, braking at the acceleration a needs no more than v^2 / (2 a), however time is then cut
-into steps (each step goes on at the speed to which it has braked). So the largest v from which a joint at the distance d
-can still stop fulfils  v h + v^2 / (2 a) = d,  that is
+With speed v after a step of time h, braking at the acceleration a needs no more than v^2 / (2 a), however time is then
+cut into steps (each step goes on at the speed to which it has braked). So the largest v from which a joint at the
+distance d can still stop fulfils  v h + v^2 / (2 a) = d,  that is
 
     v = 2 d / (h + sqrt(h^2 + 2 d / a)),
 

@@ -1,8 +1,8 @@
 """The One-Euro filter, on the directions that robot and human share.
 
 Casiez, Roussel, Vogel, "1 Euro Filter: A Simple Speed-based Low-pass Filter for Noisy Input in Interactive Systems",
-CHI 2012. A first-order low pass whose time constant falls as the speed rises: noise is seen where a limb rests, lag where
-it moves. Its parameters are written as times and speeds: 1 / tau = (1 + speed / half_speed) / rest_time is the paper's
+CHI 2012. A first-order low pass whose time constant falls as the speed rises: noise is seen where a limb rests, lag
+where it moves. Its parameters are written as times and speeds: 1 / tau = (1 + speed / half_speed) / rest_time is the paper's
 f_c = f_min + beta speed, with tau = 1 / (2 pi f_c).
 
 Directions are filtered in place of rotations, as they are all that the cost reads: files that share the same limbs out
@@ -54,8 +54,8 @@ def one_euro(
         state: the last one.
         raw_BD3: directions that are seen now.
         passed_B: time since the last ones [s], more than 0.
-        unit_D1: 1 for directions that have length 1 (D, 1), 0 for those whose length is how much they count; of these
-            it is filtered along, so that one that points to and fro counts little.
+        unit_D1: 1 for directions that have length 1 (D, 1), 0 for those whose length is how much they count, which is
+            filtered along.
         settings: the time constants.
     """
     passed_B11 = passed_B[:, None, None]

@@ -14,24 +14,28 @@ class StreamSettings:
 
     rest_time: float = 0.1
     """Time constant [s] of the filter on what is seen of a person who stands still, 0 or more; 0: no filter."""
-    half_speed: float = 0.2
+    half_speed: float = 0.1
     """Speed of a limb [rad/s] at which the time constant is half as long, at twice that speed a third, and so on; more
-    than 0. Slower than this, nobody sees a lag; what shakes faster is a motion."""
+    than 0. A limb's lag, in angle, is thus at most `rest_time` times this speed: with the defaults 0.6 degrees."""
     speed_time: float = 0.05
     """Time constant [s] of the estimate of that speed, 0 or more."""
-    smoothness: float = 0.02
+    smoothness: float = 0.01
     """Weight of the pull towards the last answer, 0 or more: that of |q_t - q_(t-1)|^2 at 24 frames a second [1/rad^2],
-    and at other rates the same for the same speed, as for the reference (`evaluation.smoothness`)."""
+    and at other rates the same for the same speed. Half of the reference's (`evaluation.smoothness`), as no next frame
+    pulls the other way: at 60 frames a second it holds a straight arm's twist ten times as firmly as two degrees of
+    noise turn it, and holds up a limb by less than a tenth of a frame."""
     worse_deg: float = 5.0
     """How much worse [degrees, root mean square over an arm's limbs] the branch that is followed must be than the other
     one to be left, 0 or more."""
     worse_time: float = 0.2
     """For how long [s] without a break, 0 or more."""
-    ramp_time: float = 0.1
-    """Time [s] from rest to a joint's full speed, which limits its acceleration; 0: no such limit."""
+    ramp_time: float = 0.05
+    """Time [s] from rest to a joint's full speed, which limits its acceleration; 0: no such limit. URDFs give none; this
+    is 160 rad/s^2 for NAO, about what a boxer's arm reaches."""
     longest_gap: float = 0.1
-    """No more time [s] than this, or than one and a half frames, counts as passed since the last answer when joints move:
-    after a gap the robot goes on from where it stands, in place of leaping to where it would be by now. More than 0."""
+    """No more time [s] than this, or than one and a half frames, counts as passed since the last answer when joints
+    move: after a gap the robot goes on from where it stands, and does not leap to where it would be by now. More than
+    0."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
