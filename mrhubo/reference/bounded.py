@@ -24,8 +24,8 @@ _APART = 0.995
 _SLACK = 0.05
 """Least slack [rad] to begin with."""
 _GIVE = 1e-6
-"""How far a bound gives way [rad] for each unit of its multiplier: so there is a minimum, too, where bounds leave no room
-between them (a joint that must run all the way from one settled frame to another)."""
+"""How far a bound gives way [rad] for each unit of its multiplier: so there is a minimum, too, where bounds leave no
+room between them (a joint that must run all the way from one settled frame to another)."""
 
 
 @dataclass(frozen=True)
