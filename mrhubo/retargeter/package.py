@@ -20,7 +20,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.config import Config
 from mrhubo.errors import UserError
-from mrhubo.motion import MotionLike, read_poses
+from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.poses import check_frame_rate
 from mrhubo.reference import DirectionProblem, Polish, angle_between
 from mrhubo.retargeter.clip import join_frames
@@ -159,12 +159,14 @@ class Retargeter(nn.Module):
         Args:
             local_TJ33: as for `predict`.
             polish: as for `predict`.
-            frame_rate: frames per second, if the poses are one motion.
+            frame_rate: frames per second, if the poses are one motion; a `Motion` has its own.
             together: all frames become one smooth motion, as for `predict`; None: where the frame rate is known.
 
         Raises:
             UserError: as for `predict`; or a motion without a frame rate is to become smooth.
         """
+        if isinstance(local_TJ33, Motion):
+            frame_rate = local_TJ33.frame_rate
         if together and frame_rate is None:
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
         q_TN = self.predict(local_TJ33, polish, None if together is False else frame_rate)
