@@ -59,9 +59,7 @@ _FRAMES, _REFERENCE = "frame by frame", "reference"
 _WAYS: Mapping[str, Way] = {
     "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
     _FRAMES: Way("retarget", lambda r, motions: [r.predict(m.local_TJ33, POLISH) for m in motions]),
-    "whole clips": Way(
-        "clip", lambda r, motions: [r.predict(m.local_TJ33, POLISH, m.frame_rate) for m in motions]
-    ),
+    "whole clips": Way("clip", lambda r, motions: [r.predict(m.local_TJ33, POLISH, m.frame_rate) for m in motions]),
     "stream": Way("stream", lambda r, motions: [result.q for result in Stream(r).retarget_all(motions)]),
 }
 
