@@ -113,7 +113,7 @@ def test_reverse_pairs_are_the_references_answer_to_the_priors_poses(root: Path,
     assert float(cost_B.mean()) < 1.02 * float(reference.solve_frames(local_BJ33)[1].mean()), (
         "no better with more starts"
     )
-    assert abs(float(pairs["z_norm"].mean()) / BodyPrior.open().latent ** 0.5 - 1.1) < 0.1
+    assert abs(float(pairs["z_norm"][:50].mean()) / BodyPrior.open().latent ** 0.5 - 1.1) < 0.1
 
 
 def test_another_share_of_reverse_pairs_keeps_what_is_there(root: Path, made: PairStore, tmp_path: Path) -> None:
