@@ -9,6 +9,7 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config
 from mrhubo.files.storage import DamagedFile
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
@@ -52,13 +53,11 @@ def test_aligned_humans_point_where_the_robot_does(root: Path, made: PairStore, 
     before = generate(config_of(root, tmp_path, "pairs.align=false")).read_all()
     after, body_map = made.read_all(), build_body_map(config_of(root, tmp_path).robot)
     forward = ~after["reverse"]
-    measured = body_map.measured
-    directions = body_map.robot_directions(body_map.robot.forward(after["q"][forward]))[:, measured]
-    aligned, unaligned = (
-        body_map.human_directions(rotation.stack_columns(pairs["H"][forward]))[:, measured] for pairs in (after, before)
-    )
-    torch.testing.assert_close(aligned, directions, atol=1e-4, rtol=0)
-    assert float((unaligned - directions).abs().max()) > 0.1
+    directions = body_map.robot_directions(body_map.robot.forward(after["q"][forward]))
+    unaligned, aligned = (body_map.human_directions(rotation.stack_columns(p["H"][forward])) for p in (before, after))
+    shown = body_map.measured
+    torch.testing.assert_close(aligned[:, shown], directions[:, shown], atol=1e-4, rtol=0)
+    assert float((unaligned - directions)[:, shown].abs().max()) > 0.1
     for name in ("q", "R", "cost", "residual_m", "z_norm"):
         torch.testing.assert_close(after[name], before[name])
     assert torch.equal(after["H"][~forward], before["H"][~forward])
@@ -83,10 +82,9 @@ def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
     torch.testing.assert_close((reached - target).norm(dim=-1).mean(1), pairs["residual_m"], atol=1e-5, rtol=1e-3)
     assert pairs["reverse"].tolist() == 150 * [False] + 100 * [True]
     directions = body_map.human_directions(matrices) * body_map.robot_directions(robot.forward(pairs["q"]))
-    directions = directions[:, body_map.measured]
-    for reverse in (False, True):
-        same = directions.sum(-1)[pairs["reverse"] == reverse].mean()
-        assert float(same) > 0.8, "human and robot limbs point the same way"
+    for reverse, least in ((False, 0.8), (True, 0.6)):  # many a drawn pose is out of the robot's reach
+        same = directions[:, body_map.measured].sum(-1)[pairs["reverse"] == reverse].mean()
+        assert float(same) > least, "human and robot limbs point the same way"
 
 
 def test_phi_of_the_whole_pose_is_the_papers(root: Path, tmp_path: Path) -> None:
@@ -113,7 +111,11 @@ def test_reverse_pairs_are_the_references_answer_to_the_priors_poses(root: Path,
     assert float(cost_B.mean()) < 1.02 * float(reference.solve_frames(local_BJ33)[1].mean()), (
         "no better with more starts"
     )
-    assert abs(float(pairs["z_norm"][:50].mean()) / BodyPrior.open().latent ** 0.5 - 1.1) < 0.1
+    drawn = 50  # of each shard's 100 the last half is drawn joint by joint, legs and back at rest
+    assert abs(float(pairs["z_norm"][:drawn].mean()) / BodyPrior.open().latent ** 0.5 - 1.1) < 0.1
+    legs = [i for i, name in enumerate(POSED_JOINT_NAMES) if name.endswith(("hip", "knee"))]
+    at_rest = (local_BJ33[:, legs] - torch.eye(3)).abs().amax(dim=(1, 2, 3)) < 1e-6
+    assert at_rest.tolist() == [i >= drawn for i in range(len(at_rest))]
 
 
 def test_another_share_of_reverse_pairs_keeps_what_is_there(root: Path, made: PairStore, tmp_path: Path) -> None:
