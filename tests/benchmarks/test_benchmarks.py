@@ -24,6 +24,7 @@ from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
 SCRIPTS = [
+    "confidence",
     "pair_pictures",
     "pair_quality",
     "pairing",
@@ -177,6 +178,14 @@ def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     torch.manual_seed(0)
     made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
     return made.save(tmp_path_factory.mktemp("package"), {"run_id": "abc"})
+
+
+def test_confidence(run: Run, package: Path, clips: Path, tmp_path: Path) -> None:
+    text = run("confidence", package, "--motions", clips, "--frames", 4, "--picture", tmp_path / "a.png")
+    ((_, _, error, *_), *others) = rows(text, "  ")
+    assert len(others) == 13 and 0 <= float(error) < 60
+    areas = {row[0].split(",")[0].split(" ")[0]: float(row[1]) for row in rows(text, "told apart")}
+    assert areas["elbows"] > 0.8 and (tmp_path / "a.png").stat().st_size > 10_000
 
 
 def test_retarget(run: Run, package: Path) -> None:

@@ -53,11 +53,13 @@ def test_aligned_humans_point_where_the_robot_does(root: Path, made: PairStore, 
     before = generate(config_of(root, tmp_path, "pairs.align=false")).read_all()
     after, body_map = made.read_all(), build_body_map(config_of(root, tmp_path).robot)
     forward = ~after["reverse"]
-    directions = body_map.robot_directions(body_map.robot.forward(after["q"][forward]))
-    unaligned, aligned = (body_map.human_directions(rotation.stack_columns(p["H"][forward])) for p in (before, after))
-    shown = body_map.measured
-    torch.testing.assert_close(aligned[:, shown], directions[:, shown], atol=1e-4, rtol=0)
-    assert float((unaligned - directions)[:, shown].abs().max()) > 0.1
+    measured = body_map.measured
+    directions = body_map.robot_directions(body_map.robot.forward(after["q"][forward]))[:, measured]
+    aligned, unaligned = (
+        body_map.human_directions(rotation.stack_columns(pairs["H"][forward]))[:, measured] for pairs in (after, before)
+    )
+    torch.testing.assert_close(aligned, directions, atol=1e-4, rtol=0)
+    assert float((unaligned - directions).abs().max()) > 0.1
     for name in ("q", "R", "cost", "residual_m", "z_norm"):
         torch.testing.assert_close(after[name], before[name])
     assert torch.equal(after["H"][~forward], before["H"][~forward])
