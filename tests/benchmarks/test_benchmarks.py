@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -181,7 +182,9 @@ def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_confidence(run: Run, package: Path, clips: Path, tmp_path: Path) -> None:
-    text = run("confidence", package, "--motions", clips, "--frames", 4, "--picture", tmp_path / "a.png")
+    (tmp_path / "one").mkdir()
+    shutil.copy(clips / "wave.npz", tmp_path / "one")
+    text = run("confidence", package, "--motions", tmp_path / "one", "--frames", 4, "--picture", tmp_path / "a.png")
     ((_, _, error, *_), *others) = rows(text, "  ")
     assert len(others) == 13 and 0 <= float(error) < 60
     areas = {row[0].split(",")[0].split(" ")[0]: float(row[1]) for row in rows(text, "told apart")}
