@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mrhubo.reference import OptimizationRetargeter
     from mrhubo.retargeter import Retargeter, RetargetResult
     from mrhubo.robot import Robot
+    from mrhubo.streaming import Stream
 
     __version__: str
 
@@ -30,6 +31,7 @@ __all__ = [
     "RetargetResult",
     "Retargeter",
     "Robot",
+    "Stream",
     "UserError",
     "__version__",
     "load",
@@ -42,6 +44,7 @@ _HOMES = {
     "RetargetResult": "mrhubo.retargeter",
     "Retargeter": "mrhubo.retargeter",
     "Robot": "mrhubo.robot",
+    "Stream": "mrhubo.streaming",
     "UserError": "mrhubo.errors",
     "read_motion": "mrhubo.motion",
 }

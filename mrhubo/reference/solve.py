@@ -74,9 +74,12 @@ class DirectionProblem(nn.Module):
         chunks = zip(q_BN.split(self.chunk), target_BD3.split(self.chunk), strict=True)
         return torch.cat([self.quadratic(*chunk).cost_BC for chunk in chunks])
 
-    def frozen(self, q_BN: Tensor, gradient_BN: Tensor) -> Tensor:
-        """Active set (B, N): joints at a limit that the gradient's descent would push beyond it."""
-        return ((q_BN <= self.lower_N) & (gradient_BN > 0)) | ((q_BN >= self.upper_N) & (gradient_BN < 0))
+    def frozen(self, q_BN: Tensor, gradient_BN: Tensor, bounds: tuple[Tensor, Tensor] | None = None) -> Tensor:
+        """Active set (B, N): joints at a limit that the gradient's descent would push beyond it; limits are the joints'
+        or `bounds`.
+        """
+        lower, upper = bounds or (self.lower_N, self.upper_N)
+        return ((q_BN <= lower) & (gradient_BN > 0)) | ((q_BN >= upper) & (gradient_BN < 0))
 
     def minimise(
         self, q_BN: Tensor, target_BD3: Tensor, steps: int = 40, tolerance: float = 1e-4
@@ -114,9 +117,11 @@ class DirectionProblem(nn.Module):
                 damping_BC = damping_BC[going_B]
         return found_BN, found_cost_BC
 
-    def step(self, q_BN: Tensor, model: Quadratic, damping_BN: Tensor) -> Tensor:
-        """Damped Gauss-Newton step (B, N) [rad] of the joints that are not frozen at a limit; the others stay."""
-        free_BN = (~self.frozen(q_BN, model.gradient_BN)).to(q_BN)
+    def step(
+        self, q_BN: Tensor, model: Quadratic, damping_BN: Tensor, bounds: tuple[Tensor, Tensor] | None = None
+    ) -> Tensor:
+        """Damped Gauss-Newton step (B, N) [rad] of the joints that are not `frozen` at a limit; the others stay."""
+        free_BN = (~self.frozen(q_BN, model.gradient_BN, bounds)).to(q_BN)
         diagonal_BN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1)
         system_BNN = model.hessian_BNN * (free_BN[:, :, None] * free_BN[:, None, :])
         extra_BN = torch.where(free_BN > 0, damping_BN * (diagonal_BN + 0.01), torch.ones_like(diagonal_BN))

@@ -4,6 +4,6 @@ from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.features import PoseFeatures
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.package import POLISH, Retargeter
-from mrhubo.retargeter.result import RetargetResult
+from mrhubo.retargeter.result import RetargetResult, join_results
 
-__all__ = ["POLISH", "PoseFeatures", "RetargetNetwork", "RetargetResult", "Retargeter", "build_network"]
+__all__ = ["POLISH", "PoseFeatures", "RetargetNetwork", "RetargetResult", "Retargeter", "build_network", "join_results"]

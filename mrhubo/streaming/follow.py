@@ -1,0 +1,94 @@
+"""What a stream does with each frame: filter, two branches, limits. People are a batch and know nothing of each other.
+
+Legend: B people, D directions, N joints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from mrhubo.retargeter import POLISH, Retargeter
+from mrhubo.streaming.branches import Branches, BranchState
+from mrhubo.streaming.limits import JointLimits, JointState
+from mrhubo.streaming.one_euro import OneEuroState, one_euro
+from mrhubo.streaming.settings import StreamSettings
+
+
+@dataclass(frozen=True)
+class StreamState:
+    """All that a stream remembers of its people."""
+
+    filtered: OneEuroState
+    branches: BranchState
+    joints: JointState
+    unseen_B: Tensor
+    """Time since each person was last seen [s]; infinite for one who never was."""
+    placed_B: Tensor
+    """Whether the robot already stands somewhere, so that it has to go from there."""
+
+
+class Follower:
+    """The work on a frame, for one retargeter."""
+
+    def __init__(self, retargeter: Retargeter, settings: StreamSettings, longest_step: float) -> None:
+        """`longest_step`: no more time [s] counts as passed when joints move."""
+        body_map = retargeter.body_map
+        self.retargeter, self.settings, self.longest_step = retargeter, settings, longest_step
+        self.branches = Branches(retargeter.directions, settings)
+        self.limits = JointLimits(body_map.robot, settings.ramp_time)
+        unit_D1 = torch.zeros(len(body_map.directions), 1)
+        unit_D1[body_map.measured] = 1.0
+        self._unit_D1 = unit_D1.to(retargeter.device)
+
+    def begin(self, people: int, q_BN: Tensor | None = None) -> StreamState:
+        """Nobody has been seen. `q_BN`: where the robots stand [rad], inside the limits; default: their home pose,
+        which the first answer may leave at once.
+        """
+        robot, problem = self.retargeter.body_map.robot, self.retargeter.directions
+        stand_BN = robot.home().expand(people, -1) if q_BN is None else q_BN
+        nothing_BD3 = stand_BN.new_zeros(people, len(self._unit_D1), 3)
+        return StreamState(
+            OneEuroState.at(nothing_BD3), BranchState.at(stand_BN, problem.blocks.joints_NC.shape[1]),
+            JointState.at_rest(stand_BN), stand_BN.new_full((people,), torch.inf),
+            torch.full((people,), q_BN is not None, device=stand_BN.device),
+        )  # fmt: skip
+
+    def advance(
+        self, state: StreamState, local_BJ33: Tensor, target_BD3: Tensor, seen_B: Tensor, passed: float
+    ) -> StreamState:
+        """The next state; its `joints.q_BN` are the answer.
+
+        Args:
+            state: the last one.
+            local_BJ33: human poses.
+            target_BD3: their directions.
+            seen_B: who is seen in this frame; the poses of the others are not looked at, only moved through.
+            passed: time since the last state [s], more than 0.
+        """
+        unseen_B = state.unseen_B + passed
+        since_B = unseen_B.clamp_max(self.longest_step)
+        filtered, branches = state.filtered, state.branches
+        velocity_BN = torch.zeros_like(branches.kept_BN)
+        joints = state.joints
+        if bool(seen_B.any()):
+            new_B, known_B = seen_B & unseen_B.isinf(), seen_B & unseen_B.isfinite()
+            filter_B = torch.where(known_B, unseen_B, self.longest_step)
+            moved = one_euro(filtered, target_BD3, filter_B, self._unit_D1, self.settings)
+            filtered = filtered.where(known_B, moved).where(new_B, OneEuroState.at(target_BD3))
+            aim_BD3 = filtered.filtered_BD3
+            network_BN = self.retargeter.answer(local_BJ33, aim_BD3)
+            if bool(known_B.any()):
+                followed, speed_BN = self.branches.advance(branches, network_BN, aim_BD3, since_B)
+                branches = branches.where(known_B, followed)
+                velocity_BN = torch.where(known_B[:, None], speed_BN, velocity_BN)
+            if bool(new_B.any()):
+                first_BN = self.retargeter.answer(local_BJ33, aim_BD3, POLISH)
+                branches = branches.where(new_B, BranchState.at(first_BN, branches.worse_BC.shape[1]))
+                joints = joints.where(new_B & ~state.placed_B, JointState.at_rest(first_BN))
+            unseen_B = torch.where(seen_B, 0.0, unseen_B)
+        step_B = torch.full_like(unseen_B, min(passed, self.longest_step))
+        joints = self.limits.follow(joints, branches.kept_BN, velocity_BN, step_B)
+        return StreamState(filtered, branches, joints, unseen_B, torch.ones_like(state.placed_B))
