@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import nan
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -89,7 +90,7 @@ def _columns(body_map: BodyMap, region: Region) -> list[int]:
     return [i for i, direction in enumerate(body_map.directions) if direction.part.region == region]
 
 
-def _excess(clip: Clip, error_TD: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, float]:
+def _excess(clip: Clip, error_TD: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, Any]:
     columns = _columns(body_map, "arm")
     if clip.optimum_TN is None or not columns:
         return {}
@@ -99,7 +100,7 @@ def _excess(clip: Clip, error_TD: Tensor, human_TD3: Tensor, body_map: BodyMap) 
     return {"excess_deg": float(excess_T.mean()), "excess_max_deg": float(excess_T.max())}
 
 
-def _speeds(clip: Clip, q_TN: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, float]:
+def _speeds(clip: Clip, q_TN: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, Any]:
     rate = clip.motion.frame_rate
     speed_XN = q_TN.diff(dim=0).abs() * rate
     if not len(speed_XN):

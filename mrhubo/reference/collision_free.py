@@ -3,7 +3,8 @@
 The cost of `solve` with one term more, self-collision, the same limits and the same solver, and ten times the
 smoothness. The margin is wider than what the penalty gives way, so the result is free of collision, not nearly so;
 where it still is not (every start of a frame ends in a collision), the motion rests in the free pose that is nearest in
-time.
+time. Joints of this motion may turn faster than they can: where two ways out lie on two sides of an obstacle, a slow
+motion between them would touch it.
 
 Legend: B problems, T frames, S starts, D directions, N joints, C = 1 block.
 """
