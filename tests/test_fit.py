@@ -248,7 +248,7 @@ def test_a_finished_fit_run_again_is_a_new_run_with_the_same_result(
         (["robot.urdf=nowhere/nao.urdf"], "nowhere/nao.urdf does not exist"),
         (["robot.key_links=[l_wirst]"], "nearest: 'l_wrist'"),
         (["robot.joints=[LShoulderPich]"], "nearest: 'LShoulderPitch'"),
-        (["model.input_joints=[left_elbo]"], "nearest: 'left_elbow'"),
+        (["model.input_joints=[left_elbo]", "model.input_frame=local"], "nearest: 'left_elbow'"),
         (["evaluation.motions=[nowhere]"], "nowhere"),
         (["evaluation.validation=[]"], "evaluation.validation"),
         (["body.prior_path=nowhere.safetensors"], "nowhere.safetensors"),

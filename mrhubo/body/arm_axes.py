@@ -1,32 +1,42 @@
-"""How an arm is turned about itself when it rests: SMPL's way, and the way of the CMU recordings that we hold.
+"""How an arm is turned about itself: SMPL's way, and that of skeletons whose elbows are hinges about an oblique axis.
 
 SMPL's elbows bend about the vertical of the T-pose, (0, -1, 0) on the left. The skeletons of the CMU Graphics Lab
 Motion Capture Database bend theirs about an oblique axis of the upper arm, and a conversion that keeps the skeleton's
-frames keeps that. The limbs point the same way; the upper arm's and the forearm's own turns differ by a constant, which
-is taken out here.
+frames keeps that. The limbs point the same way; upper arm and forearm are turned about themselves by a constant, the
+tilt, which is taken out here.
 
-Legend: B batch, J = 21 posed joints.
+Legend: B batch, T frames, J = 21 posed joints.
 """
 
 from __future__ import annotations
 
 import math
 
+import torch
 from torch import Tensor
 
 from mrhubo import rotation
+from mrhubo.body.anatomy import hinge_axis
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, SIDES
 
-CMU_ELBOW_AXIS = (0.0, -0.871, 0.491)
-"""About which the left elbow of the CMU recordings bends, in the upper arm's frame: a pure hinge."""
+CMU_TILT = math.atan2(-0.491, 0.871)
+"""Of the CMU recordings: their left elbow bends about (0, -0.871, 0.491)."""
+_BENT = math.radians(10.0)
+"""From which bend on an elbow tells its axis."""
+_ENOUGH = 10
+"""Frames in which it must."""
+_PURE = math.radians(6.0)
+"""How far a hinge's axis may stray; four degrees are left of hinges where a motion was resampled. Elbows of fitted
+bodies are ball joints, and stray by tens of degrees."""
+_ACROSS = math.radians(10.0)
+"""How far a hinge's axis may be from a right angle with the bone."""
 
 
-def cmu_to_smpl_arms(local_BJ33: Tensor) -> Tensor:
-    """Local rotations (B, 21, 3, 3) with both arms turned about their bones, so that elbows bend about SMPL's axis;
-    limbs keep their directions, and hands their orientation.
+def untilt_arms(local_BJ33: Tensor, tilt: float) -> Tensor:
+    """Local rotations (B, 21, 3, 3) with both arms turned about their bones, so that elbows that bend about an axis
+    tilted by `tilt` [rad] bend about SMPL's; limbs keep their directions, and hands their orientation.
     """
-    _, y, z = CMU_ELBOW_AXIS
-    turn_33 = rotation.axis_angle_to_matrix(local_BJ33.new_tensor([math.atan2(-z, -y), 0.0, 0.0]))
+    turn_33 = rotation.axis_angle_to_matrix(local_BJ33.new_tensor([tilt, 0.0, 0.0]))
     found = local_BJ33.clone()
     for side in SIDES:  # bones lie along x, and a turn about x is its own mirror image
         shoulder, elbow, wrist = (POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "elbow", "wrist"))
@@ -34,3 +44,24 @@ def cmu_to_smpl_arms(local_BJ33: Tensor) -> Tensor:
         found[:, elbow] = turn_33.T @ local_BJ33[:, elbow] @ turn_33
         found[:, wrist] = turn_33.T @ local_BJ33[:, wrist]
     return found
+
+
+def elbow_tilt(local_TJ33: Tensor) -> float | None:
+    """By what angle [rad] about the bones the axis of both elbows is tilted from SMPL's, where the elbows of a motion
+    (T, 21, 3, 3) are hinges; None where they are not, or do not bend enough to tell.
+    """
+    tilts = []
+    for elbow in (f"{side}_elbow" for side in SIDES):
+        turn_T3 = rotation.matrix_to_axis_angle(local_TJ33[:, POSED_JOINT_NAMES.index(elbow)])
+        axis_X3 = torch.nn.functional.normalize(turn_T3[turn_T3.norm(dim=-1) > _BENT], dim=-1)
+        if len(axis_X3) < _ENOUGH:
+            continue
+        mean_3 = torch.nn.functional.normalize(axis_X3.mean(dim=0), dim=0)
+        strays = torch.linalg.cross(axis_X3, mean_3.expand_as(axis_X3)).norm(dim=-1).amax()
+        if float(strays) > math.sin(_PURE) or abs(float(mean_3[0])) > math.sin(_ACROSS):
+            return None
+        _, y, _ = hinge_axis(elbow)
+        tilts.append(math.atan2(y * float(mean_3[2]), y * float(mean_3[1])))
+    if not tilts or max(tilts) - min(tilts) > _PURE:
+        return None
+    return sum(tilts) / len(tilts)

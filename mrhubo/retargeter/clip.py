@@ -60,8 +60,9 @@ def jerk_weights(problem: DirectionProblem, target_TD3: Tensor, frame_rate: floa
     """Weights (Y, N) [1/rad^2] of the squared third differences: less where the human directions that a joint's block
     turns jerk more.
     """
-    jerk_YD = target_TD3.diff(n=3, dim=0).norm(dim=-1) * frame_rate**3
-    weight_DC = problem.blocks.directions_DC * problem.directions.weight_D[:, None]
+    columns = problem.body_map.measured
+    jerk_YD = target_TD3[:, columns].diff(n=3, dim=0).norm(dim=-1) * frame_rate**3
+    weight_DC = (problem.blocks.directions_DC * problem.directions.weight_D[:, None])[columns]
     jerk_YC = jerk_YD @ (weight_DC / weight_DC.sum(dim=0).clamp(min=1e-9))
     if len(jerk_YC):
         half = round(_WINDOW_S / 2 * frame_rate)

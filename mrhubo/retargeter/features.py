@@ -12,7 +12,6 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
-from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import joint_index
 from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap
@@ -54,8 +53,7 @@ class DirectionFeatures(PoseFeatures):
 
     def forward(self, pose_BJ6: Tensor) -> Tensor:
         """As for `PoseFeatures`."""
-        human = HumanPose.of(rotation.sixd_to_matrix(pose_BJ6), self._shared.skeleton)
-        return self.of(self._shared.of_human(human))
+        return self.of(self._shared.of_human(rotation.stack_columns(pose_BJ6)))
 
     def of(self, direction_BD3: Tensor) -> Tensor:
         """Features (B, F) of human directions (B, D, 3)."""

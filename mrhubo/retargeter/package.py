@@ -134,8 +134,8 @@ class Retargeter(nn.Module):
         return torch.cat([self._predict(part, polish) for part in self._parts(local_TJ33, polish)])
 
     def _predict(self, local_TJ33: Tensor, polish: int) -> Tensor:
-        human = self.body_map.human(local_TJ33) if polish and len(local_TJ33) else None
-        return self.answer(local_TJ33, None if human is None else self.body_map.human_directions(human), polish)
+        needed = bool(polish) or isinstance(self.network.features, DirectionFeatures)
+        return self.answer(local_TJ33, self.body_map.human_directions(local_TJ33) if needed else None, polish)
 
     @torch.no_grad()
     def retarget(self, local_TJ33: MotionLike, polish: int = POLISH) -> RetargetResult:

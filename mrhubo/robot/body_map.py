@@ -94,6 +94,11 @@ class BodyMap(nn.Module):
         return self.shared.measured_columns
 
     @property
+    def measured_names(self) -> tuple[str, ...]:
+        """Their names, in order: those of the columns of `RetargetResult.direction_error_deg`."""
+        return tuple(self.direction_names[i] for i in self.measured)
+
+    @property
     def keypoint_names(self) -> tuple[str, ...]:
         """Names of the target keypoints."""
         return self.scale.keypoint_names
@@ -122,7 +127,7 @@ class BodyMap(nn.Module):
         """Directions (B, D, 3) of human poses, or of their local rotations (B, 21, 3, 3), in human axes of the parts
         from which they are seen. Their length is how much they count: 1, but for bend axes, which count 0 to 1.
         """
-        return self.shared.of_human(human if isinstance(human, HumanPose) else self.human(human))
+        return self.shared.of_human(human.local_BJ33 if isinstance(human, HumanPose) else human)
 
     def input_joints(self, directions: Iterable[int] | None = None) -> tuple[str, ...]:
         """The human joints that tell about the robot's parts, or about some directions alone: what a pose needs to

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, Skeleton, keypoint_indices
+from mrhubo.body.turns import JointTurns
 from mrhubo.frames import human_axes
 from mrhubo.robot.bending import BendAxis, bend_axis, find_bend_axes
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb
@@ -44,7 +44,7 @@ class Directions(nn.Module):
     limb_offsets_2E3: Tensor
     axis_links_A: Tensor
     axes_A3: Tensor
-    rest_A3: Tensor
+    rest_D3: Tensor
     order_D: Tensor
     view_axes_V33: Tensor
     view_D: Tensor
@@ -53,8 +53,8 @@ class Directions(nn.Module):
         """Looks links and human joints up."""
         super().__init__()
         self.skeleton, self.keypoints = skeleton, keypoints
-        rows = [*keypoints.directions, *find_bend_axes(robot, keypoints)]
-        self.all = tuple(sorted(rows, key=lambda d: keypoints.parts.index(d.part)))
+        found = [*keypoints.directions, *find_bend_axes(robot, keypoints)]
+        self.all = tuple(sorted(found, key=lambda d: keypoints.parts.index(d.part)))
         self.names = tuple(d.name for d in self.all)
         limbs = [(i, d) for i, d in enumerate(self.all) if isinstance(d, Limb)]
         axes = [(i, d) for i, d in enumerate(self.all) if isinstance(d, Axis)]
@@ -72,10 +72,12 @@ class Directions(nn.Module):
         self.view_links = tuple(keypoints.ends[name].link for name in self.views)
         views = [self.views.index(d.part.seen_from or "") for d in self.all]
         joint_of = {part.name: JOINT_NAMES.index(part.joint) for part in keypoints.parts}
-        self._view_joints = [joint_of[name] for name in self.views]
         self._view_rows = [robot.link_index(link) for link in self.view_links]
-        self._bones = [keypoint_indices([d.part.start for _, d in limbs]), keypoint_indices([d.name for _, d in limbs])]
-        self._axis_joints = [joint_of[d.part.name] for _, d in (*axes, *bends)]
+        rows = [d for _, d in (*limbs, *axes, *bends)]
+        self.turns = JointTurns([joint_of[name] for name in (*self.views, *(d.part.name for d in rows))])
+        starts, tips = (keypoint_indices([getattr(d.part, end) for _, d in limbs]) for end in ("start", "end"))
+        bones_E3 = torch.nn.functional.normalize(skeleton.rest_K3[tips] - skeleton.rest_K3[starts], dim=-1)
+        rests = [*(d.rest for _, d in axes), *(d.part.rest for _, d in bends)]
         self._bends = len(bends)
         ends = [[d.start for _, d in limbs], [d.end for _, d in limbs]]
         tensors = {
@@ -85,7 +87,7 @@ class Directions(nn.Module):
             ),
             "axis_links_A": torch.tensor([robot.link_index(d.link) for _, d in (*axes, *bends)], dtype=torch.long),
             "axes_A3": torch.stack([d.axis_3 for _, d in (*axes, *bends)]) if axes or bends else torch.zeros(0, 3),
-            "rest_A3": torch.tensor([*(d.rest for _, d in axes), *(d.part.rest for _, d in bends)]).reshape(-1, 3),
+            "rest_D3": torch.cat([bones_E3, *(bones_E3.new_tensor([x]) for x in rests)]),
             "order_D": torch.tensor([i for i, _ in (*limbs, *axes, *bends)]).argsort(),
             "view_axes_V33": torch.stack([human_axes(keypoints.ends[name].axes_23) for name in self.views]),
             "view_D": torch.tensor(views),
@@ -118,20 +120,17 @@ class Directions(nn.Module):
         view_X = self.view_D[self.limb_columns] if limbs else self.view_D
         return (vectors_BX3[..., None, :] @ torch.stack(list(views), dim=1).index_select(1, view_X))[..., 0, :]
 
-    def of_human(self, human: HumanPose) -> Tensor:
-        """Directions (B, D, 3) of human poses, in human axes of the parts from which they are seen; their length is
-        how much they count.
+    def of_human(self, local_BJ33: Tensor) -> Tensor:
+        """Directions (B, D, 3) of human poses (B, 21, 3, 3), in human axes of the parts from which they are seen; their
+        length is how much they count.
         """
-        keypoints, rotations = human.keypoint_BK3, human.rotation_BJ33
-        starts, ends = self._bones
-        limbs = torch.nn.functional.normalize(keypoints[:, ends] - keypoints[:, starts], dim=-1)
-        axes = (rotations[:, self._axis_joints] @ self.rest_A3.to(rotations)[..., None])[..., 0]
+        turns_BX33, views = self.turns(local_BJ33), len(self.views)
+        found_BD3 = (turns_BX33[:, views:] @ self.rest_D3[..., None].to(turns_BX33))[..., 0]
         if self._bends:
-            upper_BX3, lower_BX3 = (limbs[:, places] for places in self._bent_limbs)
-            bend_BX3, needed_BX = bend_axis(upper_BX3, lower_BX3, axes[:, -self._bends :])
-            axes = torch.cat((axes[:, : -self._bends], bend_BX3 * needed_BX[..., None]), dim=1)
-        pelvis_BD3 = torch.cat((limbs, axes), dim=1).index_select(1, self.order_D)
-        return self.seen(pelvis_BD3, [rotations[:, joint] for joint in self._view_joints])
+            upper_BX3, lower_BX3 = (found_BD3[:, places] for places in self._bent_limbs)
+            bend_BX3, needed_BX = bend_axis(upper_BX3, lower_BX3, found_BD3[:, -self._bends :])
+            found_BD3 = torch.cat((found_BD3[:, : -self._bends], bend_BX3 * needed_BX[..., None]), dim=1)
+        return self.seen(found_BD3.index_select(1, self.order_D), list(turns_BX33[:, :views].unbind(1)))
 
     def input_joints(self, directions: Iterable[int] | None = None) -> tuple[str, ...]:
         """The human joints that tell about all directions, or about some of them, in SMPL's order."""

@@ -43,7 +43,7 @@ def test_the_reference_itself_is_without_error(root: Path, name: str, local_TJ33
     assert found.joint_rad == 0 and found.link_cm == 0 and found.frames == 60
     assert found.limb_deg == found.reference_limb_deg
     assert found.at_limit == pytest.approx(reference.at_limit_share)
-    columns = [i for i, part in enumerate(body_map.direction_names) if "hand" not in part and "head" not in part]
+    columns = [i for i, part in enumerate(body_map.measured_names) if "hand" not in part and "head" not in part]
     assert found.limb_deg == pytest.approx(float(reference.residual_deg_TD[:, columns].mean()), rel=1e-4)
     assert math.isnan(found.hand_deg) == math.isnan(found.head_deg) == (name == "nao")
 

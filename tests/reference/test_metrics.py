@@ -52,7 +52,7 @@ def test_direction_error_of_the_arm_at_rest(body_maps: dict[str, BodyMap]) -> No
     body_map = body_maps["reachy"]
     rest_TJ33 = torch.eye(3).expand(1, 21, 3, 3)
     error_TD = direction_error(body_map, torch.zeros(1, 17), rest_TJ33)
-    found = dict(zip(body_map.direction_names, error_TD[0].tolist(), strict=True))
+    found = dict(zip(body_map.measured_names, error_TD[0].tolist(), strict=True))
     for name in ("left_elbow", "left_wrist", "right_elbow", "right_wrist", "left_hand_fingers"):
         assert found[name] == pytest.approx(90, abs=1e-3)
     assert found["head_forward"] < 1

@@ -55,7 +55,7 @@ def waist(table: tuple[BodyPart, ...]) -> tuple[BodyPart, ...]:
 
 def write_urdf(path: Path, root: str = "pelvis") -> Path:
     """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs."""
-    limit = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
+    limit = '<limit lower="{}" upper="{}" effort="1" velocity="10"/>'
 
     def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float, high: float) -> str:
         return (f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
@@ -192,7 +192,7 @@ def test_a_human_who_squats_and_turns_is_followed(body_map: BodyMap) -> None:
     local_TJ33 = rotation.axis_angle_to_matrix(turn)
     result = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0)
     assert result.jumps == 0
-    legs = columns(body_map, "leg", "foot", "trunk")
+    legs = [body_map.measured.index(i) for i in columns(body_map, "leg", "foot", "trunk")]
     assert float(result.residual_deg_TD[:, legs].mean()) < 3
     knee_T = result.q_TN[:, body_map.robot.joint_names.index("l_knee")]
     assert float(knee_T[12]) == pytest.approx(1.8, abs=0.15)
@@ -233,7 +233,8 @@ def test_a_human_is_turned_until_he_points_there(body_map: BodyMap) -> None:
     )  # fmt: skip
     aligned = align_pose(body_map, local_BJ33, wanted_BD3)
     found_BD3 = body_map.human_directions(aligned)
-    torch.testing.assert_close(found_BD3, wanted_BD3, atol=2e-4, rtol=0)
+    shown = body_map.measured
+    torch.testing.assert_close(found_BD3[:, shown], wanted_BD3[:, shown], atol=2e-4, rtol=0)
 
 
 def test_input_joints_are_those_of_the_rows(body_map: BodyMap) -> None:

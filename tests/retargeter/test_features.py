@@ -2,59 +2,61 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mrhubo import rotation
-from mrhubo.body import Skeleton
-from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.config import load_config
 from mrhubo.errors import UserError
-from mrhubo.retargeter import PoseFeatures
-
-ARM = ("left_shoulder", "left_elbow", "left_wrist")
-
-
-@settings(max_examples=60, deadline=None)
-@given(names=st.lists(st.sampled_from(POSED_JOINT_NAMES), min_size=1, max_size=21), seed=st.integers(0, 1000))
-def test_chest_features_are_rotations_relative_to_the_chest(names: list[str], seed: int) -> None:
-    """Whichever joints are asked for, above the chest, below it, beside it, more than once."""
-    pose = torch.randn(3, 21, 6, generator=torch.Generator().manual_seed(seed))
-    turns = Skeleton().global_rotations(rotation.sixd_to_matrix(pose))
-    chest = turns[:, JOINT_NAMES.index("spine3"), None]
-    wanted = chest.mT @ turns[:, [JOINT_NAMES.index(name) for name in names]]
-    features = PoseFeatures(names, "chest")
-    assert features.size == 6 * len(names)
-    torch.testing.assert_close(features(pose), rotation.matrix_to_sixd(wanted).flatten(1), atol=1e-5, rtol=0)
+from mrhubo.motion import Motion
+from mrhubo.motion.resharing import reshare
+from mrhubo.retargeter.features import DirectionFeatures, RotationFeatures
+from mrhubo.robot import BodyMap, build_body_map
 
 
-def test_chest_features_ignore_what_lies_below_the_chest() -> None:
-    features = PoseFeatures(ARM, "chest")
-    pose = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(4, 21, 3)))
-    bent = pose.clone()
-    bent[:, [2, 5, 8]] = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(torch.randn(4, 3, 3)))  # the spine
-    torch.testing.assert_close(features(bent), features(pose), atol=1e-5, rtol=0)
-    moved = pose.clone()
-    moved[:, 15] = bent[:, 2]  # left_shoulder
-    assert float((features(moved) - features(pose)).abs().max()) > 0.1
+@pytest.fixture(scope="module")
+def body_map(root: Path) -> BodyMap:
+    return build_body_map(load_config(root / "conf" / "reachy.yaml").robot)
 
 
-def test_chest_features_hold_the_upper_arm_direction() -> None:
-    local = rotation.axis_angle_to_matrix(0.5 * torch.randn(6, 21, 3))
-    points, turns = Skeleton().keypoints_and_rotations(local)
-    direction = torch.nn.functional.normalize(points[:, 18] - points[:, 16], dim=-1)
-    seen = (turns[:, 9].mT @ direction[..., None])[..., 0]
-    features = PoseFeatures(("left_shoulder",), "chest")(rotation.matrix_to_sixd(local))
-    torch.testing.assert_close(features[:, :3], seen, atol=1e-5, rtol=0)
+def poses(count: int) -> torch.Tensor:
+    turns = 0.6 * torch.randn(count, 21, 3, generator=torch.Generator().manual_seed(0))
+    return rotation.axis_angle_to_matrix(turns)
 
 
-def test_local_features_are_the_pose_itself() -> None:
+def test_directions_are_those_of_the_body_map(body_map: BodyMap) -> None:
+    columns = [3, 0, 7]
+    features, local = DirectionFeatures(body_map, columns), poses(6)
+    assert features.names == tuple(body_map.direction_names[i] for i in columns) and features.size == 9
+    wanted = body_map.human_directions(local)[:, columns].flatten(1)
+    torch.testing.assert_close(features(rotation.matrix_to_sixd(local)), wanted, atol=1e-6, rtol=0)
+    torch.testing.assert_close(features.of(body_map.human_directions(local)), wanted)
+
+
+def test_directions_do_not_depend_on_how_turns_are_shared_out(body_map: BodyMap) -> None:
+    """Bend axes do, a little, where elbows are straight: the upper arm's own turn is all that tells them there."""
+    motion = Motion("m", poses(40), 30.0)
+    other = reshare(motion, seed=1)
+    assert float((motion.local_TJ33 - other.local_TJ33).abs().max()) > 0.3
+    features = DirectionFeatures(body_map, body_map.measured)
+    before, after = (features(rotation.matrix_to_sixd(m.local_TJ33.float())) for m in (motion, other))
+    torch.testing.assert_close(after, before, atol=1e-4, rtol=0)
+
+
+def test_directions_go_where_the_network_goes(body_map: BodyMap) -> None:
+    features = DirectionFeatures(body_map, [0, 1]).double()
+    found = features(rotation.matrix_to_sixd(poses(3).double()))
+    assert found.dtype == torch.float64 and body_map.robot.lower_N.dtype == torch.float32
+
+
+def test_rotations_are_the_pose_itself() -> None:
     pose = torch.randn(3, 21, 6)
-    torch.testing.assert_close(PoseFeatures(("left_hip", "head"), "local")(pose), pose[:, [0, 14]].flatten(1))
+    torch.testing.assert_close(RotationFeatures(("left_hip", "head"))(pose), pose[:, [0, 14]].flatten(1))
 
 
 @pytest.mark.parametrize("names", [(), ("pelvis",), ("left_wirst",)])
 def test_impossible_input_joints_are_refused(names: tuple[str, ...]) -> None:
     with pytest.raises(UserError):
-        PoseFeatures(names, "chest")
+        RotationFeatures(names)

@@ -80,7 +80,7 @@ EDITS: dict[str, Callable[[Path], object]] = {
     "two joints exchanged": lambda p: swap(p / "config.yaml", "LShoulderPitch", "RShoulderPitch"),
     "two joints renamed": lambda p: swap(p / "robot.urdf", 'joint name="LElbowYaw"', 'joint name="RElbowYaw"'),
     "a narrower range": lambda p: edit(p / "config.yaml", ("ranges: {}", "ranges: {LElbowYaw: [-0.1, 0.1]}")),
-    "other inputs": lambda p: edit(p / "config.yaml", ("input_joints: null", "input_joints: [left_elbow, right_elbow, head]")),
+    "other inputs": lambda p: edit(p / "config.yaml", ("input_joints: null", "input_joints: [left_elbow, right_elbow, head]"), ("input_frame: directions", "input_frame: local")),
     "another name": lambda p: edit(p / "config.yaml", ("name: nao", "name: oan")),
 }  # fmt: skip
 
@@ -98,9 +98,7 @@ def test_an_edited_file_is_named(folder: Path, what: str) -> None:
 def test_older_packages_are_compared_by_content(folder: Path, what: str) -> None:
     without_checksums(folder)
     EDITS[what](folder)
-    refused(
-        folder, "disagree|other joints|other human joints|do not fit|two robots|no limb|moves no body part|turns no"
-    )
+    refused(folder, "disagree|other joints|other things|do not fit|two robots|no limb|moves no body part|turns no")
 
 
 def test_older_packages_whose_content_agrees_are_read(made: Path, folder: Path) -> None:
@@ -159,7 +157,7 @@ def test_a_header_or_weights_with_a_fresh_checksum_must_still_fit(
         ({"lower_rad": "7"}, "tells no limits"),
         ({"joint_names": "[" * 5_000}, "tells nothing of 'joint_names'"),
         ({"joint_names": ""}, "tells nothing of 'joint_names'"),
-        ({"input_joints": "[]"}, "other human joints"),
+        ({"seen": "[]"}, "other things"),
         ({"robot": "oan"}, "name two robots, 'oan' and 'nao'"),
         ({"files_xxh3": "{}"}, "does not tell the checksum of every file"),
         ({"files_xxh3": "[1]"}, "does not tell the checksum of every file"),
@@ -168,7 +166,7 @@ def test_a_header_or_weights_with_a_fresh_checksum_must_still_fit(
 )
 def test_what_a_header_says_is_compared(made: Path, opened: Retargeter, change: dict[str, str], message: str) -> None:
     header = read_tensors(made / WEIGHTS)[1]
-    robot, inputs = opened.body_map.robot, opened.network.features.input_joints
+    robot, inputs = opened.body_map.robot, opened.network.features.names
     check_files(made, OTHERS, header)
     assert check_content(made, header, robot, inputs) == opened.phi_threshold
     with pytest.raises(UserError, match=message):

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from mrhubo.config import TrainerConfig
 from mrhubo.fitting.module import RetargetModule
-from mrhubo.retargeter import PoseFeatures, RetargetNetwork
+from mrhubo.retargeter import RetargetNetwork
+from mrhubo.retargeter.features import RotationFeatures
 from mrhubo.retargeter.networks import Branch, Branched, ResidualMLP, mlp
 
 LOWER, UPPER = torch.tensor([-2.08567, 0.0349066, -3.0]), torch.tensor([2.08567, 1.54462, -2.9])
@@ -18,7 +19,7 @@ ARM = ("left_shoulder", "left_elbow", "left_wrist")
 
 def network(**settings: object) -> RetargetNetwork:
     torch.manual_seed(0)
-    return RetargetNetwork(PoseFeatures(ARM, "chest"), LOWER, UPPER, hidden=32, **settings)  # type: ignore[arg-type]
+    return RetargetNetwork(RotationFeatures(ARM), LOWER, UPPER, hidden=32, **settings)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", ["tanh", "clamp"])

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
 from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
@@ -27,6 +28,8 @@ from mrhubo.rotation import axis_angle_to_matrix
 
 MAX_FRAMES = 2_000_000
 """Longest motion that is read (four and a half hours at 120 frames a second, 1.5 GB as matrices)."""
+_LEVEL = math.radians(1.0)
+"""Tilts of elbows' axes up to this stay: an angle that says nothing."""
 _BLOCK = 65_536
 """Frames that are read and converted at a time."""
 _MAX_SMALL = 1_000_000
@@ -66,6 +69,11 @@ def read_amass(path: Path) -> Motion:
         family, rest = find_family(file, betas)
     for part in local_TJ33.split(_BLOCK) if family else ():
         part.copy_(from_family(part, family))
+    # Elbows of a body that was fitted are no hinges; those of a converted skeleton are, about whatever axis it has.
+    tilt = None if family else elbow_tilt(local_TJ33)
+    if tilt is not None and abs(tilt) > _LEVEL:
+        local_TJ33 = untilt_arms(local_TJ33, tilt)
+        notes.append(f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out")
     name = motion_name(path)
     return Motion(
         name=name,
