@@ -2,7 +2,8 @@
 
     python benchmarks/stream.py PACKAGE [--motions data/motions] [--rate 60] [--noise 2] [--seconds 1]
 
-PACKAGE is the folder of a trained retargeter. Times are medians of single frames on one thread. The motions are told at
+PACKAGE is the folder of a trained retargeter. Times are medians of single frames on one thread: its own time, to which
+other programs that run on the machine add little. The motions are told at
 --rate frames a second; a straight hanging arm that is seen with --noise degrees of noise is added to them. Columns:
 error of the limbs, its excess over each frame's own optimum (`solve_frames`), jumps (steps over 0.5 rad per 1/24 s that
 the human did not make), frames with a joint over the URDF's speed, the highest speed, jerk of the directions over the
@@ -80,9 +81,9 @@ def milliseconds(answer: Callable[[Tensor], object], poses: Tensor, seconds: flo
     """Median and 90th percentile of one frame's time."""
     taken: list[float] = []
     for pose in itertools.cycle(poses):
-        start = time.perf_counter()
+        start = time.thread_time()
         answer(pose)
-        taken.append(time.perf_counter() - start)
+        taken.append(time.thread_time() - start)
         if sum(taken) > seconds and len(taken) > 10:
             break
     taken = sorted(taken[3:])
