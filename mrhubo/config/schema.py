@@ -129,8 +129,12 @@ class PairsConfig:
     w_prior: float = bounded(0.001, 0.0)
     """Weight of the squared norm of the latent (VPoser's inverse kinematics, and so the paper: 0.01)."""
     align: bool = True
-    """Turn the arms, hands and head that inverse kinematics found until they point exactly where the robot's do; phi
-    and the other measures are of the pose before that. False = leave them where they are (the paper)."""
+    """Turn the arms, hands and head that inverse kinematics found until they point exactly where the robot's do; cost
+    and distances are of the pose before that. False = leave them where they are (the paper)."""
+    phi: str = choice("read", "read", "all")
+    """Of what phi is the reconstruction error: `read` = the pose as the robot reads it, a person at rest but for the
+    parts that the robot has, and the joints that these turn; `all` = all joints of the pose that inverse kinematics
+    found (the paper)."""
     filter: str = choice("linear", "linear", "hard", "none")
     """Use of phi: `linear` = drop above the threshold, then draw with a probability that falls linearly with phi (the
     paper); `hard` = drop above the threshold only; `none` = use every pair."""

@@ -4,6 +4,7 @@ prepare        everything that a user can get wrong is checked            prepar
 references     the reference retargeter answers the motions that measure   references
 train          the scale factor if it is to be searched for, the pairs,
 the networks: Lightning's trainer with its hooks            training, datamodule, module
+calibrate      how far to trust an answer                                  retargeter.calibration
 measure        on the test clips                                           measurement
 package        what a user takes away, and all of it in MLflow             record
 """
@@ -33,6 +34,7 @@ from mrhubo.fitting.record import (
 )
 from mrhubo.fitting.references import make_references
 from mrhubo.fitting.training import train
+from mrhubo.retargeter.calibration import calibrate
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.ranks import Ranks
 from mrhubo.runtime.workspace import Workspace
@@ -91,6 +93,7 @@ def _run_steps(
         )
         log_pairs(recording, training)
         retargeter = training.retargeter
+        retargeter.confidence = calibrate(retargeter)
         measured = measure(training.prepared, report, retargeter, test)
         log_measures(recording, measured, training.best_link_cm)
         log_answers(recording, test, measured.predictions)

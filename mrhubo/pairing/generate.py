@@ -26,6 +26,7 @@ from mrhubo.pairing.random_poses import random_poses
 from mrhubo.pairing.store import PairStore
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
+from mrhubo.robot.plausibility import read_phi
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.threads import use_threads
 
@@ -150,11 +151,18 @@ class PairGenerator:
         prior_B = z_BZ.square().sum(-1)
         return {
             "H": pose_BJ6,
-            "phi": self.prior.reconstruction_error(found_BJ6),
+            "phi": self._phi(found_BJ6, pose_BJ6),
             "cost": self.problem.w_data * distance_BK.square().sum(1) + self.problem.w_prior * prior_B,
             "residual_m": distance_BK.mean(dim=1),
             "z_norm": prior_B.sqrt(),
         }
+
+    def _phi(self, found_BJ6: Tensor, pose_BJ6: Tensor) -> Tensor:
+        """phi (B,) of what inverse kinematics found, or of what the robot reads of the pair's human pose."""
+        if self.settings.phi == "all":
+            return self.prior.reconstruction_error(found_BJ6)
+        human_BD3 = self.body_map.human_directions(rotation.sixd_to_matrix(pose_BJ6))
+        return read_phi(self.body_map, self.prior, human_BD3)
 
 
 def _shard_seed(seed: int, index: int) -> int:

@@ -26,8 +26,8 @@ from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_pairs
 
 MEASURES = ("phi", "cost", "residual_m", "z_norm")
-"""One number a pair, of the pose that the inverse kinematics ended with, before alignment: reconstruction error, cost,
-mean keypoint distance [m], norm of z."""
+"""One number a pair: reconstruction error, as `pairs.phi` says; and of the pose that the inverse kinematics ended with,
+before alignment, cost, mean keypoint distance [m], norm of z."""
 SCHEMA = "mrhubo.pairs/5"
 _NOT_IN_PAIRS = ("count", "reverse_share", "dir", "workers", "filter", "filter_k")
 """Keys of `pairs` that do not change what a shard holds."""

@@ -20,6 +20,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import check_regular
 from mrhubo.files.storage import checksum_file
+from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel
 from mrhubo.robot import Robot
 
 _FILES = "files_xxh3"
@@ -112,6 +113,16 @@ def check_content(folder: Path, metadata: Mapping[str, str], robot: Robot, input
     if not abs(threshold) <= _LARGEST_THRESHOLD:
         raise UserError(f"{folder}: its header's phi_threshold is no number that phi can be compared with; {_RENEW}")
     return threshold
+
+
+def check_confidence(folder: Path, metadata: Mapping[str, str]) -> ConfidenceModel:
+    """The confidence model that the header tells; the standard one for packages made before there was one."""
+    if "confidence" not in metadata:
+        return STANDARD
+    try:
+        return ConfidenceModel.from_json(metadata["confidence"])
+    except UserError as error:
+        raise UserError(f"{folder}: its header is wrong: {error}; {_RENEW}") from error
 
 
 def check_prior(folder: Path, metadata: Mapping[str, str], prior: BodyPrior) -> None:

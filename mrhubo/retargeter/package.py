@@ -22,7 +22,6 @@ from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
-from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError, shortened
@@ -30,9 +29,10 @@ from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
 from mrhubo.motion import NOT_FINITE, MotionLike, read_poses, refuse_frames, to_tensor
 from mrhubo.reference import DirectionProblem, Polish, angle_between
 from mrhubo.retargeter.architecture import build_network
-from mrhubo.retargeter.confidence import confidence
+from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, Signals, branches_of, find_signals, shake
 from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.integrity import (
+    check_confidence,
     check_content,
     check_files,
     check_paths,
@@ -43,6 +43,7 @@ from mrhubo.retargeter.integrity import (
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
+from mrhubo.robot.plausibility import read
 
 SCHEMA = "mrhubo.retargeter/4"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
@@ -69,7 +70,13 @@ class Retargeter(nn.Module):
     body_map: BodyMap
 
     def __init__(
-        self, network: RetargetNetwork, body_map: BodyMap, prior: BodyPrior, config: Config, phi_threshold: float
+        self,
+        network: RetargetNetwork,
+        body_map: BodyMap,
+        prior: BodyPrior,
+        config: Config,
+        phi_threshold: float,
+        confidence: ConfidenceModel = STANDARD,
     ) -> None:
         super().__init__()
         self.network = network.requires_grad_(False).eval()
@@ -77,6 +84,8 @@ class Retargeter(nn.Module):
         self.directions = DirectionProblem(body_map)
         """The optimiser's cost, for `polish`."""
         self._polish = Polish(self.directions)
+        self.confidence, self.branches = confidence, branches_of(self.directions)
+        """How much each branch of an answer is to be trusted, and what the branches are."""
 
     @property
     def device(self) -> torch.device:
@@ -114,7 +123,12 @@ class Retargeter(nn.Module):
                 frame), `polish` is negative, or the frame rate is not positive.
         """
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
-        return self.retarget(poses.local_TJ33, polish).with_leading(poses.shape, poses.frame_rate)
+        length = poses.shape[-1] if poses.shape else 1
+        answers = [
+            self.retarget(clip_TJ33, polish, poses.frame_rate)
+            for clip_TJ33 in (poses.local_TJ33.split(max(1, length)) if poses.frame_rate else [poses.local_TJ33])
+        ]
+        return join_results(answers).with_leading(poses.shape, poses.frame_rate)
 
     @torch.no_grad()
     def predict(self, local_TJ33: MotionLike, polish: int = 0) -> Tensor:
@@ -138,33 +152,58 @@ class Retargeter(nn.Module):
         return self.answer(local_TJ33, self.body_map.human_directions(local_TJ33) if needed else None, polish)
 
     @torch.no_grad()
-    def retarget(self, local_TJ33: MotionLike, polish: int = POLISH) -> RetargetResult:
+    def retarget(self, local_TJ33: MotionLike, polish: int = POLISH, frame_rate: float | None = None) -> RetargetResult:
         """Joint angles, by default after steps of optimisation until they have converged, with a confidence for each
-        frame; arguments as for `predict`.
+        frame; arguments as for `predict`, and frames per second, if the poses are one motion.
         """
-        return join_results([self._retarget(part, polish) for part in self._parts(local_TJ33, polish)])
-
-    def _retarget(self, local_TJ33: Tensor, polish: int) -> RetargetResult:
-        human = self.body_map.human(local_TJ33)
-        target_TD3 = self.body_map.human_directions(human)
-        return self._judge(self.answer(local_TJ33, target_TD3, polish), human, target_TD3)
+        return join_results([self._retarget(part, polish, frame_rate) for part in self._parts(local_TJ33, polish)])
 
     @torch.no_grad()
-    def judge(self, q_TN: Tensor, local_TJ33: Tensor) -> RetargetResult:
-        """What `retarget` tells about its own answers, for any joint angles (T, N) [rad] and human poses (T, 21, 3, 3),
-        both on the retargeter's device, float32.
-        """
-        human = self.body_map.human(local_TJ33)
-        return self._judge(q_TN, human, self.body_map.human_directions(human))
+    def signals(self, local_TJ33: Tensor, shake_TD: Tensor | None, polish: int = POLISH) -> tuple[Signals, Tensor]:
+        """What tells how far to trust the answers to poses (T, 21, 3, 3), and the answers' directions (T, D, 3).
 
-    def _judge(self, q_TN: Tensor, human: HumanPose, target_TD3: Tensor) -> RetargetResult:
+        Args:
+            local_TJ33: local rotations (T, 21, 3, 3), of which no more are given than fit into memory.
+            shake_TD: how much directions shake (`mrhubo.retargeter.confidence.shake`), where that is known.
+            polish: as for `predict`.
+        """
+        target_TD3 = self.body_map.human_directions(local_TJ33)
+        q_TN = self.answer(local_TJ33, target_TD3, polish)
+        robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
+        return self._signals(target_TD3, robot_TD3, shake_TD), robot_TD3
+
+    def _signals(self, target_TD3: Tensor, robot_TD3: Tensor, shake_TD: Tensor | None) -> Signals:
+        reading = read(self.body_map, self.prior, target_TD3)
+        return find_signals(self.branches, target_TD3, robot_TD3, reading, shake_TD)
+
+    def _retarget(self, local_TJ33: Tensor, polish: int, frame_rate: float | None) -> RetargetResult:
+        target_TD3 = self.body_map.human_directions(local_TJ33)
+        return self._judge(self.answer(local_TJ33, target_TD3, polish), target_TD3, frame_rate)
+
+    @torch.no_grad()
+    def judge(self, q_TN: Tensor, local_TJ33: Tensor, frame_rate: float | None = None) -> RetargetResult:
+        """What `retarget` tells about its own answers, for any joint angles (T, N) [rad] and human poses (T, 21, 3, 3),
+        both on the retargeter's device, float32; with frames per second, if they are one motion.
+        """
+        return self._judge(q_TN, self.body_map.human_directions(local_TJ33), frame_rate)
+
+    def _judge(self, q_TN: Tensor, target_TD3: Tensor, frame_rate: float | None) -> RetargetResult:
         links = self.body_map.robot.forward(q_TN)
         robot_TD3, columns = self.body_map.robot_directions(links), self.body_map.measured
         error_deg_TD = torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns]))
-        phi_T = self.prior.reconstruction_error(rotation.matrix_to_sixd(human.local_BJ33))
-        trust_T = confidence(phi_T, self.phi_threshold, error_deg_TD)
-        collision_T = self.collision.collides(q_TN, links)
-        return RetargetResult(q_TN, self.joint_names, trust_T, error_deg_TD, phi_T, collision_T)
+        shake_TD = None if frame_rate is None else shake(target_TD3, frame_rate)
+        signals = self._signals(target_TD3, robot_TD3, shake_TD)
+        trust_TC = self.confidence(signals)
+        return RetargetResult(
+            q_TN,
+            self.joint_names,
+            trust_TC.amin(dim=1) if self.branches else torch.zeros_like(q_TN[:, 0]),
+            error_deg_TD,
+            signals.phi.amax(dim=1) if self.branches else torch.zeros_like(q_TN[:, 0]),
+            self.collision.collides(q_TN, links),
+            trust_TC,
+            tuple(branch.name for branch in self.branches),
+        )
 
     def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
         """The poses as the networks want them, on their device, float32, so many at a time that all that is made of
@@ -223,6 +262,7 @@ class Retargeter(nn.Module):
             "seen": json.dumps(self.network.features.names),
             "output": "joint angles in rad, in the order of joint_names",
             "phi_threshold": repr(self.phi_threshold),
+            "confidence": self.confidence.to_json(),
             **provenance,
             **file_checksums(folder, _OTHERS),
         }
@@ -259,7 +299,7 @@ class Retargeter(nn.Module):
             said = shortened(" ".join(str(error).split()), 300)
             raise UserError(f"{folder}: weights and settings do not fit: {said}") from error
         check_weights(folder, network.state_dict(), body_map.robot)
-        return cls(network, body_map, prior, config, threshold)
+        return cls(network, body_map, prior, config, threshold, check_confidence(folder, metadata))
 
 
 def _portable(config: Config) -> str:

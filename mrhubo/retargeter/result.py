@@ -17,7 +17,7 @@ from mrhubo.files.joint_angles import write_joint_angles
 class RetargetResult:
     """Joint angles and how far to trust them; T stands for the leading axes of the human poses, none for a single pose.
 
-    N robot joints, D directions (limbs, hands, head).
+    N robot joints, D directions (limbs, hands, head), C branches.
     """
 
     q: Tensor
@@ -25,13 +25,19 @@ class RetargetResult:
     joint_names: tuple[str, ...]
     """The N joints, by their names in the URDF."""
     confidence: Tensor
-    """(T,), 0..1: plausibility of the human pose times agreement of the robot's limbs with the human's."""
+    """(T,), 0..1: that of the least certain branch, see `branch_confidence`."""
     direction_error_deg: Tensor
     """Angle (T, D) [deg] between the robot's and the human's limb, hand and head directions."""
     phi: Tensor
-    """Reconstruction error (T,) of the human pose under the body prior."""
+    """Reconstruction error (T,) under the body prior of what the robot reads of the human pose, of the branch where it
+    is largest; see `mrhubo.robot.plausibility`."""
     collision: Tensor
     """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it."""
+    branch_confidence: Tensor
+    """(T, C), 0..1: the probability that the limbs of each branch of the robot, an arm or the head, point where the
+    person's did, to 15 degrees; see `mrhubo.retargeter.confidence`."""
+    branch_names: tuple[str, ...]
+    """The C branches: `left_arm` and so on."""
     frame_rate: float | None = None
     """Frames per second, where the motion told it."""
 
@@ -50,10 +56,12 @@ class RetargetResult:
         """
         names = ("confidence", "direction_error_deg", "phi", "collision")
         more = {name: getattr(self, name).cpu().numpy() for name in names}
+        for number, branch in enumerate(self.branch_names):
+            more[f"confidence_{branch}"] = self.branch_confidence[..., number].cpu().numpy()
         write_joint_angles(path, self.q.cpu().numpy(), self.joint_names, self.frame_rate, more)
 
 
-_TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision")
+_TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision", "branch_confidence")
 
 
 def join_results(parts: Sequence[RetargetResult]) -> RetargetResult:

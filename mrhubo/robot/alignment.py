@@ -19,7 +19,7 @@ from mrhubo.robot.body_map import BodyMap
 from mrhubo.robot.parts import BendPart, LimbPart, OrientedPart
 
 
-def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> Tensor:
+def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor, hinged: bool = False) -> Tensor:
     """Local rotations (B, 21, 3, 3) of the poses whose `BodyMap.human_directions` are the given ones.
 
     A limb turns about the axis across its old and new direction, so that no twist is added; then, if the robot has a
@@ -30,6 +30,7 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> 
         body_map: the robot's body map.
         local_BJ33: local rotations (B, 21, 3, 3) of the poses to start from.
         direction_BD3: directions (B, D, 3), as of `BodyMap.robot_directions` or `BodyMap.human_directions`.
+        hinged: let limbs bend about a human's axes also where the robot has no such axis.
     """
     pose = _Pose(local_BJ33, body_map.skeleton.global_rotations(local_BJ33))
     rest_K3 = body_map.skeleton.rest_K3
@@ -38,11 +39,12 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> 
     from_pelvis: dict[str, Tensor] = {}
     """All directions, by the part from which they are seen: a part is turned before others are seen from it."""
     for part in body_map.keypoints.parts:
-        if not part.seen_from or not set(part.direction_names) <= column.keys():
+        there = set(part.direction_names) <= column.keys()
+        if not part.seen_from or not (there or (hinged and isinstance(part, BendPart))):
             continue
         if part.seen_from not in from_pelvis:
             from_pelvis[part.seen_from] = direction_BD3 @ pose.of(view_joint[part.seen_from]).mT
-        wanted = [from_pelvis[part.seen_from][:, column[name]] for name in part.direction_names]
+        wanted = [from_pelvis[part.seen_from][:, column[name]] for name in part.direction_names if there]
         joint = JOINT_NAMES.index(part.joint)
         if isinstance(part, LimbPart):
             start, end = (KEYPOINT_NAMES.index(name) for name in (part.start, part.end))
@@ -51,8 +53,8 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor) -> 
         elif isinstance(part, BendPart):
             limbs = (limb.direction_names[0] for limb in body_map.keypoints.parts if limb.name in part.limbs)
             upper, lower = (from_pelvis[part.seen_from][:, column[name]] for name in limbs)
-            axis_B3 = bend_axis(upper, lower, wanted[0])[0]
             own_B3 = pose.of(joint) @ pose.of(joint).new_tensor(part.rest)
+            axis_B3 = bend_axis(upper, lower, wanted[0] if there else own_B3)[0]
             pose.turn(joint, _turn_about(upper, own_B3, axis_B3))
         elif isinstance(part, OrientedPart):
             orientation_B33 = part.turn(*wanted)
