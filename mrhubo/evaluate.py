@@ -19,8 +19,11 @@ def build_parser() -> CommandParser[Config]:
     parser = CommandParser("mrhubo evaluate", DESCRIPTION, Config)
     package = "the package that a fit ended with"
     parser.add_argument("--retargeter", metavar="FOLDER", required=True, help=package)
-    polish = "steps of optimisation after the networks (default: 0, the networks alone; `retarget` makes up to 10)"
-    parser.add_argument("--polish", metavar="NUMBER", type=whole_number(0, 1_000), default=0, help=polish)
+    polish = (
+        "so many steps of optimisation after the networks, each frame on its own (default: the networks alone, then"
+        " every way of answering: frame by frame, whole clips, stream; and the same motions re-shared)"
+    )
+    parser.add_argument("--polish", metavar="NUMBER", type=whole_number(0, 1_000), help=polish)
     clips = "the validation clips, for choosing between retargeters; else the test clips"
     parser.add_argument("--validation", action="store_true", help=clips)
     parser.add_argument("--quiet", action="store_true", help="no progress lines")

@@ -13,9 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.motion import write_motion
-from mrhubo.motion.authoring.key_poses import Arm, Key, perform
+from mrhubo.motion.authoring.key_poses import Arm, Key, Performance, perform
 from mrhubo.motion.authoring.stance import Stance
 
 FRAME_RATE = 60.0
@@ -239,19 +241,87 @@ def conversation() -> list[Key]:
     ]
 
 
+def arm_sweep() -> list[Key]:
+    """Straight arms sweep from the thighs over the front to overhead and back, then out to the sides and back."""
+    down = Arm(upper=(0.17, -1, 0.0), fore=(0.16, -1, 0.10), palm=(-1, 0, 0))
+    ahead = Arm(upper=(0.10, 0.0, 1), fore=(0.09, 0.10, 1), palm=(-1, 0, 0))
+    above = Arm(upper=(0.16, 1, 0.10), fore=(0.14, 1, 0.24), palm=(1, 0, 0))
+    side = Arm(upper=(1, 0.0, 0.06), fore=(1, 0.0, 0.18), palm=(0, -1, 0))
+    return [
+        Key(0, down, down, hold=0.3),
+        Key(1.3, ahead, ahead),
+        Key(2.4, above, above, hold=0.3),
+        Key(3.8, ahead, ahead),
+        Key(5.0, down, down, hold=0.3),
+        Key(6.6, side, side, hold=0.3),
+        Key(8.4, down, down, hold=0.3),
+    ]
+
+
+def side_circles() -> list[Key]:
+    """Straight arms out to the sides, whose hands draw four circles."""
+
+    def at(turn: float) -> Arm:
+        up, forward = 0.35 * np.sin(2 * np.pi * turn), 0.35 * np.cos(2 * np.pi * turn)
+        return Arm(upper=(1, up, forward), fore=(1, up, forward + 0.12), palm=(0, -1, 0))
+
+    keys = [Key(0, HANG, HANG, hold=0.2)]
+    for eighth in range(33):
+        arm = at(eighth / 8 - 0.25)
+        keys.append(Key(1.4 + 0.16 * eighth, arm, arm))
+    return [*keys, Key(8.4, HANG, HANG, hold=0.2)]
+
+
+def hanging_noise() -> list[Key]:
+    """Straight arms hang at the sides, and every joint of them trembles by 2 degrees, as video estimators' do."""
+    down = Arm(upper=(0.17, -1, 0.0), fore=(0.16, -1, 0.10), palm=(-1, 0, 0))
+    return [Key(0, down, down, hold=8.0)]
+
+
 MOTIONS: tuple[Callable[[], list[Key]], ...] = (
     wave, boxing, stretch, crossing_arms, drinking, directing_traffic, bow_and_greet, pointing, conversation,
 )  # fmt: skip
 
 
+STRAIGHT_ARMS = (arm_sweep, side_circles, hanging_noise)
+"""Where a straight elbow leaves the twist of the arm open: apart from the others, whose mean tells what to expect."""
+TREMBLING_DEG = 2.0
+
+
 def main(folder: Path) -> None:
     """Writes every motion to `folder`. Rounding to 1e-5 rad hides what differs between machines."""
     for seed, motion in enumerate(MOTIONS):
-        done = perform(motion(), FRAME_RATE, seed)
-        numbers = [np.round(a, 5) for a in (done.pose_body_T63, done.root_orient_T3, done.trans_T3)]
-        description = " ".join((motion.__doc__ or "").split())
-        write_motion(folder / f"{motion.__name__}.npz", *numbers, frame_rate=FRAME_RATE, description=description)
-        print(f"{motion.__name__}: {len(numbers[0]) / FRAME_RATE:.1f} s")
+        write(folder, motion, perform(motion(), FRAME_RATE, seed))
+    for seed, motion in enumerate(STRAIGHT_ARMS):
+        done = straightened(perform(motion(), FRAME_RATE, seed))
+        write(folder / "straight_arms", motion, trembling(done) if motion is hanging_noise else done)
+
+
+def write(folder: Path, motion: Callable[[], list[Key]], done: Performance) -> None:
+    """One file."""
+    folder.mkdir(exist_ok=True)
+    numbers = [np.round(a, 5) for a in (done.pose_body_T63, done.root_orient_T3, done.trans_T3)]
+    description = " ".join((motion.__doc__ or "").split())
+    write_motion(folder / f"{motion.__name__}.npz", *numbers, frame_rate=FRAME_RATE, description=description)
+    print(f"{motion.__name__}: {len(numbers[0]) / FRAME_RATE:.1f} s")
+
+
+def straightened(done: Performance) -> Performance:
+    """The motion with elbows that never bend."""
+    pose_TJ3 = done.pose_body_T63.reshape(-1, 21, 3).copy()
+    pose_TJ3[:, [POSED_JOINT_NAMES.index(f"{side}_elbow") for side in ("left", "right")]] = 0.0
+    return replace(done, pose_body_T63=pose_TJ3.reshape(-1, 63))
+
+
+def trembling(done: Performance) -> Performance:
+    """The motion with noise in every frame and joint of the arms, normally distributed about each axis."""
+    arms = [i for i, name in enumerate(POSED_JOINT_NAMES) if name.endswith(("shoulder", "elbow", "wrist"))]
+    pose_TJ3 = done.pose_body_T63.reshape(-1, 21, 3).copy()
+    noise = np.random.default_rng(0).normal(size=(len(pose_TJ3), len(arms), 3)) * np.radians(TREMBLING_DEG)
+    for place, joint in enumerate(arms):
+        turned = Rotation.from_rotvec(pose_TJ3[:, joint]) * Rotation.from_rotvec(noise[:, place])
+        pose_TJ3[:, joint] = turned.as_rotvec()
+    return replace(done, pose_body_T63=pose_TJ3.reshape(-1, 63))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@ Legend: T frames, J = 21 human joints, N robot joints.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from torch import Tensor
@@ -16,14 +17,14 @@ from mrhubo.body import Skeleton
 from mrhubo.config import Config, EvaluationConfig, fingerprint
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
-from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.motion import Motion, find_motions, read_folder, reshare
 from mrhubo.pairing import pose_settings
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_motions
 from mrhubo.runtime.progress import SILENT, Reporter
 
-REFERENCE_SCHEMA = "mrhubo.reference/3"
+REFERENCE_SCHEMA = "mrhubo.reference/4"
 _NAME = 80
 """Bytes of a motion's name that the name of a file begins with."""
 
@@ -34,6 +35,8 @@ class Clip:
 
     motion: Motion
     reference_TN: Tensor
+    optimum_TN: Tensor | None = None
+    """Those (T, N) [rad] that suit each frame best, whatever comes before and after; None: nobody asked."""
 
     @property
     def name(self) -> str:
@@ -83,6 +86,13 @@ def load_motions(config: Config, skeleton: Skeleton | None = None) -> Motions:
     return Motions(folder, validation, test)
 
 
+def reshare_clips(clips: Sequence[Clip]) -> list[Clip]:
+    """The clips with their motions re-shared (`mrhubo.motion.reshare`), each with a seed of its own, the same ever
+    again. Limbs point where they did, so the reference's answers are those to the motions as they were.
+    """
+    return [replace(clip, motion=reshare(clip.motion, int(clip.motion.checksum, 16) % 2**31)) for clip in clips]
+
+
 def solve_references(
     config: Config,
     body_map: BodyMap,
@@ -119,13 +129,15 @@ def solve_references(
             path = folder / f"{config.robot.name}-{short}-{fingerprint(header)}.safetensors"
             try:
                 tensors, found = read_tensors(path)
-                reference = tensors["q"] if found == header else None
+                answers = [tensors["q"], tensors["optimum"]] if found == header else []
             except (DamagedFile, KeyError):
-                reference = None
-            if reference is None or reference.shape != (len(motion), len(body_map.robot.joint_names)):
+                answers = []
+            shape = (len(motion), len(body_map.robot.joint_names))
+            if not answers or any(answer.shape != shape for answer in answers):
                 reference = retargeter.retarget(motion.local_TJ33, motion.frame_rate).q_TN.float()
-                write_tensors(path, {"q": reference}, header)
-            clips.append(Clip(motion, reference))
+                answers = [reference, retargeter.solve_frames(motion.local_TJ33)[0].float()]
+                write_tensors(path, dict(zip(("q", "optimum"), answers, strict=True)), header)
+            clips.append(Clip(motion, *answers))
         progress.update(len(everything))
     count = len(motions.validation)
     return clips[:count], clips[count:]

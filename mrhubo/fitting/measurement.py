@@ -14,18 +14,54 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.evaluation import Clip, Evaluation, evaluate_clips, latencies, measures, table
+from mrhubo.evaluation import (
+    Clip,
+    Evaluation,
+    evaluate_clips,
+    latencies,
+    mean_metrics,
+    measures,
+    motion_table,
+    reshare_clips,
+    run_metrics,
+    table,
+)
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.references import make_references
+from mrhubo.motion import Motion
 from mrhubo.reference import at_limit_share
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.robot import Robot
 from mrhubo.runtime.progress import Reporter
+from mrhubo.streaming import Stream
 
 _STILL_RAD, _MOVING_RAD = 1e-5, 0.1
 """Range of the joints' angles over all test clips that counts as none, and as one that should be there."""
 _AT_LIMITS = 0.99
 """Share of angles at a limit above which nothing can have been learned."""
+
+
+_SUFFIX = ", re-shared"
+"""The same clips with their rotations shared out otherwise among the joints (`mrhubo.motion.reshare`)."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way of answering motions."""
+
+    prefix: str
+    """Of the names of its measures in a run, after `test`."""
+    answer: Callable[[Retargeter, Sequence[Motion]], list[Tensor]]
+    """Joint angles (T, N) [rad] of each motion."""
+
+
+_FRAMES, _REFERENCE = "frame by frame", "reference"
+_WAYS: Mapping[str, Way] = {
+    "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
+    _FRAMES: Way("retarget", lambda r, motions: [r.predict(m.local_TJ33, POLISH) for m in motions]),
+    "whole clips": Way("clip", lambda r, motions: [r.predict(m.local_TJ33, POLISH, m.frame_rate) for m in motions]),
+    "stream": Way("stream", lambda r, motions: [result.q for result in Stream(r).retarget_all(motions)]),
+}
 
 
 @dataclass(frozen=True)
@@ -34,12 +70,18 @@ class Measured:
 
     predictions: Sequence[Tensor]
     """Joint angles (T, N) [rad] of every clip, the networks' alone."""
-    networks: Sequence[Evaluation]
-    """Of the networks alone: clip by clip, then the means over clips and over frames."""
+    ways: Mapping[str, Sequence[Evaluation]]
+    """By the way of answering, to the clips as they are and to re-shared ones: clip by clip, then the means over clips
+    and over frames."""
     networks_latency: Mapping[str, float]
-    retarget: Sequence[Evaluation]
-    """Of `Retargeter.retarget`, which makes a step of optimisation after them."""
+    """Of the networks alone."""
     retarget_latency: Mapping[str, float]
+    """With the steps of optimisation."""
+
+    @property
+    def networks(self) -> Sequence[Evaluation]:
+        """Of the networks alone, to the clips as they are."""
+        return self.ways["networks"]
 
     @property
     def over_clips(self) -> Evaluation:
@@ -49,31 +91,45 @@ class Measured:
     @property
     def table(self) -> str:
         """For a person."""
-        return table(self.networks, self.retarget)
+        return f"{table(self.networks)}\n\n{motion_table(self.ways)}"
 
     @property
     def measures(self) -> dict[str, float]:
         """Of the networks alone, means over clips, by name."""
         return measures(self.over_clips)
 
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Under the names that a run has for them."""
+        found = run_metrics(self.networks, self.networks_latency)
+        for name, evaluations in self.ways.items():
+            way, reshared = name.removesuffix(_SUFFIX), name.endswith(_SUFFIX)
+            prefix = _REFERENCE if way == _REFERENCE else _WAYS[way].prefix
+            parts = ["test", *(["reshared"] if reshared else []), *([prefix] if prefix else [])]
+            found |= mean_metrics(evaluations, self.retarget_latency if name == _FRAMES else {}, "/".join(parts))
+        return found
+
 
 def measure(prepared: Prepared, report: Reporter, retargeter: Retargeter, clips: Sequence[Clip]) -> Measured:
-    """Answers and scores of the networks alone and with the step of optimisation, and how long both take."""
+    """Answers and scores in every way, and how long a frame takes."""
+    predictions: list[Tensor] = []
+    ways: dict[str, Sequence[Evaluation]] = {}
+    sets = {"": clips, _SUFFIX: reshare_clips(clips)}
+    with report.step("evaluation", 2 * len(_WAYS) * len(clips), "clips") as progress:
+        for suffix, asked in sets.items():
+            for name, way in _WAYS.items():
+                progress.update(len(ways) * len(clips), name + suffix)
+                found = way.answer(retargeter, [clip.motion for clip in asked])
+                predictions = predictions or found
+                ways[name + suffix] = _score(prepared, found, asked)
+        progress.update(2 * len(_WAYS) * len(clips))
+    ways[_REFERENCE] = _score(prepared, [clip.reference_TN for clip in clips], clips)
     polished = functools.partial(retargeter.predict, polish=POLISH)
-    with report.step("evaluation", 2 * len(clips), "clips") as progress:
-        progress.update(0)
-        predictions, networks = _score(prepared, retargeter.predict, clips)
-        progress.update(len(clips))
-        _, retarget = _score(prepared, polished, clips)
-        progress.update(2 * len(clips))
-    return Measured(predictions, networks, latencies(retargeter.predict, clips), retarget, latencies(polished, clips))
+    return Measured(predictions, ways, latencies(retargeter.predict, clips), latencies(polished, clips))
 
 
-def _score(
-    prepared: Prepared, predict: Callable[[Tensor], Tensor], clips: Sequence[Clip]
-) -> tuple[list[Tensor], list[Evaluation]]:
-    predictions = [predict(clip.motion.local_TJ33) for clip in clips]
-    return predictions, evaluate_clips(predictions, clips, prepared.body_map, prepared.config.robot.key_links)
+def _score(prepared: Prepared, predictions: Sequence[Tensor], clips: Sequence[Clip]) -> list[Evaluation]:
+    return evaluate_clips(predictions, clips, prepared.body_map, prepared.config.robot.key_links)
 
 
 def refuse_useless(clips: Sequence[Clip], predictions: Sequence[Tensor], robot: Robot, remedy: str) -> None:
@@ -103,16 +159,17 @@ def refuse_useless(clips: Sequence[Clip], predictions: Sequence[Tensor], robot: 
 
 
 def measure_package(
-    prepared: Prepared, report: Reporter, package: Path, validation: bool = False, polish: int = 0
+    prepared: Prepared, report: Reporter, package: Path, validation: bool = False, polish: int | None = None
 ) -> str:
-    """The table of clips and their means, and the latency, of a package.
+    """The tables of clips and their means, and the latency, of a package.
 
     Args:
         prepared: the robot, and the motions that measure.
         report: told of the clips.
         package: the folder that a fit ended with.
         validation: the validation clips in place of the test clips.
-        polish: steps of optimisation after the networks.
+        polish: steps of optimisation after the networks, each frame on its own; None: the networks alone, then every
+            way of answering.
 
     Raises:
         UserError: the package cannot be used, or is of another robot.
@@ -133,15 +190,16 @@ def measure_package(
             "the config has; measured against each other, they would tell nothing"
         )
     clips = make_references(prepared, report)[0 if validation else 1]
-    predictions = []
-    with report.step("evaluation", len(clips), "clips") as progress:
-        for done, clip in enumerate(clips, start=1):
-            predictions.append(retargeter.predict(clip.motion.local_TJ33, polish))
-            progress.update(done, clip.name)
-    found = evaluate_clips(predictions, clips, body_map, prepared.config.robot.key_links)
-    one, many = latencies(lambda pose: retargeter.predict(pose, polish), clips).values()
-    lines = [table(found), ""]
+    if polish is not None:
+        predict = functools.partial(retargeter.predict, polish=polish)
+        with report.step("evaluation", len(clips), "clips"):
+            found = _score(prepared, [predict(clip.motion.local_TJ33) for clip in clips], clips)
+        lines, latency = [table(found)], latencies(predict, clips)
+    else:
+        measured = measure(prepared, report, retargeter, clips)
+        lines, latency = [measured.table], measured.networks_latency
     if links := body_map.collision.uncovered:
         lines.append(f"collision: {len(links)} links have meshes for collision, which are not read: {', '.join(links)}")
+    one, many = latency.values()
     lines.append(f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once")
-    return "\n".join(lines)
+    return "\n".join([lines[0], "", *lines[1:]])

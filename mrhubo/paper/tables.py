@@ -65,6 +65,25 @@ _MORE = {
     "latency_1000_us": ("a frame of 1,000 [us]", 1, 0),
 }
 
+_MOTION = {
+    "limb_deg": ("limbs [deg]", 1, 2),
+    "excess_deg": ("over optimum", 1, 2),
+    "excess_max_deg": ("at worst", 1, 1),
+    "jerk_ratio": ("jerk ratio", 1, 2),
+    "speed_max": ("speed [rad/s]", 1, 1),
+    "speed_p99": ("99%", 1, 1),
+    "over_limit": ("over limit [%]", 100, 1),
+    "jumps": ("jumps", 1, 1),
+}
+_WAYS = {
+    "": "the networks alone",
+    "retarget/": "with steps of optimisation, frame by frame",
+    "clip/": "with steps of optimisation, whole clips",
+    "stream/": "a stream",
+    "reference/": "the reference",
+}
+"""How motions are answered, by what goes before the names of measures."""
+
 Results = Mapping[tuple[str, str], Sequence[Mapping[str, float]]]
 """Test measures (names without `test/`) of every seed, by (robot, method)."""
 
@@ -148,9 +167,15 @@ def tables(results: Results) -> str:
     blocks.append(_more(results, {**_OVER_FRAMES, **_MORE}) + "\n")
     polished = {f"retarget/{name}": column for name, column in {**_ERRORS, **_MORE}.items()}
     ours = {key: found for key, found in results.items() if any("retarget/joint_rad" in seed for seed in found)}
-    blocks.append("The same with the step of optimisation that `retarget` makes after the networks\n")
-    blocks.append(_more(ours, polished))
-    return "\n".join(blocks)
+    blocks.append("The same with steps of optimisation after the networks, frame by frame\n")
+    blocks.append(_more(ours, polished) + "\n")
+    moved = {key: found for key, found in results.items() if any("clip/jumps" in seed for seed in found)}
+    for shared, title in (("", "as they are"), ("reshared/", "re-shared")):
+        for way, name in _WAYS.items():
+            columns = {f"{shared}{way}{measure}": column for measure, column in _MOTION.items()}
+            if any(set(columns) & set(seed) for found in moved.values() for seed in found):
+                blocks += [f"Motion, the test clips {title}: {name}\n", _more(moved, columns) + "\n"]
+    return "\n".join(blocks).rstrip("\n")
 
 
 def _more(results: Results, columns: Mapping[str, tuple[str, float, int]]) -> str:

@@ -11,7 +11,7 @@ from mrhubo.reference.metrics import (
 )
 from mrhubo.reference.polish import Polish
 from mrhubo.reference.result import OptimizationResult
-from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult
+from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult, count_jumps
 from mrhubo.reference.solve import DirectionProblem
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "ReferenceResult",
     "angle_between",
     "at_limit_share",
+    "count_jumps",
     "direction_error",
     "direction_jerk",
     "joint_error",

@@ -7,15 +7,27 @@ Legend: T frames, D directions, N joints, C blocks, M joints of one block.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
-from scipy.linalg import solveh_banded
 from torch import Tensor
 
+from mrhubo.reference.bounded import Banded, Bounds, bounded_minimum, solve_factored
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
 
 _PATIENCE = 6.0
+
+
+@dataclass(frozen=True)
+class StepBound:
+    """How far joints may turn from one frame to the next."""
+
+    step_N: Tensor
+    """[rad]."""
+    counts_X: Tensor
+    """Between which frames and the next (T - 1,)."""
 
 
 def refine(
@@ -26,13 +38,16 @@ def refine(
     sweeps: int = 100,
     tolerance: float = 3e-4,
     fixed_T: Tensor | None = None,
+    bound: StepBound | None = None,
 ) -> tuple[Tensor, Tensor]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
 
     Gauss-Newton on all frames at once: the system is banded. Joints at a limit that the descent would push beyond it
     are frozen for the step. A block's step counts only if the block's cost falls; damping is raised in the frames whose
-    own share of the cost rose, and lowered in the others if the step counted. A block ends when a step turns none of its
-    joints by `tolerance` [rad], or six steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
+    own share of the cost rose, and lowered in the others if the step counted. A block ends when a step turns none of
+    its joints by `tolerance` [rad], or six steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
+
+    With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad.
     """
     model = _motion_quadratic(problem, q_TN, target_TD3, smoothness)
     cost_C = model.cost_BC.double().sum(0)
@@ -40,7 +55,7 @@ def refine(
     failures_C = torch.zeros_like(cost_C)
     for _ in range(sweeps):
         running_C = failures_C < _PATIENCE
-        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T)
+        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
         trial_TN = torch.clamp(trial_TN, problem.lower_N, problem.upper_N)
         trial_TN = torch.where(running_C[problem.blocks.block_N], trial_TN, q_TN)
         trial = _motion_quadratic(problem, trial_TN, target_TD3, smoothness)
@@ -67,6 +82,7 @@ def refine_around(
     free_T: Tensor,
     sweeps: int,
     tolerance: float,
+    step_N: Tensor | None = None,
 ) -> Tensor:
     """`refine` for the frames in `free_T` (T,); the others stay.
 
@@ -76,8 +92,8 @@ def refine_around(
     used_X = torch.nonzero(widen(free_T, smoothness.reach))[:, 0]
     if not len(used_X):
         return q_TN
-    near = smoothness.at(used_X)
-    part_XN = refine(problem, q_TN[used_X], target_TD3[used_X], near, sweeps, tolerance, ~free_T[used_X])[0]
+    near, bound = smoothness.at(used_X), None if step_N is None else StepBound(step_N, used_X.diff() == 1)
+    part_XN = refine(problem, q_TN[used_X], target_TD3[used_X], near, sweeps, tolerance, ~free_T[used_X], bound)[0]
     return q_TN.index_copy(0, used_X, part_XN)
 
 
@@ -110,9 +126,10 @@ def _motion_step(
     running_C: Tensor,
     smoothness: Smoothness,
     fixed_T: Tensor | None,
+    bound: StepBound | None,
 ) -> Tensor:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
-    free_TN = ~problem.frozen(q_TN, model.gradient_BN)
+    free_TN = torch.ones_like(q_TN, dtype=torch.bool) if bound else ~problem.frozen(q_TN, model.gradient_BN)
     if fixed_T is not None:
         free_TN &= ~fixed_T[:, None]
     bands, damping_TN = smoothness.hessian(q_TN), damping_TC[:, problem.blocks.block_N]
@@ -127,27 +144,26 @@ def _motion_step(
             joints_M = torch.nonzero(problem.blocks.block_N == block)[:, 0]
             both_TMM = free_TN[:, joints_M, None] & free_TN[:, None, joints_M]
             within_TMM = model.hessian_BNN[:, joints_M[:, None], joints_M] * both_TMM
-            parts = (right_TN, diagonal_TN, *couplings)
-            right_TM, diagonal_TM, *couplings_TM = (part[:, joints_M].double().cpu().numpy() for part in parts)
-            step_TM = _solve_banded(within_TMM.double().cpu().numpy(), diagonal_TM, couplings_TM, right_TM)
+            right_TM, diagonal_TM, *couplings_TM = (
+                _array(part[:, joints_M]) for part in (right_TN, diagonal_TN, *couplings)
+            )
+            system = Banded(_array(within_TMM), diagonal_TM, couplings_TM)
+            if bound is None:
+                step_TM = solve_factored(system.factor(), right_TM)
+            else:
+                bounds = _bounds(problem, q_TN, free_TN[:, 0], bound, joints_M)
+                step_TM = bounded_minimum(system, right_TM, bounds)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
 
 
-def _solve_banded(
-    within_TMM: np.ndarray, diagonal_TM: np.ndarray, couplings_TM: list[np.ndarray], right_TM: np.ndarray
-) -> np.ndarray:
-    """The solution (T, M) of a symmetric system, of which are given: the entries within a frame, but its diagonal
-    apart, and those between a joint and the same joint one, two ... frames later.
-    """
-    frames, joints = right_TM.shape
-    # Lower banded form: row k holds the entries k below the diagonal; the next frame's same joint is `joints` below.
-    banded = np.zeros((len(couplings_TM) * joints + 1, frames, joints))
-    banded[0] = diagonal_TM
-    for k in range(1, joints):
-        banded[k, :, : joints - k] = np.diagonal(within_TMM, offset=-k, axis1=1, axis2=2)
-    for lag, coupling_TM in enumerate(couplings_TM, start=1):
-        banded[lag * joints, : frames - lag] = coupling_TM
-    step = solveh_banded(banded.reshape(len(banded), -1), right_TM.ravel(), lower=True, overwrite_ab=True,
-                         check_finite=False)  # fmt: skip
-    return step.reshape(frames, joints)
+def _bounds(problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, bound: StepBound, joints_M: Tensor) -> Bounds:
+    moved_XM, most_M = q_TN.diff(dim=0)[:, joints_M], bound.step_N[joints_M]
+    moves = torch.stack((problem.lower_N - q_TN, problem.upper_N - q_TN))[..., joints_M]
+    steps = torch.stack((-most_M - moved_XM, most_M - moved_XM))
+    counts_X = bound.counts_X & (free_T[1:] | free_T[:-1])
+    return Bounds(_array(moves), _array(steps), _array(free_T), _array(counts_X))
+
+
+def _array(tensor: Tensor) -> np.ndarray:
+    return tensor.double().cpu().numpy()

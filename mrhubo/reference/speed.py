@@ -2,29 +2,24 @@
 
     |q_t - q_(t-1)| <= step        for every joint, from each frame to the next
 
-First the nearest motion that keeps to it, then the best one near that: an augmented Lagrangian around the frames that
-were too fast, whose last thousandths the nearest motion takes away again.
+First the nearest motion that keeps to it, then the best one near that (`bounded`), whose last millionths the nearest
+motion takes away again.
 
-Legend: T frames, X steps between them, N joints, D directions.
+Legend: T frames, N joints, D directions.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import torch
 from torch import Tensor
 
-from mrhubo.reference.refine import motion_cost, refine_around, widen
+from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
-from mrhubo.reference.terms import Smoothness, StepPenalty
+from mrhubo.reference.terms import Smoothness
 
-_WEIGHT = 30.0
-"""Of the penalty [1/rad^2]: some ten times a frame's own curvature, so that few rounds are enough."""
-_ROUNDS, _SWEEPS, _TOLERANCE = 4, 6, 1e-3
-_ENOUGH = 1e-3
-"""Steps that are too long by no more than this share of the bound are left to the projection."""
+_SWEEPS, _TOLERANCE = 5, 2e-3
 _AROUND_S = 0.5
 """Frames this near in time [s] to those that were too fast may change."""
 _FLOAT = 4e-7
@@ -39,12 +34,13 @@ def speed_bound(velocity_N: Tensor, frame_rate: float) -> tuple[Tensor, int]:
     return torch.maximum(step_N - 2 * _FLOAT, step_N / 2), math.ceil(_AROUND_S * frame_rate)
 
 
-def nearest_slow(q_TN: Tensor, step_N: Tensor) -> Tensor:
+def nearest_slow(q_TN: Tensor, step_N: Tensor, fixed_T: Tensor | None = None) -> Tensor:
     """The motion (T, N) [rad] without a step longer than `step_N` (N,) whose largest distance from `q_TN` is least.
 
     It is the mean of the least and the greatest of all motions that keep to the bound, above and below the given one:
     E. J. McShane, "Extension of range of functions", 1934. Nothing leaves the range that the joint had. Joints that
-    keep to the bound stay as they are, to the bit.
+    keep to the bound stay as they are, to the bit. So do frames in `fixed_T` (T,), whose steps are short enough; the
+    others are then as near as these let them.
     """
     too_fast_N = (q_TN.diff(dim=0).abs() > step_N).any(dim=0)
     if not bool(too_fast_N.any()):
@@ -58,8 +54,12 @@ def nearest_slow(q_TN: Tensor, step_N: Tensor) -> Tensor:
         after_TM = (path_TM - ramp_TM).flip(0).cummax(dim=0).values.flip(0) + ramp_TM
         return torch.maximum(before_TM, after_TM)
 
+    found_TM = (least_above(path_TM) - least_above(-path_TM)) / 2
+    if fixed_T is not None and bool(fixed_T.any()):
+        from_TM, to_TM = (least_above(torch.where(fixed_T[:, None], p, -torch.inf)) for p in (path_TM, -path_TM))
+        found_TM = torch.where(fixed_T[:, None], path_TM, torch.minimum(torch.maximum(found_TM, from_TM), -to_TM))
     found_TN = q_TN.clone()
-    found_TN[:, too_fast_N] = ((least_above(path_TM) - least_above(-path_TM)) / 2).to(q_TN)
+    found_TN[:, too_fast_N] = found_TM.to(q_TN)
     return found_TN
 
 
@@ -77,24 +77,14 @@ def keep_speed(
     Blocks of joints without a step that is too long stay too, and so do frames that are more than `around` away from
     those that the nearest slow motion changes, and those in `fixed_T` (T,), whose steps are short enough.
     """
-    nearest_TN = nearest_slow(q_TN, step_N)
+    nearest_TN = nearest_slow(q_TN, step_N, fixed_T)
     changed_TN = nearest_TN != q_TN
     if not bool(changed_TN.any()):
         return q_TN
     free_T = widen(changed_TN.any(dim=1), around)
     if fixed_T is not None:
-        free_T, nearest_TN = free_T & ~fixed_T, torch.where(fixed_T[:, None], q_TN, nearest_TN)
-    penalty = StepPenalty(step_N, torch.zeros_like(q_TN[1:]), _WEIGHT)
-    found_TN = nearest_TN
-    for _ in range(_ROUNDS):
-        firm = dataclasses.replace(smoothness, penalty=penalty)
-        found_TN = refine_around(problem, found_TN, target_TD3, firm, free_T, _SWEEPS, _TOLERANCE)
-        moved_XN = found_TN.diff(dim=0)
-        if not bool((moved_XN.abs() > (1 + _ENOUGH) * step_N).any()):
-            break
-        penalty = penalty.shifted(moved_XN)
-    found_TN = nearest_slow(found_TN, step_N)
-    costs = [motion_cost(problem, motion_TN, target_TD3, smoothness) for motion_TN in (found_TN, nearest_TN)]
-    found_TN = torch.where((costs[0] < costs[1])[problem.blocks.block_N], found_TN, nearest_TN)
+        free_T = free_T & ~fixed_T
+    found_TN = refine_around(problem, nearest_TN, target_TD3, smoothness, free_T, _SWEEPS, _TOLERANCE, step_N)
+    found_TN = nearest_slow(found_TN, step_N, fixed_T)
     concerned_C = changed_TN.any(dim=0).float() @ problem.blocks.joints_NC > 0
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)

@@ -30,7 +30,7 @@ _CUTOFF_HZ = 4.0
 motion at this frequency is followed by a half, one at half of it by 98%."""
 _CALM_JERK = 60.0
 """[1/s^3]: the highest jerk of one radian in one second along the smoothest path, 60 A / T^3 (T. Flash, N. Hogan, "The
-coordination of arm movements", 1985). Far above it the term weighs as little as keeps its share of the cost constant."""
+coordination of arm movements", 1985). Far above it the weight falls with its square: the term costs no more."""
 _WINDOW_S = 0.2
 """Time over which the human's jerk is averaged."""
 _SWEEPS, _TOLERANCE = 20, 2e-3

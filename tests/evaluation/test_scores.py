@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
 
 import pytest
@@ -13,11 +12,22 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.evaluate import main
-from mrhubo.evaluation import Clip, Evaluation, evaluate_clip, latency_us, mean_score, measures, table
+from mrhubo.evaluation import (
+    Clip,
+    Evaluation,
+    evaluate_clip,
+    latency_us,
+    mean_score,
+    measures,
+    motion_table,
+    reshare_clips,
+    table,
+)
 from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import BodyMap, build_body_map
+from tests.chain import cut_motion
 
 
 def body_map_of(root: Path, robot: str) -> tuple[BodyMap, list[str]]:
@@ -100,12 +110,43 @@ def test_means_count_clips_or_frames() -> None:
     assert "head_deg" not in measures(over_clips) and measures(over_clips)["at_limit"] == 2
     text = table([*clips, over_clips, over_frames])
     assert "head" not in text and len({len(line) for line in text.splitlines()}) == 1
-    better = Evaluation("mean over clips", 40, *[0.5] * 5, nan, *[0.5] * 4)
-    longer = table([*clips, over_clips, over_frames], [clips[0], better, better]).splitlines()
-    assert [line.split("  ")[0] for line in longer] == [
-        "clip", "a", "b", "-" * len(longer[0]), "mean over clips", "mean over frames", *["mean over clips, retarget"] * 2,
-    ]  # fmt: skip
-    assert "0.500" in longer[-1] and len({len(line) for line in longer}) == 1
+    ways = {way: [*clips, over_clips, over_frames] for way in ("networks", "whole clips, re-shared")}
+    lines = motion_table(ways).splitlines()
+    assert [line.split("  ")[0] for line in lines] == ["mean over clips", *ways] and len({*map(len, lines)}) == 1
+    assert "over optimum" not in lines[0] and "2.00" in lines[1]  # nobody knows the optimum
+
+
+def test_excess_speed_and_jumps(root: Path, local_TJ33: torch.Tensor) -> None:
+    """A robot that stands at each frame's optimum has no excess; one joint that turns once at a known speed shows."""
+    body_map, key_links = body_map_of(root, "nao")
+    optimum, _ = OptimizationRetargeter(body_map).solve_frames(local_TJ33[:1])
+    still_TJ33, optimum = local_TJ33[:1].expand(12, -1, -1, -1), optimum.expand(12, -1).clone()
+    joint = body_map.robot.joint_names.index("LElbowYaw")
+    speed = float(body_map.robot.velocity_N[joint])
+    clip = Clip(Motion("a", still_TJ33, 24.0), optimum, optimum)
+    quiet = evaluate_clip(clip, optimum, body_map, key_links)
+    assert quiet.excess_deg == quiet.excess_max_deg == quiet.speed_max == quiet.over_limit == quiet.jumps == 0
+    for share, over, jumps in ((0.9, 0, 0), (1.1, 1, 0), (2.0, 1, 1)):
+        q_TN = optimum.clone()
+        q_TN[6:, joint] -= share * speed / 24 * torch.sign(q_TN[0, joint])
+        found = evaluate_clip(clip, q_TN, body_map, key_links)
+        assert found.speed_max == pytest.approx(share * speed, rel=1e-4)
+        assert found.over_limit == pytest.approx(over / 11) and found.jumps == jumps
+        assert 0 < found.excess_deg < found.excess_max_deg
+    assert math.isnan(evaluate_clip(Clip(clip.motion, optimum), optimum, body_map, key_links).excess_deg)
+
+
+def test_reshared_clips_ask_for_the_same(root: Path, local_TJ33: torch.Tensor) -> None:
+    body_map, _ = body_map_of(root, "nao")
+    clips = [Clip(Motion("a", local_TJ33[first:], 24.0), torch.zeros(1, 8)) for first in (0, 20)]
+    found, again = reshare_clips(clips), reshare_clips(clips)
+    for before, after, same in zip(clips, found, again, strict=True):
+        assert (
+            torch.equal(after.motion.local_TJ33, same.motion.local_TJ33) and after.reference_TN is before.reference_TN
+        )
+        limbs = [body_map.human_directions(clip.motion.local_TJ33)[:, body_map.measured] for clip in (before, after)]
+        torch.testing.assert_close(*limbs, atol=1e-4, rtol=0)
+        assert float((after.motion.local_TJ33 - before.motion.local_TJ33).abs().max()) > 0.05
 
 
 def test_latency_is_a_time_a_frame() -> None:
@@ -123,16 +164,20 @@ def test_the_command_measures_a_package_and_refuses_another_robots(
     made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
     package = made.save(tmp_path / "package", {})
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path)
+        cut_motion(name, tmp_path, (1, 3), every=4)
     given = ["--retargeter", str(package), "--quiet", f"pairs.dir={tmp_path}", f"evaluation.motions=[{tmp_path}]"]
     plain = ""
-    for flags, clip in (([], "wave"), (["--validation"], "drinking")):
+    for flags, clip in (([], "wave"), (["--validation", "--polish", "0"], "drinking")):
         main(["--config", str(root / "conf" / "nao.yaml"), *given, *flags])
         output = capsys.readouterr().out
         plain = output if clip == "wave" else plain
         assert f"\n{clip} " in output and "mean over frames" in output and "us for one frame" in output
+    for way in ("networks", "frame by frame", "whole clips", "stream", "whole clips, re-shared", "reference"):
+        assert any(line.startswith(f"{way}  ") for line in plain.splitlines())
+    assert max(map(len, plain.splitlines())) <= 150
     main(["--config", str(root / "conf" / "nao.yaml"), *given, "--polish", "2"])
     polished = capsys.readouterr().out
+    assert "whole clips" not in polished
 
     def limbs(table: str) -> float:
         return float(next(line for line in table.splitlines() if line.startswith("wave")).split()[4])

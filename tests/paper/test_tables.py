@@ -62,11 +62,16 @@ def measures(joint: float, link: float) -> dict[str, float]:
 def test_the_tables_hold_both_figures() -> None:
     results = {
         ("nao", "proposed"): [measures(0.1, 1.0), measures(0.2, 2.0)],
-        ("coman", "our default"): [{**measures(0.05, 0.5), "retarget/joint_rad": 0.04}],
+        ("coman", "our default"): [
+            {**measures(0.05, 0.5), "retarget/joint_rad": 0.04, "clip/jumps": 2.0, "reshared/clip/over_limit": 0.25}
+        ],
         ("coman", "S3LE"): [measures(0.15, 3.5)],
     }
     text = tables(results)
-    first, second, more, after = text.split("\n\n")[1::2]
+    first, second, more, after, *motion = text.split("\n\n")[1::2]
+    titles = [part for part in text.split("\n\n")[::2] if part.startswith("Motion")]
+    assert titles[-1] == "Motion, the test clips re-shared: with steps of optimisation, whole clips"
+    assert "| 25.0 " in motion[-1] and any("| 2.0 " in block for block in motion) and "S3LE" not in "".join(motion)
     assert "| nao   | 0.150 ± 0.071 (0.389) |" in first and "| coman |                       | 0.050       |" in first
     assert "| nao   | 1.50 ± 0.71 (3.887) |" in second
     assert "without filter" not in first

@@ -2,10 +2,14 @@ from __future__ import annotations
 
 import itertools
 
+import pytest
 import torch
 
-from mrhubo.reference import OptimizationRetargeter
-from mrhubo.reference.trajectory import best_path, pick, refine
+from mrhubo.reference import OptimizationRetargeter, trajectory
+from mrhubo.reference.refine import refine
+from mrhubo.reference.speed import speed_bound
+from mrhubo.reference.terms import Smoothness
+from mrhubo.reference.trajectory import MotionTask, best_path, pick, smooth_motion
 
 
 def test_best_path_equals_trying_all() -> None:
@@ -38,18 +42,40 @@ def test_pick_takes_each_block_from_its_own_candidate() -> None:
 def test_refined_motion_is_a_minimum(retargeters: dict[str, OptimizationRetargeter]) -> None:
     """Few frames, out of reach in part: no small change inside the limits lowers the motion's cost."""
     problem = retargeters["nao"].problem
-    generator, pull = torch.Generator().manual_seed(2), 0.05
-    target_TD3 = torch.nn.functional.normalize(torch.randn(1, 4, 3, generator=generator), dim=-1)
-    target_TD3 = torch.nn.functional.normalize(target_TD3 + 0.3 * torch.randn(6, 4, 3, generator=generator), dim=-1)
+    generator, pull, directions = torch.Generator().manual_seed(2), 0.05, len(problem.body_map.directions)
+    target_TD3 = torch.nn.functional.normalize(torch.randn(1, directions, 3, generator=generator), dim=-1)
+    target_TD3 = torch.nn.functional.normalize(
+        target_TD3 + 0.3 * torch.randn(6, directions, 3, generator=generator), dim=-1
+    )
 
     def cost(q_TN: torch.Tensor) -> float:
         each_TC = problem.quadratic(q_TN, target_TD3).cost_BC.double()
         return float(each_TC.sum() + pull * q_TN.diff(dim=0).double().square().sum())
 
     start_TN = problem.robot.sample(6, generator)
-    q_TN, cost_C = refine(problem, start_TN, target_TD3, pull, sweeps=200, tolerance=1e-9)
+    q_TN, cost_C = refine(problem, start_TN, target_TD3, Smoothness(pull), sweeps=200, tolerance=1e-9)
     assert float(cost_C.sum()) < cost(start_TN)
     assert abs(cost(q_TN) - float(cost_C.sum())) < 1e-4
     for _ in range(100):
         moved_TN = q_TN + 0.02 * torch.randn(q_TN.shape, generator=generator)
         assert cost(torch.clamp(moved_TN, problem.lower_N, problem.upper_N)) > cost(q_TN) - 1e-5
+
+
+def test_windows_do_not_show(retargeters: dict[str, OptimizationRetargeter], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motion that is worked on in windows of a few seconds is the same as in one piece, and as slow as it must be."""
+    problem = retargeters["nao"].problem
+    generator, rate = torch.Generator().manual_seed(5), 24.0
+    keys_1NK = problem.robot.sample(10, generator).T[None]
+    q_TN = torch.nn.functional.interpolate(keys_1NK, size=400, mode="linear")[0].T.contiguous()
+    target_TD3 = problem.body_map.robot_directions(problem.robot.forward(q_TN))
+    jerk_YN = torch.full((397, 8), 0.5)
+    task = MotionTask(
+        target_TD3, Smoothness(0.02, jerk_YN), *speed_bound(problem.robot.velocity_N / 2, rate), sweeps=30
+    )
+    found = []
+    for window, ahead in ((1000, 100), (220, 110)):
+        monkeypatch.setattr(trajectory, "_WINDOW", window)
+        monkeypatch.setattr(trajectory, "_AHEAD", ahead)
+        found.append(smooth_motion(problem, q_TN[:, None], problem.cost(q_TN, target_TD3)[:, None], task))
+        assert bool((found[-1].diff(dim=0).abs() * rate <= problem.robot.velocity_N / 2).all())
+    torch.testing.assert_close(*found, atol=5e-3, rtol=0)

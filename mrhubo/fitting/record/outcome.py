@@ -14,7 +14,7 @@ from typing import Any
 
 from torch import Tensor
 
-from mrhubo.evaluation import Clip, mean_metrics, run_metrics
+from mrhubo.evaluation import Clip
 from mrhubo.fitting.measurement import Measured
 from mrhubo.fitting.record.predictions import log_predictions
 from mrhubo.fitting.record.recording import Recording
@@ -29,9 +29,7 @@ _DIGITS = 10
 def log_measures(recording: Recording, measured: Measured, best_link_cm: float) -> None:
     """Metrics and a table of the test clips; `best_link_cm` is the best validation link error."""
     networks = measured.networks
-    metrics = run_metrics(networks, measured.networks_latency)
-    metrics |= mean_metrics(measured.retarget, measured.retarget_latency, "test/retarget")
-    recording.logger.log_metrics({"val/best_link_cm": best_link_cm, **metrics})
+    recording.logger.log_metrics({"val/best_link_cm": best_link_cm, **measured.metrics})
     log_rows(recording, [dataclasses.asdict(score) for score in networks])
     recording.client.log_text(recording.run_id, measured.table + "\n", "test/clips.txt")
 

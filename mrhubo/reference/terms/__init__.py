@@ -3,7 +3,7 @@
 from mrhubo.reference.terms.directions import DirectionTerm
 from mrhubo.reference.terms.posture import PostureTerm
 from mrhubo.reference.terms.self_collision import SelfCollisionTerm
-from mrhubo.reference.terms.smoothness import Smoothness, StepPenalty
+from mrhubo.reference.terms.smoothness import Smoothness
 from mrhubo.reference.terms.term import Quadratic, State, Term
 
 __all__ = [
@@ -13,6 +13,5 @@ __all__ = [
     "SelfCollisionTerm",
     "Smoothness",
     "State",
-    "StepPenalty",
     "Term",
 ]

@@ -1,11 +1,9 @@
-"""The terms of a motion's cost that couple frames: joints move slowly, evenly, and never faster than they can.
+"""The terms of a motion's cost that couple frames: joints move slowly and evenly.
 
     pull * sum_t |q_t - q_(t-1)|^2                                          velocity
     sum_t jerk_t * |q_t - 3 q_(t-1) + 3 q_(t-2) - q_(t-3)|^2                its second derivative in time
-    sum_t weight * max(0, |q_t - q_(t-1)| - step + shift_t)^2               the limit, softly
 
-The third is the penalty of an augmented Lagrangian (M. R. Hestenes, "Multiplier and gradient methods", 1969): where a
-step stays too long, its shift grows, until it does not. Whatever a term costs in several frames, each of them bears the
+Whatever a term costs in several frames, each of them bears the
 same share of it.
 
 Legend: T frames, X steps between them, Y = T - 3 differences of third order, N joints, C blocks.
@@ -13,7 +11,6 @@ Legend: T frames, X steps between them, Y = T - 3 differences of third order, N 
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -25,26 +22,6 @@ _THIRD = (-1.0, 3.0, -3.0, 1.0)
 
 
 @dataclass(frozen=True)
-class StepPenalty:
-    """What steps cost that are longer than they may be."""
-
-    step_N: Tensor
-    """How far a joint may turn from one frame to the next [rad]."""
-    shift_XN: Tensor
-    """By how much less than that a step is free of cost [rad]."""
-    weight: float
-    """[1/rad^2]."""
-
-    def excess(self, moved_XN: Tensor) -> Tensor:
-        """What is too much of each step (X, N) [rad], with its sign."""
-        return moved_XN.sign() * (moved_XN.abs() - self.step_N + self.shift_XN).clamp(min=0)
-
-    def shifted(self, moved_XN: Tensor) -> StepPenalty:
-        """The same with shifts that have learned from the steps (X, N) [rad] of a minimum."""
-        return StepPenalty(self.step_N, self.excess(moved_XN).abs(), self.weight)
-
-
-@dataclass(frozen=True)
 class Smoothness:
     """The terms above."""
 
@@ -52,7 +29,6 @@ class Smoothness:
     """[1/rad^2]."""
     jerk_YN: Tensor | None = None
     """[1/rad^2]; None: it costs nothing."""
-    penalty: StepPenalty | None = None
 
     @property
     def reach(self) -> int:
@@ -61,44 +37,27 @@ class Smoothness:
 
     def at(self, frame_X: Tensor) -> Smoothness:
         """The same for some frames alone (X,), by their numbers."""
-        jerk, penalty = self.jerk_YN, self.penalty
-        if penalty is not None:
-            penalty = dataclasses.replace(penalty, shift_XN=penalty.shift_XN[frame_X[1:] - 1])
-        if jerk is not None:
-            jerk = jerk[frame_X[3:] - 3]
-        return Smoothness(self.pull, jerk, penalty)
+        return self if self.jerk_YN is None else Smoothness(self.pull, self.jerk_YN[frame_X[3:] - 3])
 
     def costs(self, q_TN: Tensor, joints_NC: Tensor) -> Tensor:
         """What each frame bears (T, C), for joint angles (T, N) [rad]."""
-        moved_XN = q_TN.diff(dim=0)
-        cost_XN = self.pull * moved_XN.square()
-        if self.penalty is not None:
-            cost_XN = cost_XN + self.penalty.weight * self.penalty.excess(moved_XN).square()
-        cost_TN = _shared(cost_XN, 1)
+        cost_TN = _shared(self.pull * q_TN.diff(dim=0).square(), 1)
         if self.jerk_YN is not None and len(self.jerk_YN):
             cost_TN = cost_TN + _shared(self.jerk_YN * q_TN.diff(n=3, dim=0).square(), 3)
         return cost_TN @ joints_NC.to(q_TN)
 
     def gradient(self, q_TN: Tensor) -> Tensor:
         """Half of the gradient (T, N)."""
-        moved_XN = q_TN.diff(dim=0)
-        force_XN = self.pull * moved_XN
-        if self.penalty is not None:
-            force_XN = force_XN + self.penalty.weight * self.penalty.excess(moved_XN)
-        gradient_TN = _spread(force_XN, (-1.0, 1.0))
+        gradient_TN = _spread(self.pull * q_TN.diff(dim=0), (-1.0, 1.0))
         if self.jerk_YN is not None and len(self.jerk_YN):
             gradient_TN = gradient_TN + _spread(self.jerk_YN * q_TN.diff(n=3, dim=0), _THIRD)
         return gradient_TN
 
     def hessian(self, q_TN: Tensor) -> list[Tensor]:
-        """Half of the Gauss-Newton Hessian: its diagonal (T, N), then its entries between each frame and the next (T - 1,
+        """Half of the Hessian: its diagonal (T, N), then its entries between each frame and the next (T - 1,
         N), the one after that (T - 2, N), and so on.
         """
-        moved_XN = q_TN.diff(dim=0)
-        weight_XN = torch.full_like(moved_XN, self.pull)
-        if self.penalty is not None:
-            weight_XN = weight_XN + self.penalty.weight * (self.penalty.excess(moved_XN) != 0)
-        bands = _bands(weight_XN, (-1.0, 1.0))
+        bands = _bands(torch.full_like(q_TN[1:], self.pull), (-1.0, 1.0))
         if self.jerk_YN is not None and len(self.jerk_YN):
             more = _bands(self.jerk_YN, _THIRD)
             bands = [bands[0] + more[0], bands[1] + more[1], *more[2:]]

@@ -13,12 +13,10 @@ from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.terms import (
     DirectionTerm,
     PostureTerm,
-    Quadratic,
     SelfCollisionTerm,
+    Smoothness,
     State,
     Term,
-    add_pull,
-    pull_diagonal,
 )
 from mrhubo.robot import BodyMap
 
@@ -115,23 +113,40 @@ def test_self_collision(name: str, body_maps: dict[str, BodyMap]) -> None:
     torch.testing.assert_close(twice.hessian_BNN, 2 * model.hessian_BNN)
 
 
-def test_smoothness() -> None:
-    generator, pull = torch.Generator().manual_seed(0), 0.3
-    q_TN = torch.randn(6, 3, generator=generator, dtype=torch.float64)
+@pytest.mark.parametrize("frames", [2, 3, 4, 9])
+def test_smoothness(frames: int) -> None:
+    """Costs, gradient and Hessian of both terms at once; the blocks' costs are their joints'."""
+    generator = torch.Generator().manual_seed(0)
+    q_TN = torch.randn(frames, 3, generator=generator, dtype=torch.float64)
     joints_NC = torch.tensor([[1.0, 0], [0, 1], [0, 1]], dtype=torch.float64)
-    nothing = Quadratic(torch.zeros(6, 2).double(), torch.zeros(6, 3).double(), torch.zeros(6, 3, 3).double())
+    jerk_YN = torch.rand(max(frames - 3, 0), 3, generator=generator, dtype=torch.float64)
+    smoothness = Smoothness(0.3, jerk_YN)
 
     def cost(q_TN: Tensor) -> Tensor:
-        return pull * q_TN.diff(dim=0).square().sum()
+        jerk = (jerk_YN * q_TN.diff(n=3, dim=0).square()).sum() if frames > 3 else 0.0
+        return 0.3 * q_TN.diff(dim=0).square().sum() + jerk
 
-    model = add_pull(nothing, q_TN, pull, joints_NC)
-    torch.testing.assert_close(model.cost_BC.sum(), cost(q_TN))
-    torch.testing.assert_close(model.cost_BC[:, 0].sum(), pull * q_TN[:, 0].diff().square().sum())
-    torch.testing.assert_close(2 * model.gradient_BN, torch.autograd.functional.jacobian(cost, q_TN))  # pyright: ignore
+    torch.testing.assert_close(smoothness.costs(q_TN, joints_NC).sum(), cost(q_TN))
+    one_TN = q_TN * torch.tensor([1.0, 0, 0])
+    torch.testing.assert_close(smoothness.costs(q_TN, joints_NC)[:, 0].sum(), cost(one_TN))
+    gradient_TN = torch.autograd.functional.jacobian(cost, q_TN)
+    torch.testing.assert_close(2 * smoothness.gradient(q_TN), gradient_TN)  # pyright: ignore
     hessian_TNTN = torch.autograd.functional.hessian(cost, q_TN)
-    diagonal_TN = torch.stack([hessian_TNTN[:, n, :, n].diagonal() for n in range(3)], dim=1)  # pyright: ignore
-    torch.testing.assert_close(2 * pull_diagonal(6, pull, q_TN).expand(6, 3), diagonal_TN)
-    assert float(hessian_TNTN[2, 1, 3, 1]) == pytest.approx(-2 * pull)  # pyright: ignore
+    bands = smoothness.hessian(q_TN)
+    assert len(bands) == 1 + (3 if frames > 3 else 1)
+    for lag, band_TN in enumerate(bands):
+        for n in range(3):
+            torch.testing.assert_close(2 * band_TN[:, n], hessian_TNTN[:, n, :, n].diagonal(-lag))  # pyright: ignore
+
+
+def test_smoothness_of_some_frames_is_that_of_all_away_from_their_ends() -> None:
+    generator = torch.Generator().manual_seed(0)
+    q_TN, jerk_YN = torch.randn(14, 2, generator=generator), torch.rand(11, 2, generator=generator)
+    whole, frame_X = Smoothness(0.3, jerk_YN), torch.arange(3, 12)
+    inner = slice(whole.reach, -whole.reach)
+    gradient_XN = whole.at(frame_X).gradient(q_TN[frame_X])
+    torch.testing.assert_close(gradient_XN[inner], whole.gradient(q_TN)[frame_X][inner])
+    assert len(gradient_XN[inner]) == 3
 
 
 def check_model(term: Term, blocks: Blocks, at: State, residual_BR: Tensor, jacobian_BRN: Tensor) -> None:

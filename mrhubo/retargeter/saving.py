@@ -1,0 +1,109 @@
+"""A retargeter's package on disk: weights, URDF, settings, joint names, limits, units."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
+from mrhubo.config import Config, load_config, to_yaml
+from mrhubo.errors import UserError, shortened
+from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
+from mrhubo.retargeter.architecture import build_network
+from mrhubo.retargeter.confidence import ConfidenceModel
+from mrhubo.retargeter.integrity import (
+    check_confidence,
+    check_content,
+    check_files,
+    check_paths,
+    check_prior,
+    check_weights,
+    file_checksums,
+)
+from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.robot import BodyMap, build_body_map
+
+SCHEMA = "mrhubo.retargeter/4"
+_WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
+_SKELETON = "skeleton.safetensors"
+_OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)
+"""Files beside the weights."""
+
+
+def write_package(
+    folder: Path,
+    network: RetargetNetwork,
+    body_map: BodyMap,
+    prior: BodyPrior,
+    config: Config,
+    settings: Mapping[str, str],
+) -> Path:
+    """Writes a package; `settings` go into the header."""
+    folder.mkdir(parents=True, exist_ok=True)
+    robot = body_map.robot
+    with atomic_path(folder / _URDF) as temporary:
+        shutil.copyfile(config.robot.urdf, temporary)
+    prior.save(folder / _PRIOR)
+    save_skeleton(folder / _SKELETON, body_map.skeleton)
+    with atomic_path(folder / _CONFIG) as temporary:
+        temporary.write_text(_portable(config))
+    metadata = {
+        "schema": SCHEMA,
+        "robot": robot.name,
+        "joint_names": json.dumps(robot.joint_names),
+        "lower_rad": json.dumps(robot.lower_N.tolist()),
+        "upper_rad": json.dumps(robot.upper_N.tolist()),
+        "input": "SMPL body joints 1..21, local rotations, 6D (first two columns, column after column)",
+        "seen": json.dumps(network.features.names),
+        "output": "joint angles in rad, in the order of joint_names",
+        **settings,
+        **file_checksums(folder, _OTHERS),
+    }
+    write_tensors(folder / _WEIGHTS, network.state_dict(), metadata)
+    return folder
+
+
+def read_package(folder: Path) -> tuple[RetargetNetwork, BodyMap, BodyPrior, Config, float, ConfidenceModel]:
+    """What a retargeter is made of.
+
+    Raises:
+        UserError: the folder is no package, a file is missing or damaged, was edited or comes from another package,
+            or weights and settings do not fit.
+    """
+    if os.path.isfile(folder):
+        raise UserError(f"{folder}: is a file; a package is a folder: name {folder.parent}")
+    if not os.path.lexists(folder / _WEIGHTS):
+        raise UserError(f"{folder}: is no package of a retargeter: {_WEIGHTS} is missing")
+    tensors, metadata = read_tensors(folder / _WEIGHTS)
+    if metadata.get("schema") != SCHEMA:
+        raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
+    check_files(folder, _OTHERS, metadata)
+    config = load_config(folder / _CONFIG, environment=False)
+    body = config.body
+    check_paths(folder, {_URDF: config.robot.urdf, _PRIOR: body.prior_path, _SKELETON: body.model_path})
+    prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))
+    check_prior(folder, metadata, prior)
+    network = build_network(config, body_map)
+    threshold = check_content(folder, metadata, body_map.robot, network.features.names)
+    try:
+        network.load_state_dict({name: tensor for name, tensor in tensors.items() if tensor.is_floating_point()})
+    except RuntimeError as error:
+        said = shortened(" ".join(str(error).split()), 300)
+        raise UserError(f"{folder}: weights and settings do not fit: {said}") from error
+    check_weights(folder, network.state_dict(), body_map.robot)
+    return network, body_map, prior, config, threshold, check_confidence(folder, metadata)
+
+
+def _portable(config: Config) -> str:
+    """What loading needs of the config, as YAML whose only paths are the files beside it.
+
+    How pairs were made and the network was trained is in the run (`run_id`); a package outlives changes of those keys.
+    """
+    config = copy.deepcopy(config)
+    config.robot.urdf = Path(_URDF)
+    config.body.prior_path, config.body.model_path, config.body.betas = Path(_PRIOR), Path(_SKELETON), []
+    return to_yaml({"robot": config.robot, "body": config.body, "model": config.model})
