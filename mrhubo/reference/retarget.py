@@ -135,8 +135,8 @@ class OptimizationRetargeter(nn.Module):
     def retarget_collision_free(
         self, local_TJ33: MotionLike, frame_rate: float, q_TN: Tensor | None = None
     ) -> ReferenceResult:
-        """A motion in which the robot never touches itself, as near to the human's as that allows; unlike `retarget`'s, it
-        does not keep to the limits of joints' speeds.
+        """A motion in which the robot never touches itself, as near to the human's as that allows. Unlike that of
+        `retarget`, it does not keep to the limits of joints' speeds.
 
         Args:
             local_TJ33: human poses, local rotations (T, 21, 3, 3).

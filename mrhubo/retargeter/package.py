@@ -195,11 +195,12 @@ class Retargeter(nn.Module):
         return find_signals(self.branches, target_TD3, robot_TD3, reading, shake_TD)
 
     @torch.no_grad()
-    def judge(self, q_TN: Tensor, local_TJ33: Tensor) -> RetargetResult:
+    def judge(self, q_TN: Tensor, local_TJ33: Tensor, frame_rate: float | None = None) -> RetargetResult:
         """What `retarget` tells about its own answers, for any joint angles (T, N) [rad] and human poses (T, 21, 3, 3),
-        both on the retargeter's device, float32.
+        both on the retargeter's device, float32; with frames per second, if they are one motion.
         """
-        return self._judge(q_TN, self.body_map.human_directions(local_TJ33), None)
+        target_TD3 = self.body_map.human_directions(local_TJ33)
+        return self._judge(q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
 
     def _judge(self, q_TN: Tensor, target_TD3: Tensor, shake_TD: Tensor | None) -> RetargetResult:
         links = self.body_map.robot.forward(q_TN)

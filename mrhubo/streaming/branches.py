@@ -91,7 +91,7 @@ class Branches:
     def _steps(
         self, q_YN: Tensor, target_YD3: Tensor, pull_Y: Tensor, bounds: tuple[Tensor, Tensor]
     ) -> tuple[Tensor, Tensor]:
-        """Answers (Y, N) after steps on cost plus pull, inside bounds, and what each block costs (Y, C) without pull."""
+        """Answers (Y, N) after steps on cost plus pull, inside bounds, and the blocks' costs (Y, C) without pull."""
         problem, centre_YN = self.problem, q_YN
         block_N, joints_NC = problem.blocks.block_N, problem.blocks.joints_NC
         model = problem.quadratic(q_YN, target_YD3)

@@ -2,8 +2,8 @@
 
 Casiez, Roussel, Vogel, "1 Euro Filter: A Simple Speed-based Low-pass Filter for Noisy Input in Interactive Systems",
 CHI 2012. A first-order low pass whose time constant falls as the speed rises: noise is seen where a limb rests, lag
-where it moves. Its parameters are written as times and speeds: 1 / tau = (1 + speed / half_speed) / rest_time is the paper's
-f_c = f_min + beta speed, with tau = 1 / (2 pi f_c).
+where it moves. Its parameters are written as times and speeds: 1 / tau = (1 + speed / half_speed) / rest_time is the
+paper's f_c = f_min + beta speed, with tau = 1 / (2 pi f_c).
 
 Directions are filtered in place of rotations, as they are all that the cost reads: files that share the same limbs out
 among joints in other ways get the same answer.

@@ -29,9 +29,9 @@ class StreamSettings:
     one to be left, 0 or more."""
     worse_time: float = 0.2
     """For how long [s] without a break, 0 or more."""
-    ramp_time: float = 0.05
-    """Time [s] from rest to a joint's full speed, which limits its acceleration; 0: no such limit. URDFs give none; this
-    is 160 rad/s^2 for NAO, about what a boxer's arm reaches."""
+    ramp_time: float = 0.02
+    """Time [s] from rest to a joint's full speed, which limits its acceleration; 0: no such limit. URDFs give none;
+    a robot's maker may. Who starts or turns suddenly is followed half of this time later, at least."""
     longest_gap: float = 0.1
     """No more time [s] than this, or than one and a half frames, counts as passed since the last answer when joints
     move: after a gap the robot goes on from where it stands, and does not leap to where it would be by now. More than

@@ -177,7 +177,9 @@ class Stream:
             local_TJ33 = self._poses(motion)
             q_TN = answers.get(i, local_TJ33.new_zeros(0, len(self.retargeter.joint_names)))
             parts = zip(q_TN.split(_PART), local_TJ33.split(_PART), strict=True)
-            result = join_results([self.retargeter.judge(*part) for part in parts])
+            result = join_results(
+                [self.retargeter.judge(*part, motion.frame_rate if len(motion) else None) for part in parts]
+            )
             results.append(result.with_leading((len(motion),), motion.frame_rate))
         return results
 
@@ -204,4 +206,8 @@ class Stream:
 
 def _without_confidence(result: RetargetResult, chosen_B: Tensor) -> RetargetResult:
     """No confidence in those who are not seen."""
-    return dataclasses.replace(result, confidence=torch.where(chosen_B, 0.0, result.confidence))
+    return dataclasses.replace(
+        result,
+        confidence=torch.where(chosen_B, 0.0, result.confidence),
+        branch_confidence=torch.where(chosen_B[:, None], 0.0, result.branch_confidence),
+    )

@@ -36,7 +36,7 @@ SCRIPTS = [
     "retarget",
     "scaling",
 ]
-SCRIPTS += ["training"]
+SCRIPTS += ["stream", "training"]
 LIBRARIES = ["common", "levenberg_marquardt"]
 Run = Callable[..., str]
 
@@ -254,6 +254,14 @@ def test_scaling_starts_commands_and_says_what_failed() -> None:
     assert 0 < scaling.run(["-c", "pass"]) < 60
     with pytest.raises(SystemExit, match="no luck"):
         scaling.run(["-c", "raise ValueError('no luck')"])
+
+
+def test_stream(run: Run, package: Path, clips: Path) -> None:
+    text = run("stream", package, "--motions", clips, "--rate", 10, "--seconds", 0.05)
+    assert len(rows(text, "a frame alone")) == 4
+    found = rows(text, "motion")
+    assert [row[1] for row in found[:3]] == ["networks", "`retarget`", "stream"]
+    assert all(row[4] == "0" and row[5] == "0.0%" for row in found if row[1] == "stream")
 
 
 def test_training(run: Run) -> None:

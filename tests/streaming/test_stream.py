@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -175,7 +176,14 @@ def test_what_is_no_pose_is_refused_and_changes_nothing(retargeter: Retargeter, 
 
 def test_what_a_stream_cannot_be(retargeter: Retargeter) -> None:
     assert mrhubo.Stream is Stream
-    for wrong in ({"rate": 0}, {"rate": math.nan}, {"people": 0}, {"people": 1.5}, {"people": True}):
+    wrongs: tuple[dict[str, Any], ...] = (
+        {"rate": 0},
+        {"rate": math.nan},
+        {"people": 0},
+        {"people": 1.5},
+        {"people": True},
+    )
+    for wrong in wrongs:
         with pytest.raises(UserError):
             Stream(retargeter, **wrong)
     stream = Stream(retargeter, settings=StreamSettings(worse_deg=0, worse_time=0, smoothness=0, rest_time=0))
