@@ -208,7 +208,7 @@ def scaled(signals: Signals, usual_phi: float) -> Tensor:
 
 STANDARD = ConfidenceModel(
     usual_phi=0.07,
-    moving=Weights(certain=2.9, miss=2.7, implausible=3.0, excess=1.9, shake=1.0),
-    still=Weights(certain=2.3, miss=2.5, implausible=2.7, excess=1.7, shake=0.0),
+    moving=Weights(certain=3.2, miss=3.2, implausible=4.2, excess=3.9, shake=1.1),
+    still=Weights(certain=2.4, miss=2.9, implausible=3.8, excess=3.4, shake=0.0),
 )
 """Of a retargeter that was never calibrated: what NAO's is, rounded."""

@@ -34,7 +34,8 @@ def roc_curve(score_X: np.ndarray, bad_X: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def roc_area(score_X: np.ndarray, bad_X: np.ndarray) -> float:
     """Probability that something bad has a lower score than something good; ties count half."""
-    return float(np.trapezoid(*roc_curve(score_X, bad_X)[::-1]))
+    mistaken, found = roc_curve(score_X, bad_X)
+    return float(np.trapezoid(found, mistaken))
 
 
 def reliability_sheet(

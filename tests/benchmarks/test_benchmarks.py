@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -24,6 +25,7 @@ from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
 SCRIPTS = [
+    "confidence",
     "pair_pictures",
     "pair_quality",
     "pairing",
@@ -177,6 +179,16 @@ def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     torch.manual_seed(0)
     made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
     return made.save(tmp_path_factory.mktemp("package"), {"run_id": "abc"})
+
+
+def test_confidence(run: Run, package: Path, clips: Path, tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    shutil.copy(clips / "wave.npz", tmp_path / "one")
+    text = run("confidence", package, "--motions", tmp_path / "one", "--frames", 4, "--picture", tmp_path / "a.png")
+    ((_, _, error, *_), *others) = rows(text, "  ")
+    assert len(others) == 13 and 0 <= float(error) < 60
+    areas = {row[0].split(",")[0].split(" ")[0]: float(row[1]) for row in rows(text, "told apart")}
+    assert areas["elbows"] > 0.8 and (tmp_path / "a.png").stat().st_size > 10_000
 
 
 def test_retarget(run: Run, package: Path) -> None:
