@@ -39,7 +39,7 @@ def inside(retargeter: Retargeter, q: Tensor) -> bool:
 def test_no_limit_is_exceeded_whatever_comes_in(retargeter: Retargeter, wave: Tensor) -> None:
     generator, robot = torch.Generator().manual_seed(0), retargeter.body_map.robot
     stream, time, last, last_time = Stream(retargeter), 0.0, None, 0.0
-    for frame in range(60):
+    for frame in range(36):
         kind = frame % 6
         pose: Tensor | None = wave[frame % 20]
         if kind == 1:
@@ -67,7 +67,7 @@ def test_who_stands_still_gets_the_frames_own_optimum_and_the_robot_stays_there(
     optimum = retargeter.judge(best, pose).direction_error_deg.mean(dim=1)
     stream = Stream(retargeter, people=8)
     stream.reset(retargeter.body_map.robot.home().expand(8, -1))
-    for _ in range(59):
+    for _ in range(49):
         stream.joints(pose)
     answer = stream(pose)
     assert float((answer.direction_error_deg.mean(dim=1) - optimum).max()) < 0.5
