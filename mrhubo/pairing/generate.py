@@ -107,8 +107,8 @@ class PairGenerator:
             size = poses_at_once(self.device)
             z_BZ, human_BJ33 = drawn or self._decoded(self.solve(target_BK3))
             directions = self.body_map.robot_directions(poses)
-            chunks = zip(*(x.split(size) for x in (z_BZ, human_BJ33, target_BK3, directions)), strict=True)
-            parts = [self._measure(*chunk, direction) for chunk in chunks]
+            chunks = (x.split(size) for x in (z_BZ, human_BJ33, target_BK3, directions))
+            parts = [self._measure(z, h, target, limbs, direction) for z, h, target, limbs in zip(*chunks, strict=True)]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
             return {name: tensor.cpu() for name, tensor in {"q": q_BN, "R": orientation_BM6, **found}.items()}
 
