@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from mrhubo.body.pose import HumanPose
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot import BodyMap, LinkPoses, Robot
 from mrhubo.rotation import wrap_angle
@@ -39,16 +38,14 @@ def link_error(robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence
     return 100 * (position_TL3 - reference_TL3).norm(dim=-1).mean(dim=-1)
 
 
-def direction_error(
-    body_map: BodyMap, q_TN: Tensor, human: HumanPose | Tensor, poses: LinkPoses | None = None
-) -> Tensor:
-    """Angle (T, D) [degrees] between the robot's measured directions (`BodyMap.measured`) and those of human poses, or
-    of their local rotations (T, 21, 3, 3).
+def direction_error(body_map: BodyMap, q_TN: Tensor, local_TJ33: Tensor, poses: LinkPoses | None = None) -> Tensor:
+    """Angle (T, D) [degrees] between the robot's measured directions (`BodyMap.measured`) and those of human poses,
+    local rotations (T, 21, 3, 3).
 
     `poses` are the robot's link poses at q, if they are there already.
     """
     robot_TD3 = body_map.robot_directions(poses or body_map.robot.forward(q_TN))
-    human_TD3 = body_map.human_directions(human)
+    human_TD3 = body_map.human_directions(local_TJ33)
     return torch.rad2deg(angle_between(robot_TD3[:, body_map.measured], human_TD3[:, body_map.measured]))
 
 

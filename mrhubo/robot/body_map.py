@@ -9,7 +9,6 @@ from collections.abc import Iterable
 
 from torch import Tensor, nn
 
-from mrhubo.body.pose import HumanPose
 from mrhubo.body.skeleton import Skeleton
 from mrhubo.config import RobotConfig, with_places
 from mrhubo.errors import UserError
@@ -119,15 +118,11 @@ class BodyMap(nn.Module):
         """Unit directions (B, D, 3) of the robot, in human axes of the parts from which they are seen."""
         return self.shared.view_robot(poses).direction_BD3
 
-    def human(self, local_BJ33: Tensor) -> HumanPose:
-        """Human poses of local rotations (B, 21, 3, 3) of SMPL's joints 1..21, on this skeleton."""
-        return HumanPose.of(local_BJ33, self.skeleton)
-
-    def human_directions(self, human: HumanPose | Tensor) -> Tensor:
-        """Directions (B, D, 3) of human poses, or of their local rotations (B, 21, 3, 3), in human axes of the parts
-        from which they are seen. Their length is how much they count: 1, but for bend axes, which count 0 to 1.
+    def human_directions(self, local_BJ33: Tensor) -> Tensor:
+        """Directions (B, D, 3) of human poses, local rotations (B, 21, 3, 3) of SMPL's joints 1..21, in human axes of the
+        parts from which they are seen. Their length is how much they count: 1, but for bend axes, which count 0 to 1.
         """
-        return self.shared.of_human(human.local_BJ33 if isinstance(human, HumanPose) else human)
+        return self.shared.of_human(local_BJ33)
 
     def input_joints(self, directions: Iterable[int] | None = None) -> tuple[str, ...]:
         """The human joints that tell about the robot's parts, or about some directions alone: what a pose needs to
