@@ -79,7 +79,8 @@ def test_it_ends_with_a_table_the_package_and_the_dashboard(fitted: tuple[Path, 
     lines = output.strip().splitlines()
     assert lines[0].split()[:6] == ["clip", "frames", "joint", "[rad]", "link", "[cm]"]
     assert {line.split()[0] for line in lines if line} >= {"boxing", "wave", "mean", "package:", "dashboard:"}
-    assert "mean over clips, retarget" in output
+    ways = ["networks", "frame by frame", "whole clips", "stream", "reference"]
+    assert all(f"\n{way} " in output for way in ways) and "\nwhole clips, re-shared " in output
     package = Path(next(line.split(None, 1)[1] for line in lines if line.startswith("package:")))
     assert package.parent == folder / "mlruns" / "packages"
     assert "--host 127.0.0.1" in lines[-1]

@@ -119,8 +119,8 @@ class BodyMap(nn.Module):
         return self.shared.view_robot(poses).direction_BD3
 
     def human_directions(self, local_BJ33: Tensor) -> Tensor:
-        """Directions (B, D, 3) of human poses, local rotations (B, 21, 3, 3) of SMPL's joints 1..21, in human axes of the
-        parts from which they are seen. Their length is how much they count: 1, but for bend axes, which count 0 to 1.
+        """Directions (B, D, 3) of human poses, local rotations (B, 21, 3, 3), in human axes of the parts from which
+        they are seen. Their length is how much they count: 1, but for bend axes, which count 0 to 1.
         """
         return self.shared.of_human(local_BJ33)
 

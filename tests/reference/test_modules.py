@@ -18,9 +18,10 @@ from mrhubo.reference.collision_free import CollisionFreeProblem
 from mrhubo.reference.retarget import StartPool
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.robot import Keypoints, build_body_map
+from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.keypoints import Axis, Limb
 
-_AS_READ = (Keypoints, Axis, Limb, yourdfpy.URDF)
+_AS_READ = (Keypoints, Axis, BendAxis, Limb, yourdfpy.URDF)
 """Descriptions of a file: they stay as they were read."""
 
 
