@@ -38,7 +38,8 @@ def main(argv: list[str] | None = None) -> None:
     local_TJ33 = rotation.axis_angle_to_matrix(turns_T66[:, 3:].unflatten(1, (21, 3)))
     retargeter = Retargeter.load(given.package)
     body_map = retargeter.body_map
-    limbs = [i for i, direction in enumerate(body_map.directions) if direction.part.region in ("arm", "leg")]
+    measured = [body_map.directions[i] for i in body_map.measured]
+    limbs = [i for i, direction in enumerate(measured) if direction.part.region in ("arm", "leg")]
 
     def limb_error(q_TN: Tensor) -> Tensor:
         return direction_error(body_map, q_TN, local_TJ33)[:, limbs].mean(dim=1)

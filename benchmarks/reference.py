@@ -40,7 +40,8 @@ def main(argv: list[str]) -> None:
             for motion, found in zip(motions, plain, strict=True)
         ]
         end = time.perf_counter()
-        parts = list(dict.fromkeys(direction.part.name for direction in retargeter.body_map.directions))
+        measured = retargeter.body_map.measured
+        parts = list(dict.fromkeys(retargeter.body_map.directions[i].part.name for i in measured))
         rows = [
             [name, *measures(retargeter, motions, found, parts, seconds)]
             for name, found, seconds in (("q", plain, middle - start), ("q_cf, from q", free, end - middle))
@@ -60,13 +61,13 @@ def measures(
 ) -> list[str]:
     """The cells of a row, means over frames."""
     body_map = retargeter.body_map
-    shapes, names = body_map.collision, [direction.part.name for direction in body_map.directions]
+    shapes, names = body_map.collision, [body_map.directions[i].part.name for i in body_map.measured]
     q_TN, residual_TD = torch.cat([f.q_TN for f in found]), torch.cat([f.residual_deg_TD for f in found])
     jerks = []
     for motion, result in zip(motions, found, strict=True):
         robot_TD3 = body_map.robot_directions(body_map.robot.forward(result.q_TN))
-        human_TD3 = body_map.human_directions(motion.local_TJ33)
-        jerks.append([float(direction_jerk(d, motion.frame_rate).sum()) for d in (robot_TD3, human_TD3)])
+        both = (d[:, body_map.measured] for d in (robot_TD3, body_map.human_directions(motion.local_TJ33)))
+        jerks.append([float(direction_jerk(d, motion.frame_rate).sum()) for d in both])
     robot_jerk, human_jerk = torch.tensor(jerks).sum(0).tolist()
     limits = sum(f.at_limit_share * len(f.q_TN) for f in found) / len(q_TN)
     columns = [[i for i, name in enumerate(names) if name == part] for part in parts]

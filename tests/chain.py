@@ -56,9 +56,9 @@ def load(folder: Path) -> Retargeter:
     return mrhubo.load(folder)
 
 
-def answer(retargeter: Retargeter, motion: Motion) -> dict[str, Tensor]:
+def answer(retargeter: Retargeter, motion: Motion, **settings: int) -> dict[str, Tensor]:
     """Joint angles (T, N) and all that is said about them."""
-    result = retargeter(motion)
+    result = retargeter(motion, **settings)
     return {name: getattr(result, name) for name in ("q", "confidence", "direction_error_deg", "phi", "collision")}
 
 

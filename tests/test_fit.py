@@ -44,10 +44,13 @@ SMALL = [
 
 @pytest.fixture(scope="module")
 def motions(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three of the shipped motions."""
+    """Two seconds of three of the shipped motions."""
     folder = tmp_path_factory.mktemp("motions")
     for name in ("drinking", "wave", "boxing"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", folder)
+        with np.load(root / "data" / "motions" / f"{name}.npz") as file:
+            frames = len(file["pose_body"])
+            cut = {key: file[key][60:180] if file[key].shape[:1] == (frames,) else file[key] for key in file.files}
+        np.savez(folder / f"{name}.npz", **cut)
     return folder
 
 
@@ -337,7 +340,7 @@ def test_two_ranks_fit_together_to_nearly_the_same_result(
     assert got.keys() == expected.keys()
     for name, value in expected.items():
         if name.startswith("test"):
-            assert got[name] == pytest.approx(value, rel=0.02), name
+            assert got[name] == pytest.approx(value, rel=0.02, abs=1e-3), name
 
 
 def test_ranks_that_cannot_share_a_batch_are_refused(

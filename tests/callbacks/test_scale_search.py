@@ -25,6 +25,7 @@ from mrhubo.fit import main
 from mrhubo.fitting.preparation import prepare
 from mrhubo.motion import Motion
 from mrhubo.pairing import ScaleFactorObjective
+from mrhubo.reference import angle_between
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap, ManualScale, build_body_map, varied
 from mrhubo.runtime.progress import Reporter
@@ -76,11 +77,14 @@ def test_distances_are_those_of_the_arms(config: Config, body_map: BodyMap, prio
     turned[:, objective.arm_joints[0]] = turned[:, objective.arm_joints[0]] @ turn
     expected = torch.full((12,), 0.5 / len(objective.arm_joints))
     torch.testing.assert_close(objective.distances(turned), expected, atol=1e-3, rtol=0)
-    seen = ScaleFactorObjective(body_map, prior, config.pairs, clip.reference_TN, clip.motion.local_TJ33, "chest")
+    settings = config.pairs, clip.reference_TN, clip.motion.local_TJ33, "directions"
+    seen = ScaleFactorObjective(body_map, prior, *settings)
     collar = clip.motion.local_TJ33.clone()
     collar[:, 12] = collar[:, 12] @ turn  # carries shoulder and elbow along, as seen from the chest
     assert float(objective.distances(collar).max()) < 1e-3
-    torch.testing.assert_close(seen.distances(collar), 2 * expected, atol=1e-3, rtol=0)
+    both = (body_map.human_directions(p)[:, seen.arm_directions] for p in (collar, clip.motion.local_TJ33))
+    torch.testing.assert_close(seen.distances(collar), angle_between(*both).mean(dim=1), atol=1e-4, rtol=0)
+    assert float(seen.distances(collar).min()) > 0.02 and float(seen.distances(clip.motion.local_TJ33).max()) < 1e-4
 
 
 def test_only_reached_poses_are_measured_on(

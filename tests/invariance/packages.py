@@ -23,12 +23,12 @@ def joints_of(config: Path) -> list[str]:
     return yaml.safe_load(config.read_text())["robot"]["joints"]
 
 
-def answers_alike(package: Path, changed: Path, change: Change, motion: Motion) -> None:
+def answers_alike(package: Path, changed: Path, change: Change, motion: Motion, **settings: int) -> None:
     """Asserts that two packages give the same motion, once the change is undone, and say the same about it."""
     joints = joints_of(package / "config.yaml")
     before, after = load(package), load(changed)
     assert list(after.joint_names) == [change.joints[joints[i]] for i in change.order or []]
-    expected, found = answer(before, motion), answer(after, motion)
+    expected, found = answer(before, motion, **settings), answer(after, motion, **settings)
     assert float(expected["q"].std(dim=0).mean()) > 0.02, "it moves"
     found["q"] = undo(change, joints, found["q"])
     for name in ("q", "confidence", "phi"):
@@ -49,7 +49,8 @@ def changed_package(package: Path, change: Change, folder: Path) -> Path:
     new_package(written, folder)
     robot = yaml.safe_load((package / "config.yaml").read_text())["robot"]["name"]
     tensors, told = read_tensors(package / "retargeter.safetensors")
-    header = {**read_tensors(folder / "retargeter.safetensors")[1], "phi_threshold": told["phi_threshold"]}
+    learnt = {key: told[key] for key in ("phi_threshold", "confidence")}
+    header = {**read_tensors(folder / "retargeter.safetensors")[1], **learnt}
     old = joints_of(package / "config.yaml")
     new = [old[i] for i in change.order or range(len(old))]
     signs = torch.tensor([-1.0 if name in change.negated else 1.0 for name in new])

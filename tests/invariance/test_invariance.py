@@ -74,7 +74,9 @@ def test_networks_answer_the_same(robot: str, seed: int, motions: dict[str, Moti
     change = draw_change(package / "config.yaml", seed, *KINDS)
     changed = changed_package(package, change, tmp_path / "changed")
     for motion in motions.values():
-        answers_alike(package, changed, change, motion)
+        # No steps: what is far off after them, as untrained networks are, starts again at random poses of the robot, which
+        # are others where joints are in another order. Trained ones: tests/golden.
+        answers_alike(package, changed, change, motion, polish=0)
 
 
 @pytest.mark.parametrize("robot", ["nao", "reachy"])

@@ -21,7 +21,7 @@ def test_quadratic_is_the_cost_and_its_derivative(retargeters: dict[str, Optimiz
     model = problem.quadratic(q_BN, target_BD3)
     assert bool((model.cost_BC > retargeters["nao"].problem.quadratic(q_BN, target_BD3).cost_BC.sum(1)[:, None]).all())
     assert float(torch.linalg.eigvalsh(model.hessian_BNN).min()) > 0
-    step = 2e-4
+    step = 5e-4
     for joint in range(q_BN.shape[1]):
         ends = []
         for sign in (-1, 1):
@@ -72,7 +72,7 @@ def test_frames_that_cannot_be_freed_rest(
     q_TN = problem.robot.home().expand(6, -1).clone()
     target_TD3 = problem.body_map.robot_directions(problem.robot.forward(q_TN))
     monkeypatch.setattr(problem.contact, "margin", 10.0)  # something is always near
-    monkeypatch.setattr(collision_free, "refine", lambda p, q, *a, **k: (q, None))
+    monkeypatch.setattr(collision_free, "refine_around", lambda p, q, *a: q)
     monkeypatch.setattr(collision_free, "_start_again", lambda p, pool, q, *a: q)
     touching = torch.tensor([False, True, True, False, False, True])
     q_TN += torch.arange(6.0)[:, None] * 0.01

@@ -50,7 +50,8 @@ def test_straight_arm_does_not_flip(
     assert float(result.q_TN.diff(dim=0).abs().max()) < 0.5
     torch.testing.assert_close(result.residual_deg_TD, direction_error(retargeter.body_map, result.q_TN, local_TJ33))
     alone_TN, _ = retargeter.solve_frames(local_TJ33)
-    assert float((alone_TN.diff(dim=0).abs()).max()) > 0.5  # frame by frame, the twist does flip
+    if name != "reachy":  # whose elbow bends as a human's does, so that the upper arm's own turn tells the twist
+        assert float((alone_TN.diff(dim=0).abs()).max()) > 0.5  # frame by frame, the twist does flip
     alone_TD = direction_error(retargeter.body_map, alone_TN, local_TJ33)
     assert float(result.residual_deg_TD.mean() - alone_TD.mean()) < 0.5  # smoothness costs next to no accuracy
 
@@ -107,14 +108,15 @@ def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, Opt
     problem = retargeters["nao"].problem
     q_TN = torch.zeros(4, 8)
     q_TN[2:, 0] = 0.6
-    still_TD3 = torch.tensor([1.0, 0, 0]).expand(4, 4, 3)
+    still_TD3 = torch.tensor([1.0, 0, 0]).expand(4, len(problem.body_map.directions), 3)
+    left, right = (problem.body_map.direction_names.index(f"{side}_wrist") for side in ("left", "right"))
     assert count_jumps(problem, q_TN, still_TD3, 24.0) == 1
     assert count_jumps(problem, q_TN, still_TD3, 12.0) == 0  # the same step, at half the speed
     turning_TD3 = still_TD3.clone()
-    turning_TD3[2:, 1] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])
+    turning_TD3[2:, left] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])
     assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 0
     turning_TD3 = still_TD3.clone()
-    turning_TD3[2:, 3] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])  # but that is the other arm
+    turning_TD3[2:, right] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])  # but that is the other arm
     assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 1
 
 

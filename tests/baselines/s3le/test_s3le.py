@@ -48,14 +48,15 @@ def trained(body_map: BodyMap, poses: torch.Tensor) -> S3LE:
 
 def test_answers_are_feasible_and_near_the_reference(body_map: BodyMap, poses: torch.Tensor, trained: S3LE) -> None:
     robot, collision = body_map.robot, SelfCollision(body_map.robot)
-    unseen_BD3 = body_map.human_directions(poses[400:])
+    unseen_BD3 = body_map.human_directions(poses[400:])[:, body_map.measured]
     for neighbours in (1, 10):
         q_BN = trained.answer(trained.human_codes(unseen_BD3), neighbours, 0.5, collision)
         assert bool(((q_BN >= robot.lower_N) & (q_BN <= robot.upper_N)).all())
         assert not bool(collision.collides(q_BN).any())
-    robot_BD3 = body_map.robot_directions(robot.forward(q_BN))
+    robot_BD3 = body_map.robot_directions(robot.forward(q_BN))[:, body_map.measured]
     miss = (robot_BD3 - unseen_BD3).norm(dim=-1).mean()
     random_BD3 = body_map.robot_directions(robot.forward(robot.sample(200, torch.Generator().manual_seed(3))))
+    random_BD3 = random_BD3[:, body_map.measured]
     assert float(miss) < 0.5 * float((random_BD3 - unseen_BD3).norm(dim=-1).mean())
 
 
@@ -65,7 +66,7 @@ def test_a_projection_has_the_code_of_what_it_is_the_projection_of(body_map: Bod
     beyond_BN = trained.middle_N + 1.2 * trained.half_N * unit_BN
     projected_BN = trained.answer(trained.robot_codes(beyond_BN), 10, 0.5, collision)
     codes, projected, others = (
-        trained.human_codes(body_map.robot_directions(robot.forward(q_BN)))
+        trained.human_codes(body_map.robot_directions(robot.forward(q_BN))[:, body_map.measured])
         for q_BN in (beyond_BN, projected_BN, beyond_BN.roll(1, 0))
     )
     assert float((codes - projected).norm(dim=1).mean()) < 0.5 * float((codes - others).norm(dim=1).mean())
@@ -79,7 +80,7 @@ def test_the_same_seed_gives_the_same_answers(body_map: BodyMap, poses: torch.Te
 
 def test_the_nearest_is_found_and_a_colliding_mean_is_not_taken(body_map: BodyMap) -> None:
     robot, collision = body_map.robot, SelfCollision(body_map.robot)
-    model = S3LE(len(body_map.directions), robot.lower_N, robot.upper_N, 16, 4)
+    model = S3LE(len(body_map.measured), robot.lower_N, robot.upper_N, 16, 4)
     q_BN = robot.sample(4000, torch.Generator().manual_seed(0))
     free_BN = q_BN[~collision.collides(q_BN)]
     model.set_feasible(free_BN)
