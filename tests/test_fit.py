@@ -31,7 +31,7 @@ from mrhubo.fitting.record import run_name
 from mrhubo.motion import read_motion
 from mrhubo.retargeter import Retargeter
 from mrhubo.runtime.ranks import Ranks
-from tests.chain import as_command
+from tests.chain import as_command, cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
@@ -43,14 +43,11 @@ SMALL = [
 
 
 @pytest.fixture(scope="module")
-def motions(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def motions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two seconds of three of the shipped motions."""
     folder = tmp_path_factory.mktemp("motions")
     for name in ("drinking", "wave", "boxing"):
-        with np.load(root / "data" / "motions" / f"{name}.npz") as file:
-            frames = len(file["pose_body"])
-            cut = {key: file[key][60:180] if file[key].shape[:1] == (frames,) else file[key] for key in file.files}
-        np.savez(folder / f"{name}.npz", **cut)
+        cut_motion(name, folder, (1, 3), every=2)
     return folder
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import mlflow
@@ -17,6 +16,7 @@ from mrhubo.paper.tables import METHODS, PAPER, Part, chart, parts, tables
 from mrhubo.reproduce import main
 from mrhubo.runtime.database import database_uri
 from mrhubo.runtime.progress import Reporter
+from tests.chain import cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
@@ -92,13 +92,12 @@ def test_the_papers_figures_are_those_of_its_tables() -> None:
 
 
 def test_the_command_trains_once_and_finds_what_is_done(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     methods = ("one stage", "our default")
     motions = tmp_path / "motions"
-    motions.mkdir()
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", motions)
+        cut_motion(name, motions, (1, 3), every=2)
     given = ["--robots", "nao", "--methods", ", ".join(methods), "--seeds", "1", "--quiet", *SMALL]
     given += [f"pairs.dir={tmp_path / 'pairs'}"]
     given += [f"tracking.dir={tmp_path / 'mlruns'}", f"evaluation.motions=[{motions}]", "trainer.accelerator=cpu"]
