@@ -9,7 +9,7 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -137,13 +137,18 @@ class Retargeter(nn.Module):
         check_frame_rate(frame_rate)
         parts = list(self._parts(local_TJ33, polish))
         directed = bool(polish or frame_rate) or isinstance(self.network.features, DirectionFeatures)
-        targets = [self.body_map.human_directions(part) if directed else None for part in parts]
+        targets = [self.body_map.human_directions(part) for part in parts] if directed else [None] * len(parts)
+        return self._predict(parts, targets, polish, frame_rate)
+
+    def _predict(
+        self, parts: Sequence[Tensor], targets: Sequence[Tensor | None], polish: int, frame_rate: float | None
+    ) -> Tensor:
+        """`predict` for the parts of a motion, with their directions where they are needed."""
         q_TN = torch.cat([self.answer(*part, polish) for part in zip(parts, targets, strict=True)])
         if frame_rate is None:
             return q_TN
-        return join_frames(
-            self.directions, q_TN, torch.cat([target for target in targets if target is not None]), frame_rate
-        )
+        known = [target for target in targets if target is not None]
+        return join_frames(self.directions, q_TN, torch.cat(known), frame_rate)
 
     @torch.no_grad()
     def retarget(
@@ -169,8 +174,11 @@ class Retargeter(nn.Module):
             frame_rate = local_TJ33.frame_rate
         if together and frame_rate is None:
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
-        q_TN = self.predict(local_TJ33, polish, None if together is False else frame_rate)
-        targets = [self.body_map.human_directions(part) for part in self._parts(local_TJ33, polish)]
+        joined_at = None if together is False else frame_rate
+        check_frame_rate(joined_at)
+        parts = list(self._parts(local_TJ33, polish))
+        targets = [self.body_map.human_directions(part) for part in parts]
+        q_TN = self._predict(parts, targets, polish, joined_at)
         shake_TD = None if frame_rate is None else shake(torch.cat(targets), frame_rate)
         sizes = [len(target) for target in targets]
         shakes = [None] * len(sizes) if shake_TD is None else shake_TD.split(sizes)

@@ -118,7 +118,7 @@ def joint_speed(joints: Mapping[str, Joint], name: str, most: float) -> float:
     if not (math.isfinite(most) and most > 0):
         raise UserError(f"robot.max_speed: must be a positive number of rad/s, found {most}")
     speeds = [most]
-    for joint in joints.values():
+    for joint in (joint for joint in joints.values() if joint.name == name or joint.mimic is not None):
         try:
             source = drive(joints, joint.name)
         except UserError:  # told where it matters
