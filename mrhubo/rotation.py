@@ -20,6 +20,8 @@ __all__ = [
     "matrix_to_sixd",
     "orthonormal",
     "quaternion_to_matrix",
+    "random_axes",
+    "shortest_turn",
     "sixd_to_matrix",
     "stack_columns",
     "wrap_angle",
@@ -75,6 +77,21 @@ def quaternion_to_matrix(quaternion_xyzw: Tensor) -> Tensor:
 def matrix_to_quaternion(matrix: Tensor) -> Tensor:
     """(..., 3, 3) to (..., 4) unit quaternions (x, y, z, w)."""
     return roma.rotmat_to_unitquat(matrix)
+
+
+def shortest_turn(start: Tensor, end: Tensor) -> Tensor:
+    """The smallest rotations (..., 3, 3) between unit vectors (..., 3); none if they are opposite, where no axis is
+    told.
+    """
+    axis = torch.linalg.cross(start, end)
+    sine = axis.norm(dim=-1, keepdim=True)
+    angle = torch.atan2(sine, (start * end).sum(-1, keepdim=True))
+    return axis_angle_to_matrix(axis * (angle / sine.clamp_min(1e-9)))
+
+
+def random_axes(*shape: int, generator: torch.Generator | None, dtype: torch.dtype | None = None) -> Tensor:
+    """Unit vectors (*shape, 3), uniform on the sphere."""
+    return torch.nn.functional.normalize(torch.randn(*shape, 3, generator=generator, dtype=dtype), dim=-1)
 
 
 def geodesic_distance(a: Tensor, b: Tensor) -> Tensor:

@@ -127,3 +127,18 @@ def test_wrap_angle() -> None:
     assert float(wrapped.min()) >= -math.pi and float(wrapped.max()) < math.pi
     torch.testing.assert_close(torch.sin(wrapped), torch.sin(angle))
     torch.testing.assert_close(torch.cos(wrapped), torch.cos(angle))
+
+
+def test_the_shortest_turn_takes_one_vector_to_another_about_the_axis_across_both() -> None:
+    start, end = (rotation.random_axes(200, generator=torch.Generator().manual_seed(seed)) for seed in (0, 1))
+    turn = rotation.shortest_turn(start, end)
+    torch.testing.assert_close((turn @ start[..., None])[..., 0], end, atol=1e-5, rtol=0)
+    about = rotation.matrix_to_axis_angle(turn)
+    torch.testing.assert_close((about * start).sum(-1), torch.zeros(200), atol=1e-4, rtol=0)
+    torch.testing.assert_close(rotation.shortest_turn(start, start), torch.eye(3).expand(200, 3, 3))
+
+
+def test_random_axes_are_unit_vectors_of_any_direction() -> None:
+    found = rotation.random_axes(4_000, 2, generator=torch.Generator().manual_seed(0)).flatten(0, 1)
+    torch.testing.assert_close(found.norm(dim=-1), torch.ones(8_000), atol=1e-6, rtol=0)
+    torch.testing.assert_close(found.T @ found / 8_000, torch.eye(3) / 3, atol=0.02, rtol=0)

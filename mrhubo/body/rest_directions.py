@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.body.skeleton import PARENTS, POSED_JOINT_NAMES, Skeleton
-from mrhubo.rotation import axis_angle_to_matrix
+from mrhubo.rotation import shortest_turn
 
 _SAME = 5e-3
 """Sine of an angle (0.3 degrees) between two directions up to which they are the same: those of the table are rounded
@@ -100,10 +100,8 @@ def _turns(family: Family) -> Tensor:
     ours = dict(zip(POSED_JOINT_NAMES, Skeleton().offsets_J3.double(), strict=True))
     turns = torch.eye(3, dtype=torch.float64).repeat(len(POSED_JOINT_NAMES), 1, 1)
     for joint, direction in family.directions.items():
-        start, end = ours[_END[joint]], torch.tensor(direction, dtype=torch.float64)
-        axis = torch.linalg.cross(start, end)
-        angle = torch.atan2(axis.norm(), start @ end)
-        turns[POSED_JOINT_NAMES.index(joint)] = axis_angle_to_matrix(axis / axis.norm().clamp_min(1e-12) * angle)
+        both = torch.stack((ours[_END[joint]], torch.tensor(direction, dtype=torch.float64)))
+        turns[POSED_JOINT_NAMES.index(joint)] = shortest_turn(*torch.nn.functional.normalize(both, dim=1))
     return turns
 
 

@@ -24,7 +24,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import KEYPOINT_NAMES, PARENTS, SIDES, Skeleton, joint_index
 from mrhubo.motion.motion import Motion
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, orthonormal
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, orthonormal, random_axes
 
 _SLOWEST_HZ, _FASTEST_HZ = 0.02, 0.15
 """How fast a habit drifts [1/s]. At 0.15 Hz an angle whose range is 40 degrees turns at most 19 degrees a second, far
@@ -99,7 +99,7 @@ def _split(
 
 def _axis(generator: torch.Generator) -> Tensor:
     """A unit vector (3,) of any direction."""
-    return torch.nn.functional.normalize(torch.randn(3, generator=generator, dtype=torch.float64), dim=0)
+    return random_axes(generator=generator, dtype=torch.float64)
 
 
 def _drift(seconds_T: Tensor, generator: torch.Generator) -> Tensor:

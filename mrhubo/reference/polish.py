@@ -45,7 +45,7 @@ class Polish(nn.Module):
             steps: Levenberg-Marquardt steps at most; a block ends earlier where it has converged.
         """
         q_BN, cost_BC = self.problem.minimise(q_BN, target_BD3, steps)
-        weight_BC = (target_BD3.norm(dim=-1) * self.problem.directions.weight_D) @ self.problem.blocks.directions_DC
+        weight_BC = self.problem.weights(target_BD3)
         far_BC = cost_BC > weight_BC * _FAR_RAD**2
         if not steps or not bool(far_BC.any()):
             return q_BN

@@ -25,11 +25,9 @@ from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import speed_bound
 from mrhubo.reference.starts import StartPool
-from mrhubo.reference.terms import Smoothness
+from mrhubo.reference.terms import REFERENCE_RATE, Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, pick, smooth_motion
 from mrhubo.robot import BodyMap, Robot
-
-_REFERENCE_RATE = 24.0
 
 
 @dataclass(frozen=True)
@@ -160,8 +158,7 @@ class OptimizationRetargeter(nn.Module):
         return self._free
 
     def _smoothness(self, frame_rate: float) -> Smoothness:
-        """Weight of |q_t - q_(t-1)|^2: that of the squared velocity, with the reference rate as the unit of time."""
-        return Smoothness(self.smoothness * (frame_rate / _REFERENCE_RATE) ** 2)
+        return Smoothness(pull_at(self.smoothness, frame_rate))
 
     @torch.no_grad()
     def solve_frames(self, local_BJ33: MotionLike) -> tuple[Tensor, Tensor]:
@@ -226,7 +223,7 @@ def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
 
     Both per 1/24 s, whatever the frame rate; a step is counted once per block.
     """
-    scale = frame_rate / _REFERENCE_RATE
+    scale = frame_rate / REFERENCE_RATE
     turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
     columns = problem.body_map.measured
     human_XD = angle_between(target_TD3[1:, columns], target_TD3[:-1, columns])

@@ -74,6 +74,12 @@ class DirectionProblem(nn.Module):
         chunks = zip(q_BN.split(self.chunk), target_BD3.split(self.chunk), strict=True)
         return torch.cat([self.quadratic(*chunk).cost_BC for chunk in chunks])
 
+    def weights(self, target_BD3: Tensor) -> Tensor:
+        """How much the directions of each block count together (B, C): a block costs about this times the mean square
+        of its angles to the human.
+        """
+        return (target_BD3.norm(dim=-1) * self.directions.weight_D) @ self.blocks.directions_DC
+
     def frozen(self, q_BN: Tensor, gradient_BN: Tensor, bounds: tuple[Tensor, Tensor] | None = None) -> Tensor:
         """Active set (B, N): joints at a limit that the gradient's descent would push beyond it; limits are the joints'
         or `bounds`.

@@ -21,10 +21,10 @@ from torch import Tensor
 
 from mrhubo.reference import DirectionProblem
 from mrhubo.reference.speed import speed_bound
-from mrhubo.reference.terms import Smoothness
+from mrhubo.reference.terms import Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, smooth_motion
 
-_SMOOTHNESS, _REFERENCE_RATE = 0.02, 24.0
+_SMOOTHNESS = 0.02
 _CUTOFF_HZ = 4.0
 """Where a calm human's frequencies end. An error of a limb weighs about |q|^2, its jerk (2 pi f)^6 |q|^2 as much, so a
 motion at this frequency is followed by a half, one at half of it by 98%."""
@@ -49,8 +49,7 @@ def join_frames(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
     """
     if len(q_TN) < 2:
         return q_TN
-    pull = _SMOOTHNESS * (frame_rate / _REFERENCE_RATE) ** 2
-    smoothness = Smoothness(pull, jerk_weights(problem, target_TD3, frame_rate))
+    smoothness = Smoothness(pull_at(_SMOOTHNESS, frame_rate), jerk_weights(problem, target_TD3, frame_rate))
     bound = speed_bound(problem.robot.velocity_N, frame_rate)
     task = MotionTask(target_TD3, smoothness, *bound, _SWEEPS, _TOLERANCE)
     return smooth_motion(problem, q_TN[:, None], problem.cost(q_TN, target_TD3)[:, None], task)

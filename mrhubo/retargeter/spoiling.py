@@ -19,7 +19,7 @@ def shaken(local_BJ33: Tensor, noise_deg: Tensor | float, generator: torch.Gener
     """Every joint turned about a random axis by a normally distributed angle, of standard deviation `noise_deg`, one
     number or (B,) [deg].
     """
-    axis_BJ3 = torch.nn.functional.normalize(torch.randn(*local_BJ33.shape[:2], 3, generator=generator), dim=-1)
+    axis_BJ3 = rotation.random_axes(*local_BJ33.shape[:2], generator=generator)
     spread_B11 = torch.deg2rad(torch.as_tensor(noise_deg, dtype=torch.float32)).reshape(-1, 1, 1)
     angle_BJ1 = spread_B11 * torch.randn(*local_BJ33.shape[:2], 1, generator=generator)
     return local_BJ33 @ rotation.axis_angle_to_matrix(angle_BJ1 * axis_BJ3).to(local_BJ33)
@@ -46,7 +46,7 @@ def dislocated(
     found = local_BJ33.clone()
     joints = dict.fromkeys(POSED_JOINT_NAMES.index(part.joint) for part in parts if isinstance(part, LimbPart))
     for joint in joints:
-        axis_B3 = torch.nn.functional.normalize(torch.randn(len(found), 3, generator=generator), dim=-1)
+        axis_B3 = rotation.random_axes(len(found), generator=generator)
         angle_B1 = most_deg * (0.25 + 0.75 * torch.rand(len(found), 1, generator=generator))
         angle_B1 = angle_B1 * (torch.rand(len(found), 1, generator=generator) < share)
         found[:, joint] = rotation.axis_angle_to_matrix(torch.deg2rad(angle_B1) * axis_B3).to(found) @ found[:, joint]

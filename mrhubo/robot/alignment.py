@@ -49,7 +49,7 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor, hin
         if isinstance(part, LimbPart):
             start, end = (KEYPOINT_NAMES.index(name) for name in (part.start, part.end))
             bone_3 = torch.nn.functional.normalize(rest_K3[end] - rest_K3[start], dim=0)
-            pose.turn(joint, _shortest_turn(pose.of(joint) @ bone_3, wanted[0]))
+            pose.turn(joint, rotation.shortest_turn(pose.of(joint) @ bone_3, wanted[0]))
         elif isinstance(part, BendPart):
             limbs = (limb.direction_names[0] for limb in body_map.keypoints.parts if limb.name in part.limbs)
             upper, lower = (from_pelvis[part.seen_from][:, column[name]] for name in limbs)
@@ -103,11 +103,3 @@ def _turn_about(axis_B3: Tensor, start_B3: Tensor, end_B3: Tensor) -> Tensor:
     along_B = (start_B3 * axis_B3).sum(-1) * (end_B3 * axis_B3).sum(-1)
     cosine_B = (start_B3 * end_B3).sum(-1) - along_B
     return rotation.axis_angle_to_matrix(axis_B3 * torch.atan2(sine_B, cosine_B)[:, None])
-
-
-def _shortest_turn(start_B3: Tensor, end_B3: Tensor) -> Tensor:
-    """The smallest rotations (B, 3, 3) between unit vectors; none if they are opposite, where no axis is told."""
-    axis_B3 = torch.linalg.cross(start_B3, end_B3)
-    sine_B1 = axis_B3.norm(dim=-1, keepdim=True)
-    angle_B1 = torch.atan2(sine_B1, (start_B3 * end_B3).sum(-1, keepdim=True))
-    return rotation.axis_angle_to_matrix(axis_B3 * (angle_B1 / sine_B1.clamp_min(1e-9)))

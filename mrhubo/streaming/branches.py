@@ -17,17 +17,16 @@ import torch
 from torch import Tensor
 
 from mrhubo.reference import DirectionProblem
-from mrhubo.reference.terms import Quadratic
+from mrhubo.reference.terms import REFERENCE_RATE, Quadratic
+from mrhubo.streaming.people import OfPeople
 from mrhubo.streaming.settings import StreamSettings
 
 _STEPS = 2
-_REFERENCE_RATE = 24.0
-"""Frames per second at which a smoothness is stated."""
 _DAMPING, _EASIER, _HARDER = 1e-2, 0.1, 10.0
 
 
 @dataclass(frozen=True)
-class BranchState:
+class BranchState(OfPeople):
     """What is followed, and since when it has been worse."""
 
     kept_BN: Tensor
@@ -39,13 +38,6 @@ class BranchState:
     def at(cls, q_BN: Tensor, blocks: int) -> BranchState:
         """Where a stream begins."""
         return cls(q_BN, q_BN.new_zeros(len(q_BN), blocks))
-
-    def where(self, chosen_B: Tensor, other: BranchState) -> BranchState:
-        """`other` for some people, this one for the rest."""
-        return BranchState(
-            torch.where(chosen_B[:, None], other.kept_BN, self.kept_BN),
-            torch.where(chosen_B[:, None], other.worse_BC, self.worse_BC),
-        )
 
 
 class Branches:
@@ -69,7 +61,7 @@ class Branches:
         reach_BN = problem.robot.velocity_N * passed_B[:, None]
         lower_BN = torch.maximum(problem.lower_N, kept_BN - reach_BN)
         upper_BN = torch.minimum(problem.upper_N, kept_BN + reach_BN)
-        pull_B = self.settings.smoothness / (_REFERENCE_RATE * passed_B).square()
+        pull_B = self.settings.smoothness / (REFERENCE_RATE * passed_B).square()
         both_YN, cost_YC = self._steps(
             torch.cat((kept_BN, network_BN)),
             torch.cat((target_BD3, target_BD3)),
@@ -78,8 +70,7 @@ class Branches:
              torch.cat((upper_BN, problem.upper_N.expand_as(kept_BN)))),
         )  # fmt: skip
         (moved_BN, other_BN), (cost_BC, other_cost_BC) = both_YN.chunk(2), cost_YC.chunk(2)
-        weight_BC = (target_BD3.norm(dim=-1) * problem.directions.weight_D) @ problem.blocks.directions_DC
-        excess_BC = (cost_BC.sqrt() - other_cost_BC.sqrt()) / weight_BC.clamp_min(1e-9).sqrt()
+        excess_BC = (cost_BC.sqrt() - other_cost_BC.sqrt()) / problem.weights(target_BD3).clamp_min(1e-9).sqrt()
         worse_BC = torch.where(
             excess_BC > math.radians(self.settings.worse_deg), state.worse_BC + passed_B[:, None], 0.0
         )

@@ -20,13 +20,14 @@ import torch
 from torch import Tensor
 
 from mrhubo.robot import Robot
+from mrhubo.streaming.people import OfPeople
 
 _WITHIN = 1 - 1e-6
 """Share of the speed limit that is used, so that who works the speed out in float32 again finds none above it."""
 
 
 @dataclass(frozen=True)
-class JointState:
+class JointState(OfPeople):
     """Where joints are, and how fast they turn."""
 
     q_BN: Tensor
@@ -38,13 +39,6 @@ class JointState:
     def at_rest(cls, q_BN: Tensor) -> JointState:
         """Joints that stand still."""
         return cls(q_BN, torch.zeros_like(q_BN, dtype=torch.float64))
-
-    def where(self, chosen_B: Tensor, other: JointState) -> JointState:
-        """`other` for some people, this one for the rest."""
-        return JointState(
-            torch.where(chosen_B[:, None], other.q_BN, self.q_BN),
-            torch.where(chosen_B[:, None], other.velocity_BN, self.velocity_BN),
-        )
 
 
 class JointLimits:

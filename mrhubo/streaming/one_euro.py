@@ -19,11 +19,12 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from mrhubo.streaming.people import OfPeople
 from mrhubo.streaming.settings import StreamSettings
 
 
 @dataclass(frozen=True)
-class OneEuroState:
+class OneEuroState(OfPeople):
     """What a filter remembers."""
 
     raw_BD3: Tensor
@@ -35,14 +36,6 @@ class OneEuroState:
     def at(cls, raw_BD3: Tensor) -> OneEuroState:
         """As if these directions had always been there."""
         return cls(raw_BD3, torch.zeros_like(raw_BD3), raw_BD3)
-
-    def where(self, chosen_B: Tensor, other: OneEuroState) -> OneEuroState:
-        """`other` for some people, this one for the rest."""
-        return OneEuroState(
-            torch.where(chosen_B[:, None, None], other.raw_BD3, self.raw_BD3),
-            torch.where(chosen_B[:, None, None], other.velocity_BD3, self.velocity_BD3),
-            torch.where(chosen_B[:, None, None], other.filtered_BD3, self.filtered_BD3),
-        )
 
 
 def one_euro(

@@ -48,7 +48,7 @@ def pose_distance(skeleton: Skeleton, a_BJ33: Tensor, b_BJ33: Tensor) -> tuple[T
 
 def turn_joints(pose_BJ6: Tensor, angle_BJ: Tensor, generator: torch.Generator | None = None) -> Tensor:
     """Poses whose every joint is turned by the given angle [rad] about an axis drawn uniformly from the sphere."""
-    axis = torch.nn.functional.normalize(torch.randn(*angle_BJ.shape, 3, generator=generator), dim=-1)
+    axis = rotation.random_axes(*angle_BJ.shape, generator=generator)
     turn = rotation.axis_angle_to_matrix(axis.to(pose_BJ6) * angle_BJ[..., None])
     return rotation.matrix_to_sixd(rotation.sixd_to_matrix(pose_BJ6) @ turn)
 

@@ -3,10 +3,11 @@
 from mrhubo.reference.terms.directions import DirectionTerm
 from mrhubo.reference.terms.posture import PostureTerm
 from mrhubo.reference.terms.self_collision import SelfCollisionTerm
-from mrhubo.reference.terms.smoothness import Smoothness
+from mrhubo.reference.terms.smoothness import REFERENCE_RATE, Smoothness, pull_at
 from mrhubo.reference.terms.term import Quadratic, State, Term
 
 __all__ = [
+    "REFERENCE_RATE",
     "DirectionTerm",
     "PostureTerm",
     "Quadratic",
@@ -14,4 +15,5 @@ __all__ = [
     "Smoothness",
     "State",
     "Term",
+    "pull_at",
 ]

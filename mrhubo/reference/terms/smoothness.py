@@ -3,8 +3,7 @@
     pull * sum_t |q_t - q_(t-1)|^2                                          velocity
     sum_t jerk_t * |q_t - 3 q_(t-1) + 3 q_(t-2) - q_(t-3)|^2                its second derivative in time
 
-Whatever a term costs in several frames, each of them bears the
-same share of it.
+Whatever a term costs in several frames, each of them bears the same share of it.
 
 Legend: T frames, X steps between them, Y = T - 3 differences of third order, N joints, C blocks.
 """
@@ -18,7 +17,14 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+REFERENCE_RATE = 24.0
+"""Frames per second at which a smoothness is stated."""
 _THIRD = (-1.0, 3.0, -3.0, 1.0)
+
+
+def pull_at(smoothness: float, frame_rate: float) -> float:
+    """`pull` [1/rad^2] at a frame rate: the same for the same velocity, with the reference rate as the unit of time."""
+    return smoothness * (frame_rate / REFERENCE_RATE) ** 2
 
 
 @dataclass(frozen=True)
@@ -54,8 +60,8 @@ class Smoothness:
         return gradient_TN
 
     def hessian(self, q_TN: Tensor) -> list[Tensor]:
-        """Half of the Hessian: its diagonal (T, N), then its entries between each frame and the next (T - 1,
-        N), the one after that (T - 2, N), and so on.
+        """Half of the Hessian: its diagonal (T, N), then its entries between each frame and the next (T - 1, N), the
+        one after that (T - 2, N), and so on.
         """
         bands = _bands(torch.full_like(q_TN[1:], self.pull), (-1.0, 1.0))
         if self.jerk_YN is not None and len(self.jerk_YN):
