@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mrhubo.errors import UserError
-    from mrhubo.motion import Motion, read_motion
+    from mrhubo.motion import Motion, ReadOptions, read_motion
     from mrhubo.reference import OptimizationRetargeter
     from mrhubo.retargeter import Retargeter, RetargetResult
     from mrhubo.robot import Robot
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Motion",
     "OptimizationRetargeter",
+    "ReadOptions",
     "RetargetResult",
     "Retargeter",
     "Robot",
@@ -41,6 +42,7 @@ __all__ = [
 _HOMES = {
     "Motion": "mrhubo.motion",
     "OptimizationRetargeter": "mrhubo.reference",
+    "ReadOptions": "mrhubo.motion",
     "RetargetResult": "mrhubo.retargeter",
     "Retargeter": "mrhubo.retargeter",
     "Robot": "mrhubo.robot",

@@ -3,6 +3,7 @@
 from mrhubo.motion.load import find_motions, read_folder, read_motion
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
+from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.resample import resample
 from mrhubo.motion.resharing import reshare
 from mrhubo.motion.writers.amass import write_motion
@@ -12,6 +13,7 @@ __all__ = [
     "Motion",
     "MotionLike",
     "Poses",
+    "ReadOptions",
     "find_motions",
     "read_folder",
     "read_motion",

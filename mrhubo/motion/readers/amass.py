@@ -24,6 +24,8 @@ from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MAX_TURN, Turns
 from mrhubo.motion.readers.family import find_family
+from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import RATES, ReadOptions
 from mrhubo.rotation import axis_angle_to_matrix
 
 MAX_FRAMES = 2_000_000
@@ -36,10 +38,8 @@ _MAX_SMALL = 1_000_000
 """Bytes of an array that holds a number, some, or a text."""
 _MAX_ROOT_TURN = 8 * math.pi
 """No root's axis-angle number is that large [rad]: a person may turn round some times; degrees are larger."""
-_FRAME_RATES = (1.0, 1000.0)
 _RATE_KEYS = ("mocap_frame_rate", "mocap_framerate")
 _POSES_WIDTHS = {66: "body", 72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
-_NAME_ENDINGS = ("_stageii", "_poses")
 _LARGEST_BETA = 1e6
 _FARTHEST_M = 1e5
 """No root is that far from the origin [m]."""
@@ -48,7 +48,7 @@ _Y_UP_FROM_Z_UP = torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.
 
 
 @np.errstate(all="ignore")  # what overflows is found out below
-def read_amass(path: Path) -> Motion:
+def read_amass(path: Path, options: ReadOptions) -> Motion:
     """Reads `pose_body` (T, 63), or `poses` (T, 66 or more) with the root's three numbers first.
 
     The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up, other files
@@ -62,7 +62,7 @@ def read_amass(path: Path) -> Motion:
     notes: list[str] = []
     with open_npz(path) as file:
         key, local_TJ33 = _read_pose(file)
-        frame_rate = _read_frame_rate(file)
+        frame_rate = _read_frame_rate(file, options, notes)
         description = _read_description(file, notes)
         root_rotation_T33, root_position_T3, up = _read_root(file, key, len(local_TJ33), notes)
         betas = _read_betas(file, notes)
@@ -92,14 +92,6 @@ def read_amass(path: Path) -> Motion:
 def _matrices(axis_angle_TX: np.ndarray) -> Tensor:
     """Axis-angle numbers (T, 3 K) [rad] as rotations (T, K, 3, 3), float32."""
     return axis_angle_to_matrix(torch.from_numpy(axis_angle_TX).unflatten(-1, (-1, 3))).float()
-
-
-def motion_name(path: Path) -> str:
-    """A file's name without its ending, and without AMASS's `_poses` or `_stageii`."""
-    name = path.stem
-    for ending in _NAME_ENDINGS:
-        name = name.removesuffix(ending)
-    return name or path.stem
 
 
 def _read_pose(file: NpzFile) -> tuple[str, Tensor]:
@@ -198,18 +190,25 @@ def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
     return tuple(float(number) for number in array.astype(np.float64))
 
 
-def _read_frame_rate(file: NpzFile) -> float:
+def _read_frame_rate(file: NpzFile, options: ReadOptions, notes: list[str]) -> float:
     path = file.path
     key = next((key for key in _RATE_KEYS if key in file.keys), None)
     if key is None:
-        raise UserError(f"{path}: holds no frame rate; expected the key '{_RATE_KEYS[0]}' or '{_RATE_KEYS[1]}'")
+        if options.rate is not None:
+            return float(options.rate)
+        raise UserError(
+            f"{path}: holds no frame rate (the key '{_RATE_KEYS[0]}' or '{_RATE_KEYS[1]}'); say what it is: --rate 30"
+            " on the command line, ReadOptions(rate=30) in Python"
+        )
     array = file.read(key, max_bytes=_MAX_SMALL)
     if array.size != 1:
         raise UserError(f"{path}: '{key}' has shape {array.shape}; expected one number")
     rate = float(array.reshape(()))
-    low, high = _FRAME_RATES
+    low, high = RATES
     if not low <= rate <= high:
         raise UserError(f"{path}: '{key}' is {rate:g} frames per second; expected {low:g} to {high:g}")
+    if options.rate is not None and options.rate != rate:
+        notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {rate:g}")
     return rate
 
 

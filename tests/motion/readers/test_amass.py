@@ -161,7 +161,7 @@ def _with(row: int, column: int, value: float) -> np.ndarray:
         ({"pose_body": POSE_T63[:0], **RATE}, r"'pose_body' is empty: shape \(0, 63\)"),
         ({"pose_body": POSE_T63.astype(complex), **RATE}, "'pose_body' has type complex128; expected numbers"),
         ({"pose_body": POSE_T63.astype("U5"), **RATE}, "'pose_body' has type <U5; expected numbers"),
-        ({"pose_body": POSE_T63}, "holds no frame rate; expected the key 'mocap_frame_rate' or 'mocap_framerate'"),
+        ({"pose_body": POSE_T63}, "holds no frame rate .*--rate 30.*ReadOptions"),
         ({"pose_body": POSE_T63, "mocap_frame_rate": np.array(0.0)}, "is 0 frames per second; expected 1 to 1000"),
         ({"pose_body": POSE_T63, "mocap_framerate": np.array(1001)}, "'mocap_framerate' is 1001 frames per second"),
         ({"pose_body": POSE_T63, "mocap_frame_rate": np.array(np.nan)}, "is nan frames per second"),
@@ -284,7 +284,7 @@ def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
         read_motion(raw)
     bare = tmp_path / "bare.npz"
     bare.write_bytes(pickle.dumps(Attack()))
-    with pytest.raises(UserError, match="is not an .npz file"):
+    with pytest.raises(UserError, match="is a Python pickle"):
         read_motion(bare)
     assert not witness.exists()
 
@@ -321,9 +321,9 @@ def test_missing_files_and_a_bare_array(tmp_path: Path) -> None:
         read_motion(tmp_path / "none.npz")
     bare = tmp_path / "bare.npz"
     bare.write_bytes(_npy(POSE_T63))
-    with pytest.raises(UserError, match="is not an .npz file"):
+    with pytest.raises(UserError, match="is a single NumPy array"):
         read_motion(bare)
-    with pytest.raises(UserError, match="holds neither .* it holds: nothing"):
+    with pytest.raises(UserError, match="is an empty zip archive"):
         read_motion(_archive(tmp_path / "empty.npz", {}))
 
 
@@ -392,7 +392,7 @@ def test_read_folder_sorts_and_passes_over_what_is_no_motion(tmp_path: Path) -> 
 
 
 def test_read_folder_refuses(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="holds no .npz motion file"):
+    with pytest.raises(UserError, match="holds no motion file"):
         read_folder(tmp_path)
     with pytest.raises(UserError, match="there is no such folder"):
         read_folder(tmp_path / "none")

@@ -1,0 +1,60 @@
+"""The table of formats: which reader takes a file, told by what is in it and never by its ending."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from mrhubo.errors import UserError
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.amass import read_amass
+from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.options import ReadOptions
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file and who reads it."""
+
+    name: str
+    """For a sentence that lists what is read."""
+    recognises: Callable[[Content], bool]
+    """Whether a file is of this kind; must not raise."""
+    read: Callable[[Path, ReadOptions], Motion]
+    """Raises a UserError that names the path where the file is bad."""
+    endings: tuple[str, ...]
+    """The endings, in small letters, of files in a folder that are of this kind or damaged."""
+
+
+FORMATS: tuple[Format, ...] = (
+    Format(
+        "SMPL-family .npz",
+        lambda content: content.is_zip and not content.is_torch and bool(content.arrays or not content.names),
+        read_amass,
+        (".npz",),
+    ),
+)
+"""The first row that recognises a file reads it."""
+
+
+def find_format(content: Content) -> Format | None:
+    """The row of the table that reads a file; None where there is none."""
+    return next((row for row in FORMATS if row.recognises(content)), None)
+
+
+def read_any(path: Path, options: ReadOptions) -> Motion:
+    """Reads a motion by whichever reader recognises it.
+
+    Raises:
+        UserError: nobody does (says what the file is), or whoever does finds it bad.
+    """
+    content = Content.open(path)
+    row = find_format(content)
+    if row is None:
+        expected = ", ".join(row.name for row in FORMATS)
+        raise UserError(
+            f"{path}: is {content.described}, and no human motion that is read here; expected one of: {expected}"
+            " (docs/formats.md says how each is laid out)"
+        )
+    return row.read(path, options)
