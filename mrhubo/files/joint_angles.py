@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import atomic_path
+from mrhubo.files.atomic import atomic_path
 
 
 def write_joint_angles(

@@ -12,7 +12,8 @@ from pathlib import Path
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError, shortened
-from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
+from mrhubo.files.atomic import atomic_path
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import ConfidenceModel
 from mrhubo.retargeter.integrity import (
