@@ -62,7 +62,7 @@ class Retargeter(nn.Module):
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
         self.directions = DirectionProblem(body_map)
         """The optimiser's cost, for `polish`."""
-        self._polish = Polish(self.directions)
+        self.polisher = Polish(self.directions)
         self.confidence, self.branches = confidence, branches_of(self.directions)
         """How much each branch of an answer is to be trusted, and what the branches are."""
 
@@ -248,7 +248,7 @@ class Retargeter(nn.Module):
             q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
         if not polish or not len(q_TN) or target_TD3 is None:
             return q_TN
-        return self._polish(q_TN, target_TD3, polish)
+        return self.polisher(q_TN, target_TD3, polish)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
