@@ -61,19 +61,20 @@ class NpzFile:
                 return npy.read_array(handle, allow_pickle=False)
 
     def blocks(self, key: str, rows: int, max_rows: int | None = None) -> Iterator[np.ndarray]:
-        """The rows of an array (rows, columns) of numbers, so many at a time, so that they need not fit into memory.
+        """The rows of an array of numbers, so many at a time, so that they need not fit into memory: what follows the
+        first axis as one (rows, columns).
 
         Raises:
-            UserError: as for `read`, or it has not two axes.
+            UserError: as for `read`, or it has no two axes.
         """
         header = self._header(key, "fiu", max_rows)
-        if len(header.shape) != 2:
+        if len(header.shape) < 2:
             raise UserError(f"{self.path}: '{key}' has shape {header.shape}; expected (rows, columns)")
+        count, columns = header.shape[0], math.prod(header.shape[1:])
         if header.by_column:
-            whole = self.read(key, max_rows=max_rows)
-            yield from (whole[start : start + rows] for start in range(0, len(whole), rows))
+            whole = self.read(key, max_rows=max_rows).reshape(count, columns)
+            yield from (whole[start : start + rows] for start in range(0, count, rows))
             return
-        count, columns = header.shape
         with self._reading(key, "its content is truncated or altered") as handle:
             _read_header(handle)
             for start in range(0, count, rows):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.amass import read_amass
+from mrhubo.motion.readers.amass import is_amass, read_amass
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.options import ReadOptions
 
@@ -30,7 +30,7 @@ class Format:
 FORMATS: tuple[Format, ...] = (
     Format(
         "SMPL-family .npz",
-        lambda content: content.is_zip and not content.is_torch and bool(content.arrays or not content.names),
+        is_amass,
         read_amass,
         (".npz",),
     ),
