@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any, BinaryIO
 from zipfile import ZipFile
 
 import numpy as np
@@ -84,6 +85,23 @@ class NpzFile:
                     raise EOFError
                 yield np.frombuffer(content, header.dtype).reshape(-1, columns)
 
+    def read_any(self, key: str, load: Callable[[BinaryIO], Any], max_bytes: int = MAX_BYTES) -> Any:
+        """One array of numbers or text; or, of one that holds pickled objects, what `load` makes of the pickle.
+
+        Raises:
+            UserError: it is damaged, too large, or of another type.
+        """
+        stored = self._archive.getinfo(f"{key}.npy").file_size
+        if stored > max_bytes:
+            raise UserError(
+                f"{self.path}: '{key}' has {stored / 2**30:.3g} GiB; at most {max_bytes / 2**30:.3g} are read"
+            )
+        with self._reading(key, "it is truncated, altered, or no .npy array") as handle:
+            try:
+                return read_member(handle, stored, load)
+            except UserError as error:
+                raise UserError(f"{self.path}: '{key}' {error}") from error
+
     def _header(self, key: str, kinds: str, max_rows: int | None, max_bytes: int = MAX_BYTES) -> _Header:
         path = self.path
         with self._reading(key, "its header is not one of an .npy array") as handle:
@@ -133,6 +151,36 @@ def open_npz(path: Path) -> Iterator[NpzFile]:
     """
     with open_archive(path, "is not an .npz file (a zip archive of arrays)", 4 * MAX_BYTES) as archive:
         yield NpzFile(path, archive)
+
+
+def read_member(handle: IO[bytes], stored: int, load: Callable[[BinaryIO], Any]) -> Any:
+    """The array of an .npy file or member, of numbers or text; or, of one that holds pickled objects, what `load` makes
+    of the pickle.
+
+    Args:
+        handle: opened at its beginning.
+        stored: how many bytes it has, which may be read.
+        load: reads the pickle.
+
+    Raises:
+        UserError: it is damaged or of another type.
+    """
+    try:
+        header = _read_header(handle)
+    except Exception as error:  # whatever numpy makes of a stranger's bytes
+        raise UserError("has a header that is not one of an .npy array") from error
+    if header.dtype.hasobject:
+        return load(io.BytesIO(handle.read(stored)))
+    if header.dtype.kind not in "fiubU":
+        raise UserError(f"has type {shortened(header.dtype)}; expected {_TYPES['fiu']}")
+    size = math.prod(header.shape) * header.dtype.itemsize
+    if size > stored:
+        raise UserError(f"claims shape {shortened(header.shape)}, but holds {stored} bytes; the file is damaged")
+    content = handle.read(size)
+    if len(content) < size:
+        raise UserError("is truncated")
+    flat = np.frombuffer(content, header.dtype) if size else np.zeros(0, header.dtype)
+    return flat.reshape(header.shape, order="F" if header.by_column else "C")
 
 
 def _read_header(handle: IO[bytes]) -> _Header:

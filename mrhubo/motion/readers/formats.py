@@ -9,6 +9,8 @@ from pathlib import Path
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.amass import is_amass, read_amass
+from mrhubo.motion.readers.amc import is_amc, is_asf, read_acclaim, read_asf_alone
+from mrhubo.motion.readers.bvh import is_bvh, read_bvh
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.options import ReadOptions
 
@@ -34,6 +36,9 @@ FORMATS: tuple[Format, ...] = (
         read_amass,
         (".npz",),
     ),
+    Format("BVH", is_bvh, read_bvh, (".bvh",)),
+    Format("ASF/AMC", is_amc, read_acclaim, (".amc",)),
+    Format("ASF without AMC", is_asf, read_asf_alone, ()),
 )
 """The first row that recognises a file reads it."""
 
