@@ -202,6 +202,7 @@ GIVEN = {
     "--retargeter": "no-package",
     "--sweep": "no-sweep.yaml",
     "--motion": "wave.npz",
+    "--predictions": "wave.npz",
     "--out": "wave.csv",
     "--robot": "nao",
 }

@@ -111,7 +111,7 @@ def _checked(key: str, value: Any) -> Any:
         good = isinstance(value, list) and all(type(item) in (int, float) for item in value)
     if not good:
         raise UserError(f"'{key}' holds {shortened(value)}, which is not what belongs there")
-    return tuple(value) if key in NAME_LISTS else value
+    return value
 
 
 def _others(told: Mapping[str, Any]) -> tuple[FollowingJoint, ...]:
