@@ -1,6 +1,7 @@
 """Human motion: what it is in memory, how it is read and written."""
 
-from mrhubo.motion.load import find_motions, read_folder, read_motion
+from mrhubo.motion.editing import mirror, trim
+from mrhubo.motion.load import find_motions, motion_files, read_folder, read_motion
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
 from mrhubo.motion.readers.options import ReadOptions
@@ -15,6 +16,8 @@ __all__ = [
     "Poses",
     "ReadOptions",
     "find_motions",
+    "mirror",
+    "motion_files",
     "read_folder",
     "read_motion",
     "read_poses",
@@ -22,5 +25,6 @@ __all__ = [
     "resample",
     "reshare",
     "to_tensor",
+    "trim",
     "write_motion",
 ]

@@ -35,6 +35,20 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
     Raises:
         UserError: the folder is missing or holds no motion, two files hold a motion of one name, or a file is bad.
     """
+    by_name: dict[str, Path] = {}
+    for file in motion_files(folder):
+        other = by_name.setdefault(motion_name(file), file)
+        if other is not file:
+            raise UserError(f"{folder}: {other.name} and {file.name} are both named '{motion_name(file)}'; keep one")
+    return [read_motion(by_name[name], options) for name in sorted(by_name)]
+
+
+def motion_files(folder: Path) -> list[Path]:
+    """The files of a folder that `read_folder` would read, one at least, sorted.
+
+    Raises:
+        UserError: the folder is missing or holds none.
+    """
     folder = Path(folder)
     _refuse_file(folder)
     if not os.path.isdir(folder):
@@ -42,12 +56,7 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
     files = _motion_files(folder)
     if not files:
         raise UserError(f"{folder}: holds no motion file")
-    by_name: dict[str, Path] = {}
-    for file in files:
-        other = by_name.setdefault(motion_name(file), file)
-        if other is not file:
-            raise UserError(f"{folder}: {other.name} and {file.name} are both named '{motion_name(file)}'; keep one")
-    return [read_motion(by_name[name], options) for name in sorted(by_name)]
+    return files
 
 
 def find_motions(folders: Sequence[Path]) -> Path:

@@ -113,6 +113,8 @@ class Content:
             return "a video or a sound (RIFF)"
         if self.is_torch:
             return "a PyTorch file"
+        if self.arrays:
+            return f"an .npz file with {shortened(listed(self.arrays), 200)}"
         if self.is_zip:
             return f"a zip archive of {shortened(listed(self.names), 200)}" if self.names else "a damaged zip archive"
         if self.start.startswith(b"\x93NUMPY"):

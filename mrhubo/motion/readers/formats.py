@@ -8,7 +8,9 @@ from pathlib import Path
 
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.amass import read_amass
+from mrhubo.motion.readers.amass import is_amass, read_amass
+from mrhubo.motion.readers.amc import is_amc, is_asf, read_acclaim, read_asf_alone
+from mrhubo.motion.readers.bvh import is_bvh, read_bvh
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.options import ReadOptions
 
@@ -30,10 +32,13 @@ class Format:
 FORMATS: tuple[Format, ...] = (
     Format(
         "SMPL-family .npz",
-        lambda content: content.is_zip and not content.is_torch and bool(content.arrays or not content.names),
+        is_amass,
         read_amass,
         (".npz",),
     ),
+    Format("BVH", is_bvh, read_bvh, (".bvh",)),
+    Format("ASF/AMC", is_amc, read_acclaim, (".amc",)),
+    Format("ASF without AMC", is_asf, read_asf_alone, ()),
 )
 """The first row that recognises a file reads it."""
 
