@@ -4,8 +4,8 @@
 computer needs that one file, NumPy, and no PyTorch.
 
 Legend: J = 21 posed human joints, P of them that are looked at; D directions, V parts that they are seen from, Z bend
-axes; A driven joints of the robot, N joints of q, C blocks of joints, U poses to start again from; K steps of a reading,
-T turned human joints; X branches, S capsules.
+axes; A driven joints of the robot, N joints of q, C blocks of joints, U poses to start again from; K steps of a
+reading, T turned human joints; X branches, S capsules.
 """
 
 from __future__ import annotations
@@ -18,12 +18,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
+from mrhubo.fast.checks import check
 from mrhubo.files.arrays import read_arrays
+from mrhubo.files.atomic import checksum_file
 
 SCHEMA = "mrhubo.runtime/1"
 FILE = "runtime.safetensors"
 """Its name in a package."""
+
+WEIGHTS = "retargeter.safetensors"
+"""The file of a package whose checksum it knows."""
+_RENEW = "where PyTorch is, mrhubo.load(folder).save_description(folder) writes it anew"
 
 LIMB, BEND, SHARE, ORIENT = range(4)
 """Kinds of steps of a reading."""
@@ -212,6 +218,10 @@ class Settings:
     """Of the prior."""
     constants: Mapping[str, float]
     """Numbers of the optimiser and of the confidence, by name."""
+    own_rest: bool
+    """Whether the human's rest pose is mrhubo's own."""
+    facts: Mapping[str, Any]
+    """Who made it, its checksum, and the robot's other joints (`mrhubo.robot_motion.RobotFacts`)."""
 
 
 @dataclass(frozen=True)
@@ -264,23 +274,30 @@ class Description:
         sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in _SECTIONS.items()}
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
-        return cls(features=arrays["features"], prior=prior, settings=Settings(**{**told, **names}), **sections, **stages)
+        return cls(
+            features=arrays["features"], prior=prior, settings=Settings(**{**told, **names}), **sections, **stages
+        )
 
     @classmethod
     def read(cls, path: Path) -> Description:
         """Of a file, or of the package in a folder.
 
         Raises:
-            UserError: it is missing, damaged, or of another version.
+            UserError: it is missing, damaged, of another version, or of another package than it lies in.
         """
-        path = path / FILE if path.is_dir() else path
-        arrays, metadata = read_arrays(path)
+        file = path / FILE if path.is_dir() else path
+        arrays, metadata = read_arrays(file)
         if metadata.get("schema") != SCHEMA:
-            raise UserError(f"{path}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'; load and save the package again")
+            raise UserError(f"{file}: schema is '{shortened(metadata.get('schema'))}', expected '{SCHEMA}'; {_RENEW}")
         try:
-            return cls.of(arrays, metadata)
-        except (KeyError, ValueError, TypeError) as error:
-            raise UserError(f"{path}: is no description that this version reads: {error}") from error
+            found = cls.of(arrays, metadata)
+            check(found)
+        except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
+            raise UserError(f"{file}: is no description that this version reads: {error}") from error
+        weights = file.with_name(WEIGHTS)
+        if weights.is_file() and checksum_file(weights) != found.settings.facts["checksum"]:
+            raise UserError(f"{file}: belongs to another package than the {WEIGHTS} beside it; {_RENEW}")
+        return found
 
 
 _SECTIONS: dict[str, type] = {
@@ -300,7 +317,11 @@ def _section(kind: type[Kind], name: str, arrays: Mapping[str, np.ndarray]) -> K
 
 def _of_layers(name: str, layers: Layers) -> dict[str, np.ndarray]:
     pairs = {f"{name}.layers.{i}": pair for i, pair in enumerate(layers)}
-    return {f"{place}.{kind}": array for place, pair in pairs.items() for kind, array in zip(("weight", "bias"), pair, strict=True)}
+    return {
+        f"{place}.{kind}": array
+        for place, pair in pairs.items()
+        for kind, array in zip(("weight", "bias"), pair, strict=True)
+    }
 
 
 def _layers(name: str, arrays: Mapping[str, np.ndarray]) -> Layers:

@@ -44,7 +44,9 @@ class Answers:
         trust = description.trust
         shapes = (len(description.cost.lower_N),), (len(trust.measured),), ()
         q_BN, error_BM, phi_B = (np.zeros((frames, *shape), np.float32) for shape in shapes)
-        return cls(q_BN, error_BM, phi_B, np.zeros(frames, np.bool_), np.zeros((frames, len(trust.column_XD)), np.float32))
+        return cls(
+            q_BN, error_BM, phi_B, np.zeros(frames, np.bool_), np.zeros((frames, len(trust.column_XD)), np.float32)
+        )
 
 
 class Engine(Protocol):
@@ -68,9 +70,7 @@ class Engine(Protocol):
         """Joint angles (B, N) [rad] after steps of optimisation, float32."""
         ...
 
-    def answer(
-        self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None
-    ) -> Answers:
+    def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """After steps of optimisation, with all that is told of them; shaking of branches in degrees, where known."""
         ...
 
@@ -98,9 +98,7 @@ class NumpyEngine:
 
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""
-        return networks.joint_angles(
-            self.description, networks.features_of(self.description, local_BJ33, target_BD3)
-        )
+        return networks.joint_angles(self.description, networks.features_of(self.description, local_BJ33, target_BD3))
 
     def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int) -> np.ndarray:
         """As `Engine.polish`."""
@@ -108,9 +106,7 @@ class NumpyEngine:
             return q_BN
         return steps.polish(self.description, q_BN.astype(np.float64), target_BD3, polish).astype(np.float32)
 
-    def answer(
-        self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None
-    ) -> Answers:
+    def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """As `Engine.answer`."""
         d, found = self.description, Answers.empty(self.description, len(q_BN))
         for rows in _chunks(len(q_BN)):
@@ -167,7 +163,9 @@ class CompiledEngine:
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
         found_BD3 = np.empty((len(local_BJ33), len(self.description.cost.weight_D), 3))
-        self._shared(len(local_BJ33), lambda rows: self._kernels.directions(self._tables, local_BJ33[rows], found_BD3[rows]))
+        self._shared(
+            len(local_BJ33), lambda rows: self._kernels.directions(self._tables, local_BJ33[rows], found_BD3[rows])
+        )
         return found_BD3
 
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
@@ -186,12 +184,12 @@ class CompiledEngine:
         found = Answers.empty(self.description, 0)
         q_BN = q_BN.copy()
         if polish:
-            self._shared(len(q_BN), lambda rows: self._retarget(self._steps, polish, rows, q_BN, target_BD3, None, None, found))
+            self._shared(
+                len(q_BN), lambda rows: self._retarget(self._steps, polish, rows, q_BN, target_BD3, None, None, found)
+            )
         return q_BN
 
-    def answer(
-        self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None
-    ) -> Answers:
+    def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """As `Engine.answer`."""
         d, frames = self.description, len(q_BN)
         found = Answers.empty(d, frames)
@@ -219,7 +217,10 @@ class CompiledEngine:
         self, what: int, polish: int, rows: slice, q_BN: np.ndarray, target_BD3: np.ndarray, six_BF: np.ndarray | None,
         shake_BX: np.ndarray | None, into: Answers,
     ) -> None:  # fmt: skip
-        six, shaken = (none if given is None else given[rows] for none, given in zip(self._nothing, (six_BF, shake_BX), strict=True))
+        six, shaken = (
+            none if given is None else given[rows]
+            for none, given in zip(self._nothing, (six_BF, shake_BX), strict=True)
+        )
         self._kernels.retarget(
             self._tables, self._activation, polish, what, target_BD3[rows], q_BN[rows], six, shaken,
             into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body import BodyPrior, anatomy
+from mrhubo.body.rest_directions import is_ours
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
 from mrhubo.body.vposer import VPoser
 from mrhubo.errors import UserError
@@ -90,6 +91,12 @@ def describe(retargeter: Retargeter) -> Description:
             isinstance(parts[0], ResidualMLP),
             prior.activation,
             {name: float(value) for name, value in constants.items()},
+            is_ours(body_map.skeleton),
+            {
+                "made_by": retargeter.facts.made_by,
+                "checksum": retargeter.facts.checksum,
+                "others": [asdict(other) for other in retargeter.facts.others],
+            },
         ),
     )
 
@@ -158,7 +165,9 @@ class _Bodies:
         """Each after those above it."""
         exact, home_N = copy.deepcopy(robot).double(), robot.home().double()
         poses, self._pose = exact.forward(home_N[None]), {self.description.root: np.eye(4)}
-        for link, rotation_33, position_3 in zip(exact.links, poses.rotation_BL33[0], poses.position_BL3[0], strict=True):
+        for link, rotation_33, position_3 in zip(
+            exact.links, poses.rotation_BL33[0], poses.position_BL3[0], strict=True
+        ):
             pose_44 = np.eye(4)
             pose_44[:3, :3], pose_44[:3, 3] = rotation_33.cpu().numpy(), position_3.cpu().numpy()
             self._pose[link] = pose_44
@@ -358,7 +367,9 @@ def _trust(retargeter: Retargeter, joint_T: np.ndarray) -> Trust:
     branches, directions = retargeter.branches, len(retargeter.body_map.directions)
     weights = [asdict(weights) for weights in (retargeter.confidence.moving, retargeter.confidence.still)]
     return Trust(
-        column_XD=_int([[d in branch.columns for d in range(directions)] for branch in branches]).reshape(-1, directions),
+        column_XD=_int([[d in branch.columns for d in range(directions)] for branch in branches]).reshape(
+            -1, directions
+        ),
         slot_XT=_int([[j in branch.joints for j in joint_T] for branch in branches]).reshape(-1, len(joint_T)),
         measured=_int(retargeter.body_map.measured),
         weight_25=_float([[w[name] for name in ("certain", *confidence.SIGNALS)] for w in weights]),
@@ -374,5 +385,5 @@ def _capsules(body_map: BodyMap) -> Capsules:
         body_S=_int([number[body] for body in collision._body_C.tolist()]),
         end_S23=_float(collision._ends_C23),
         radius_S=_float(collision._radius_C),
-        pair_Y2=_int(collision._pair_2P.T),
+        pair_Y2=np.array(collision._pair_2P.T.cpu().numpy(), np.int32),
     )

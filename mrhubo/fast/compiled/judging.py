@@ -255,7 +255,13 @@ def _squared_distance(ends_S3, i, j):
     start_a, start_b = row(ends_S3, i), row(ends_S3, j)
     along_a, along_b = add(row(ends_S3, i + 1), start_a, -1.0), add(row(ends_S3, j + 1), start_b, -1.0)
     r = add(start_a, start_b, -1.0)
-    a, e, b, c, f = dot(along_a, along_a), dot(along_b, along_b), dot(along_a, along_b), dot(along_a, r), dot(along_b, r)
+    a, e, b, c, f = (
+        dot(along_a, along_a),
+        dot(along_b, along_b),
+        dot(along_a, along_b),
+        dot(along_a, r),
+        dot(along_b, r),
+    )
     safe_a, safe_e = max(a, SHORT), max(e, SHORT)
     determinant = a * e - b * b
     s = 0.0

@@ -33,7 +33,7 @@ class Kernels(NamedTuple):
 
 
 STEPS, ALL, WITHOUT_PRIOR = range(3)
-"""What `retarget` does: steps of optimisation alone; these and judging; judging alone, with the prior's answer given."""
+"""What `retarget` does: steps alone; steps and judging; judging alone, with the prior's answer given."""
 
 
 def _checksum() -> str:

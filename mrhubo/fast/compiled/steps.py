@@ -364,7 +364,9 @@ def polish(t, work, target_BD3, b, q_N, steps):
                 far |= _far(t, work, c)
             enough = work.best_C[c]
             if number == starts + 1:
-                enough = work.own_cost_C[c] - work.weight_C[c] * real(t, POLISH_4, GAIN) if _far(t, work, c) else -np.inf
+                enough = (
+                    work.own_cost_C[c] - work.weight_C[c] * real(t, POLISH_4, GAIN) if _far(t, work, c) else -np.inf
+                )
             if number and cost < enough:
                 work.best_C[c] = cost
             if number == 0 or cost < enough:

@@ -6,8 +6,8 @@ Legend: B frames, F numbers that the networks see, N joints.
 from __future__ import annotations
 
 from collections.abc import Callable
-
 from dataclasses import dataclass
+
 import numpy as np
 
 from mrhubo.fast.description import Description, Layers, Part
