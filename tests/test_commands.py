@@ -22,7 +22,7 @@ from mrhubo.errors import UserError
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = {
     name: f"mrhubo.{name}"
-    for name in ("fit", "pair", "retarget", "evaluate", "sweep", "baseline", "reproduce", "prior")
+    for name in ("fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
 }
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
 """Of the config; elsewhere `Config`."""

@@ -82,9 +82,13 @@ def joint_angles(description: Description, features_BF: np.ndarray, act: Activat
 def features_of(description: Description, local_BJ33: np.ndarray, direction_BD3: np.ndarray) -> np.ndarray:
     """What the networks see (B, F), of poses (B, 21, 3, 3) and of their directions (B, D, 3)."""
     if description.settings.features == "directions":
-        return direction_BD3[:, description.features].reshape(len(direction_BD3), -1).astype(np.float32)
+        return (
+            direction_BD3[:, description.features]
+            .reshape(len(direction_BD3), 3 * len(description.features))
+            .astype(np.float32)
+        )
     columns_BX32 = local_BJ33[:, description.features, :, :2]
-    return columns_BX32.swapaxes(-1, -2).reshape(len(local_BJ33), -1).astype(np.float32)
+    return columns_BX32.swapaxes(-1, -2).reshape(len(local_BJ33), 6 * len(description.features)).astype(np.float32)
 
 
 def _branched(stage: tuple[Part, ...], x_BI: np.ndarray, residual: bool, act: Activation) -> np.ndarray:
