@@ -32,8 +32,8 @@ _JUMP = 5.0
 """How many times as far as in any other step joints move from a first frame that is no part of the motion."""
 _JUMP_LEAST = 0.15
 """The least that they then move, of a leg's length."""
-_STEPS = 240
-"""Steps that the first one is compared with."""
+_STEPS = 6
+"""Steps that the first one is compared with: motions begin quietly, and go on at the speed at which they begin."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,16 @@ class Reference:
     """Columns: the body's left, up and forward."""
     what: str
     """In words."""
+
+    def in_world(self, world_33: np.ndarray, unit: float) -> Reference:
+        """The same in another world, into which a turn leads, in metres."""
+        to_world = Rotation.from_matrix(world_33)
+        return Reference(
+            {name: unit * world_33 @ point_3 for name, point_3 in self.point.items()},
+            {name: to_world * turn for name, turn in self.turn.items()},
+            world_33 @ self.axes_33,
+            self.what,
+        )
 
 
 def find_reference(tree: JointTree, place: Mapping[str, int]) -> Reference | None:
@@ -67,11 +77,11 @@ def find_reference(tree: JointTree, place: Mapping[str, int]) -> Reference | Non
     return None
 
 
-def first_frame_jumps(tree: JointTree, place: Mapping[str, int], reference: Reference | None) -> bool:
+def first_frame_jumps(tree: JointTree, place: Mapping[str, int]) -> bool:
     """Whether the first frame is a pose at rest from which the motion jumps away."""
     if len(tree) < 4 or _read(tree.pose(slice(0, 1), list(place.values())), place, "", True) is None:
         return False
-    pose = tree.pose(slice(0, _STEPS), list(place.values()))
+    pose = tree.pose(slice(0, _STEPS + 2), list(place.values()))
     hips = pose.turn[place["pelvis"]]
     seen = [hips.inv().apply(pose.point[p] - pose.point[place["pelvis"]]) for p in place.values()]
     step_F = np.linalg.norm(np.diff(np.stack(seen), axis=1), axis=-1).max(0)
