@@ -196,6 +196,8 @@ def _single(tree: Tree) -> Layout | None:
         return Layout(Kind(name, "smplx", worlds), found.tracks())
     if "pred_rotmat" in keys:
         return Layout(Kind("TRAM", "smpl", CAMERAS), found.tracks())
+    if found.names.pose == "local_rot_mats":
+        return Layout(Kind("Kimodo with SMPL-X's skeleton", "smplx", ANY_WORLD), found.tracks())
     if "smpl_scaling" in keys:
         return Layout(Kind("AIST++", "smpl", ANY_WORLD), found.tracks())
     return Layout(_kind("SMPL parameters", found, tree), found.tracks())
