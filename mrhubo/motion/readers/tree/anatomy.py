@@ -33,8 +33,8 @@ _BENT = np.sin(np.radians(15.0))
 _LEG, _ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 NEEDED = ("pelvis", "spine3", *(f"{side}_{name}" for side in ("left", "right") for name in (*_LEG, *_ARM)))
 """Joints without which nothing can be made of a tree."""
-ROLES = (*NEEDED, "neck", "head", "left_foot", "right_foot")
-"""Joints that are looked for; `spine3` is the chest, `foot` where the toes begin."""
+ROLES = (*NEEDED, "neck", "head", "left_foot", "right_foot", "left_collar", "right_collar")
+"""Joints that are looked for; `spine3` is the chest, `foot` where toes begin, `collar` the first joint of the arm."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,7 @@ def find_anatomy(tree: JointTree, given: Mapping[str, int] | None = None, what: 
     for side, leg, arm in zip(("left", "right"), legs, arms, strict=True):
         place |= {f"{side}_{name}": limbs.legs[leg][i] for i, name in enumerate(_LEG)}
         place |= {f"{side}_{name}": limbs.arms[arm][i] for i, name in enumerate(_ARM)}
+        place[f"{side}_collar"] = limbs.chains["arm"][arm].places[0]
         toes = _toes(shape, limbs, leg)
         if toes is not None:
             place[f"{side}_foot"] = toes

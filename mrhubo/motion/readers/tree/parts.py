@@ -31,8 +31,10 @@ _STEADY = 0.9
 """Length of a mean of unit vectors from which on they agree: they spread by some 25 degrees."""
 _ENOUGH = 10
 """Frames in which a limb must be bent, to tell the axis of its hinge."""
-_NEAR_AXIS = np.cos(np.radians(20.0))
-"""An axis of a bone as near as this to where up seems to be on pelvis or head is meant to be up."""
+_NEAR_UP = np.cos(np.radians(20.0))
+"""An axis of a bone as near as this to where up seems to be on pelvis or head is meant to be up, if another is left."""
+_NEAR_LEFT = {"pelvis": np.cos(np.radians(3.0)), "head": np.cos(np.radians(20.0))}
+"""How near that one is: hips tell it exactly, a head that looks about does not."""
 _SHORT = 1e-3
 """Two joints nearer to each other [m] are in one place."""
 _HINGES = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
@@ -120,8 +122,11 @@ def _upright_parts(sample: Frames) -> dict[str, Tensor]:
     """By shapes of bones and means over the motion."""
     rest = rest_points()
     rest["below"] = rest["spine1"]
-    hips, shoulders = (tuple(f"{side}_{joint}" for side in SIDES) for joint in ("hip", "shoulder"))
+    hips, shoulders, collars = (tuple(f"{side}_{name}" for side in SIDES) for name in ("hip", "shoulder", "collar"))
     parts: dict[str, Tensor] = {}
+    if set(collars) <= sample.point.keys():  # they do not move on the chest, but may be in one place
+        left_F3, right_F3 = (sample.point[collar] for collar in collars)
+        shoulders = collars if float((left_F3 - right_F3).norm(dim=-1).mean()) > _SHORT else shoulders
     for name, (left, right), up in (("pelvis", hips, (hips, "below")), ("spine3", shoulders, (("spine3",), "neck"))):
         start, end = up
         frames = []
@@ -138,11 +143,11 @@ def _upright_parts(sample: Frames) -> dict[str, Tensor]:
         elif seen is not None and (mean_33 := _mean(sample.turn[name].mT @ seen)) is not None:
             parts[name] = mean_33
     if "pelvis" in parts:
-        parts["pelvis"] = _snapped(parts["pelvis"])
+        parts["pelvis"] = _snapped(parts["pelvis"], "pelvis")
     if "head" in sample.turn and "spine3" in parts:
         head_33 = _mean(sample.turn["head"].mT @ sample.turn["spine3"] @ parts["spine3"])
         if head_33 is not None:
-            parts["head"] = _snapped(head_33)
+            parts["head"] = _snapped(head_33, "head")
     for side in SIDES:
         seen = turn_of(f"{side}_ankle", sample.point) if f"{side}_foot" in sample.point else None
         mean_33 = None if seen is None else _mean(sample.turn[f"{side}_ankle"].mT @ seen)
@@ -151,11 +156,11 @@ def _upright_parts(sample: Frames) -> dict[str, Tensor]:
     return parts
 
 
-def _snapped(part_33: Tensor) -> Tensor:
-    """The constant with up along the bone's axis that is nearest, if one is near."""
+def _snapped(part_33: Tensor, name: str) -> Tensor:
+    """The constant with up along the bone's axis that is nearest, if the bone's axes are meant to be left and up."""
     up_3 = part_33[:, 1]
     largest = int(up_3.abs().argmax())
-    if float(up_3[largest].abs()) < _NEAR_AXIS:
+    if float(up_3[largest].abs()) < _NEAR_UP or float(part_33[:, 0].abs().max()) < _NEAR_LEFT[name]:
         return part_33
     axis_3 = torch.zeros_like(up_3)
     axis_3[largest] = torch.sign(up_3[largest])

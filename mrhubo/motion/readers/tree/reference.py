@@ -28,12 +28,13 @@ _ARMS_UP_DEG = 50.0
 """Arms at rest hang, or are held out, at least by this angle from straight up."""
 _SNAP_DEG = 12.0
 """Trunk and hips that are as near to an axis of the file are meant to be along it."""
-_JUMP = 5.0
-"""How many times as far as in any other step joints move from a first frame that is no part of the motion."""
+_JUMP = 2.0
+"""How many times as far as in the next steps joints move from a first frame that is no part of the motion. Who really
+starts from a pose moves less in the first step than in those that follow."""
 _JUMP_LEAST = 0.15
 """The least that they then move, of a leg's length."""
 _STEPS = 6
-"""Steps that the first one is compared with: motions begin quietly, and go on at the speed at which they begin."""
+"""Steps that the first one is compared with."""
 
 
 @dataclass(frozen=True)
