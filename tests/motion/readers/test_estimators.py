@@ -19,6 +19,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, read_folder, read_motion
 from mrhubo.motion.readers.content import NoMotion
 from tests.files.test_safe_pickle import attacks
+from tests.motion.damage import damaged_by, read_or_refused
 from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, phalp, romp, wham
 
 RATE = ReadOptions(rate=30)
@@ -197,27 +198,7 @@ def test_damaged_files_are_read_or_refused_by_name(
     tmp_path_factory: pytest.TempPathFactory, name: str, data: st.DataObject
 ) -> None:
     folder = Path(os.fspath(tmp_path_factory.getbasetemp()))
-    damage(good_file(name, folder), good_file("wham", folder), folder / "damaged", data.draw(st.integers(0, 2**32)))
-
-
-def damage(good: bytes, other: bytes, path: Path, seed: int) -> None:
-    """Flips bytes of a good file, cuts it off, or splices a piece of another in; then reads it."""
-    generator = np.random.default_rng(seed)
-    content, kind = bytearray(good), generator.integers(3)
-    if kind == 0:
-        for place in generator.integers(len(content), size=generator.integers(1, 6)):
-            content[place] = generator.integers(256)
-    elif kind == 1:
-        content = content[: generator.integers(len(content))]
-    else:
-        start, size = generator.integers(len(other)), generator.integers(1, 200)
-        place = generator.integers(len(content))
-        content[place : place + generator.integers(200)] = other[start : start + size]
-    path.write_bytes(content)
-    try:
-        motion = read_motion(path, RATE)
-    except UserError as error:
-        assert str(path) in str(error)
-    else:
-        assert motion.local_TJ33.shape[1:] == (21, 3, 3) and bool(motion.local_TJ33.isfinite().all())
-        assert motion.root_rotation_T33 is None or bool(motion.root_rotation_T33.isfinite().all())
+    path = folder / "damaged"
+    seed = data.draw(st.integers(0, 2**32))
+    path.write_bytes(damaged_by(seed, good_file(name, folder), good_file("wham", folder)))
+    read_or_refused(path)

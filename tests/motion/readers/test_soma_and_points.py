@@ -23,8 +23,8 @@ from mrhubo.motion import Motion, ReadOptions, read_motion
 from mrhubo.motion.orientations import rest_points
 from mrhubo.motion.readers.sam3d import _ELBOWS, _PLACES
 from mrhubo.motion.readers.soma import _ALL, _FEW_FINGERS, _OURS, _names
+from tests.motion.damage import damaged_by, read_or_refused
 from tests.motion.readers.estimator_files import made_up, matrices, padded
-from tests.motion.readers.test_estimators import damage
 
 RATE = ReadOptions(rate=30)
 FRAMES = 5
@@ -281,5 +281,7 @@ def test_damaged_files_are_read_or_refused_by_name(tmp_path: Path, name: str) ->
     WRITERS[name](tmp_path / "good")
     soma_x(tmp_path / "other")
     for seed in range(15):
-        damage((tmp_path / "good").read_bytes(), (tmp_path / "other").read_bytes(), tmp_path / "damaged", seed)
+        good, other = (tmp_path / "good").read_bytes(), (tmp_path / "other").read_bytes()
+        (tmp_path / "damaged").write_bytes(damaged_by(seed, good, other))
+        read_or_refused(tmp_path / "damaged")
     assert Rotation.from_matrix(LOCAL[0].numpy()).magnitude().max() > 0.1  # the good file is of somebody who moves
