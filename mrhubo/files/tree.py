@@ -158,6 +158,13 @@ class Tree:
             value = str(value.reshape(()))
         return value if isinstance(value, str) else None
 
+    def texts(self) -> list[str]:
+        """The texts of a list or an array of such; none where it is neither."""
+        value = self._value
+        if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.ndim == 1:
+            return value.tolist()
+        return [text for node in self if (text := node.text()) is not None]
+
     @property
     def described(self) -> str:
         """In words."""
