@@ -11,7 +11,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config
-from mrhubo.files.storage import DamagedFile
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import build_body_map
