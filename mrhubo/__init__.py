@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mrhubo.reference import OptimizationRetargeter
     from mrhubo.retargeter import Retargeter, RetargetResult
     from mrhubo.robot import Robot
+    from mrhubo.robot_motion import RobotMotion, read_robot_motion, write_robot_motion
     from mrhubo.streaming import Stream
 
     __version__: str
@@ -32,11 +33,14 @@ __all__ = [
     "RetargetResult",
     "Retargeter",
     "Robot",
+    "RobotMotion",
     "Stream",
     "UserError",
     "__version__",
     "load",
     "read_motion",
+    "read_robot_motion",
+    "write_robot_motion",
 ]
 
 _HOMES = {
@@ -46,9 +50,12 @@ _HOMES = {
     "RetargetResult": "mrhubo.retargeter",
     "Retargeter": "mrhubo.retargeter",
     "Robot": "mrhubo.robot",
+    "RobotMotion": "mrhubo.robot_motion",
     "Stream": "mrhubo.streaming",
     "UserError": "mrhubo.errors",
     "read_motion": "mrhubo.motion",
+    "read_robot_motion": "mrhubo.robot_motion",
+    "write_robot_motion": "mrhubo.robot_motion",
 }
 """Module of each public name."""
 

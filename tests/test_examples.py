@@ -12,6 +12,7 @@ import pytest
 import torch
 from PIL import Image
 
+import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.retargeter import Retargeter, build_network
@@ -105,6 +106,21 @@ def test_moving_picture(package: str, tmp_path: Path) -> None:
     run("06_moving_picture.py", package, str(ROOT / "data" / "motions" / "wave.npz"), "nao.gif", 1.0, 0.5)
     with Image.open(tmp_path / "nao.gif") as picture:
         assert getattr(picture, "n_frames", 1) == 6
+
+
+def test_ros_bag(package: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mcap_ros2", reason="the extra `ros` is not installed")
+    run("07_ros_bag.py", package)
+    text = capsys.readouterr().out
+    assert "wave.mcap: 433 points at 60 per second" in text and "what was written: 0 rad" in text
+
+
+def test_code_that_writes_runs(package: str) -> None:
+    (code,) = [code for code in blocks("docs/python.md") if "read_joint_order" in code]
+    motion = mrhubo.read_motion(ROOT / "data" / "motions" / "wave.npz")
+    names: dict[str, Any] = {"mrhubo": mrhubo, "result": mrhubo.load(package)(motion, polish=0, together=False)}
+    exec(code, names)
+    assert len(names["same"]) == 433 and "held" in names["notes"][0]
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/python.md"])

@@ -77,6 +77,9 @@ import mrhubo
 result = mrhubo.load({str(package)!r})(mrhubo.read_motion({str(root / "data" / "motions" / "wave.npz")!r}))
 assert result.q.shape == (len(result.confidence), 8)
 result.save({str(tmp_path / "wave.csv")!r})
+from mrhubo.retarget import main
+main(["--retargeter", {str(package)!r}, "--motion", {str(root / "data" / "motions" / "wave.npz")!r}, "--to", "0.2",
+      "--out", {str(tmp_path / "wave.json")!r}])
 """)
     assert {"torch", "pytorch_kinematics"} <= loaded
     assert loaded.isdisjoint(TRAINING_ONLY), loaded & TRAINING_ONLY

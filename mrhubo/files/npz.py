@@ -20,7 +20,7 @@ from mrhubo.files.archive import check_member, open_archive
 
 MAX_BYTES = 4 * 2**30
 """Largest array that is read."""
-_TYPES = {"U": "text", "fiu": "numbers"}
+_TYPES = {"U": "text", "fiu": "numbers", "fiub": "numbers"}
 _MAX_AXES = 32
 
 

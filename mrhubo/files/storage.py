@@ -6,7 +6,6 @@ data.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import platform
@@ -23,46 +22,14 @@ from safetensors.torch import save
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.files.regular import check_regular, open_regular, read_regular
+from mrhubo.files.atomic import atomic_path, checksum_file
+from mrhubo.files.regular import check_regular, read_regular
 
 _CHECKSUM = "xxh3"
 
 
 class DamagedFile(UserError):
     """A file that is missing, truncated, altered, or not what its name says."""
-
-
-@contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
-    """Yields a temporary path in the same folder; on success its content is synced and takes the place of `path`.
-
-    Raises:
-        UserError: the folder or the disk refuses the file (no space, no permission); nothing half-written stays.
-    """
-    temporary = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        with open(temporary, "rb") as handle:
-            os.fsync(handle.fileno())
-        os.replace(temporary, path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        with contextlib.suppress(OSError):  # it was never made, nor perhaps its folder
-            temporary.unlink(missing_ok=True)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Makes a renamed file outlast a power cut; Windows does that on its own, and opens no folders."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 class Locked(UserError):
@@ -99,19 +66,6 @@ def remove_leftovers(folder: Path) -> None:
         process = path.name.split(".")[-2]
         if process.isdecimal() and (int(process) == os.getpid() or not psutil.pid_exists(int(process))):
             path.unlink(missing_ok=True)
-
-
-def checksum_file(path: Path) -> str:
-    """xxh3 of a file's bytes, 16 hex digits.
-
-    Raises:
-        UserError: it is missing, no regular file, or may not be read.
-    """
-    digest = xxhash.xxh3_64()
-    with open_regular(path) as file:
-        while piece := file.read(2**20):
-            digest.update(piece)
-    return digest.hexdigest()
 
 
 @contextmanager

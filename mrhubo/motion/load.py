@@ -35,15 +35,8 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
     Raises:
         UserError: the folder is missing or holds no motion, two files hold a motion of one name, or a file is bad.
     """
-    folder = Path(folder)
-    _refuse_file(folder)
-    if not os.path.isdir(folder):
-        raise UserError(f"{folder}: there is no such folder")
-    files = _motion_files(folder)
-    if not files:
-        raise UserError(f"{folder}: holds no motion file")
     by_name: dict[str, Path] = {}
-    for file in files:
+    for file in motion_files(folder):
         other = by_name.setdefault(motion_name(file), file)
         if other is not file:
             raise UserError(f"{folder}: {other.name} and {file.name} are both named '{motion_name(file)}'; keep one")
@@ -56,6 +49,22 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
     if other is not None and not motions:
         raise other
     return motions
+
+
+def motion_files(folder: Path) -> list[Path]:
+    """The files of a folder that `read_folder` would try, one at least, sorted.
+
+    Raises:
+        UserError: the folder is missing or holds none.
+    """
+    folder = Path(folder)
+    _refuse_file(folder)
+    if not os.path.isdir(folder):
+        raise UserError(f"{folder}: there is no such folder")
+    files = _motion_files(folder)
+    if not files:
+        raise UserError(f"{folder}: holds no motion file")
+    return files
 
 
 def find_motions(folders: Sequence[Path]) -> Path:

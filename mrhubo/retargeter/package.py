@@ -10,6 +10,7 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,9 +30,10 @@ from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.parts import pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
-from mrhubo.retargeter.saving import read_package, write_package
-from mrhubo.robot import BodyMap, SelfCollision
+from mrhubo.retargeter.saving import package_checksum, read_package, write_package
+from mrhubo.robot import BodyMap, SelfCollision, robot_facts
 from mrhubo.robot.plausibility import read
+from mrhubo.robot_motion import RobotFacts
 
 POLISH = 10
 """Steps of optimisation that `retarget` makes after the networks, at most, unless told otherwise. On CMU's clips and
@@ -65,6 +67,8 @@ class Retargeter(nn.Module):
         self._polish = Polish(self.directions)
         self.confidence, self.branches = confidence, branches_of(self.directions)
         """How much each branch of an answer is to be trusted, and what the branches are."""
+        self.origin, self.checksum = "a network of mrhubo that was not saved", ""
+        """Where it was loaded from, and the checksum of its weights' file, which has those of all others."""
 
     @property
     def device(self) -> torch.device:
@@ -80,6 +84,11 @@ class Retargeter(nn.Module):
     def joint_names(self) -> tuple[str, ...]:
         """Joints of the output, in order."""
         return self.body_map.robot.joint_names
+
+    @cached_property
+    def facts(self) -> RobotFacts:
+        """What files of the robot's motion tell of it."""
+        return robot_facts(self.body_map.robot, self.origin, self.checksum)
 
     if TYPE_CHECKING:
 
@@ -115,7 +124,8 @@ class Retargeter(nn.Module):
         length = poses.shape[-1] if poses.shape and poses.frame_rate else len(poses.local_TJ33)
         clips = poses.local_TJ33.split(max(1, length))
         answers = [self.retarget(clip_TJ33, polish, poses.frame_rate, together) for clip_TJ33 in clips]
-        return join_results(answers).with_leading(poses.shape, poses.frame_rate)
+        told = (motion.name, motion.source) if isinstance(motion, Motion) else ()
+        return join_results(answers).with_leading(poses.shape, poses.frame_rate, *told)
 
     @torch.no_grad()
     def predict(self, local_TJ33: MotionLike, polish: int = 0, frame_rate: float | None = None) -> Tensor:
@@ -224,6 +234,8 @@ class Retargeter(nn.Module):
             self.collision.collides(q_TN, links),
             trust_TC,
             tuple(branch.name for branch in self.branches),
+            self.body_map.measured_names,
+            robot=self.facts,
         )
 
     def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
@@ -263,4 +275,7 @@ class Retargeter(nn.Module):
             UserError: the folder is no package, a file is missing or damaged, was edited or comes from another package,
                 or weights and settings do not fit.
         """
-        return cls(*read_package(Path(folder)))
+        folder = Path(folder)
+        retargeter = cls(*read_package(folder))
+        retargeter.origin, retargeter.checksum = f"package {folder.resolve().name}", package_checksum(folder)
+        return retargeter

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from hypothesis import strategies as st
 
 import mrhubo
@@ -34,6 +35,22 @@ def damaged(content: bytes, steps: list[Step]) -> bytes:
         else:
             content = content[:at] + content[at // 2 :]
     return content
+
+
+def damaged_by(seed: int, content: bytes, other: bytes) -> bytes:
+    """A file with some bytes changed, without its end, or with a piece of another good file in it."""
+    generator = np.random.default_rng(seed)
+    changed, kind = bytearray(content), generator.integers(3)
+    if kind == 0:
+        for place in generator.integers(len(changed), size=generator.integers(1, 6)):
+            changed[place] = generator.integers(256)
+    elif kind == 1:
+        changed = changed[: generator.integers(len(changed))]
+    else:
+        start, size = generator.integers(len(other)), generator.integers(1, 200)
+        place = generator.integers(len(changed))
+        changed[place : place + generator.integers(200)] = other[start : start + size]
+    return bytes(changed)
 
 
 def read_or_refused(path: Path) -> None:

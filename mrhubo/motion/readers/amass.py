@@ -54,6 +54,8 @@ def is_amass(content: Content) -> bool:
     if not content.is_zip or content.is_torch:
         return False
     key = next((key for key in _POSE_KEYS if key in content.arrays), None)
+    if "joint_names" in content.arrays:  # SOMA-X, whose joints are others
+        return False
     return not content.names or (key is not None and not _has_people(content.path, key))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.layouts import find_layout
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
+from mrhubo.motion.readers.rows import read_rows
+from mrhubo.motion.readers.sam3d import read_sam3d
+from mrhubo.motion.readers.soma import read_soma
 from mrhubo.motion.readers.tracks import choose, motion_of
 
 _MAX_PROTOCOL = 5
@@ -38,20 +42,28 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         UserError: the file is damaged, hostile, too large, or what it tells is no motion.
     """
     tree = read_tree(path)
+
+    def rate(notes: list[str]) -> float:
+        return _rate(path, tree, options, notes)
+
+    found = read_rows(tree, options) or read_soma(tree, rate) or read_sam3d(tree, options, rate)
+    return found or _read_smpl(path, tree, options, rate)
+
+
+def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[list[str]], float]) -> Motion:
     layout = find_layout(tree)
     if layout is None:
         content = Content.open(path)
         what = content.described if content.arrays else f"{content.described} of {tree.described}"
         raise NoMotion(
-            f"{path}: is {what}, in which there is no human motion that is known here; expected what WHAM,"
-            " GVHMR, GEM, 4D-Humans, TRAM, ROMP, PyMAF-X or another writes, or SMPL's 'poses' (frames, 72), say;"
+            f"{path}: is {what}, in which there is no human motion that is known here; expected what WHAM, GVHMR, GEM,"
+            " 4D-Humans, TRAM, ROMP, PyMAF-X, SAM 3D Body or another writes, or SMPL's 'poses' (frames, 72), say;"
             " docs/formats.md says how each is laid out"
         )
-    notes: list[str] = []
+    notes = list(layout.notes)
     track = choose(path, layout.tracks, options, notes)
     arrays = track.read()
-    frame_rate = _rate(path, tree, options, notes)
-    return motion_of(path, arrays, layout.kind, frame_rate, notes)
+    return motion_of(path, arrays, layout.kind, rate(notes), notes)
 
 
 def _rate(path: Path, tree: Tree, options: ReadOptions, notes: list[str]) -> float:

@@ -3,13 +3,14 @@
 Where a name is from: `pose_world` WHAM, `smpl_poses` AIST++ (https://google.github.io/aistplusplus_dataset),
 `smpl_thetas` ROMP, `pred_rotmat` TRAM, `body_pose` the package smplx (https://github.com/vchoutas/smplx), `pose_body`
 AMASS, `poses_body` EMDB (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC),
-`fullpose` GRAB (https://github.com/otaheri/GRAB), `poses` and `pose` everybody.
+`fullpose` GRAB (https://github.com/otaheri/GRAB), `local_rot_mats` Kimodo, `poses` and `pose` everybody.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.rotations import Form, find_form
 from mrhubo.motion.readers.tracks import SmplArrays, Track
 
+T = TypeVar("T")
 _WITH_ROOT, _WITHOUT = (22, 24, 52, 55), (21, 23)
 """How many joints a pose has: of body, SMPL, SMPL-H and SMPL-X; and of SMPL-X's or SMPL's body without the root."""
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
@@ -52,6 +54,7 @@ _NAMES = (
     _Names("pose"),
     _Names("thetas"),
     _Names("rotations"),
+    _Names("local_rot_mats", position=("root_positions",)),
 )
 
 
@@ -120,14 +123,19 @@ def find_here(node: Tree) -> Found | None:
     return None
 
 
-def find_inside(node: Tree, deepest: int = _DEEPEST) -> Found | None:
+def find_inside(node: Tree) -> Found | None:
     """The first SMPL parameters in a dictionary or in those in it; those in the world go before what a camera sees."""
-    found = find_here(node)
+    return search(node, find_here)
+
+
+def search(node: Tree, find: Callable[[Tree], T | None], deepest: int = _DEEPEST) -> T | None:
+    """What is found first in a dictionary or in those in it; what is in the world goes before what a camera sees."""
+    found = find(node)
     if found is not None or deepest == 0:
         return found
     entries = [(name, child) for name, child in _some(node) if child.is_mapping]
     for _, child in sorted(entries, key=lambda entry: _rank(entry[0])):
-        found = find_inside(child, deepest - 1)
+        found = search(child, find, deepest - 1)
         if found is not None:
             return found
     return None

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -53,13 +54,19 @@ class SmplArrays:
 
 
 @dataclass(frozen=True)
-class Track:
+class Person:
     """One person in a file."""
 
     person: str
     """A name or a number that the file has for them; empty where it has none."""
     length: int
     """In how many frames they are seen."""
+
+
+@dataclass(frozen=True)
+class Track(Person):
+    """One person, of whom the file has SMPL parameters."""
+
     read: Callable[[], SmplArrays]
     """Reads what the file has of them."""
 
@@ -76,7 +83,10 @@ class Kind:
     """Which way may be up, names of `mrhubo.motion.readers.world`."""
 
 
-def choose(path: Path, tracks: Sequence[Track], options: ReadOptions, notes: list[str]) -> Track:
+Chosen = TypeVar("Chosen", bound=Person)
+
+
+def choose(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: list[str]) -> Chosen:
     """The person that is asked for, or whoever is seen in most frames; of those, the first.
 
     Raises:

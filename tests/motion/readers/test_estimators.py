@@ -18,8 +18,10 @@ from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, read_folder, read_motion
 from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.linking import link
 from tests.files.test_safe_pickle import attacks
-from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, phalp, romp, wham
+from tests.motion.damage import damaged_by, read_or_refused
+from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, phalp, pymaf, romp, wham
 
 RATE = ReadOptions(rate=30)
 FRAMES = 6
@@ -55,7 +57,7 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
             read_motion(path)
 
 
-@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many])
+@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many and name != "pymaf"])
 def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, name: str) -> None:
     writer = WRITERS[name]
     lengths = (FRAMES, FRAMES) if name == "slahmr" else (4, FRAMES)
@@ -118,11 +120,26 @@ def test_old_bodies_of_phalps_tracks_are_passed_over(tmp_path: Path) -> None:
     assert motion.confidence_TJ is not None and motion.confidence_TJ[:, 0].tolist() == [1, 1, 0, 0, 1, 1]
 
 
-def test_people_whom_romp_does_not_track_go_by_their_place(tmp_path: Path) -> None:
-    people = {1: made_up(FRAMES, camera=True), 2: made_up(3, seed=1, camera=True)}
-    romp(tmp_path / "a.npz", people, tracked=False)
-    assert close(read_motion(tmp_path / "a.npz", RATE), people[1], "smpl")
-    assert close(read_motion(tmp_path / "a.npz", ReadOptions(rate=30, person="1")), people[2], "smpl")
+@pytest.mark.parametrize("write", [pymaf, lambda path, people: romp(path, people, tracked=False)])
+def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
+    """They come in turns: in the first frame the second person first."""
+    people = {0: made_up(FRAMES, camera=True), 1: made_up(4, seed=1, camera=True)}
+    family = "smplx" if write is pymaf else "smpl"
+    write(tmp_path / "a", people)
+    motion = read_motion(tmp_path / "a", RATE)
+    assert close(motion, people[0], family) and "does not say who is who" in motion.notes[0]
+    assert "'1' (6 frames), '0' (4 frames)" in motion.notes[1]
+    assert close(read_motion(tmp_path / "a", ReadOptions(rate=30, person="0")), people[1], family)
+
+
+def test_who_comes_back_soon_is_the_same_and_later_another() -> None:
+    here, away, none = np.zeros((1, 3)), np.full((1, 3), 5.0), np.zeros((0, 3))
+    assert link([here, none, here + 0.5, away, here], 1.0) == [[0], [], [0], [1], [0]]
+    assert link([here, *[none] * 40, here], 1.0)[-1] == [1]
+    assert link([np.stack((here, away))[:, 0], np.stack((away, here))[:, 0]], 1.0) == [[0, 1], [1, 0]]
+    assert link([np.full((2, 3), np.nan), np.full((2, 3), np.nan)], 1.0) == [[0, 1], [2, 3]]
+    with pytest.raises(UserError, match="101 people"):
+        link([np.zeros((101, 3))], 1.0)
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -197,27 +214,7 @@ def test_damaged_files_are_read_or_refused_by_name(
     tmp_path_factory: pytest.TempPathFactory, name: str, data: st.DataObject
 ) -> None:
     folder = Path(os.fspath(tmp_path_factory.getbasetemp()))
-    damage(good_file(name, folder), good_file("wham", folder), folder / "damaged", data.draw(st.integers(0, 2**32)))
-
-
-def damage(good: bytes, other: bytes, path: Path, seed: int) -> None:
-    """Flips bytes of a good file, cuts it off, or splices a piece of another in; then reads it."""
-    generator = np.random.default_rng(seed)
-    content, kind = bytearray(good), generator.integers(3)
-    if kind == 0:
-        for place in generator.integers(len(content), size=generator.integers(1, 6)):
-            content[place] = generator.integers(256)
-    elif kind == 1:
-        content = content[: generator.integers(len(content))]
-    else:
-        start, size = generator.integers(len(other)), generator.integers(1, 200)
-        place = generator.integers(len(content))
-        content[place : place + generator.integers(200)] = other[start : start + size]
-    path.write_bytes(content)
-    try:
-        motion = read_motion(path, RATE)
-    except UserError as error:
-        assert str(path) in str(error)
-    else:
-        assert motion.local_TJ33.shape[1:] == (21, 3, 3) and bool(motion.local_TJ33.isfinite().all())
-        assert motion.root_rotation_T33 is None or bool(motion.root_rotation_T33.isfinite().all())
+    path = folder / "damaged"
+    seed = data.draw(st.integers(0, 2**32))
+    path.write_bytes(damaged_by(seed, good_file(name, folder), good_file("wham", folder)))
+    read_or_refused(path)
