@@ -37,7 +37,7 @@ FORMATS: tuple[Format, ...] = (
     Format("BVH", is_bvh, read_bvh, (".bvh",)),
     Format("ASF/AMC", is_amc, read_acclaim, (".amc",)),
     Format("ASF without AMC", is_asf, read_asf_alone, ()),
-    Format("keypoints (.json, .npy, .npz)", is_keypoints, read_keypoints, (".json",)),
+    Format("keypoints (.json, .npy, .npz)", is_keypoints, read_keypoints, ()),
     # the last row: whatever else holds arrays in dictionaries
     Format("what an estimator of human pose writes", is_container, read_estimated, _PYTHON),
 )

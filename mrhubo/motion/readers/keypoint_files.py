@@ -10,6 +10,7 @@ Legend: T frames, K keypoints.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,9 @@ POINT_KEYS = (
 NAME_KEYS = ("names", "joint_names", "keypoint_names", "landmark_names", "keypoints_names")
 CONFIDENCE_KEYS = ("confidence", "confidences", "conf", "scores", "visibility", "keypoint_scores", "presence")
 _POSE_KEYS = {"poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa"}
+_JSON = re.compile(
+    r"\s*(?:\[\s*[\[{]|\{.*\"(?:" + "|".join((*POINT_KEYS, "instance_info", "frames")) + r")\"\s*:)", re.DOTALL
+)
 _MAX_JSON = 512 * 2**20
 _MAX_NAMES = 1_000_000
 _MOST_POINTS = 1_000
@@ -53,7 +57,7 @@ class Keypoints:
 
 def holds_points(content: Content) -> bool:
     """Whether a file has points and no rotations, by the names of its arrays, or by the shape of its only one; or is
-    JSON. Does not raise.
+    JSON with something that may be points. Does not raise.
     """
     if content.arrays:
         return bool(content.arrays & set(POINT_KEYS)) and not content.arrays & _POSE_KEYS
@@ -63,8 +67,7 @@ def holds_points(content: Content) -> bool:
         except UserError:
             return False
         return shape is not None and len(shape) == 3 and shape[2] in (3, 4)
-    text = content.text
-    return text is not None and text.lstrip("\ufeff \t\r\n")[:1] in ("{", "[")
+    return content.text is not None and bool(_JSON.match(content.text))
 
 
 def read_keypoints_file(path: Path, options: ReadOptions) -> Keypoints:

@@ -84,7 +84,8 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
         {name: torch.from_numpy(np.ascontiguousarray(point_T3)) for name, point_T3 in points.items()},
         confidence={name: torch.from_numpy(np.ascontiguousarray(sure_T)) for name, sure_T in sure.items()},
     )
-    return motion_from_points(body, motion_name(path), rate, f"keypoints {found.where}, {what}, {world}", tuple(notes))
+    source = f"keypoints {found.where}, {what}, {world}"
+    return motion_from_points(body, motion_name(path), rate, source, tuple(notes), str(path))
 
 
 def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
@@ -158,7 +159,7 @@ def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str
     largest = int(np.abs(mean_3).argmax())
     axis = ("" if mean_3[largest] > 0 else "-") + "xyz"[largest]
     trunk_T = np.linalg.norm(sum(points[f"{s}_shoulder"] - points[f"{s}_hip"] for s in SIDES), axis=-1) / 2
-    leg = _LEG_OVER_TRUNK * float(np.nanmedian(trunk_T))
+    leg = _LEG_OVER_TRUNK * _typical(trunk_T)
     if _seen(points, "ankle") and _seen(points, "knee"):
         legs = [_bone(points, f"{s}_hip", f"{s}_knee") + _bone(points, f"{s}_knee", f"{s}_ankle") for s in SIDES]
         leg = float(np.mean(legs))
@@ -179,13 +180,13 @@ def _forward(points: Mapping[str, np.ndarray]) -> float:
         for part in ("ear", "shoulder"):
             if all(f"{side}_{part}" in points for side in SIDES):
                 way = _unit(points["nose"] - (points[f"left_{part}"] + points[f"right_{part}"]) / 2)
-                ways.append(np.nanmean((way * forward_T3).sum(-1)))
+                ways.append(_typical((way * forward_T3).sum(-1)))
                 break
     for side in SIDES:
         for toe in ("toe", "foot"):
             if f"{side}_{toe}" in points and f"{side}_ankle" in points:
                 way = _unit(points[f"{side}_{toe}"] - points[f"{side}_ankle"])
-                ways.append(np.nanmean((way * forward_T3).sum(-1)))
+                ways.append(_typical((way * forward_T3).sum(-1)))
                 break
     known = [way for way in ways if np.isfinite(way)]
     return float(np.mean(known)) if known else 0.0
@@ -196,7 +197,13 @@ def _seen(points: Mapping[str, np.ndarray], joint: str) -> bool:
 
 
 def _bone(points: Mapping[str, np.ndarray], start: str, end: str) -> float:
-    return float(np.nanmedian(np.linalg.norm(points[end] - points[start], axis=-1)))
+    return _typical(np.linalg.norm(points[end] - points[start], axis=-1))
+
+
+def _typical(value_T: np.ndarray) -> float:
+    """The median of those that are known; NaN where none is."""
+    known_X = value_T[np.isfinite(value_T)]
+    return float(np.median(known_X)) if len(known_X) else np.nan
 
 
 def _some(point_TK3: np.ndarray) -> np.ndarray:
