@@ -60,7 +60,7 @@ def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[lis
             " 4D-Humans, TRAM, ROMP, PyMAF-X, SAM 3D Body or another writes, or SMPL's 'poses' (frames, 72), say;"
             " docs/formats.md says how each is laid out"
         )
-    notes: list[str] = []
+    notes = list(layout.notes)
     track = choose(path, layout.tracks, options, notes)
     arrays = track.read()
     return motion_of(path, arrays, layout.kind, rate(notes), notes)

@@ -14,6 +14,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.family import family_of
+from mrhubo.motion.readers.linking import LINKED, link
 from mrhubo.motion.readers.rotations import Form, find_form
 from mrhubo.motion.readers.smpl_names import Found, find_here, find_inside, names_of, people_in
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, Track
@@ -21,6 +22,9 @@ from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
 
 _SMALL = 1_000
 """Numbers that an array of one person in one frame has at most."""
+_METRES, _BOXES = 1.0, 0.5
+"""How far anybody gets from one frame to the next, with the noise of a depth that is guessed: in metres, and in heights
+of the box around a person in a picture."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,7 @@ class Layout:
 
     kind: Kind
     tracks: list[Track]
+    notes: tuple[str, ...] = ()
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -103,12 +108,14 @@ def _romp(tree: Tree) -> Layout | None:
     frames = [results] if "smpl_thetas" in results.keys else [frame for _, frame in results.items()]
     if not frames or not any("smpl_thetas" in frame.keys for frame in frames):
         return None
-    seen: dict[str, list[tuple[int, Tree, int]]] = {}
-    for number, frame in enumerate(frames):
-        thetas = frame.get("smpl_thetas")
-        for row in range(len(thetas.array()) if thetas is not None and thetas.array().ndim == 2 else 0):
-            seen.setdefault(str(row), []).append((number, frame, row))
-    return Layout(kind, [Track(person, len(found), _romp_reader(found)) for person, found in seen.items()])
+    rows = [_rows(frame, "smpl_thetas") for frame in frames]
+    places = [_places(frame, "cam_trans", count) for frame, count in zip(frames, rows, strict=True)]
+    seen: dict[int, list[tuple[int, Tree, int]]] = {}
+    for number, people in enumerate(_linked(tree, places, _METRES)):
+        for row, person in enumerate(people):
+            seen.setdefault(person, []).append((number, frames[number], row))
+    tracks = [Track(str(person), len(found), _romp_reader(found)) for person, found in seen.items()]
+    return Layout(kind, tracks, (LINKED,) if max(rows) > 1 else ())
 
 
 def _romp_reader(found: list[tuple[int, Tree, int]]) -> Callable[[], SmplArrays]:
@@ -130,7 +137,7 @@ def _pymaf(tree: Tree) -> Layout | None:
     """PyMAF-X: arrays with a row for each person in each frame, whom it does not track.
 
     `joblib.dump(pred_results, ...)` of https://github.com/HongwenZhang/PyMAF-X/blob/master/apps/demo_smplx.py: `pose`
-    (N, 72), `betas` (N, 10), `frame_ids`, and `person_ids`, texts that end in `_f<frame>_p<number in the frame>`.
+    (N, 72), `betas` (N, 10), `bboxes` (N, 4), `frame_ids`, and `person_ids`, texts that number the people of a frame.
     """
     people, found = tree.get("person_ids"), find_here(tree)
     if (
@@ -140,12 +147,19 @@ def _pymaf(tree: Tree) -> Layout | None:
         or not {"smplx_params", "smplx_verts"} & set(tree.keys)
     ):
         return None
-    rows: dict[str, list[int]] = {}
-    for row, name in enumerate(people):
-        rows.setdefault((name.text() or "").rpartition("_p")[2] or "0", []).append(row)
     whole = found.read()
-    if sum(map(len, rows.values())) != len(whole.pose):
-        raise UserError(f"{tree.path}: has {len(people)} names of people for {len(whole.pose)} poses")
+    boxes, order = tree.get("bboxes"), whole.frames
+    if len(people) != len(whole.pose) or order is None:
+        raise UserError(f"{tree.path}: has {len(people)} names of people and {len(whole.pose)} poses")
+    box_N4 = None if boxes is None or boxes.shape() != (len(people), 4) else boxes.array().astype(np.float64)
+    # places in heights of the person's box, so that near and far people go alike far
+    place_N2 = np.zeros((len(people), 2)) if box_N4 is None else box_N4[:, :2] / np.maximum(box_N4[:, 3:], 1.0)
+    order = order.reshape(-1)
+    frames = [np.flatnonzero(order == frame) for frame in np.unique(order)]
+    rows: dict[int, list[int]] = {}
+    for here, numbers in zip(frames, _linked(tree, [place_N2[here] for here in frames], _BOXES), strict=True):
+        for row, number in zip(here, numbers, strict=True):
+            rows.setdefault(number, []).append(int(row))
 
     def of(chosen: list[int]) -> SmplArrays:
         taken = (None if array is None else array[chosen] for array in (whole.pose, whole.betas, whole.frames))
@@ -153,8 +167,9 @@ def _pymaf(tree: Tree) -> Layout | None:
         assert pose is not None
         return SmplArrays(whole.key, pose, whole.form, whole.first, None, None, betas, frames)
 
-    tracks = [Track(name, len(chosen), lambda chosen=chosen: of(chosen)) for name, chosen in rows.items()]
-    return Layout(Kind("PyMAF-X", "smplx", CAMERAS), tracks)
+    tracks = [Track(str(name), len(chosen), lambda chosen=chosen: of(chosen)) for name, chosen in rows.items()]
+    several = max(map(len, frames), default=0) > 1
+    return Layout(Kind("PyMAF-X", "smplx", CAMERAS), tracks, (LINKED,) if several else ())
 
 
 def _people(tree: Tree) -> Layout | None:
@@ -228,6 +243,25 @@ def _needed_form(array: np.ndarray | None, node: Tree, counts: tuple[int, ...]) 
     if form is None:
         raise UserError(f"{node.named} is {node.described}, and no pose of SMPL's")
     return form
+
+
+def _rows(node: Tree, key: str) -> int:
+    """How many rows an array of a frame has; none where it is missing."""
+    shape = node[key].shape() if key in node.keys else None
+    return shape[0] if shape is not None and len(shape) == 2 else 0
+
+
+def _places(node: Tree, key: str, people: int) -> np.ndarray:
+    """Where the people of a frame are (N, 3); at one place where it does not tell."""
+    shape = node[key].shape() if key in node.keys else None
+    return node[key].array().astype(np.float64) if shape == (people, 3) else np.zeros((people, 3))
+
+
+def _linked(tree: Tree, places: list[np.ndarray], reach: float) -> list[list[int]]:
+    try:
+        return link(places, reach)
+    except UserError as error:
+        raise UserError(f"{tree.path}: {error}") from error
 
 
 def _stack(nodes: list[Tree]) -> np.ndarray:

@@ -26,6 +26,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.amass import MAX_FRAMES
+from mrhubo.motion.readers.linking import LINKED, link
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.smpl_names import search
@@ -35,6 +36,8 @@ from mrhubo.motion.readers.world import ANY_WORLD, find_up
 _KEY, _CAMERA = "pred_keypoints_3d", "pred_cam_t"
 _POINTS = 70
 _FARTHEST_M = 1e5
+_REACH = 1.0
+"""How far anybody gets from one frame to the next [m], with the noise of a depth that is guessed."""
 _FACE = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
 _BODY = tuple(f"{side}_{name}" for name in ("shoulder", "elbow", "hip", "knee", "ankle") for side in SIDES)
 _PLACES: dict[str, tuple[int, ...]] = {
@@ -69,10 +72,10 @@ def read_sam3d(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]]
     Raises:
         UserError: the points are no motion, or the frame rate is not known.
     """
-    people = _people(tree)
+    notes: list[str] = []
+    people = _people(tree, notes)
     if not people:
         return None
-    notes: list[str] = []
     tracks = [Person(name, count) for name, (count, _) in people.items()]
     chosen = choose(tree.path, tracks, options, notes)
     seen = people[chosen.person][1]()
@@ -101,19 +104,35 @@ def _hinge(points_TK3: Tensor, points: dict[str, Tensor], side: str) -> Tensor:
     return torch.nn.functional.normalize(axis_T3.nan_to_num(), dim=-1)
 
 
-def _people(tree: Tree) -> dict[str, tuple[int, Callable[[], _Seen]]]:
+def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _Seen]]]:
     """Who is in a file: in how many frames, and what reads them."""
     stacked = search(tree, _stacked)
     if stacked is not None:
         return {"": (len(stacked.points), lambda: stacked)}
     frames = list(tree) if tree.is_list else [child for _, child in tree.items()]
-    seen: dict[str, dict[int, Tree]] = {}
-    for number, frame in enumerate(frames):
-        people = list(frame) if frame.is_list else [frame]
-        for place, person in enumerate(people):
-            if _KEY in person.keys:
-                seen.setdefault(str(place), {})[number] = person
-    return {name: (len(found), lambda found=found: _gathered(found, len(frames))) for name, found in seen.items()}
+    people = [[person for person in (frame if frame.is_list else (frame,)) if _KEY in person.keys] for frame in frames]
+    if not any(people):
+        return {}
+    try:
+        numbers = link(
+            [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for here in people], _REACH
+        )
+    except UserError as error:
+        raise UserError(f"{tree.path}: {error}") from error
+    if max(map(len, people)) > 1:
+        notes.append(LINKED)
+    seen: dict[int, dict[int, Tree]] = {}
+    for frame, (here, found) in enumerate(zip(people, numbers, strict=True)):
+        for person, number in zip(here, found, strict=True):
+            seen.setdefault(number, {})[frame] = person
+    return {str(name): (len(found), lambda found=found: _gathered(found, len(frames))) for name, found in seen.items()}
+
+
+def _place(person: Tree) -> np.ndarray:
+    """Where somebody is, (3,); the origin where it is not told."""
+    place = person.get(_CAMERA)
+    array = place.array() if place is not None and place.shape() is not None else np.zeros(0)
+    return array.reshape(3).astype(np.float64) if array.size == 3 else np.zeros(3)
 
 
 def _stacked(node: Tree) -> _Seen | None:
@@ -132,10 +151,9 @@ def _stacked(node: Tree) -> _Seen | None:
 def _gathered(found: dict[int, Tree], frames: int) -> _Seen:
     points, camera = np.full((frames, _POINTS, 3), np.nan), np.full((frames, 3), np.nan)
     for number, person in found.items():
-        array, place = person[_KEY].array(), person.get(_CAMERA)
+        array = person[_KEY].array()
         if array.size != _POINTS * 3:
             raise UserError(f"{person.named}: '{_KEY}' has shape {array.shape}; expected ({_POINTS}, 3)")
         points[number] = array.reshape(_POINTS, 3)
-        where = place.array() if place is not None and place.shape() is not None else np.zeros(0)
-        camera[number] = where.reshape(3) if where.size == 3 else 0.0
+        camera[number] = _place(person)
     return _Seen(points, camera)

@@ -117,15 +117,16 @@ def tram(path: Path, people: dict[int, np.ndarray]) -> None:
 
 
 def romp(path: Path, people: dict[int, np.ndarray], tracked: bool = True) -> None:
+    """People stand three metres from each other; in every second frame they come in the other order."""
     frames = max(map(len, people.values()))
     results, tracks = {}, {}
     for t in range(frames):
-        here = [p for p, pose in people.items() if t < len(pose)]
+        here = [p for p, pose in people.items() if t < len(pose)][:: 1 if t % 2 else -1]
         frame = {
             "cam": np.zeros((len(here), 3), np.float32),
             "smpl_thetas": np.stack([padded(people[p][t : t + 1], 24)[0] for p in here]),
             "smpl_betas": np.zeros((len(here), 10), np.float32),
-            "cam_trans": np.ones((len(here), 3), np.float32),
+            "cam_trans": np.stack([np.array((1, 3 * p - 3 * max(people), 0), np.float32) for p in here]),
             "joints": np.zeros((len(here), 71, 3), np.float32),
         }
         if tracked:
@@ -141,15 +142,17 @@ def romp(path: Path, people: dict[int, np.ndarray], tracked: bool = True) -> Non
 
 
 def pymaf(path: Path, people: dict[int, np.ndarray]) -> None:
+    """The best seen come first, so that a number in a frame is now one and now the other."""
     frames = max(map(len, people.values()))
-    rows = [(t, p) for t in range(frames) for p, pose in people.items() if t < len(pose)]
+    rows = [(t, p) for t in range(frames) for p in list(people)[:: 1 if t % 2 else -1] if t < len(people[p])]
     pose = np.stack([padded(people[p][t : t + 1], 24)[0] for t, p in rows])
     content = {
         "pred_cam": np.zeros((len(rows), 3), np.float32),
         "smplx_verts": np.zeros((len(rows), 4, 3), np.float32),
         "pose": pose,
         "betas": np.zeros((len(rows), 10), np.float32),
-        "frame_ids": [t for t, _ in rows],
+        "bboxes": np.array([(200.0 * p + t, 300.0, 150.0, 150.0) for t, p in rows]),
+        "frame_ids": np.array([t for t, _ in rows]),
         "person_ids": [f"video_f{t}_p{p}" for t, p in rows],
         "smplx_params": [{"shape": torch.zeros(2, 10), "body_pose": torch.eye(3).repeat(2, 22, 1, 1)}],
     }

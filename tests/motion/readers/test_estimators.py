@@ -18,9 +18,10 @@ from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, read_folder, read_motion
 from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.linking import link
 from tests.files.test_safe_pickle import attacks
 from tests.motion.damage import damaged_by, read_or_refused
-from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, phalp, romp, wham
+from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, phalp, pymaf, romp, wham
 
 RATE = ReadOptions(rate=30)
 FRAMES = 6
@@ -56,7 +57,7 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
             read_motion(path)
 
 
-@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many])
+@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many and name != "pymaf"])
 def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, name: str) -> None:
     writer = WRITERS[name]
     lengths = (FRAMES, FRAMES) if name == "slahmr" else (4, FRAMES)
@@ -119,11 +120,26 @@ def test_old_bodies_of_phalps_tracks_are_passed_over(tmp_path: Path) -> None:
     assert motion.confidence_TJ is not None and motion.confidence_TJ[:, 0].tolist() == [1, 1, 0, 0, 1, 1]
 
 
-def test_people_whom_romp_does_not_track_go_by_their_place(tmp_path: Path) -> None:
-    people = {1: made_up(FRAMES, camera=True), 2: made_up(3, seed=1, camera=True)}
-    romp(tmp_path / "a.npz", people, tracked=False)
-    assert close(read_motion(tmp_path / "a.npz", RATE), people[1], "smpl")
-    assert close(read_motion(tmp_path / "a.npz", ReadOptions(rate=30, person="1")), people[2], "smpl")
+@pytest.mark.parametrize("write", [pymaf, lambda path, people: romp(path, people, tracked=False)])
+def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
+    """They come in turns: in the first frame the second person first."""
+    people = {0: made_up(FRAMES, camera=True), 1: made_up(4, seed=1, camera=True)}
+    family = "smplx" if write is pymaf else "smpl"
+    write(tmp_path / "a", people)
+    motion = read_motion(tmp_path / "a", RATE)
+    assert close(motion, people[0], family) and "does not say who is who" in motion.notes[0]
+    assert "'1' (6 frames), '0' (4 frames)" in motion.notes[1]
+    assert close(read_motion(tmp_path / "a", ReadOptions(rate=30, person="0")), people[1], family)
+
+
+def test_who_comes_back_soon_is_the_same_and_later_another() -> None:
+    here, away, none = np.zeros((1, 3)), np.full((1, 3), 5.0), np.zeros((0, 3))
+    assert link([here, none, here + 0.5, away, here], 1.0) == [[0], [], [0], [1], [0]]
+    assert link([here, *[none] * 40, here], 1.0)[-1] == [1]
+    assert link([np.stack((here, away))[:, 0], np.stack((away, here))[:, 0]], 1.0) == [[0, 1], [1, 0]]
+    assert link([np.full((2, 3), np.nan), np.full((2, 3), np.nan)], 1.0) == [[0, 1], [2, 3]]
+    with pytest.raises(UserError, match="101 people"):
+        link([np.zeros((101, 3))], 1.0)
 
 
 @pytest.mark.parametrize("name", WRITERS)

@@ -207,17 +207,17 @@ def test_points_of_sam_3d_body(tmp_path: Path) -> None:
 
 
 def test_answers_of_sam_3d_body_in_lists(tmp_path: Path) -> None:
-    """Of two people in a frame, the second is seen in every other."""
+    """Of two people, the second is seen in every other frame, and comes first there."""
     points = seventy_points(bent_arms()).astype(np.float32)
     answers = [
-        [{"pred_keypoints_3d": p, "pred_cam_t": np.zeros(3), "mask": None}]
-        + ([{"pred_keypoints_3d": p + 1, "pred_cam_t": np.zeros(3)}] if t % 2 else [])
+        ([{"pred_keypoints_3d": p + 1, "pred_cam_t": np.full(3, 4.0)}] if t % 2 else [])
+        + [{"pred_keypoints_3d": p, "pred_cam_t": np.zeros(3), "mask": None}]
         for t, p in enumerate(points)
     ]
     joblib.dump(answers, tmp_path / "clip.pkl", compress=3)
     motion = read_motion(tmp_path / "clip.pkl", RATE)
     check_points(motion)
-    assert "'0' (5 frames), '1' (2 frames)" in motion.notes[0]
+    assert "'0' (5 frames), '1' (2 frames)" in motion.notes[1]
     other = read_motion(tmp_path / "clip.pkl", ReadOptions(rate=30, person="1"))
     assert other.confidence_TJ is not None and other.confidence_TJ[:, 0].tolist() == [0, 1, 0, 1, 0]
 
