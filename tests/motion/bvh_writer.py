@@ -86,6 +86,7 @@ def write_bvh(motion: Motion, style: Style) -> str:
     """The file's text."""
     rng = np.random.default_rng(style.seed)
     names, offsets = names_of(style), [np.zeros(3), *Skeleton().offsets_J3.double().numpy()]
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
     local = [motion.root_rotation_T33, *motion.local_TJ33.unbind(1)]
     turns = [Rotation.from_matrix(x.double().numpy()) for x in local]
     world: list[Rotation] = []
@@ -138,6 +139,7 @@ def write_bvh(motion: Motion, style: Style) -> str:
         parent, joint, offset = nodes[key]
         if parent is None or key == "pelvis":
             return place_T3 if key == "pelvis" or not style.extra_root else np.zeros_like(place_T3)
+        assert parent is not None
         # all nodes between two joints of ours hang on the upper one
         carrier = nodes[parent][1] if key in index or key.endswith(("_roll", "_base")) else joint
         base = points(parent)
@@ -157,7 +159,7 @@ def write_bvh(motion: Motion, style: Style) -> str:
         if style.axes == "world" or key == "extra":
             frame[key] = to_file.inv()
         elif style.axes == "random":
-            frame[key] = Rotation.random(random_state=rng)
+            frame[key] = Rotation.from_quat(rng.normal(size=4))
         else:  # x along the bone to the first child
             inner = next((child for child in children.get(key, []) if np.linalg.norm(nodes[child][2]) > 1e-6), None)
             way = np.array([0.0, 1.0, 0.0]) if inner is None else nodes[inner][2] / np.linalg.norm(nodes[inner][2])

@@ -12,6 +12,7 @@ from mrhubo.motion.readers.amc import is_amc, is_asf, read_acclaim, read_asf_alo
 from mrhubo.motion.readers.bvh import is_bvh, read_bvh
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.estimators import is_container, read_estimated
+from mrhubo.motion.readers.keypoints import is_keypoints, read_keypoints
 from mrhubo.motion.readers.options import ReadOptions
 
 
@@ -36,6 +37,7 @@ FORMATS: tuple[Format, ...] = (
     Format("BVH", is_bvh, read_bvh, (".bvh",)),
     Format("ASF/AMC", is_amc, read_acclaim, (".amc",)),
     Format("ASF without AMC", is_asf, read_asf_alone, ()),
+    Format("keypoints (.json, .npy, .npz)", is_keypoints, read_keypoints, ()),
     # the last row: whatever else holds arrays in dictionaries
     Format("what an estimator of human pose writes", is_container, read_estimated, _PYTHON),
 )

@@ -84,7 +84,7 @@ def tree_motion(
         f"{kind} {len(tree.joints)} joints, {unit_name}, {axis} up ({why}); {rest}; the chest is "
         f"'{tree.names[place['spine3']]}'"
     )
-    return motion_from_points(BodyPoints(points, turns, axes), name, frame_rate, source, tuple(remarks))
+    return motion_from_points(BodyPoints(points, turns, axes), name, frame_rate, source, tuple(remarks), what)
 
 
 def _read(
