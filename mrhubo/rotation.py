@@ -3,8 +3,8 @@
 6D is the first two COLUMNS of the rotation matrix, flattened column after column: (r00, r10, r20, r01, r11, r21)
 (Zhou et al., "On the Continuity of Rotation Representations in Neural Networks", CVPR 2019). Other code flattens rows.
 Axis-angle is in radians; quaternions are (x, y, z, w). Every function takes any number of leading batch axes, and its
-gradients are finite at angle 0 and at angle pi. Written out here, as the library that has the same formulas takes longer
-to import than a motion to retarget.
+gradients are finite at angle 0 and at angle pi. Written out here, as the library that has the same formulas takes
+longer to import than a motion to retarget.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ def matrix_to_quaternion(matrix: Tensor) -> Tensor:
     """(..., 3, 3) to (..., 4) unit quaternions (x, y, z, w).
 
     Each row of 4 q q^T is the quaternion times one of its numbers; the row of the largest is taken, which no rotation
-    makes small (F. L. Markley, "Unit quaternion from rotation matrix", Journal of Guidance, Control, and Dynamics 31(2),
-    2008).
+    makes small (F. L. Markley, "Unit quaternion from rotation matrix", Journal of Guidance, Control, and Dynamics
+    31(2), 2008).
     """
     (m00, m01, m02), (m10, m11, m12), (m20, m21, m22) = (row.unbind(-1) for row in matrix.unbind(-2))
     xy, xz, yz = m10 + m01, m20 + m02, m21 + m12

@@ -32,14 +32,19 @@ def is_packed(start: bytes) -> bool:
     return start.startswith(_LZ4) or any(start.startswith(magic) for magic, _ in _UNPACKERS)
 
 
-def open_unpacked(path: Path, max_bytes: int) -> BinaryIO:
+def open_unpacked(path: Path, max_bytes: int, max_plain: int) -> BinaryIO:
     """A file that is packed, unpacked into memory; any other as it is. The caller closes it.
+
+    Args:
+        path: the file.
+        max_bytes: most bytes that a packed one unpacks to.
+        max_plain: most bytes of any other.
 
     Raises:
         UserError: it is no regular file, damaged, packed in a way that is not read, or unpacks to too much.
     """
-    packed = check_regular(path, max_bytes)
-    handle = open_regular(path, max_bytes)
+    packed = check_regular(path, max_plain)
+    handle = open_regular(path, max_plain)
     start = handle.read(8)
     handle.seek(0)
     if not is_packed(start):

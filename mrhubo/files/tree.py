@@ -16,9 +16,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from mrhubo.errors import UserError, listed, shortened
-from mrhubo.files.joblib_stream import take_array
+from mrhubo.files.joblib_stream import Later, take_array
 from mrhubo.files.npz import open_npz, read_member
 from mrhubo.files.packed import open_unpacked
+from mrhubo.files.regular import MAX_BYTES as MAX_FILE
 from mrhubo.files.regular import check_regular, open_regular
 from mrhubo.files.safe_pickle import MAX_BYTES, is_old_torch, read_torch, to_array, to_number, to_tensor
 from mrhubo.files.unpickler import RecordedObject, unpickle
@@ -146,6 +147,8 @@ class Tree:
 
     def shape(self) -> tuple[int, ...] | None:
         """Of the array that it is; None where it is none."""
+        if isinstance(self._value, Later):
+            return self._value.shape
         try:
             return self.array().shape
         except UserError:
@@ -158,6 +161,13 @@ class Tree:
             value = str(value.reshape(()))
         return value if isinstance(value, str) else None
 
+    def texts(self) -> list[str]:
+        """The texts of a list or an array of such; none where it is neither."""
+        value = self._value
+        if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.ndim == 1:
+            return value.tolist()
+        return [text for node in self if (text := node.text()) is not None]
+
     @property
     def described(self) -> str:
         """In words."""
@@ -165,6 +175,8 @@ class Tree:
             return f"a dictionary with {shortened(listed(self.keys), 200)}"
         if self.is_list:
             return f"a list of {len(self):,}"
+        if isinstance(self._value, Later):
+            return f"an array of shape {self._value.shape}"
         if isinstance(self._value, RecordedObject):
             shape = self.shape()
             return f"an array of shape {shape}" if shape is not None else f"an object '{shortened(self._value.kind)}'"
@@ -190,6 +202,8 @@ class Tree:
             return np.array(float(value))
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
             return value
+        if isinstance(value, Later):
+            return value.read(self.path)
         if isinstance(value, RecordedObject):
             return _from_record(value, self._source.storages, self.named)
         if not self.is_list or not len(self):
@@ -223,7 +237,7 @@ def read_tree(path: Path) -> Tree:
             raise UserError(
                 "was saved by torch before 1.6; load it with a torch that you trust it with, and save it anew"
             )
-        with open_unpacked(path, MAX_BYTES) as handle:
+        with open_unpacked(path, MAX_BYTES, MAX_FILE) as handle:
             if start.startswith(_NPY):
                 size = check_regular(path, MAX_BYTES)
                 return Tree(read_member(handle, size, _unpickle), _Source(path))

@@ -62,6 +62,12 @@ class Stream(Protocol):
         """The next bytes of the file, behind what was unpickled so far; fewer at its end."""
         ...
 
+    def passed(self, size: int) -> int | None:
+        """Passes over the next bytes of a file on disk, and gives the place where they begin; None, and nothing is
+        passed, where there is no such file, or it has not so many.
+        """
+        ...
+
     def nested(self) -> Any:
         """What the pickle that comes next in the file holds."""
         ...
@@ -101,12 +107,20 @@ class _Reader:
     def __init__(self, file: BinaryIO | io.BufferedIOBase) -> None:
         self._file = file
         here = file.tell()
-        self._left = file.seek(0, io.SEEK_END) - here
+        self._end = file.seek(0, io.SEEK_END)
+        self._left = self._end - here
         file.seek(here)
         self.readline = file.readline
 
     def read(self, size: int) -> bytes:
         return self._file.read(min(size, self._left)) if size >= 0 else b""
+
+    def passed(self, size: int) -> int | None:
+        here = self._file.tell()
+        if not isinstance(self._file, io.BufferedReader) or not 0 <= size <= self._end - here:
+            return None
+        self._file.seek(size, io.SEEK_CUR)
+        return here
 
 
 # The pure Python one: the other, in C, makes room for as many places as the highest number in the memo says.
@@ -158,6 +172,10 @@ class _RestrictedUnpickler(pickle._Unpickler):
     def take(self, size: int) -> bytes:
         """See `Stream`."""
         return self.source.read(size)
+
+    def passed(self, size: int) -> int | None:
+        """See `Stream`."""
+        return self.source.passed(size)
 
     def nested(self) -> Any:
         """See `Stream`."""

@@ -4,6 +4,7 @@ from mrhubo.motion.editing import mirror, trim
 from mrhubo.motion.load import find_motions, motion_files, read_folder, read_motion
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
+from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.resample import resample
 from mrhubo.motion.resharing import reshare
@@ -13,6 +14,7 @@ __all__ = [
     "NOT_FINITE",
     "Motion",
     "MotionLike",
+    "NoMotion",
     "Poses",
     "ReadOptions",
     "find_motions",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.formats import FORMATS, find_format, read_any
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
@@ -30,7 +30,7 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
     """Every motion in a folder (not in its subfolders), sorted by name.
 
     Files that some reader recognises are taken, and so are damaged ones with the ending of a motion file, to be
-    complained of. Hidden files and AMASS's shape files are passed over.
+    complained of. Hidden files, AMASS's shape files, and arrays and pickles that hold no motion are passed over.
 
     Raises:
         UserError: the folder is missing or holds no motion, two files hold a motion of one name, or a file is bad.
@@ -40,11 +40,19 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
         other = by_name.setdefault(motion_name(file), file)
         if other is not file:
             raise UserError(f"{folder}: {other.name} and {file.name} are both named '{motion_name(file)}'; keep one")
-    return [read_motion(by_name[name], options) for name in sorted(by_name)]
+    motions, other = [], None
+    for name in sorted(by_name):
+        try:
+            motions.append(read_motion(by_name[name], options))
+        except NoMotion as error:
+            other = other or error
+    if other is not None and not motions:
+        raise other
+    return motions
 
 
 def motion_files(folder: Path) -> list[Path]:
-    """The files of a folder that `read_folder` would read, one at least, sorted.
+    """The files of a folder that `read_folder` would try, one at least, sorted.
 
     Raises:
         UserError: the folder is missing or holds none.
@@ -90,6 +98,7 @@ def _is_motion(file: Path) -> bool:
     if file.suffix.lower() in {ending for row in FORMATS for ending in row.endings}:
         return True
     try:
-        return find_format(Content.open(file)) is not None
+        row = find_format(Content.open(file))
     except UserError:
         return False
+    return row is not None and bool(row.endings)  # what has none is beside motions, and is none itself

@@ -62,12 +62,21 @@ def _table() -> dict[str, tuple[Triad, ...]]:
     hips, shoulders, ears, eyes = (_both(name) for name in ("hip", "shoulder", "ear", "eye"))
     upright = (hips, shoulders)
     found = {
-        "pelvis": (Triad(_line("hip"), upright), Triad(_line("hip"), (hips, ("neck",)))),
-        "spine3": (Triad(_line("shoulder"), upright), Triad(_line("shoulder"), (("pelvis",), ("neck",)))),
+        "pelvis": (
+            Triad(_line("hip"), (("pelvis",), ("spine2",))),
+            Triad(_line("hip"), upright),
+            Triad(_line("hip"), (hips, ("neck",))),
+        ),
+        "spine3": (
+            Triad(_line("collar"), (("spine2",), _both("collar"))),
+            Triad(_line("shoulder"), (("spine2",), shoulders)),
+            Triad(_line("shoulder"), upright),
+            Triad(_line("shoulder"), (("pelvis",), ("neck",))),
+        ),
         "head": (
             Triad(_line("ear"), (ears, ("nose",))),
             Triad(_line("eye"), (eyes, ("nose",))),
-            Triad((("neck",), ("head_top",)), (("neck",), ("nose",))),
+            Triad((("nose",), ("head_top",)), (shoulders, ("head_top",))),
         ),
     }
     for side in SIDES:

@@ -107,7 +107,7 @@ class _Build:
 
 
 def motion_from_points(
-    body: BodyPoints, name: str, frame_rate: float, source: str, notes: tuple[str, ...] = ()
+    body: BodyPoints, name: str, frame_rate: float, source: str, notes: tuple[str, ...] = (), what: str = ""
 ) -> Motion:
     """The motion of our skeleton whose limbs, hands, feet and head are turned as a body's, seen from chest and pelvis.
 
@@ -117,12 +117,13 @@ def motion_from_points(
         frame_rate: frames per second.
         source: what the file was taken for.
         notes: what its reader has to say.
+        what: the file, for sentences; default: the name.
 
     Raises:
         UserError: neither points nor turns tell how the chest is turned, in any frame.
     """
     build = _Build(body)
-    _trunk(build, name)
+    _trunk(build, what or name)
     for limb in _LIMBS:
         for side in SIDES:
             _limb(build, limb, side)
@@ -157,12 +158,12 @@ def body_has(body: BodyPoints, joint: str) -> bool:
     return all(f"{side}_{name}" in body.points for side in SIDES)
 
 
-def _trunk(build: _Build, name: str) -> None:
+def _trunk(build: _Build, what: str) -> None:
     """Pelvis, spine and collars; a pelvis that nothing tells is turned as the chest."""
     chest_T33, pelvis_T33 = build.turn("spine3"), build.turn("pelvis")
     if chest_T33 is None or not bool(torch.isfinite(chest_T33).flatten(1).all(-1).any()):
         raise UserError(
-            f"{name}: nothing tells how the chest is turned; both shoulders and both hips must be known in some frame"
+            f"{what}: nothing tells how the chest is turned; both shoulders and both hips must be known in some frame"
         )
     sides = [f"{side}_{joint}" for joint in ("shoulder", "hip") for side in SIDES]
     known_T = torch.isfinite(chest_T33).flatten(1).all(-1)

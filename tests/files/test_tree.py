@@ -65,6 +65,13 @@ def test_what_joblib_dumps(tmp_path: Path, packed: Any) -> None:
     check(read_tree(tmp_path / "a.pkl"))
 
 
+def test_what_joblib_before_1_2_dumped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It did not align arrays, and put no padding before them."""
+    monkeypatch.setattr(joblib.numpy_pickle.NumpyArrayWrapper.__init__, "__defaults__", (False, None))
+    joblib.dump(CONTENT, tmp_path / "a.pkl")
+    check(read_tree(tmp_path / "a.pkl"))
+
+
 @pytest.mark.parametrize("protocol", range(6))
 def test_what_pickle_dumps(tmp_path: Path, protocol: int) -> None:
     (tmp_path / "a.pkl").write_bytes(pickle.dumps(CONTENT, protocol))
@@ -215,3 +222,20 @@ def visit(node: Tree, deepest: int) -> None:
     assert node.described
     for child in [child for _, child in node.items()] + list(node) if deepest else []:
         visit(child, deepest - 1)
+
+
+def test_large_arrays_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
+    """Estimators write the mesh of every frame beside the pose."""
+    large = np.arange(4_000_000, dtype=np.float64).reshape(1000, 4000)
+    path = tmp_path / "a.pkl"
+    joblib.dump({"verts": large, "fortran": np.asfortranarray(large), "pose": ARRAY}, path)
+    with bounded(10, 5):
+        found = read_tree(path)
+        np.testing.assert_array_equal(found["pose"].array(), ARRAY)
+        assert found["verts"].shape() == large.shape and "an array of shape" in found["verts"].described
+    np.testing.assert_array_equal(found["verts"].array(), large)
+    np.testing.assert_array_equal(found["fortran"].array(), large)
+    found = read_tree(path)
+    os.truncate(path, 2_000_000)
+    with pytest.raises(UserError, match="was changed while it was read"):
+        found["verts"].array()

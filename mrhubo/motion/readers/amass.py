@@ -50,8 +50,23 @@ _FARTHEST_M = 1e5
 
 
 def is_amass(content: Content) -> bool:
-    """Whether a file has a pose under a key of AMASS; so is taken to have who is damaged beyond telling."""
-    return content.is_zip and not content.is_torch and (not content.names or bool(content.arrays & set(_POSE_KEYS)))
+    """Whether a file has a pose under a key of AMASS, of one person, or is a zip archive too damaged to tell."""
+    if not content.is_zip or content.is_torch:
+        return False
+    key = next((key for key in _POSE_KEYS if key in content.arrays), None)
+    if "joint_names" in content.arrays:  # SOMA-X, whose joints are others
+        return False
+    return not content.names or (key is not None and not _has_people(content.path, key))
+
+
+def _has_people(path: Path, key: str) -> bool:
+    """Whether a pose has an axis for people before that of the frames, as SLAHMR's has."""
+    try:
+        with open_npz(path) as file:
+            shape = file.shape(key)
+    except UserError:
+        return False
+    return find_form(shape, _JOINTS[key]) is None and find_form(shape[1:], _JOINTS[key]) is not None
 
 
 @np.errstate(all="ignore")  # what overflows is found out below

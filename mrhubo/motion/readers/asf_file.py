@@ -34,12 +34,18 @@ _ORDER = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 @dataclass
 class _Bone:
-    direction: tuple[float, ...] = (0.0, 0.0, 0.0)
+    direction: tuple[float, float, float] = (0.0, 0.0, 0.0)
     length: float = 0.0
     axis: tuple[float, ...] = (0.0, 0.0, 0.0)
     axis_order: str = "xyz"
     dof: tuple[str, ...] = ()
     parent: str = ""
+
+    @property
+    def vector(self) -> tuple[float, float, float]:
+        """From its beginning to its end."""
+        x, y, z = self.direction
+        return self.length * x, self.length * y, self.length * z
 
 
 @dataclass(frozen=True)
@@ -134,7 +140,7 @@ def _tree(skeleton: Skeleton, starts: dict[str, int], value_TC: np.ndarray, degr
     joints: list[Joint] = []
     for name, bone in bones.items():
         above = bones[bone.parent] if bone.parent else None
-        offset = bone.direction if above is None else tuple(above.length * x for x in above.direction)
+        offset = (0.0, 0.0, 0.0) if above is None else above.vector
         turns = [(dof[1], starts[name] + i) for i, dof in enumerate(bone.dof) if dof[0] == "r"]
         moves = [(dof[1], starts[name] + i) for i, dof in enumerate(bone.dof) if dof[0] == "t"]
         if not degrees:
@@ -146,7 +152,7 @@ def _tree(skeleton: Skeleton, starts: dict[str, int], value_TC: np.ndarray, degr
     parents = {bone.parent for bone in bones.values()}
     for name, bone in bones.items():
         if name not in parents and bone.length:
-            joints.append(Joint(f"end of {name}", place[name], tuple(bone.length * x for x in bone.direction)))
+            joints.append(Joint(f"end of {name}", place[name], bone.vector))
     return JointTree(tuple(joints), value_TC)
 
 

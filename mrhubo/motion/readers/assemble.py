@@ -46,7 +46,7 @@ def upright(motion: Motion, worlds: tuple[str, ...]) -> tuple[Motion, str]:
     rotation_T33, position_T3 = motion.root_rotation_T33, motion.root_position_T3
     if rotation_T33 is None:
         return replace(motion, root_position_T3=None), ""
-    up, turn_33 = find_up(rotation_T33, worlds)
+    up, turn_33 = find_up(rotation_T33[:, :, 1], worlds)
     turned = replace(
         motion,
         root_rotation_T33=turn_33 @ rotation_T33,

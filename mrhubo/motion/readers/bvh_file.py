@@ -104,7 +104,9 @@ def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
                 if len(offset) != 3:
                     raise _broken(path, line, "an offset of three numbers is expected")
                 old = joints[place]
-                joints[place] = Joint(old.name, old.parent, tuple(offset), old.rotation, old.position)
+                joints[place] = Joint(
+                    old.name, old.parent, (offset[0], offset[1], offset[2]), old.rotation, old.position
+                )
                 words = words[4:]
             elif keyword == "CHANNELS" and open_joints:
                 place = open_joints[-1]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.archive import open_archive
+from mrhubo.files.packed import is_packed
 from mrhubo.files.regular import open_regular
 
 START = 65_536
@@ -29,13 +30,16 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"SQLite format 3", "an SQLite database"),
     (b"\x7fELF", "a program"),
     (b"\x1aE\xdf\xa3", "a video"),
-    (b"\x1f\x8b", "a gzip archive"),
     (b"7z\xbc\xaf", "a 7z archive"),
     (b"Rar!", "a RAR archive"),
     (b"v https://git-lfs", "a pointer of Git LFS, in place of the file itself"),
     (b"version https://git-lfs", "a pointer of Git LFS, in place of the file itself"),
 )
 _MAX_ARCHIVE = 8 * 2**30
+
+
+class NoMotion(UserError):
+    """A file that is not damaged, but no human motion that anybody here reads."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,11 @@ class Content:
         return self.is_zip and self.start[30 : 30 + size].endswith((b"/data.pkl", b"/.format_version"))
 
     @property
+    def is_npy(self) -> bool:
+        """Whether it is a single NumPy array."""
+        return self.start.startswith(b"\x93NUMPY")
+
+    @property
     def arrays(self) -> frozenset[str]:
         """The names of an .npz file's arrays; none where it is no such file."""
         return frozenset(name.removesuffix(".npy") for name in self.names if name.endswith(".npy"))
@@ -104,6 +113,8 @@ class Content:
     @property
     def described(self) -> str:
         """What it is, as far as can be told, for a sentence: 'is ...' fits before it."""
+        if is_packed(self.start):
+            return "a packed pickle"
         for magic, what in _MAGIC:
             if self.start.startswith(magic):
                 return what
@@ -117,7 +128,7 @@ class Content:
             return f"an .npz file with {shortened(listed(self.arrays), 200)}"
         if self.is_zip:
             return f"a zip archive of {shortened(listed(self.names), 200)}" if self.names else "a damaged zip archive"
-        if self.start.startswith(b"\x93NUMPY"):
+        if self.is_npy:
             return "a single NumPy array (.npy)"
         if self.start[:1] == b"\x80" and self.start[1:2] <= b"\x05":
             return "a Python pickle"

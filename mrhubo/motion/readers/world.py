@@ -24,9 +24,9 @@ ANY_WORLD = ("y up", "y down", "z up")
 """Of files that do not say whose they are."""
 
 
-def find_up(rotation_T33: Tensor, worlds: tuple[str, ...]) -> tuple[str, Tensor]:
-    """Which of some worlds a root's rotations (T, 3, 3) are in, and the matrix (3, 3) that makes y its up axis."""
-    up_3 = rotation_T33[:, :, 1].mean(dim=0)
-    turns = {world: torch.tensor(_TO_Y_UP[world]) for world in worlds}
+def find_up(body_up_T3: Tensor, worlds: tuple[str, ...]) -> tuple[str, Tensor]:
+    """Which of some worlds a body's own up axes (T, 3) are in, and the matrix (3, 3) that makes y its up axis."""
+    up_3 = body_up_T3.mean(dim=0)
+    turns = {world: torch.tensor(_TO_Y_UP[world]).to(up_3) for world in worlds}
     best = max(worlds, key=lambda world: float((turns[world] @ up_3)[1]))
     return best, turns[best]

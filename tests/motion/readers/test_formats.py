@@ -40,7 +40,7 @@ def test_what_nobody_reads_is_called_what_it_is(tmp_path: Path, start: bytes, sa
     path.write_bytes(start)
     with pytest.raises(UserError, match=said) as caught:
         read_motion(path)
-    assert str(caught.value).startswith(str(path)) and "expected one of: SMPL-family" in str(caught.value)
+    assert str(caught.value).startswith(str(path)) and "expected one of: AMASS" in str(caught.value)
 
 
 def test_an_empty_file_is_no_motion(tmp_path: Path) -> None:

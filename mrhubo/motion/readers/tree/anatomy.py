@@ -24,16 +24,17 @@ _STEADIER = 0.6
 """A joint above the one that carries the arms is the chest if shoulders move less in its axes than this share."""
 _MOVES = 0.02
 """Shoulders that move by less, of their distance, do not tell."""
-_SURE, _HINT = 0.3, 0.1
-"""How clear toes and knees must be, of 1, to be sure which side is left; and to be asked where names do not say."""
+_SURE, _PLAIN, _HINT = 0.3, 0.6, 0.1
+"""How clear toes and knees must be, of 1, to be sure together which side is left; how clear toes by themselves; and how
+clear either must be to be asked where names do not say."""
 _BENT = np.sin(np.radians(15.0))
 """Sine of the bend from which a knee tells where forward is."""
 
 _LEG, _ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 NEEDED = ("pelvis", "spine3", *(f"{side}_{name}" for side in ("left", "right") for name in (*_LEG, *_ARM)))
 """Joints without which nothing can be made of a tree."""
-ROLES = (*NEEDED, "neck", "head", "left_foot", "right_foot")
-"""Joints that are looked for; `spine3` is the chest, `foot` where the toes begin."""
+ROLES = (*NEEDED, "neck", "head", "left_foot", "right_foot", "left_collar", "right_collar")
+"""Joints that are looked for; `spine3` is the chest, `foot` where toes begin, `collar` the first joint of the arm."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ def find_anatomy(tree: JointTree, given: Mapping[str, int] | None = None, what: 
     for side, leg, arm in zip(("left", "right"), legs, arms, strict=True):
         place |= {f"{side}_{name}": limbs.legs[leg][i] for i, name in enumerate(_LEG)}
         place |= {f"{side}_{name}": limbs.arms[arm][i] for i, name in enumerate(_ARM)}
+        place[f"{side}_collar"] = limbs.chains["arm"][arm].places[0]
         toes = _toes(shape, limbs, leg)
         if toes is not None:
             place[f"{side}_foot"] = toes
@@ -169,9 +171,10 @@ def _sides(shape: Shape, limbs: Limbs, notes: list[str], what: str) -> tuple[tup
     knee_says = knees / weight if weight else 0.0
     # Leg and arm are compared with their partners; arms' names need not begin where legs' do.
     called = _called(limbs.chains["leg"], names)
-    both_sure = min(abs(toe_says), abs(knee_says)) > _SURE and toe_says * knee_says > 0
+    sure = min(abs(toe_says), abs(knee_says)) > _SURE and toe_says * knee_says > 0
+    sure |= abs(toe_says) > _PLAIN and knee_says * np.sign(toe_says) > -_HINT
     geometry = toe_says + knee_says
-    if both_sure:
+    if sure:
         says = geometry
         if called * geometry < 0:
             notes.append(

@@ -64,20 +64,23 @@ def _fit(shape: Shape, legs: Pair, arms: Pair) -> Limbs | None:
     tree = shape.tree
     if arms.carrier in inside or legs.carrier in inside:
         return None
-    leg_fits = [_best(chain, lambda i, j, k, chain=chain: _leg_cost(chain, i, j, k)) for chain in legs.limbs]
-    if any(fit is None for fit in leg_fits):
-        return None
-    leg = sum(chain.below[fit[1][2]] - chain.below[fit[1][0]] for chain, fit in zip(legs.limbs, leg_fits, strict=True))
-    leg /= 2
-    if leg <= 0:
-        return None
-    arm_fits = [
-        _best(chain, lambda i, j, k, chain=chain, other=other: _arm_cost(shape, chain, other, leg, i, j, k))
-        for chain, other in (arms.limbs, arms.limbs[::-1])
+    leg_fits = [
+        fit
+        for chain in legs.limbs
+        if (fit := _best(chain, lambda i, j, k, chain=chain: _leg_cost(chain, i, j, k))) is not None
     ]
-    if any(fit is None for fit in arm_fits):
+    if len(leg_fits) < 2:
         return None
-    cost = sum(fit[0] for fit in (*leg_fits, *arm_fits))
+    leg = sum(chain.below[k] - chain.below[i] for chain, (_, (i, _, k)) in zip(legs.limbs, leg_fits, strict=True)) / 2
+    arm_fits = [
+        fit
+        for chain, other in (arms.limbs, arms.limbs[::-1])
+        if (fit := _best(chain, lambda i, j, k, chain=chain, other=other: _arm_cost(shape, chain, other, leg, i, j, k)))
+        is not None
+    ]
+    if len(arm_fits) < 2:
+        return None
+    cost = sum(cost for cost, _ in (*leg_fits, *arm_fits))
     for pair, sign in ((legs, 1.0), (arms, -1.0)):
         names = [tree.names[place] for chain in pair.limbs for place in chain.places]
         cost -= sign * _CALLED * limb_votes(names)
@@ -88,12 +91,19 @@ def _fit(shape: Shape, legs: Pair, arms: Pair) -> Limbs | None:
         if child not in inside and child not in way and shape.reach[child] + shape.length[child] > 0.05 * leg
     ]
     cost -= _HEADED * bool(others) + _HEADED * (legs.carrier in tree.above(arms.carrier)[1:])
-    triples = [tuple(chain.places[i] for i in fit[1]) for chain, fit in zip(
-        (*legs.limbs, *arms.limbs), (*leg_fits, *arm_fits), strict=True)]  # fmt: skip
+
+    def joints(chain: Chain, fit: tuple[float, Triple]) -> Triple:
+        i, j, k = fit[1]
+        return chain.places[i], chain.places[j], chain.places[k]
+
     return Limbs(
-        (triples[0], triples[1]), (triples[2], triples[3]), legs.carrier, arms.carrier,
-        {"leg": legs.limbs, "arm": arms.limbs}, cost,
-    )  # fmt: skip
+        (joints(legs.limbs[0], leg_fits[0]), joints(legs.limbs[1], leg_fits[1])),
+        (joints(arms.limbs[0], arm_fits[0]), joints(arms.limbs[1], arm_fits[1])),
+        legs.carrier,
+        arms.carrier,
+        {"leg": legs.limbs, "arm": arms.limbs},
+        cost,
+    )
 
 
 def _best(chain: Chain, cost: Callable[[int, int, int], float]) -> tuple[float, Triple] | None:

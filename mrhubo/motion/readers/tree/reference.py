@@ -28,11 +28,12 @@ _ARMS_UP_DEG = 50.0
 """Arms at rest hang, or are held out, at least by this angle from straight up."""
 _SNAP_DEG = 12.0
 """Trunk and hips that are as near to an axis of the file are meant to be along it."""
-_JUMP = 5.0
-"""How many times as far as in any other step joints move from a first frame that is no part of the motion."""
+_JUMP = 2.0
+"""How many times as far as in the next steps joints move from a first frame that is no part of the motion. Who really
+starts from a pose moves less in the first step than in those that follow."""
 _JUMP_LEAST = 0.15
 """The least that they then move, of a leg's length."""
-_STEPS = 240
+_STEPS = 6
 """Steps that the first one is compared with."""
 
 
@@ -48,6 +49,16 @@ class Reference:
     """Columns: the body's left, up and forward."""
     what: str
     """In words."""
+
+    def in_world(self, world_33: np.ndarray, unit: float) -> Reference:
+        """The same in another world, into which a turn leads, in metres."""
+        to_world = Rotation.from_matrix(world_33)
+        return Reference(
+            {name: unit * world_33 @ point_3 for name, point_3 in self.point.items()},
+            {name: to_world * turn for name, turn in self.turn.items()},
+            world_33 @ self.axes_33,
+            self.what,
+        )
 
 
 def find_reference(tree: JointTree, place: Mapping[str, int]) -> Reference | None:
@@ -67,11 +78,11 @@ def find_reference(tree: JointTree, place: Mapping[str, int]) -> Reference | Non
     return None
 
 
-def first_frame_jumps(tree: JointTree, place: Mapping[str, int], reference: Reference | None) -> bool:
+def first_frame_jumps(tree: JointTree, place: Mapping[str, int]) -> bool:
     """Whether the first frame is a pose at rest from which the motion jumps away."""
     if len(tree) < 4 or _read(tree.pose(slice(0, 1), list(place.values())), place, "", True) is None:
         return False
-    pose = tree.pose(slice(0, _STEPS), list(place.values()))
+    pose = tree.pose(slice(0, _STEPS + 2), list(place.values()))
     hips = pose.turn[place["pelvis"]]
     seen = [hips.inv().apply(pose.point[p] - pose.point[place["pelvis"]]) for p in place.values()]
     step_F = np.linalg.norm(np.diff(np.stack(seen), axis=1), axis=-1).max(0)

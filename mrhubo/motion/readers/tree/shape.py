@@ -19,8 +19,8 @@ _LONG = 0.25
 """A limb is at least this share as long as the longest one that has a partner."""
 _UNLIKE = 0.25
 """How far the bones of a pair may differ, as a mean logarithm of their ratio; people's differ by some hundredths."""
-_COMPARED = 3
-"""Bones of a pair that are compared; what hangs on hands and feet may differ."""
+_COMPARED = 2
+"""Bones of a pair that are compared; what hangs on hands and feet may differ, as a hand with a stick does."""
 _MOST_CHILDREN = 40
 """Of one joint, in which pairs are looked for."""
 
@@ -91,7 +91,7 @@ class Shape:
 
     def _alike(self, one: Chain, other: Chain) -> bool:
         bones, others = (self._bones(chain)[:_COMPARED] for chain in (one, other))
-        if len(bones) < 2 or len(bones) != len(others):
+        if len(bones) < _COMPARED or len(others) < _COMPARED:
             return False
         return float(np.mean(np.abs(np.log(np.array(bones) / np.array(others))))) < _UNLIKE
 

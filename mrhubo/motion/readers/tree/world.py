@@ -69,7 +69,12 @@ def unit_of(pose: Pose, place: Mapping[str, int], given: float | None) -> tuple[
     for side in ("left", "right"):
         hip, knee, ankle = (pose.point[place[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))
         legs.append(np.median(np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)))
-    leg = float(np.mean(legs))
+    return nearest_unit(float(np.mean(legs)))
+
+
+def nearest_unit(leg: float) -> tuple[float, str]:
+    """The unit in which a leg (thigh and shin) of this length is most like an adult's: metres and name."""
+    leg = max(leg, 1e-9) if np.isfinite(leg) else 1e-9
     name, unit = min(UNITS.items(), key=lambda entry: abs(np.log(leg * entry[1] / _LEG)))
     if abs(np.log(leg * unit / _LEG)) <= np.log(_FACTOR):
         return unit, name
