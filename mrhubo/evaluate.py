@@ -5,20 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 
 from mrhubo.config import CommandParser, Config, parse_arguments, run_command, whole_number
+from mrhubo.errors import UserError
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Measures a trained retargeter on human motion: against the reference retargeter (joints, links), against the"
     " human (directions of limbs, hands, head, jerk), and in time. The motions, and what is a key link, are those of"
-    " the config; the robot is the retargeter's own and must be the config's."
+    " the config; the robot is the retargeter's own and must be the config's. Or measures files of robot motion in"
+    " the same way, whoever made them."
 )
 
 
 def build_parser() -> CommandParser[Config]:
     """The command's arguments."""
     parser = CommandParser("mrhubo evaluate", DESCRIPTION, Config)
-    package = "the package that a fit ended with"
-    parser.add_argument("--retargeter", metavar="FOLDER", required=True, help=package)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--retargeter", metavar="FOLDER", help="the package that a fit ended with")
+    predictions = (
+        "robot motions of any retargeter, as docs/formats.md has them: each with the names of its joints, its frame"
+        " rate, and the name of the motion that it answers, in the file or as the file's"
+    )
+    what.add_argument("--predictions", metavar="FILE", nargs="+", help=predictions)
     polish = (
         "so many steps of optimisation after the networks, each frame on its own (default: the networks alone, then"
         " every way of answering: frame by frame, whole clips, stream; and the same motions re-shared)"
@@ -34,10 +41,17 @@ def main(argv: list[str]) -> None:
     """The command."""
     config, options = parse_arguments(build_parser(), argv)
     from mrhubo.fitting.measurement import measure_package
+    from mrhubo.fitting.predictions import measure_predictions
     from mrhubo.fitting.preparation import prepare
 
-    report, package = Reporter(options.quiet), Path(options.retargeter)
-    print(measure_package(prepare(config), report, package, options.validation, options.polish))
+    report = Reporter(options.quiet)
+    if options.predictions is None:
+        package = Path(options.retargeter)
+        print(measure_package(prepare(config), report, package, options.validation, options.polish))
+        return
+    if options.polish is not None or options.validation:
+        raise UserError("command line: --polish and --validation are for a package; predictions stay as they are")
+    print(measure_predictions(prepare(config), report, [Path(name) for name in options.predictions]))
 
 
 if __name__ == "__main__":

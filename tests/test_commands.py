@@ -20,7 +20,10 @@ from mrhubo.config import BaselineConfig, Config, PriorConfig, SweepConfig, load
 from mrhubo.errors import UserError
 
 ROOT = Path(__file__).resolve().parent.parent
-MODULES = {name: f"mrhubo.{name}" for name in ("fit", "pair", "evaluate", "sweep", "baseline", "reproduce", "prior")}
+MODULES = {
+    name: f"mrhubo.{name}"
+    for name in ("fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
+}
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
 """Of the config; elsewhere `Config`."""
 HEAVY = {"torch", "lightning", "mlflow", "matplotlib", "optuna", "scipy", "pandas"}
@@ -198,8 +201,12 @@ GIVEN = {
     "CONFIG": "conf/nao.yaml",
     "--retargeter": "no-package",
     "--sweep": "no-sweep.yaml",
+    "--motion": "wave.npz",
+    "--predictions": "wave.npz",
+    "--out": "wave.csv",
+    "--robot": "nao",
 }
-NEEDED = {"fit": 1, "pair": 1, "evaluate": 2, "sweep": 2, "baseline": 1, "reproduce": 0, "prior": 1}
+NEEDED = {"fit": 1, "pair": 1, "retarget": 3, "evaluate": 2, "sweep": 2, "baseline": 1, "reproduce": 0, "prior": 1}
 """How many things each command cannot do without."""
 
 

@@ -12,6 +12,7 @@ import pytest
 import torch
 from PIL import Image
 
+import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.retargeter import Retargeter, build_network
@@ -107,6 +108,21 @@ def test_moving_picture(package: str, tmp_path: Path) -> None:
         assert getattr(picture, "n_frames", 1) == 6
 
 
+def test_ros_bag(package: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mcap_ros2", reason="the extra `ros` is not installed")
+    run("07_ros_bag.py", package)
+    text = capsys.readouterr().out
+    assert "wave.mcap: 433 points at 60 per second" in text and "what was written: 0 rad" in text
+
+
+def test_code_that_writes_runs(package: str) -> None:
+    (code,) = [code for code in blocks("docs/python.md") if "read_joint_order" in code]
+    motion = mrhubo.read_motion(ROOT / "data" / "motions" / "wave.npz")
+    names: dict[str, Any] = {"mrhubo": mrhubo, "result": mrhubo.load(package)(motion, polish=0, together=False)}
+    exec(code, names)
+    assert len(names["same"]) == 433 and "held" in names["notes"][0]
+
+
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/python.md"])
 def test_code_that_retargets_runs(page: str, package: str) -> None:
     shown = [code for code in blocks(page) if "mrhubo.load" in code]
@@ -117,6 +133,13 @@ def test_code_that_retargets_runs(page: str, package: str) -> None:
         result = names["result"]
         assert tuple(result.q.shape) == (433, 8) and len(result.joint_names) == 8
         assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
+
+
+def test_code_without_pytorch_runs(package: str) -> None:
+    (code,) = [code for code in blocks("docs/fast.md") if "load_fast" in code]
+    names: dict[str, Any] = {"poses": np.tile(np.eye(3), (2, 21, 1, 1))}
+    exec(re.sub(r"mlruns/packages/nao-\w+", package, code), names)
+    assert names["answer"].q.shape == (433, 8) and names["angles"].shape == (2, 8)
 
 
 def test_the_readme_shows_six_lines() -> None:

@@ -25,7 +25,7 @@ from mrhubo.body import BodyPrior, Skeleton, VPoser, save_skeleton
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.evaluation import load_motions
-from mrhubo.files.storage import checksum_file
+from mrhubo.files.atomic import checksum_file
 from mrhubo.fit import main
 from mrhubo.fitting.record import run_name
 from mrhubo.motion import read_motion

@@ -4,7 +4,7 @@ from mrhubo.body.human import build_skeleton, open_prior
 from mrhubo.body.latent_ik import inverse_kinematics
 from mrhubo.body.official import open_skeleton, save_skeleton
 from mrhubo.body.prior import BodyPrior
-from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, mirror_pose
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, mirror_pose, mirror_rotations
 from mrhubo.body.vposer import VPoser
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "build_skeleton",
     "inverse_kinematics",
     "mirror_pose",
+    "mirror_rotations",
     "open_prior",
     "open_skeleton",
     "save_skeleton",

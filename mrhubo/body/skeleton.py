@@ -135,6 +135,17 @@ def mirror_pose(pose_BJ6: Tensor) -> Tensor:
     return pose_BJ6[..., _MIRROR, :] * sign
 
 
+def mirror_rotations(matrix_BJ33: Tensor) -> Tensor:
+    """`mirror_pose` for matrices (..., 21, 3, 3), exact to the bit."""
+    sign = matrix_BJ33.new_tensor([-1.0, 1.0, 1.0])
+    return matrix_BJ33[..., _MIRROR, :, :] * sign[:, None] * sign
+
+
+def mirror_joints(values_BJ: Tensor) -> Tensor:
+    """A value a joint (..., 21) with those of left and right exchanged."""
+    return values_BJ[..., _MIRROR]
+
+
 class Skeleton(nn.Module):
     """Rest offsets as buffers, so that they follow the module's device and precision.
 

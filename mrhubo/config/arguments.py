@@ -28,15 +28,17 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
     added; those with a value take it once. ``--help`` prints the config's keys too, whatever else is wrong.
     """
 
-    def __init__(self, prog: str, description: str, schema: type[T], takes_config: bool = True) -> None:
-        """`schema` is the config's dataclass; a command with `takes_config` False has configs of its own."""
+    def __init__(self, prog: str, description: str, schema: type[T] | None, takes_config: bool = True) -> None:
+        """`schema` is the config's dataclass, None for a command of flags alone; one with `takes_config` False has
+        configs of its own.
+        """
         super().__init__(prog, description=description, add_help=False, allow_abbrev=False, exit_on_error=False)
-        self.schema, self.takes_config = schema, takes_config
-        self.needs_config = takes_config and requires_anything(schema)
+        self.schema, self.takes_config = schema, takes_config and schema is not None
+        self.needs_config = self.takes_config and schema is not None and requires_anything(schema)
         self.register("action", None, _StoreOnce)
         self.register("type", None, nonempty)
         self.add_argument("words", nargs="*", type=str, help=argparse.SUPPRESS)
-        if takes_config:
+        if self.takes_config:
             about = "YAML file with the keys below, or the name of a config that ships with mrhubo: nao, paper/nao"
             self.add_argument("--config", metavar="CONFIG", help=about)
 
@@ -67,6 +69,8 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
             raise UserError(f"command line: CONFIG is missing, for instance {self.prog} nao; --help lists its keys")
         options.config = find_config(configs[0]) if configs else None
         options.overrides = [word for word in words if "=" in word]
+        if self.schema is None and options.overrides:
+            raise UserError(f"command line: '{options.overrides[0]}' is not a flag; {self.prog} has no other settings")
         return options
 
     def error(self, message: str) -> NoReturn:
@@ -79,7 +83,7 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
         config = argparse.Action([], "config", None, metavar=f"({either})" if self.needs_config else f"[{either}]")
         overrides = argparse.Action([], "overrides", nargs="*", metavar="KEY=VALUE")
         formatter = argparse.HelpFormatter(self.prog, width=WIDTH)
-        shown = [*self._flags(), *([config] if self.takes_config else []), overrides]
+        shown = [*self._flags(), *([config] if self.takes_config else []), *([overrides] if self.schema else [])]
         formatter.add_usage(None, shown, self._mutually_exclusive_groups)
         return formatter.format_help()
 
@@ -101,7 +105,7 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
         if not name.startswith("-") or name in self._option_string_actions or re.fullmatch(r"-[0-9.]+", name):
             return
         key = name.lstrip("-")
-        if key in keys_of(self.schema):
+        if self.schema is not None and key in keys_of(self.schema):
             raise UserError(f"command line: '{argument}' is a key, not a flag: write {key}=VALUE")
         if name == "--config":
             raise UserError(f"command line: {self.prog} takes no --config: it has its own configs")
@@ -110,6 +114,8 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
 
     def _config_word(self, word: str) -> str:
         """A word without "=", if it can name a config."""
+        if self.schema is None:
+            raise UserError(f"command line: '{word}' stands alone; a value follows its flag, as --help shows")
         if word in [key.name for key in walk(self.schema)]:
             raise UserError(f"command line: '{word}' is a key: write {word}=VALUE")
         if not self.takes_config or not word:
@@ -142,6 +148,8 @@ def parse_arguments(parser: CommandParser[T], argv: Sequence[str]) -> tuple[T, a
         SystemExit: help was asked for, and is printed.
     """
     options = parser.parse_args(argv)
+    if parser.schema is None:
+        raise TypeError("the command has no config")
     return load_config(options.config, options.overrides, parser.schema), options
 
 
@@ -193,5 +201,6 @@ class _StoreOnce(argparse.Action):
 
 def _spelt(action: argparse.Action) -> str:
     """A flag as it is typed: ``--out FILE``."""
-    value = "" if action.nargs == 0 else f" {action.metavar or action.dest.upper()}"
+    more = " ..." if action.nargs == "+" else ""
+    value = "" if action.nargs == 0 else f" {action.metavar or action.dest.upper()}{more}"
     return ", ".join(f"{name}{value}" for name in action.option_strings)

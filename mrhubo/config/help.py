@@ -33,14 +33,18 @@ def field_docs(cls: type) -> dict[str, str]:
     return docs
 
 
-def help_text(schema: type, usage: str, description: str, options: Mapping[str, str], in_file: bool = True) -> str:
+def help_text(
+    schema: type | None, usage: str, description: str, options: Mapping[str, str], in_file: bool = True
+) -> str:
     """Usage, options and every key with type, range or choices, default and meaning; at most 100 columns wide.
 
-    `in_file` says whether the user's file can hold the keys, or the command line alone.
+    `in_file` says whether the user's file can hold the keys, or the command line alone; `schema` None: there are none.
     """
     column = max(map(len, options)) + 4
     lines = [*usage.splitlines(), "", *textwrap.wrap(" ".join(description.split()), WIDTH), "", "Options:"]
     lines += [line for name, meaning in options.items() for line in _row(name, [meaning], column)]
+    if schema is None:
+        return "\n".join(lines) + "\n"
     lines += ["", *textwrap.wrap(_KEYS_NOTE.format(where="in the file or " * in_file, example=example(schema)), WIDTH)]
     lines += _section(schema, "", 4 + max((len(key.name) for key in walk(schema) if not key.is_section), default=0))
     return "\n".join(lines) + "\n"

@@ -33,6 +33,11 @@ class _Directory(io.BufferedReader):
         return super().read(self.limit if size is None or size < 0 else size)
 
 
+def too_dense(unpacked: int, packed: int) -> bool:
+    """Whether what unpacks to so many bytes is no data but a bomb."""
+    return unpacked > max(_MUCH, _DENSEST * packed)
+
+
 @contextmanager
 def open_archive(path: Path, otherwise: str, max_bytes: int = MAX_BYTES) -> Iterator[zipfile.ZipFile]:
     """Opens a zip archive whose contents are stored or deflated and unpack to at most `max_bytes` in all.
@@ -58,7 +63,7 @@ def open_archive(path: Path, otherwise: str, max_bytes: int = MAX_BYTES) -> Iter
         unpacked = sum(member.file_size for member in archive.infolist())
         if unpacked > max_bytes:
             raise UserError(f"{path}: unpacks to more than {max_bytes / 2**30:.3g} GiB, which are not read")
-        if unpacked > max(_MUCH, _DENSEST * packed):
+        if too_dense(unpacked, packed):
             times = unpacked // max(1, packed)
             raise UserError(f"{path}: would unpack to {times:,} times its size, as no data does; it is not read")
         yield archive

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any, BinaryIO
 from zipfile import ZipFile
 
 import numpy as np
@@ -19,7 +20,7 @@ from mrhubo.files.archive import check_member, open_archive
 
 MAX_BYTES = 4 * 2**30
 """Largest array that is read."""
-_TYPES = {"U": "text", "fiu": "numbers"}
+_TYPES = {"U": "text", "fiu": "numbers", "fiub": "numbers"}
 _MAX_AXES = 32
 
 
@@ -61,19 +62,20 @@ class NpzFile:
                 return npy.read_array(handle, allow_pickle=False)
 
     def blocks(self, key: str, rows: int, max_rows: int | None = None) -> Iterator[np.ndarray]:
-        """The rows of an array (rows, columns) of numbers, so many at a time, so that they need not fit into memory.
+        """The rows of an array of numbers, so many at a time, so that they need not fit into memory: what follows the
+        first axis as one (rows, columns).
 
         Raises:
-            UserError: as for `read`, or it has not two axes.
+            UserError: as for `read`, or it has no two axes.
         """
         header = self._header(key, "fiu", max_rows)
-        if len(header.shape) != 2:
+        if len(header.shape) < 2:
             raise UserError(f"{self.path}: '{key}' has shape {header.shape}; expected (rows, columns)")
+        count, columns = header.shape[0], math.prod(header.shape[1:])
         if header.by_column:
-            whole = self.read(key, max_rows=max_rows)
-            yield from (whole[start : start + rows] for start in range(0, len(whole), rows))
+            whole = self.read(key, max_rows=max_rows).reshape(count, columns)
+            yield from (whole[start : start + rows] for start in range(0, count, rows))
             return
-        count, columns = header.shape
         with self._reading(key, "its content is truncated or altered") as handle:
             _read_header(handle)
             for start in range(0, count, rows):
@@ -82,6 +84,23 @@ class NpzFile:
                 if _fill(handle, content) < size:
                     raise EOFError
                 yield np.frombuffer(content, header.dtype).reshape(-1, columns)
+
+    def read_any(self, key: str, load: Callable[[BinaryIO], Any], max_bytes: int = MAX_BYTES) -> Any:
+        """One array of numbers or text; or, of one that holds pickled objects, what `load` makes of the pickle.
+
+        Raises:
+            UserError: it is damaged, too large, or of another type.
+        """
+        stored = self._archive.getinfo(f"{key}.npy").file_size
+        if stored > max_bytes:
+            raise UserError(
+                f"{self.path}: '{key}' has {stored / 2**30:.3g} GiB; at most {max_bytes / 2**30:.3g} are read"
+            )
+        with self._reading(key, "it is truncated, altered, or no .npy array") as handle:
+            try:
+                return read_member(handle, stored, load)
+            except UserError as error:
+                raise UserError(f"{self.path}: '{key}' {error}") from error
 
     def _header(self, key: str, kinds: str, max_rows: int | None, max_bytes: int = MAX_BYTES) -> _Header:
         path = self.path
@@ -132,6 +151,36 @@ def open_npz(path: Path) -> Iterator[NpzFile]:
     """
     with open_archive(path, "is not an .npz file (a zip archive of arrays)", 4 * MAX_BYTES) as archive:
         yield NpzFile(path, archive)
+
+
+def read_member(handle: IO[bytes], stored: int, load: Callable[[BinaryIO], Any]) -> Any:
+    """The array of an .npy file or member, of numbers or text; or, of one that holds pickled objects, what `load` makes
+    of the pickle.
+
+    Args:
+        handle: opened at its beginning.
+        stored: how many bytes it has, which may be read.
+        load: reads the pickle.
+
+    Raises:
+        UserError: it is damaged or of another type.
+    """
+    try:
+        header = _read_header(handle)
+    except Exception as error:  # whatever numpy makes of a stranger's bytes
+        raise UserError("has a header that is not one of an .npy array") from error
+    if header.dtype.hasobject:
+        return load(io.BytesIO(handle.read(stored)))
+    if header.dtype.kind not in "fiubU":
+        raise UserError(f"has type {shortened(header.dtype)}; expected {_TYPES['fiu']}")
+    size = math.prod(header.shape) * header.dtype.itemsize
+    if size > stored:
+        raise UserError(f"claims shape {shortened(header.shape)}, but holds {stored} bytes; the file is damaged")
+    content = handle.read(size)
+    if len(content) < size:
+        raise UserError("is truncated")
+    flat = np.frombuffer(content, header.dtype) if size else np.zeros(0, header.dtype)
+    return flat.reshape(header.shape, order="F" if header.by_column else "C")
 
 
 def _read_header(handle: IO[bytes]) -> _Header:

@@ -64,6 +64,27 @@ def to_array(value: Any) -> np.ndarray:
         raise UserError("its parts do not make an array") from error
 
 
+def to_number(value: Any) -> float:
+    """The number that a pickled NumPy scalar stands for.
+
+    Raises:
+        UserError: it stands for something else.
+    """
+    if (
+        not isinstance(value, RecordedObject)
+        or type(value).__name__ != "scalar"
+        or not value.module.startswith("numpy")
+    ):
+        raise UserError("expected a number, found something else")
+    try:
+        dtype, content = value.args
+        return float(np.frombuffer(_bytes(content), number_type(dtype))[0])
+    except UserError:
+        raise
+    except Exception as error:  # records that do not fit together
+        raise UserError("its parts do not make a number") from error
+
+
 def _to_array(value: Any, deepest: int) -> np.ndarray:
     if not isinstance(value, RecordedObject):
         raise UserError(f"expected an array, found {type(value).__name__}")
@@ -87,6 +108,11 @@ def _dense(value: RecordedObject) -> np.ndarray:
     else:
         _, shape, dtype, is_fortran, content = value.state
         order = "F" if is_fortran else "C"
+    return np.frombuffer(_bytes(content), dtype=number_type(dtype)).reshape(shape_of(shape), order=order)
+
+
+def _bytes(content: Any) -> bytes:
+    """The bytes that something pickled stands for."""
     # In old protocols Python 3 writes bytes as _codecs.encode(text, "latin1"), or as bytes().
     if isinstance(content, RecordedObject):
         content = content.args[0] if content.args else b""
@@ -94,10 +120,15 @@ def _dense(value: RecordedObject) -> np.ndarray:
         content = content.encode("latin1")
     if not isinstance(content, bytes | bytearray):  # of a number, bytes() would make so many zeros
         raise UserError(f"expected an array's bytes, found {type(content).__name__}")
-    return np.frombuffer(bytes(content), dtype=_dtype(dtype)).reshape(_shape(shape), order=order)
+    return bytes(content)
 
 
-def _dtype(value: RecordedObject) -> np.dtype:
+def number_type(value: RecordedObject) -> np.dtype:
+    """NumPy's type that a pickled one stands for.
+
+    Raises:
+        UserError: it is not one of numbers.
+    """
     name, order = value.args[0], "<"
     if value.state is not None and value.state[1] == ">":
         order = ">"
@@ -106,7 +137,7 @@ def _dtype(value: RecordedObject) -> np.dtype:
     return np.dtype(order + name)
 
 
-def _shape(value: Any) -> tuple[int, ...]:
+def shape_of(value: Any) -> tuple[int, ...]:
     """The lengths of an array's axes, together not more than any array that is read."""
     if not isinstance(value, tuple | list) or not all(isinstance(n, int) and n >= 0 for n in value):
         raise UserError("an array's shape must be whole numbers")
@@ -116,7 +147,7 @@ def _shape(value: Any) -> tuple[int, ...]:
 
 
 def _sparse(state: dict[str, Any], by_column: bool, deepest: int) -> np.ndarray:
-    rows, columns = _shape(state["_shape"])
+    rows, columns = shape_of(state["_shape"])
     data, indices, starts = (_to_array(state[key], deepest) for key in ("data", "indices", "indptr"))
     major, minor = (columns, rows) if by_column else (rows, columns)
     counts = np.diff(starts.astype(np.int64))
@@ -137,7 +168,7 @@ def _chumpy(state: dict[str, Any], made: str, deepest: int) -> np.ndarray:
         if indices.size > _MAX_NUMBERS:
             raise UserError(f"an array claims more than {_MAX_NUMBERS:,} numbers")
         chosen = _to_array(state["a"], deepest).ravel()[indices.astype(np.int64)]
-        return chosen.reshape(_shape(state["preferred_shape"]))
+        return chosen.reshape(shape_of(state["preferred_shape"]))
     raise UserError(f"is a chumpy expression ({made}) that is not understood")
 
 
@@ -163,7 +194,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
         UserError: the file is missing, too large, no such checkpoint, or names a module that it has no use for.
     """
     try:
-        content, storages = _read_old(path) or _read_archive(path)
+        content, storages = _read_old(path) or read_torch(path)
     except UserError as error:
         said = str(error)
         raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
@@ -189,8 +220,19 @@ def _read_old(path: Path) -> tuple[Any, dict[str, bytes]] | None:
 _SAVE_ANEW = "load it with a torch that you trust it with, and save it anew"
 
 
-def _read_archive(path: Path) -> tuple[Any, dict[str, bytes]]:
-    """Records and storages of a zip archive, as torch writes since 1.6."""
+def is_old_torch(start: bytes) -> bool:
+    """Whether a file that begins so was written by torch before 1.6."""
+    return start.startswith(_OLD_MAGIC)
+
+
+def read_torch(
+    path: Path, modules: tuple[str, ...] = _CHECKPOINT_MODULES, max_steps: int | None = None
+) -> tuple[Any, dict[str, bytes]]:
+    """Records and storages of a zip archive, as torch writes since 1.6; arguments as for `unpickle`.
+
+    Raises:
+        UserError: it is no such archive, or `unpickle` refuses what is in it.
+    """
     otherwise = "is truncated, damaged, or no PyTorch checkpoint (a zip archive, as torch.save writes since 1.6)"
     with open_archive(path, otherwise, MAX_BYTES) as archive:
         names = archive.namelist()
@@ -209,7 +251,7 @@ def _read_archive(path: Path) -> tuple[Any, dict[str, bytes]]:
             content = archive.read(check_member(archive, pickles[0]))
         except Exception as error:  # whatever zipfile makes of a stranger's bytes
             raise UserError(otherwise) from error
-        return unpickle(io.BytesIO(content), _CHECKPOINT_MODULES), storages
+        return unpickle(io.BytesIO(content), modules, max_steps), storages
 
 
 def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
@@ -225,7 +267,9 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
         raise UserError(f"expected a tensor, found {kind}")
     try:
         reference, offset, shape, stride = value.args[:4]
-        shape, stride = _shape(shape), _shape(stride)
+        shape, stride = shape_of(shape), shape_of(stride)
+        if isinstance(reference, RecordedObject):
+            reference, storages = _inner_storage(reference)
         kind, key, parts = reference[1].__name__, reference[2], len(reference)
         if kind not in _TORCH_TYPES or not isinstance(key, str) or not isinstance(offset, int):
             raise UserError("a tensor's storage is of another type than numbers, or has no name")
@@ -235,7 +279,7 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
             )
         numbers = np.frombuffer(storages[key], dtype=_TORCH_TYPES[kind])
         last = offset + sum((n - 1) * s for n, s in zip(shape, stride, strict=True))
-        if parts != _STORAGE_PARTS or math.prod(shape) == 0 or offset < 0:
+        if parts < _STORAGE_PARTS or math.prod(shape) == 0 or offset < 0:
             raise UserError(f"a tensor has shape {shape} and stride {stride}")
         if last >= len(numbers) or math.prod(shape) > len(numbers):
             raise UserError(f"a tensor of shape {shape} reaches beyond its {len(numbers)} numbers")
@@ -245,3 +289,24 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
         raise
     except Exception as error:  # records that do not fit together
         raise UserError("its parts do not make a tensor") from error
+
+
+def _inner_storage(value: RecordedObject) -> tuple[Any, dict[str, bytes]]:
+    """A storage inside a pickle: its reference, and its numbers under its name.
+
+    `pickle.dump` of a tensor puts a whole file of torch before 1.6 there: four pickles, the last of which is the
+    reference, one more of the names of storages, then how many numbers the storage has (8 bytes), and the numbers
+    (`torch.serialization._legacy_save`).
+    """
+    if value.kind != "torch.storage._load_from_bytes":
+        raise UserError(f"expected a tensor's storage, found a {shortened(value.kind)}")
+    content = _bytes(value.args[0])
+    if not content.startswith(_OLD_MAGIC):
+        raise UserError("a tensor's storage is not one that torch pickles")
+    handle = io.BytesIO(content)
+    for _ in range(_OLD_PICKLES):
+        unpickle(handle, ())
+    reference, keys = unpickle(handle, ("torch",)), unpickle(handle, ())
+    if not isinstance(reference, tuple) or keys != [reference[2]]:
+        raise UserError("a tensor's storage does not have the name that its reference says")
+    return reference, {reference[2]: content[handle.tell() + 8 :]}

@@ -6,7 +6,6 @@ data.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import platform
@@ -16,53 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import torch
-import xxhash
 from filelock import FileLock, Timeout
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.files.regular import check_regular, open_regular, read_regular
-
-_CHECKSUM = "xxh3"
-
-
-class DamagedFile(UserError):
-    """A file that is missing, truncated, altered, or not what its name says."""
-
-
-@contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
-    """Yields a temporary path in the same folder; on success its content is synced and takes the place of `path`.
-
-    Raises:
-        UserError: the folder or the disk refuses the file (no space, no permission); nothing half-written stays.
-    """
-    temporary = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        with open(temporary, "rb") as handle:
-            os.fsync(handle.fileno())
-        os.replace(temporary, path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        with contextlib.suppress(OSError):  # it was never made, nor perhaps its folder
-            temporary.unlink(missing_ok=True)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Makes a renamed file outlast a power cut; Windows does that on its own, and opens no folders."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+from mrhubo.files.arrays import CHECKSUM, DamagedFile, begin_checksum
+from mrhubo.files.atomic import atomic_path, checksum_file
+from mrhubo.files.regular import check_regular, read_regular
 
 
 class Locked(UserError):
@@ -101,19 +62,6 @@ def remove_leftovers(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def checksum_file(path: Path) -> str:
-    """xxh3 of a file's bytes, 16 hex digits.
-
-    Raises:
-        UserError: it is missing, no regular file, or may not be read.
-    """
-    digest = xxhash.xxh3_64()
-    with open_regular(path) as file:
-        while piece := file.read(2**20):
-            digest.update(piece)
-    return digest.hexdigest()
-
-
 @contextmanager
 def checked_path(path: Path) -> Iterator[Path]:
     """As `atomic_path`, with a checksum of the content in a file beside it, which `matches_checksum` reads.
@@ -148,7 +96,7 @@ def _beside(path: Path) -> Path:
 
 def checksum_tensors(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
     """xxh3 of named tensors and metadata, 16 hex digits."""
-    digest = xxhash.xxh3_64(json.dumps(dict(metadata), sort_keys=True).encode())
+    digest = begin_checksum(metadata)
     for name in sorted(tensors):
         tensor = tensors[name].detach().cpu().contiguous()
         digest.update(f"{name}{tuple(tensor.shape)}{tensor.dtype}".encode())
@@ -162,7 +110,7 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], metadata: Mapping[s
     bytes.
     """
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in sorted(tensors.items())}
-    header = {**metadata, _CHECKSUM: checksum_tensors(whole, metadata)}
+    header = {**metadata, CHECKSUM: checksum_tensors(whole, metadata)}
     content = save(whole, metadata=header)
     with atomic_path(path) as temporary:
         temporary.write_bytes(_sorted_header(content))
@@ -187,7 +135,7 @@ def read_some_tensors(path: Path, names: Iterable[str]) -> tuple[dict[str, Tenso
     with _reading(path) as handle:
         metadata = dict(handle.metadata() or {})
         tensors = {name: handle.get_tensor(name) for name in names}
-    metadata.pop(_CHECKSUM, None)
+    metadata.pop(CHECKSUM, None)
     return tensors, metadata
 
 
@@ -215,7 +163,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     with _reading(path) as handle:
         metadata = dict(handle.metadata() or {})
         tensors = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118 (not a mapping)
-    expected = metadata.pop(_CHECKSUM, None)
+    expected = metadata.pop(CHECKSUM, None)
     if expected is None:
         raise DamagedFile(f"{path}: carries no checksum, so it was not written by mrhubo")
     if checksum_tensors(tensors, metadata) != expected:

@@ -12,18 +12,27 @@ from __future__ import annotations
 
 import io
 import pickle
-from collections import OrderedDict
+from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Iterable
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Protocol
 
 from mrhubo.errors import UserError, shortened
 
-_MAX_OPERATIONS = 500_000
-"""Steps that a pickle may take; those of body models and checkpoints take some thousands."""
+MAX_STEPS = 500_000
+"""Steps that a pickle may take, unless more are allowed; those of body models and checkpoints take some thousands."""
 _MAX_NAMES = 1_000
 """Different functions and classes that it may name."""
 _LARGEST_INT_KEY = 2**63
 _MAX_TUPLE_KEY = 16
+_DEEPEST = 3
+"""Pickles inside a pickle's stream."""
+
+
+_MAPPINGS: dict[tuple[str, str], type[Any]] = {
+    ("collections", "OrderedDict"): OrderedDict,
+    ("collections", "defaultdict"): defaultdict,
+}
+"""Mappings whose entries are kept; a `defaultdict` comes out as a plain dictionary, without what makes new entries."""
 
 
 class RecordedObject:
@@ -46,19 +55,46 @@ class RecordedObject:
         return f"{self.module}.{type(self).__name__}"
 
 
-def unpickle(file: BinaryIO | io.BufferedIOBase, modules: Iterable[str]) -> Any:
+class Stream(Protocol):
+    """A pickle that is being read, for who finds something else in the midst of it."""
+
+    def take(self, size: int) -> bytes:
+        """The next bytes of the file, behind what was unpickled so far; fewer at its end."""
+        ...
+
+    def passed(self, size: int) -> int | None:
+        """Passes over the next bytes of a file on disk, and gives the place where they begin; None, and nothing is
+        passed, where there is no such file, or it has not so many.
+        """
+        ...
+
+    def nested(self) -> Any:
+        """What the pickle that comes next in the file holds."""
+        ...
+
+
+def unpickle(
+    file: BinaryIO | io.BufferedIOBase,
+    modules: Iterable[str],
+    max_steps: int | None = None,
+    replace: Callable[[RecordedObject, Stream], Any] | None = None,
+) -> Any:
     """What a pickle holds, with `RecordedObject` in place of every object that is not plain Python; sets come out
     empty, as nothing here reads them.
 
     Args:
         file: an open binary file; what follows the pickle is left unread, or not, as it happens.
-        modules: top-level modules whose names the pickle may mention.
+        modules: top-level modules whose names the pickle may mention, and single names of others with their module
+            (`builtins.dict`).
+        max_steps: how many steps it may take; default: `MAX_STEPS`.
+        replace: is asked, when an object has been given its state, what shall stand in its place; formats that write
+            raw bytes into a pickle's stream read them here.
 
     Raises:
         UserError: it is no pickle, is truncated, mentions another module, or wants too much.
     """
     try:
-        return _RestrictedUnpickler(file, modules).load()
+        return _RestrictedUnpickler(_Reader(file), modules, max_steps or MAX_STEPS, replace).load()
     except UserError:
         raise
     except Exception as error:  # whatever the unpickler makes of a stranger's bytes
@@ -71,12 +107,20 @@ class _Reader:
     def __init__(self, file: BinaryIO | io.BufferedIOBase) -> None:
         self._file = file
         here = file.tell()
-        self._left = file.seek(0, io.SEEK_END) - here
+        self._end = file.seek(0, io.SEEK_END)
+        self._left = self._end - here
         file.seek(here)
         self.readline = file.readline
 
     def read(self, size: int) -> bytes:
         return self._file.read(min(size, self._left)) if size >= 0 else b""
+
+    def passed(self, size: int) -> int | None:
+        here = self._file.tell()
+        if not isinstance(self._file, io.BufferedReader) or not 0 <= size <= self._end - here:
+            return None
+        self._file.seek(size, io.SEEK_CUR)
+        return here
 
 
 # The pure Python one: the other, in C, makes room for as many places as the highest number in the memo says.
@@ -90,17 +134,25 @@ class _RestrictedUnpickler(pickle._Unpickler):
     readline: Callable[[], bytes]
     pop_mark: Callable[[], list[Any]]
 
-    def __init__(self, file: BinaryIO | io.BufferedIOBase, modules: Iterable[str]) -> None:
-        super().__init__(_Reader(file), encoding="latin1")
-        self.modules, self.names, self.steps = tuple(modules), {}, 0
+    def __init__(
+        self,
+        source: _Reader,
+        modules: Iterable[str],
+        max_steps: int,
+        replace: Callable[[RecordedObject, Stream], Any] | None,
+        depth: int = 0,
+    ) -> None:
+        super().__init__(source, encoding="latin1")
+        self.source, self.modules, self.names, self.steps = source, tuple(modules), {}, 0
+        self.max_steps, self.replace, self.depth = max_steps, replace, depth
 
     def find_class(self, module: str, name: str) -> type[Any]:
         """The class that records what a name is called with."""
-        if module.partition(".")[0] not in self.modules:
+        if module.partition(".")[0] not in self.modules and f"{module}.{name}" not in self.modules:
             asked = shortened(f"{module}.{name}")
             raise UserError(f"it asks for '{asked}', which a file of this kind has no use for; nothing was run")
-        if (module, name) == ("collections", "OrderedDict"):
-            return OrderedDict
+        if (module, name) in _MAPPINGS:
+            return _MAPPINGS[module, name]
         if (module, name) not in self.names:
             if len(self.names) >= _MAX_NAMES:
                 raise UserError(f"it names more than {_MAX_NAMES:,} functions and classes")
@@ -114,14 +166,34 @@ class _RestrictedUnpickler(pickle._Unpickler):
     def count(self) -> None:
         """One more step."""
         self.steps += 1
-        if self.steps > _MAX_OPERATIONS:
-            raise UserError(f"it takes more than {_MAX_OPERATIONS:,} steps, as no file of this kind does")
+        if self.steps > self.max_steps:
+            raise UserError(f"it takes more than {self.max_steps:,} steps, as no file of this kind does")
+
+    def take(self, size: int) -> bytes:
+        """See `Stream`."""
+        return self.source.read(size)
+
+    def passed(self, size: int) -> int | None:
+        """See `Stream`."""
+        return self.source.passed(size)
+
+    def nested(self) -> Any:
+        """See `Stream`."""
+        if self.depth >= _DEEPEST:
+            raise UserError(f"it has pickles in pickles, more than {_DEEPEST} deep")
+        inner = _RestrictedUnpickler(self.source, self.modules, self.max_steps, self.replace, self.depth + 1)
+        inner.names, inner.steps = self.names, self.steps
+        found = inner.load()
+        self.steps = inner.steps
+        return found
 
     def _make(self, kind: Any, args: Any) -> None:
         """Puts what a name that `find_class` gave makes of its arguments onto the stack."""
         if kind is OrderedDict:
             made: Any = OrderedDict()
             _set(made, (tuple(pair) for pair in args[0]) if args else ())
+        elif kind is defaultdict and isinstance(args, tuple):
+            made = {}
         elif isinstance(kind, type) and issubclass(kind, RecordedObject) and isinstance(args, tuple):
             made = kind(*args)
         else:
@@ -148,6 +220,8 @@ class _RestrictedUnpickler(pickle._Unpickler):
         state, target = self.stack.pop(), self.stack[-1]
         if isinstance(target, RecordedObject):
             target.state = state
+            if self.replace is not None:
+                self.stack[-1] = self.replace(target, self)
 
     def load_append(self) -> None:
         value, target = self.stack.pop(), self.stack[-1]

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Protocol
 from mrhubo.config import Config, SweepConfig, fingerprint, to_plain, to_yaml
 from mrhubo.config.secrets import without_secrets
 from mrhubo.errors import UserError
-from mrhubo.files.storage import atomic_path, locked
+from mrhubo.files.atomic import atomic_path
+from mrhubo.files.storage import locked
 from mrhubo.fitting.preparation import Prepared, make_places, prepare
 from mrhubo.fitting.record import dashboard_command
 from mrhubo.runtime.locations import project_root

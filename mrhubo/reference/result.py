@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from torch import Tensor
 
-from mrhubo.files.joint_angles import write_joint_angles
+from mrhubo.robot_motion import JointOrder, RobotFacts, RobotMotion, write_robot_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +26,28 @@ class OptimizationResult:
     """Angle (T, D) [deg] between the robot's and the human's limb, hand and head directions."""
     collision: Tensor
     """Whether the robot touches itself (T,), by its URDF's collision shapes."""
+    direction_names: tuple[str, ...] = ()
+    """The D directions."""
     frame_rate: float | None = None
     """Frames per second; None: every frame has been solved on its own."""
+    name: str = ""
+    """The motion's name, where it has one."""
+    source: str = ""
+    """What the motion was read from, in words."""
+    robot: RobotFacts = field(default_factory=RobotFacts)
+    """What is known of the robot, and of who answered."""
 
-    def save(self, path: Path | str) -> None:
-        """Writes an .npz or a .csv file, by the path's ending; see `write_joint_angles` for what is in it.
+    @property
+    def robot_motion(self) -> RobotMotion:
+        """The same without PyTorch, which any program can read from a file (`mrhubo.robot_motion`)."""
+        names = ("joint_names", "direction_names", "frame_rate", "name", "source", "robot")
+        arrays = {name: getattr(self, name).cpu().numpy() for name in ("q", "direction_error_deg", "collision")}
+        return RobotMotion(**arrays, **{name: getattr(self, name) for name in names})
 
-        Raises:
-            UserError: the ending is another, the result is no single motion and the ending .csv, or the disk refuses.
+    def save(
+        self, path: Path | str, format: str | None = None, joint_order: JointOrder | None = None
+    ) -> tuple[str, ...]:
+        """Writes a file, by the path's ending or as a format of `mrhubo.robot_motion.FORMATS`; arguments, what is
+        returned and raised as for `write_robot_motion`.
         """
-        more = {name: getattr(self, name).cpu().numpy() for name in ("direction_error_deg", "collision")}
-        write_joint_angles(path, self.q.cpu().numpy(), self.joint_names, self.frame_rate, more)
+        return write_robot_motion(self.robot_motion, path, format, joint_order)

@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MotionLike, check_frame_rate, read_poses, to_tensor
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
@@ -27,7 +28,7 @@ from mrhubo.reference.speed import speed_bound
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.terms import REFERENCE_RATE, Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, pick, smooth_motion
-from mrhubo.robot import BodyMap, Robot
+from mrhubo.robot import BodyMap, Robot, robot_facts
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,11 @@ class OptimizationRetargeter(nn.Module):
         error_TD = direction_error(self.body_map, q_TN, local_TJ33, links)
         found = (q_TN, error_TD, self.body_map.collision.collides(q_TN, links))
         q, error, collision = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
-        return OptimizationResult(q, robot.joint_names, error, collision, poses.frame_rate)
+        return OptimizationResult(
+            q, robot.joint_names, error, collision, self.body_map.measured_names, poses.frame_rate,
+            *((motion.name, motion.source) if isinstance(motion, Motion) else ("", "")),
+            robot_facts(robot, "the optimiser of mrhubo", robot.description.kinematics),
+        )  # fmt: skip
 
     def _solve(self, local_TJ33: Tensor, frame_rate: float | None) -> Tensor:
         """Joint angles (T, N) [rad] of one motion, or of frames on their own."""

@@ -18,8 +18,8 @@ from torch import Tensor
 
 from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError, shortened
+from mrhubo.files.atomic import checksum_file
 from mrhubo.files.regular import check_regular
-from mrhubo.files.storage import checksum_file
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel
 from mrhubo.robot import Robot
 

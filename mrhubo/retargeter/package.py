@@ -10,6 +10,7 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,20 +19,25 @@ from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
+from mrhubo.body.vposer import VPoser
 from mrhubo.config import Config
 from mrhubo.errors import UserError
+from mrhubo.fast.description import FILE, Description
+from mrhubo.files.storage import write_tensors
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.poses import check_frame_rate
 from mrhubo.reference import DirectionProblem, Polish, angle_between
 from mrhubo.retargeter.clip import join_frames
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, Signals, branches_of, find_signals, shake
+from mrhubo.retargeter.describing import describe
 from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.parts import pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
-from mrhubo.retargeter.saving import read_package, write_package
-from mrhubo.robot import BodyMap, SelfCollision
+from mrhubo.retargeter.saving import package_checksum, read_package, write_package
+from mrhubo.robot import BodyMap, SelfCollision, robot_facts
 from mrhubo.robot.plausibility import read
+from mrhubo.robot_motion import RobotFacts
 
 POLISH = 10
 """Steps of optimisation that `retarget` makes after the networks, at most, unless told otherwise. On CMU's clips and
@@ -62,9 +68,11 @@ class Retargeter(nn.Module):
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
         self.directions = DirectionProblem(body_map)
         """The optimiser's cost, for `polish`."""
-        self._polish = Polish(self.directions)
+        self.polisher = Polish(self.directions)
         self.confidence, self.branches = confidence, branches_of(self.directions)
         """How much each branch of an answer is to be trusted, and what the branches are."""
+        self.origin, self.checksum = "a network of mrhubo that was not saved", ""
+        """Where it was loaded from, and the checksum of its weights' file, which has those of all others."""
 
     @property
     def device(self) -> torch.device:
@@ -80,6 +88,11 @@ class Retargeter(nn.Module):
     def joint_names(self) -> tuple[str, ...]:
         """Joints of the output, in order."""
         return self.body_map.robot.joint_names
+
+    @cached_property
+    def facts(self) -> RobotFacts:
+        """What files of the robot's motion tell of it."""
+        return robot_facts(self.body_map.robot, self.origin, self.checksum)
 
     if TYPE_CHECKING:
 
@@ -115,7 +128,8 @@ class Retargeter(nn.Module):
         length = poses.shape[-1] if poses.shape and poses.frame_rate else len(poses.local_TJ33)
         clips = poses.local_TJ33.split(max(1, length))
         answers = [self.retarget(clip_TJ33, polish, poses.frame_rate, together) for clip_TJ33 in clips]
-        return join_results(answers).with_leading(poses.shape, poses.frame_rate)
+        told = (motion.name, motion.source) if isinstance(motion, Motion) else ()
+        return join_results(answers).with_leading(poses.shape, poses.frame_rate, *told)
 
     @torch.no_grad()
     def predict(self, local_TJ33: MotionLike, polish: int = 0, frame_rate: float | None = None) -> Tensor:
@@ -224,6 +238,8 @@ class Retargeter(nn.Module):
             self.collision.collides(q_TN, links),
             trust_TC,
             tuple(branch.name for branch in self.branches),
+            self.body_map.measured_names,
+            robot=self.facts,
         )
 
     def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
@@ -248,12 +264,33 @@ class Retargeter(nn.Module):
             q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
         if not polish or not len(q_TN) or target_TD3 is None:
             return q_TN
-        return self._polish(q_TN, target_TD3, polish)
+        return self.polisher(q_TN, target_TD3, polish)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
         settings = {"phi_threshold": repr(self.phi_threshold), "confidence": self.confidence.to_json(), **provenance}
-        return write_package(folder, self.network, self.body_map, self.prior, self.config, settings)
+        write_package(folder, self.network, self.body_map, self.prior, self.config, settings)
+        self.origin, self.checksum = f"package {folder.resolve().name}", package_checksum(folder)
+        self.__dict__.pop("facts", None)
+        self.save_description(folder)
+        return folder
+
+    def describe(self) -> Description:
+        """All that an answer needs as plain arrays, for `mrhubo.fast`.
+
+        Raises:
+            UserError: its body prior is VPoser, with which only PyTorch works.
+        """
+        return describe(self)
+
+    def save_description(self, folder: Path) -> Path | None:
+        """Writes `describe` into a folder; None for a retargeter that has no such arrays."""
+        if isinstance(self.prior, VPoser):
+            return None
+        description = self.describe()
+        tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}
+        write_tensors(folder / FILE, tensors, description.metadata())
+        return folder / FILE
 
     @classmethod
     def load(cls, folder: Path | str) -> Retargeter:
@@ -263,4 +300,7 @@ class Retargeter(nn.Module):
             UserError: the folder is no package, a file is missing or damaged, was edited or comes from another package,
                 or weights and settings do not fit.
         """
-        return cls(*read_package(Path(folder)))
+        folder = Path(folder)
+        retargeter = cls(*read_package(folder))
+        retargeter.origin, retargeter.checksum = f"package {folder.resolve().name}", package_checksum(folder)
+        return retargeter

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from mrhubo.files.joint_angles import write_joint_angles
+from mrhubo.robot_motion import JointOrder, RobotFacts, RobotMotion, write_robot_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,27 +38,40 @@ class RetargetResult:
     person's did, to 15 degrees; see `mrhubo.retargeter.confidence`."""
     branch_names: tuple[str, ...]
     """The C branches: `left_arm` and so on."""
+    direction_names: tuple[str, ...] = ()
+    """The D directions."""
     frame_rate: float | None = None
     """Frames per second, where the motion told it."""
+    name: str = ""
+    """The motion's name, where it has one."""
+    source: str = ""
+    """What the motion was read from, in words."""
+    robot: RobotFacts = field(default_factory=RobotFacts)
+    """What is known of the robot, and of who answered."""
 
-    def with_leading(self, shape: tuple[int, ...], frame_rate: float | None) -> RetargetResult:
-        """The same with other leading axes, for as many frames, and a frame rate."""
+    def with_leading(
+        self, shape: tuple[int, ...], frame_rate: float | None, name: str = "", source: str = ""
+    ) -> RetargetResult:
+        """The same with other leading axes, for as many frames, and what is known of the motion."""
         tensors = {
-            name: getattr(self, name).unflatten(0, shape) if shape else getattr(self, name)[0] for name in _TENSORS
+            field: getattr(self, field).unflatten(0, shape) if shape else getattr(self, field)[0] for field in _TENSORS
         }
-        return dataclasses.replace(self, **tensors, frame_rate=frame_rate)
+        return dataclasses.replace(self, **tensors, frame_rate=frame_rate, name=name, source=source)
 
-    def save(self, path: Path | str) -> None:
-        """Writes an .npz or a .csv file, by the path's ending; see `write_joint_angles` for what is in it.
+    @property
+    def robot_motion(self) -> RobotMotion:
+        """The same without PyTorch, which any program can read from a file (`mrhubo.robot_motion`)."""
+        names = ("joint_names", "branch_names", "direction_names", "frame_rate", "name", "source", "robot")
+        arrays = {name: getattr(self, name).cpu().numpy() for name in _TENSORS}
+        return RobotMotion(**arrays, **{name: getattr(self, name) for name in names})
 
-        Raises:
-            UserError: the ending is another, the result is no single motion and the ending .csv, or the disk refuses.
+    def save(
+        self, path: Path | str, format: str | None = None, joint_order: JointOrder | None = None
+    ) -> tuple[str, ...]:
+        """Writes a file, by the path's ending or as a format of `mrhubo.robot_motion.FORMATS`; arguments, what is
+        returned and raised as for `write_robot_motion`.
         """
-        names = ("confidence", "direction_error_deg", "phi", "collision")
-        more = {name: getattr(self, name).cpu().numpy() for name in names}
-        for number, branch in enumerate(self.branch_names):
-            more[f"confidence_{branch}"] = self.branch_confidence[..., number].cpu().numpy()
-        write_joint_angles(path, self.q.cpu().numpy(), self.joint_names, self.frame_rate, more)
+        return write_robot_motion(self.robot_motion, path, format, joint_order)
 
 
 _TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision", "branch_confidence")

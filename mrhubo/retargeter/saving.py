@@ -12,7 +12,8 @@ from pathlib import Path
 from mrhubo.body import BodyPrior, build_skeleton, open_prior, save_skeleton
 from mrhubo.config import Config, load_config, to_yaml
 from mrhubo.errors import UserError, shortened
-from mrhubo.files.storage import atomic_path, read_tensors, write_tensors
+from mrhubo.files.atomic import atomic_path, checksum_file
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.confidence import ConfidenceModel
 from mrhubo.retargeter.integrity import (
@@ -65,6 +66,15 @@ def write_package(
     }
     write_tensors(folder / _WEIGHTS, network.state_dict(), metadata)
     return folder
+
+
+def package_checksum(folder: Path) -> str:
+    """xxh3 of the weights' file, 16 hex digits; its header has the checksums of all other files.
+
+    Raises:
+        UserError: it is missing.
+    """
+    return checksum_file(folder / _WEIGHTS)
 
 
 def read_package(folder: Path) -> tuple[RetargetNetwork, BodyMap, BodyPrior, Config, float, ConfidenceModel]:

@@ -3,6 +3,7 @@
 from mrhubo.robot.alignment import align_pose
 from mrhubo.robot.body_map import BodyMap, build_body_map
 from mrhubo.robot.collision import SelfCollision
+from mrhubo.robot.facts import robot_facts
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, varied
 from mrhubo.robot.model import LinkPoses, Robot
@@ -26,5 +27,6 @@ __all__ = [
     "read_collision_geometry",
     "read_geometry",
     "read_keypoints",
+    "robot_facts",
     "varied",
 ]

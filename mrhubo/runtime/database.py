@@ -14,7 +14,8 @@ from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import atomic_path, locked, remove_leftovers
+from mrhubo.files.atomic import atomic_path
+from mrhubo.files.storage import locked, remove_leftovers
 
 NAME = "mlflow.db"
 _WAIT = 60.0

@@ -15,8 +15,9 @@ from types import TracebackType
 import torch
 
 from mrhubo.errors import UserError
+from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import check_regular, read_regular
-from mrhubo.files.storage import Locked, atomic_path, locked
+from mrhubo.files.storage import Locked, locked
 
 
 class Workspace:

@@ -180,7 +180,7 @@ class Stream:
             result = join_results(
                 [self.retargeter.judge(*part, motion.frame_rate if len(motion) else None) for part in parts]
             )
-            results.append(result.with_leading((len(motion),), motion.frame_rate))
+            results.append(result.with_leading((len(motion),), motion.frame_rate, motion.name, motion.source))
         return results
 
     def _run(self, motions: Sequence[Motion], rate: float) -> list[Tensor]:

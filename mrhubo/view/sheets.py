@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
 
-from mrhubo.files.storage import atomic_path
+from mrhubo.files.atomic import atomic_path
 
 _INK = (38, 43, 51)
 _GREY = (108, 115, 125)

@@ -13,9 +13,10 @@ import pytest
 from mrhubo.body import BodyPrior, VPoser, open_skeleton
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
+from mrhubo.files.atomic import checksum_file
 from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import MissingFile, check_regular, read_regular
-from mrhubo.files.storage import checksum_file, read_tensors
+from mrhubo.files.storage import read_tensors
 from mrhubo.motion import read_motion
 
 

@@ -163,7 +163,7 @@ BOMBS = {
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_small_pickle_takes_little(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(unpickler, "_MAX_OPERATIONS", 50_000)
+    monkeypatch.setattr(unpickler, "MAX_STEPS", 50_000)
     with bounded(20, 2):
         try:
             unpickle(io.BytesIO(BOMBS[name]), MODULES)

@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import checksum_file, read_tensors, write_tensors
+from mrhubo.files.atomic import checksum_file
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.integrity import check_content, check_files, file_checksums
 from tests.chain import ROOT, new_package

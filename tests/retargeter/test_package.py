@@ -195,11 +195,13 @@ def test_an_answer_is_saved_with_names_and_time(made: Retargeter, tmp_path: Path
             assert tuple(file["joint_names"]) == made.joint_names and float(file["frame_rate"]) == 30.0
             for key in ("q", "confidence", "phi", "collision", "direction_error_deg"):
                 np.testing.assert_array_equal(file[key], getattr(result, key))
-            for branch, confidence in zip(result.branch_names, result.branch_confidence.T, strict=True):
-                np.testing.assert_array_equal(file[f"confidence_{branch}"], confidence)
+            np.testing.assert_array_equal(file["branch_confidence"], result.branch_confidence)
+            assert tuple(file["branch_names"]) == result.branch_names
     else:
         header, *rows = (tmp_path / name).read_text().splitlines()
-        names = ["confidence", "phi", "collision", *(f"confidence_{branch}" for branch in result.branch_names)]
+        branches = (f"confidence_{branch}" for branch in result.branch_names)
+        errors = (f"error_{direction} [deg]" for direction in result.direction_names)
+        names = ["confidence", "phi", "collision", *branches, *errors]
         assert header == ",".join(["time [s]", *(f"{joint} [rad]" for joint in made.joint_names), *names])
         assert len(rows) == 6
         np.testing.assert_array_equal(np.array(rows[5].split(",")[1:18], np.float32), result.q[5])

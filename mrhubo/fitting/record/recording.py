@@ -10,7 +10,7 @@ from PIL.Image import Image
 
 from mrhubo.config import to_plain, to_yaml
 from mrhubo.config.secrets import without_secrets
-from mrhubo.files.storage import checksum_file
+from mrhubo.files.atomic import checksum_file
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.record.inputs import mlflow_datasets
 from mrhubo.fitting.record.naming import run_name

@@ -4,55 +4,79 @@ Such files come from strangers: nothing in them is unpickled, sizes are checked 
 read, and whatever is wrong with what is needed becomes a UserError that names the file, the key and the frame. What is
 not needed (the root, the body's shape, the description) is left out where it cannot be used, with a note.
 
-Legend: T frames, 63 = 21 joints x 3 axis-angle numbers [rad] of SMPL's joints 1..21.
+The layout is that of https://amass.is.tue.mpg.de, whose files are told at https://github.com/nghorbani/amass.
+
+Legend: T frames, X numbers of a row.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
-from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import MAX_TURN, Turns
+from mrhubo.motion.readers.assemble import BLOCK, to_our_rest, upright
+from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.family import find_family
-from mrhubo.rotation import axis_angle_to_matrix
+from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import find_rate
+from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
+from mrhubo.motion.readers.world import WORLDS
 
 MAX_FRAMES = 2_000_000
 """Longest motion that is read (four and a half hours at 120 frames a second, 1.5 GB as matrices)."""
-_LEVEL = math.radians(1.0)
-"""Tilts of elbows' axes up to this stay: an angle that says nothing."""
-_BLOCK = 65_536
-"""Frames that are read and converted at a time."""
 _MAX_SMALL = 1_000_000
 """Bytes of an array that holds a number, some, or a text."""
-_MAX_ROOT_TURN = 8 * math.pi
+_MAX_ROOT_TURN = 8 * np.pi
 """No root's axis-angle number is that large [rad]: a person may turn round some times; degrees are larger."""
-_FRAME_RATES = (1.0, 1000.0)
-_RATE_KEYS = ("mocap_frame_rate", "mocap_framerate")
-_POSES_WIDTHS = {66: "body", 72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
-_NAME_ENDINGS = ("_stageii", "_poses")
+_POSE_KEYS = ("pose_body", "poses")
+_JOINTS = {
+    "pose_body": {21: "body without root"},
+    "poses": {22: "body", 24: "SMPL", 52: "SMPL-H", 55: "SMPL-X"},
+}
+"""How many joints each has, and what has so many."""
 _LARGEST_BETA = 1e6
 _FARTHEST_M = 1e5
 """No root is that far from the origin [m]."""
-_Y_UP_FROM_Z_UP = torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Turns a world whose z axis is up so that y is: a quarter turn about x."""
+
+
+def is_amass(content: Content) -> bool:
+    """Whether a file has a pose under a key of AMASS, of one person, or is a zip archive too damaged to tell."""
+    if not content.is_zip or content.is_torch:
+        return False
+    key = next((key for key in _POSE_KEYS if key in content.arrays), None)
+    if "joint_names" in content.arrays:  # SOMA-X, whose joints are others
+        return False
+    return not content.names or (key is not None and not _has_people(content.path, key))
+
+
+def _has_people(path: Path, key: str) -> bool:
+    """Whether a pose has an axis for people before that of the frames, as SLAHMR's has."""
+    try:
+        with open_npz(path) as file:
+            shape = file.shape(key)
+    except UserError:
+        return False
+    return find_form(shape, _JOINTS[key]) is None and find_form(shape[1:], _JOINTS[key]) is not None
 
 
 @np.errstate(all="ignore")  # what overflows is found out below
-def read_amass(path: Path) -> Motion:
+def read_amass(path: Path, options: ReadOptions) -> Motion:
     """Reads `pose_body` (T, 63), or `poses` (T, 66 or more) with the root's three numbers first.
 
+    Joints may have an axis of their own, and be matrices: (T, 21, 3), (T, 52, 3, 3).
+
     The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up, other files
-    of this kind y; the one that the body's own up axis follows is taken, and turned to y.
+    of this kind y.
 
     Rotations refer to the rest pose of the body model that the file says it is of; they are told in our skeleton's.
 
@@ -61,21 +85,14 @@ def read_amass(path: Path) -> Motion:
     """
     notes: list[str] = []
     with open_npz(path) as file:
-        key, local_TJ33 = _read_pose(file)
-        frame_rate = _read_frame_rate(file)
+        key, form, local_TJ33 = _read_pose(file)
+        frame_rate = find_rate(path, file.keys, partial(file.read, max_bytes=_MAX_SMALL), options, notes)
         description = _read_description(file, notes)
-        root_rotation_T33, root_position_T3, up = _read_root(file, key, len(local_TJ33), notes)
+        root_rotation_T33, root_position_T3 = _read_root(file, key, form, len(local_TJ33), notes)
         betas = _read_betas(file, notes)
         family, rest = find_family(file, betas)
-    for part in local_TJ33.split(_BLOCK) if family else ():
-        part.copy_(from_family(part, family))
-    # Elbows of a body that was fitted are no hinges; those of a converted skeleton are, about whatever axis it has.
-    tilt = None if family else elbow_tilt(local_TJ33)
-    if tilt is not None and abs(tilt) > _LEVEL:
-        local_TJ33 = untilt_arms(local_TJ33, tilt)
-        notes.append(f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out")
     name = motion_name(path)
-    return Motion(
+    motion = Motion(
         name=name,
         local_TJ33=local_TJ33,
         frame_rate=frame_rate,
@@ -83,104 +100,94 @@ def read_amass(path: Path) -> Motion:
         root_rotation_T33=root_rotation_T33,
         root_position_T3=root_position_T3,
         betas=betas,
-        source=f"SMPL-family .npz with '{key}'{up}; {rest}",
         family=family,
         notes=tuple(notes),
     )
+    motion, up = upright(motion, WORLDS)
+    return to_our_rest(replace(motion, source=f"SMPL-family .npz with '{key}'{up}; {rest}"))
 
 
-def _matrices(axis_angle_TX: np.ndarray) -> Tensor:
-    """Axis-angle numbers (T, 3 K) [rad] as rotations (T, K, 3, 3), float32."""
-    return axis_angle_to_matrix(torch.from_numpy(axis_angle_TX).unflatten(-1, (-1, 3))).float()
-
-
-def motion_name(path: Path) -> str:
-    """A file's name without its ending, and without AMASS's `_poses` or `_stageii`."""
-    name = path.stem
-    for ending in _NAME_ENDINGS:
-        name = name.removesuffix(ending)
-    return name or path.stem
-
-
-def _read_pose(file: NpzFile) -> tuple[str, Tensor]:
-    """The key that holds the pose, and local rotations (T, 21, 3, 3), float32."""
+def _read_pose(file: NpzFile) -> tuple[str, Form, Tensor]:
+    """The key that holds the pose, its form, and local rotations (T, 21, 3, 3), float32."""
     path, keys = file.path, file.keys
-    key = next((key for key in ("pose_body", "poses") if key in keys), None)
+    key = next((key for key in _POSE_KEYS if key in keys), None)
     if key is None:
         found = ", ".join(map(shortened, sorted(keys)[:12])) or "nothing"
         raise UserError(f"{path}: holds neither 'pose_body' nor 'poses', so it is no human motion; it holds: {found}")
-    shape = file.shape(key, max_rows=MAX_FRAMES)
-    widths = {63: "body without root"} if key == "pose_body" else _POSES_WIDTHS
-    if len(shape) != 2 or shape[1] not in widths:
-        expected = " or ".join(f"(frames, {width}) ({what})" for width, what in widths.items())
-        raise UserError(f"{path}: '{key}' has shape {shape}; expected {expected}")
-    first = 0 if key == "pose_body" else 3
-    local_TJ33 = torch.empty(shape[0], 21, 3, 3)
-    turns = Turns()
-    for start, pose_T63 in _blocks(file, key, first, first + 63):
-        turn_TJ = np.linalg.norm(pose_T63.reshape(-1, 21, 3), axis=-1)
-        bad_N2 = np.argwhere(~(turn_TJ <= MAX_TURN))
-        if len(bad_N2):
-            frame, joint = bad_N2[0].tolist()
-            numbers = np.abs(pose_T63[frame, 3 * joint : 3 * joint + 3])
-            column = 3 * joint + int(np.argmax(np.where(np.isnan(numbers), np.inf, numbers)))
-            value = float(pose_T63[frame, column])
-            why = "is not finite" if not math.isfinite(value) else "is no axis-angle number in radians (degrees?)"
-            raise UserError(f"{path}: '{key}' {why} in frame {start + frame}, number {first + column}: {value:g}")
-        turns.add(torch.from_numpy(turn_TJ))
-        local_TJ33[start : start + len(pose_T63)] = _matrices(pose_T63)
-    if turns.are_degrees:
-        raise UserError(
-            f"{path}: '{key}' is no axis-angle in radians (degrees?): {turns.described}; multiply it by pi / 180"
-        )
-    return key, local_TJ33
+    shape, counts = file.shape(key, max_rows=MAX_FRAMES), _JOINTS[key]
+    form = find_form(shape, counts)
+    if form is None:
+        expected = " or ".join(f"(frames, {3 * joints}) ({what})" for joints, what in counts.items())
+        raise UserError(f"{path}: '{key}' has shape {shape}; expected {expected}, or matrices (frames, joints, 3, 3)")
+    first = 0 if key == "pose_body" else 1
+    return key, form, read_local(path, key, shape[0], _blocks(file, key), form, first)
 
 
-def _blocks(file: NpzFile, key: str, first: int, end: int) -> Iterator[tuple[int, np.ndarray]]:
-    """Some columns of an array (T, ...), float64, block by block, each with the number of its first frame."""
+def _blocks(file: NpzFile, key: str) -> Iterator[tuple[int, np.ndarray]]:
+    """The rows of an array (T, ...), float64, block by block (N, X), each with the number of its first frame."""
     start = 0
-    for block in file.blocks(key, _BLOCK, MAX_FRAMES):
-        yield start, block[:, first:end].astype(np.float64)
+    for block in file.blocks(key, BLOCK, MAX_FRAMES):
+        yield start, block.astype(np.float64)
         start += len(block)
 
 
-def _read_root(file: NpzFile, pose_key: str, frames: int, notes: list[str]) -> tuple[Tensor | None, Tensor | None, str]:
-    """Rotations (T, 3, 3) and places (T, 3) of the root in a world whose y axis is up, and how the file has it."""
-    key = "root_orient" if "root_orient" in file.keys else pose_key if pose_key == "poses" else None
-    root_T3 = None if key is None else _read_rows(file, key, frames, _MAX_ROOT_TURN, notes)
-    if root_T3 is None:
-        if "trans" in file.keys:
+def _read_root(
+    file: NpzFile, pose_key: str, form: Form, frames: int, notes: list[str]
+) -> tuple[Tensor | None, Tensor | None]:
+    """Rotations (T, 3, 3) and places (T, 3) of the root, as the file has them."""
+    rotation_T33 = None
+    if "root_orient" in file.keys:
+        rows_TX = _read_rows(file, "root_orient", frames, (3, 9), notes)
+        rotation_T33 = _root_matrices("root_orient", rows_TX, notes)
+    elif pose_key == "poses":
+        rotation_T33 = _root_matrices("poses", _read_rows(file, "poses", frames, (form.numbers,), notes, True), notes)
+    position_T3 = None
+    if "trans" in file.keys:
+        if rotation_T33 is None:
             notes.append("'trans' is left out: without the root's rotation its up axis is not known")
-        return None, None, ""
-    rotation_T33 = torch.cat([_matrices(root_T3[start : start + _BLOCK])[:, 0] for start in range(0, frames, _BLOCK)])
-    # The body's own up axis (y, in the pelvis) in the world: people stand and walk more than they lie.
-    _, along_y, along_z = rotation_T33[:, :, 1].mean(dim=0).tolist()
-    to_world_33 = torch.eye(3) if along_y >= along_z else _Y_UP_FROM_Z_UP
-    position_T3 = _read_rows(file, "trans", frames, _FARTHEST_M, notes) if "trans" in file.keys else None
-    return (
-        to_world_33 @ rotation_T33,
-        None if position_T3 is None else torch.from_numpy(position_T3).float() @ to_world_33.T,
-        ", y up" if along_y >= along_z else ", z up",
-    )
+            return None, None
+        position_T3 = _read_rows(file, "trans", frames, (3,), notes)
+        if position_T3 is not None and not (np.abs(position_T3) <= _FARTHEST_M).all():
+            notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {_FARTHEST_M:g}")
+            position_T3 = None
+    return rotation_T33, None if position_T3 is None else torch.from_numpy(position_T3).float()
 
 
-def _read_rows(file: NpzFile, key: str, frames: int, largest: float, notes: list[str]) -> np.ndarray | None:
-    """The first three numbers (T, 3), float64, of an array that a motion can do without; None, and a note, where it
-    cannot be used.
+def _root_matrices(key: str, rows_TX: np.ndarray | None, notes: list[str]) -> Tensor | None:
+    """Rotations (T, 3, 3) of rows (T, 3 or 9); None, and a note, where they are none."""
+    if rows_TX is None:
+        return None
+    rotation_T133 = to_matrices(rows_TX, Form(1, rows_TX.shape[1] == 9), _MAX_ROOT_TURN)
+    if rotation_T133 is None:
+        notes.append(f"'{key}' is left out: it holds NaN, infinite numbers, or what is no rotation in radians")
+        return None
+    return rotation_T133[:, 0]
+
+
+def _read_rows(
+    file: NpzFile, key: str, frames: int, widths: tuple[int, ...], notes: list[str], more: bool = False
+) -> np.ndarray | None:
+    """The rows (T, X), float64, of an array that a motion can do without; None, and a note, where it cannot be used.
+
+    Args:
+        file: the file.
+        key: the array.
+        frames: T.
+        widths: which X there may be.
+        notes: is told what is left out.
+        more: whether a row may have more numbers than the first X, which are taken.
     """
     try:
         shape = file.shape(key, max_rows=MAX_FRAMES)
-        if len(shape) != 2 or shape[0] != frames or shape[1] < 3:
-            notes.append(f"'{key}' is left out: its shape is {shape}; expected ({frames}, 3)")
+        width = int(np.prod(shape[1:]))
+        if len(shape) < 2 or shape[0] != frames or not (more or width in widths):
+            expected = " or ".join(f"({frames}, {width})" for width in widths)
+            notes.append(f"'{key}' is left out: its shape is {shape}; expected {expected}")
             return None
-        rows_T3 = np.concatenate([rows for _, rows in _blocks(file, key, 0, 3)])
+        return np.concatenate([rows[:, : widths[0] if more else width] for _, rows in _blocks(file, key)])
     except UserError as error:
         notes.append(f"'{key}' is left out: {error}")
         return None
-    if not (np.abs(rows_T3) <= largest).all():
-        notes.append(f"'{key}' is left out: it holds NaN, infinite numbers, or some beyond {largest:g}")
-        return None
-    return rows_T3
 
 
 def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
@@ -196,21 +203,6 @@ def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
         notes.append(f"'betas' is left out: expected up to 400 finite numbers, found the shape {array.shape}")
         return None
     return tuple(float(number) for number in array.astype(np.float64))
-
-
-def _read_frame_rate(file: NpzFile) -> float:
-    path = file.path
-    key = next((key for key in _RATE_KEYS if key in file.keys), None)
-    if key is None:
-        raise UserError(f"{path}: holds no frame rate; expected the key '{_RATE_KEYS[0]}' or '{_RATE_KEYS[1]}'")
-    array = file.read(key, max_bytes=_MAX_SMALL)
-    if array.size != 1:
-        raise UserError(f"{path}: '{key}' has shape {array.shape}; expected one number")
-    rate = float(array.reshape(()))
-    low, high = _FRAME_RATES
-    if not low <= rate <= high:
-        raise UserError(f"{path}: '{key}' is {rate:g} frames per second; expected {low:g} to {high:g}")
-    return rate
 
 
 def _read_description(file: NpzFile, notes: list[str]) -> str:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from mrhubo.body.rest_directions import FAMILIES
 from mrhubo.errors import UserError
 from mrhubo.files.npz import NpzFile
+from mrhubo.motion.readers.rotations import find_form
 from mrhubo.motion.writers.amass import OWN_REST, REST_KEY
 
-_FAMILY_OF_WIDTH = {72: "smpl", 156: "smplh", 165: "smplx"}
+_FAMILY_OF_JOINTS = {23: "smpl", 24: "smpl", 52: "smplh", 55: "smplx"}
+"""By how many joints a pose has; 23 are SMPL's without the root."""
+_FACE = {"pose_jaw", "pose_eye", "jaw_pose", "leye_pose", "reye_pose", "expression", "smplx_verts", "smplx_params"}
+"""Keys of what SMPL-X alone has."""
+_HANDS = {"pose_hand", "left_hand_pose", "right_hand_pose"}
 _MORE_THAN_BODY = {"poses", "pose_hand", "pose_jaw", "pose_eye"}
 """Poses of which AMASS's files hold at least one beside the body's."""
 _MAX_TEXT = 1_000
@@ -17,8 +22,8 @@ _MAX_TEXT = 1_000
 
 
 def find_family(file: NpzFile, betas: Sequence[float] | None) -> tuple[str, str]:
-    """The family of body models, a key of `FAMILIES`, and in words what is known of the rest pose; no family where
-    rotations refer to our skeleton.
+    """The family of body models of an AMASS file, a key of `FAMILIES`, and in words what is known of the rest pose; no
+    family where rotations refer to our skeleton.
 
     What mrhubo writes says so in a key of its own. Conversions that were made for our skeleton before there was that
     key do not; but they describe what is done, which no file of AMASS's does, and hold the pose of a body alone,
@@ -29,31 +34,47 @@ def find_family(file: NpzFile, betas: Sequence[float] | None) -> tuple[str, str]
     shapeless = betas is not None and not any(betas)
     if "description" in file.keys and shapeless and not _MORE_THAN_BODY & file.keys:
         return "", "rotations are taken to refer to mrhubo's own skeleton: a described pose of a body without a shape"
-    family = _family_of(file)
+    family = family_of(_read_text(file, "surface_model_type"), _joints(file), file.keys)
+    return family, rest_in_words(family)
+
+
+def family_of(said: str, joints: int, keys: Collection[str]) -> str:
+    """The family of body models, a key of `FAMILIES`; empty where nothing tells.
+
+    Args:
+        said: what the file calls its model.
+        joints: how many joints its pose has.
+        keys: what else it holds.
+    """
+    bare = "".join(character for character in said.lower() if character.isalnum())
+    for name in sorted(FAMILIES, key=len, reverse=True):
+        if bare.startswith(name):
+            return name
+    if joints in _FAMILY_OF_JOINTS:
+        return _FAMILY_OF_JOINTS[joints]
+    return "smplx" if _FACE & set(keys) else "smplh" if _HANDS & set(keys) else ""
+
+
+def rest_in_words(family: str) -> str:
+    """What is known of the rest pose of a family, or of a file that tells none."""
     if not family:
-        return "", (
+        return (
             "rotations are taken to refer to a T-pose, as the file does not tell its body model; if it is SMPL-X, arms"
             " are up to 18 degrees off"
         )
-    return family, (
+    return (
         f"rotations refer to the rest pose of {FAMILIES[family].name}; limbs are those of its mean body, from which"
         " this person's differ by a few degrees (body.model_path and body.betas make them exact)"
     )
 
 
-def _family_of(file: NpzFile) -> str:
-    said = _read_text(file, "surface_model_type").lower()
-    said = "".join(character for character in said if character.isalnum())
-    for name in sorted(FAMILIES, key=len, reverse=True):
-        if said.startswith(name):
-            return name
+def _joints(file: NpzFile) -> int:
+    """How many joints `poses` has; 0 where there are none."""
     try:
-        width = file.shape("poses")[-1] if "poses" in file.keys else 0
-    except (UserError, IndexError):
-        width = 0
-    if width in _FAMILY_OF_WIDTH:
-        return _FAMILY_OF_WIDTH[width]
-    return "smplx" if "pose_jaw" in file.keys else "smplh" if "pose_hand" in file.keys else ""
+        form = find_form(file.shape("poses"), _FAMILY_OF_JOINTS) if "poses" in file.keys else None
+    except UserError:
+        form = None
+    return 0 if form is None else form.joints
 
 
 def _read_text(file: NpzFile, key: str) -> str:

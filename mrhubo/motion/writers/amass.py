@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mrhubo.files.storage import atomic_path
+from mrhubo.files.atomic import atomic_path
 
 REST_KEY, OWN_REST = "rest_directions", "mrhubo"
 """The key that says to which rest pose rotations refer, and its text where that is our own skeleton's: other programs

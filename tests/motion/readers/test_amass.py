@@ -139,6 +139,34 @@ def test_any_type_of_number(tmp_path: Path, dtype) -> None:
     torch.testing.assert_close(motion.local_TJ33, _expected(np.round(POSE_T63)))
 
 
+@pytest.mark.parametrize("key", ["pose_body", "poses"])
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("matrices", [False, True])
+def test_joints_with_an_axis_of_their_own_and_matrices(tmp_path: Path, key: str, order: str, matrices: bool) -> None:
+    root_T3 = np.tile((0.0, 1.0, 0.0), (7, 1))
+    joints_TK3 = POSE_T63.reshape(7, 21, 3)
+    if key == "poses":
+        joints_TK3 = np.concatenate((root_T3[:, None], joints_TK3), axis=1)
+    rotation = Rotation.from_rotvec(joints_TK3.reshape(-1, 3)).as_matrix().reshape(*joints_TK3.shape, 3)
+    root = Rotation.from_rotvec(root_T3).as_matrix() if matrices else root_T3
+    array = np.asarray(rotation if matrices else joints_TK3, order=order)  # type: ignore[call-overload]
+    motion = read_motion(_save(tmp_path / "a.npz", **{key: array}, root_orient=root, trans=np.ones((7, 3)), **RATE))
+    torch.testing.assert_close(motion.local_TJ33, _expected(POSE_T63), atol=1e-6, rtol=0)
+    expected = torch.from_numpy(Rotation.from_rotvec(root_T3).as_matrix()).float()
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    torch.testing.assert_close(motion.root_rotation_T33, expected, atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 3)), np.diag((1.0, 1.0, -1.0)), 2 * np.eye(3), np.full((3, 3), np.nan)])
+def test_matrices_that_are_no_rotations_are_refused(tmp_path: Path, bad: np.ndarray) -> None:
+    pose = np.tile(np.eye(3), (7, 21, 1, 1))
+    pose[5, 3] = bad
+    with pytest.raises(UserError, match=r"'pose_body' is (not finite|no rotation matrix) in frame 5, joint 3"):
+        read_motion(_save(tmp_path / "a.npz", pose_body=pose, **RATE))
+    motion = read_motion(_save(tmp_path / "a.npz", pose_body=POSE_T63, root_orient=pose[:, 3], **RATE))
+    assert motion.root_rotation_T33 is None and "'root_orient' is left out" in motion.notes[0]
+
+
 def _with(row: int, column: int, value: float) -> np.ndarray:
     pose_T63 = POSE_T63.copy()
     pose_T63[row, column] = value
@@ -156,17 +184,20 @@ def _with(row: int, column: int, value: float) -> np.ndarray:
         ),
         ({"pose_body": _with(1, 2, 90.0), **RATE}, r"degrees\?\) in frame 1, number 2: 90"),
         ({"pose_body": POSE_T63[:, :60], **RATE}, r"'pose_body' has shape \(7, 60\); expected \(frames, 63\)"),
-        ({"pose_body": POSE_T63.reshape(7, 21, 3), **RATE}, r"'pose_body' has shape \(7, 21, 3\)"),
+        ({"pose_body": POSE_T63.reshape(7, 3, 21), **RATE}, r"'pose_body' has shape \(7, 3, 21\)"),
         ({"poses": POSE_T63, **RATE}, r"'poses' has shape \(7, 63\); expected \(frames, 66\)"),
         ({"pose_body": POSE_T63[:0], **RATE}, r"'pose_body' is empty: shape \(0, 63\)"),
         ({"pose_body": POSE_T63.astype(complex), **RATE}, "'pose_body' has type complex128; expected numbers"),
         ({"pose_body": POSE_T63.astype("U5"), **RATE}, "'pose_body' has type <U5; expected numbers"),
-        ({"pose_body": POSE_T63}, "holds no frame rate; expected the key 'mocap_frame_rate' or 'mocap_framerate'"),
+        ({"pose_body": POSE_T63}, "holds no frame rate; .*--rate 30.*ReadOptions"),
         ({"pose_body": POSE_T63, "mocap_frame_rate": np.array(0.0)}, "is 0 frames per second; expected 1 to 1000"),
         ({"pose_body": POSE_T63, "mocap_framerate": np.array(1001)}, "'mocap_framerate' is 1001 frames per second"),
         ({"pose_body": POSE_T63, "mocap_frame_rate": np.array(np.nan)}, "is nan frames per second"),
         ({"pose_body": POSE_T63, "mocap_frame_rate": np.array([30.0, 30.0])}, r"has shape \(2,\); expected one number"),
-        ({"betas": np.zeros(16), **RATE}, "holds neither 'pose_body' nor 'poses'.*betas, mocap_frame_rate"),
+        (
+            {"betas": np.zeros(16), **RATE},
+            "is an .npz file with betas, mocap_frame_rate, in which there is no human motion",
+        ),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, content: dict[str, np.ndarray], message: str) -> None:
@@ -250,9 +281,9 @@ def test_a_long_motion_is_read_block_by_block(tmp_path: Path, monkeypatch: pytes
     content = {"trans": np.tile(np.arange(25.0)[:, None], 3), "root_orient": np.zeros((25, 3)), **RATE}
     for order in ("C", "F"):
         path = _save(tmp_path / "a.npz", pose_body=np.asarray(pose_T63, order=order), **content)
-        monkeypatch.setattr(amass, "_BLOCK", 1_000)
+        monkeypatch.setattr(amass, "BLOCK", 1_000)
         whole = read_motion(path)
-        monkeypatch.setattr(amass, "_BLOCK", 10)
+        monkeypatch.setattr(amass, "BLOCK", 10)
         found = read_motion(path)
         assert torch.equal(found.local_TJ33, whole.local_TJ33)
         assert found.root_position_T3 is not None and found.root_position_T3[:, 1].tolist() == list(range(25))
@@ -284,7 +315,7 @@ def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
         read_motion(raw)
     bare = tmp_path / "bare.npz"
     bare.write_bytes(pickle.dumps(Attack()))
-    with pytest.raises(UserError, match="is not an .npz file"):
+    with pytest.raises(UserError, match="in which there is no human motion"):
         read_motion(bare)
     assert not witness.exists()
 
@@ -321,9 +352,9 @@ def test_missing_files_and_a_bare_array(tmp_path: Path) -> None:
         read_motion(tmp_path / "none.npz")
     bare = tmp_path / "bare.npz"
     bare.write_bytes(_npy(POSE_T63))
-    with pytest.raises(UserError, match="is not an .npz file"):
+    with pytest.raises(UserError, match="is a single NumPy array .* of an array of shape"):
         read_motion(bare)
-    with pytest.raises(UserError, match="holds neither .* it holds: nothing"):
+    with pytest.raises(UserError, match="is an empty zip archive"):
         read_motion(_archive(tmp_path / "empty.npz", {}))
 
 
@@ -392,7 +423,7 @@ def test_read_folder_sorts_and_passes_over_what_is_no_motion(tmp_path: Path) -> 
 
 
 def test_read_folder_refuses(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="holds no .npz motion file"):
+    with pytest.raises(UserError, match="holds no motion file"):
         read_folder(tmp_path)
     with pytest.raises(UserError, match="there is no such folder"):
         read_folder(tmp_path / "none")

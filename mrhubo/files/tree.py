@@ -1,0 +1,296 @@
+"""Nested dictionaries and lists of arrays, from whatever container a stranger's program wrote them into.
+
+.npz, .npy, pickles (plain, or joblib's, packed or not) and PyTorch files come out alike. Nothing in them is run, and
+what is not asked for is not made: a node is put together when its array is asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from mrhubo.errors import UserError, listed, shortened
+from mrhubo.files.joblib_stream import Later, take_array
+from mrhubo.files.npz import open_npz, read_member
+from mrhubo.files.packed import open_unpacked
+from mrhubo.files.regular import MAX_BYTES as MAX_FILE
+from mrhubo.files.regular import check_regular, open_regular
+from mrhubo.files.safe_pickle import MAX_BYTES, is_old_torch, read_torch, to_array, to_number, to_tensor
+from mrhubo.files.unpickler import RecordedObject, unpickle
+
+_MODULES = (
+    *("numpy", "torch", "collections", "joblib", "copyreg", "copy_reg", "_codecs", "pathlib"),
+    *(f"{module}.{name}" for module in ("builtins", "__builtin__") for name in ("dict", "list", "set", "object")),
+    *(f"builtins.{name}" for name in ("bytearray", "slice", "range", "complex")),
+)
+_MAX_STEPS = 20_000_000
+"""Of a pickle: half an hour of a video, a dozen arrays a frame, takes as many; some twenty seconds."""
+_MAX_MADE = 2**26
+"""Numbers that lists of arrays are put together to, in one file."""
+_DEEPEST = 4
+"""Lists of lists of numbers."""
+_NPY = b"\x93NUMPY"
+
+
+@dataclass(frozen=True)
+class _Member:
+    """An array of an .npz file that is read when it is asked for."""
+
+    key: str
+
+
+@dataclass
+class _Source:
+    """What the nodes of a tree share. What it made arrays of lives as long as it does, so that each is made once."""
+
+    path: Path
+    storages: dict[str, bytes] = field(default_factory=dict)
+    members: dict[str, Any] = field(default_factory=dict)
+    made: dict[int, np.ndarray] = field(default_factory=dict)
+    left: int = _MAX_MADE
+
+    def member(self, key: str) -> Any:
+        """What a member of the .npz file holds.
+
+        Raises:
+            UserError: it is damaged, hostile, or too large.
+        """
+        if key not in self.members:
+            with open_npz(self.path) as file:
+                self.members[key] = file.read_any(key, _unpickle, MAX_BYTES)
+        return self.members[key]
+
+    def count(self, numbers: int) -> None:
+        """Some more numbers that lists are put together to."""
+        self.left -= numbers
+        if self.left < 0:
+            raise UserError(
+                f"{self.path}: its lists make arrays of more than {_MAX_MADE:,} numbers, as those of no motion do"
+            )
+
+
+class Tree:
+    """A node: a dictionary, a list, or something that may be an array, a number or a text."""
+
+    def __init__(self, value: Any, source: _Source, where: str = "") -> None:
+        self._given, self._source, self.where = value, source, where
+
+    @cached_property
+    def _value(self) -> Any:
+        given = self._given
+        return _unwrapped(self._source.member(given.key) if isinstance(given, _Member) else given)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._source.path
+
+    @property
+    def named(self) -> str:
+        """The file and the place in it, for the beginning of a sentence."""
+        return f"{self.path}: '{self.where}'" if self.where else str(self.path)
+
+    @property
+    def is_mapping(self) -> bool:
+        """Whether it has keys."""
+        return isinstance(self._value, dict)
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is a list or a tuple, or an array of objects."""
+        return isinstance(self._value, list | tuple)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Of a dictionary, as texts; none of anything else."""
+        return tuple(name for name, _ in self._entries())
+
+    def items(self) -> Iterator[tuple[str, Tree]]:
+        """Keys and nodes of a dictionary; none of anything else."""
+        for name, value in self._entries():
+            yield name, Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else name)
+
+    def get(self, *names: str) -> Tree | None:
+        """The node under the first of some keys that there is."""
+        entries = dict(self.items())
+        return next((entries[name] for name in names if name in entries), None)
+
+    def __getitem__(self, name: str) -> Tree:
+        """The node under a key; UserError where there is none."""
+        found = self.get(name)
+        if found is None:
+            raise UserError(f"{self.named} is {self.described}; expected one with '{name}'")
+        return found
+
+    def __len__(self) -> int:
+        return len(self._value) if isinstance(self._value, dict | list | tuple) else 0
+
+    def __iter__(self) -> Iterator[Tree]:
+        """The nodes of a list; none of anything else."""
+        if self.is_list:
+            for number, value in enumerate(self._value):
+                yield Tree(value, self._source, f"{self.where}[{number}]")
+
+    def array(self) -> np.ndarray:
+        """The array of numbers that it is; lists of numbers, and of arrays of one shape, make one.
+
+        Raises:
+            UserError: it is none.
+        """
+        return self._array(_DEEPEST)
+
+    def shape(self) -> tuple[int, ...] | None:
+        """Of the array that it is; None where it is none."""
+        if isinstance(self._value, Later):
+            return self._value.shape
+        try:
+            return self.array().shape
+        except UserError:
+            return None
+
+    def text(self) -> str | None:
+        """The text that it is; None where it is none."""
+        value = self._value
+        if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.size == 1:
+            value = str(value.reshape(()))
+        return value if isinstance(value, str) else None
+
+    def texts(self) -> list[str]:
+        """The texts of a list or an array of such; none where it is neither."""
+        value = self._value
+        if isinstance(value, np.ndarray) and value.dtype.kind == "U" and value.ndim == 1:
+            return value.tolist()
+        return [text for node in self if (text := node.text()) is not None]
+
+    @property
+    def described(self) -> str:
+        """In words."""
+        if self.is_mapping:
+            return f"a dictionary with {shortened(listed(self.keys), 200)}"
+        if self.is_list:
+            return f"a list of {len(self):,}"
+        if isinstance(self._value, Later):
+            return f"an array of shape {self._value.shape}"
+        if isinstance(self._value, RecordedObject):
+            shape = self.shape()
+            return f"an array of shape {shape}" if shape is not None else f"an object '{shortened(self._value.kind)}'"
+        if isinstance(self._value, np.ndarray):
+            return f"an array of shape {self._value.shape}"
+        return f"a {type(self._value).__name__}"
+
+    def _entries(self) -> Iterator[tuple[str, Any]]:
+        if isinstance(self._value, dict):
+            for key, value in self._value.items():
+                name = _name(key)
+                if name is not None:
+                    yield name, value
+
+    def _array(self, deepest: int) -> np.ndarray:
+        value, made = self._value, self._source.made
+        if id(value) not in made:
+            made[id(value)] = self._make(value, deepest)
+        return made[id(value)]
+
+    def _make(self, value: Any, deepest: int) -> np.ndarray:
+        if isinstance(value, bool | int | float):
+            return np.array(float(value))
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+            return value
+        if isinstance(value, Later):
+            return value.read(self.path)
+        if isinstance(value, RecordedObject):
+            return _from_record(value, self._source.storages, self.named)
+        if not self.is_list or not len(self):
+            raise UserError(f"{self.named} is {self.described}; expected an array")
+        self._source.count(len(value))
+        if all(isinstance(number, int | float) for number in value):
+            return np.array([float(number) for number in value])
+        if deepest == 0:
+            raise UserError(f"{self.named} is a list of lists, more than {_DEEPEST} deep")
+        arrays = [child._array(deepest - 1) for child in self]
+        shapes = {array.shape for array in arrays}
+        if len(shapes) > 1:
+            found = shortened(" and ".join(map(str, sorted(shapes)[:3])))
+            raise UserError(f"{self.named} is a list of arrays of different shapes: {found}")
+        self._source.count(len(arrays) * arrays[0].size)
+        return np.stack(arrays)
+
+
+def read_tree(path: Path) -> Tree:
+    """What a file holds: a PyTorch file, an .npz or .npy file, or a pickle, packed or not.
+
+    Raises:
+        UserError: it is none of these, damaged, hostile, or too large.
+    """
+    try:
+        with open_regular(path) as handle:
+            start = handle.read(64)
+        if start.startswith(b"PK"):
+            return _read_zip(path)
+        if is_old_torch(start):
+            raise UserError(
+                "was saved by torch before 1.6; load it with a torch that you trust it with, and save it anew"
+            )
+        with open_unpacked(path, MAX_BYTES, MAX_FILE) as handle:
+            if start.startswith(_NPY):
+                size = check_regular(path, MAX_BYTES)
+                return Tree(read_member(handle, size, _unpickle), _Source(path))
+            return Tree(_unpickle(handle), _Source(path))
+    except UserError as error:
+        said = str(error)
+        raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
+
+
+def _unpickle(handle: BinaryIO) -> Any:
+    return unpickle(handle, _MODULES, _MAX_STEPS, take_array)
+
+
+def _read_zip(path: Path) -> Tree:
+    with open_npz(path) as file:
+        keys = sorted(file.keys)
+    if keys:
+        return Tree({key: _Member(key) for key in keys}, _Source(path))
+    content, storages = read_torch(path, _MODULES, _MAX_STEPS)
+    return Tree(content, _Source(path, storages))
+
+
+def _unwrapped(value: Any) -> Any:
+    """An array of objects as the list of them, and one that holds a single object without axes as that object."""
+    for _ in range(_DEEPEST):
+        is_array = isinstance(value, RecordedObject) and type(value).__name__ == "_reconstruct"
+        state = value.state if is_array else None
+        if not (isinstance(state, tuple) and len(state) == 5 and isinstance(state[4], list)):
+            return value
+        value = state[4][0] if state[1] == () and len(state[4]) == 1 else state[4]
+    return value
+
+
+def _name(key: Any) -> str | None:
+    """A dictionary's key as a text; None where it is neither text nor a number."""
+    if isinstance(key, bytes):
+        key = key.decode("latin1")
+    if isinstance(key, RecordedObject):
+        try:
+            key = to_number(key)
+        except UserError:
+            return None
+    if isinstance(key, float) and math.isfinite(key) and key == int(key):
+        key = int(key)
+    return str(key) if isinstance(key, str | int | float) else None
+
+
+def _from_record(value: RecordedObject, storages: dict[str, bytes], named: str) -> np.ndarray:
+    try:
+        if value.module.startswith("torch"):
+            return to_tensor(value, storages).numpy()
+        if type(value).__name__ == "scalar":
+            return np.array(to_number(value))
+        return to_array(value)
+    except UserError as error:
+        raise UserError(f"{named}: {error}") from error

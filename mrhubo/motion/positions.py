@@ -1,0 +1,294 @@
+"""From points of a body over time to a motion of our own skeleton, whose limbs point where the points do.
+
+Networks and optimiser read directions: where limbs point, and how hands and head are turned, each seen from the chest.
+Those are kept exactly. What points leave open is set as a body has it: the spine's turn is shared out in equal parts,
+elbows and knees are hinges, and the rest of a forearm's twist is in the wrist.
+
+A straight limb does not tell how it is turned about itself. Where the source has a bone's own rotation, that tells;
+else the axis of its elbow or knee is carried along from the last frame in which the limb was bent towards the next.
+
+Points that are missing are not invented: their limb goes on from where it was last seen, as seen from the trunk, to
+where it is seen next, with a confidence of 0.
+
+Legend: T frames, J = 21: SMPL's joints 1..21. World: y up, right-handed [m].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from mrhubo.body.anatomy import hinge_axis
+from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.errors import UserError
+from mrhubo.motion.gaps import Neighbours, fill_directions, fill_numbers, fill_rotations
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.orientations import frame_of, turn_of
+from mrhubo.robot.bending import bend_axis
+from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, orthonormal, shortest_turn
+
+BENT = math.radians(12.0)
+"""From which bend on the plane of two limbs tells the axis of the joint between them, whatever the upper limb's own
+turn (as in `mrhubo.robot.bending`)."""
+_BACKWARD = math.radians(30.0)
+"""Knees do not bend backwards: up to this bend, what looks so is a straight leg and a noisy point."""
+
+
+@dataclass(frozen=True)
+class _Limb:
+    """Two bones, a hinge between them, and what is at their end."""
+
+    carrier: str
+    joints: tuple[str, str, str]
+    """Without the side: where the upper bone starts, the hinge, and where the lower bone ends."""
+    hangs: tuple[float, float, float]
+    """Where it points, seen from the carrier, if it is never seen."""
+    one_way: bool
+    """Whether it hardly turns about itself, so that its hinge's axis is known to some ninety degrees without it."""
+
+
+_LIMBS = (
+    _Limb("spine3", ("shoulder", "elbow", "wrist"), (0.0, -1.0, 0.0), False),
+    _Limb("pelvis", ("hip", "knee", "ankle"), (0.0, -1.0, 0.0), True),
+)
+
+
+@dataclass(frozen=True)
+class BodyPoints:
+    """What a source tells of a body, in a world whose y axis is up."""
+
+    points: Mapping[str, Tensor]
+    """Points (T, 3) [m] by the names of human keypoints, also `nose`, `left_ear`, `right_ear`, `head_top`; NaN where
+    they are not known. Shoulders and hips are needed."""
+    turns: Mapping[str, Tensor] = field(default_factory=dict)
+    """Rotations (T, 3, 3) in the world of pelvis, spine3 (the chest), head, wrists (the hands) or ankles (the feet),
+    relative to our rest pose, where the source has them; else points tell."""
+    hinges: Mapping[str, Tensor] = field(default_factory=dict)
+    """Where shoulders and hips have the axes (T, 3) of elbow and knee by their bones' own turn, in the world, in the
+    sense of `mrhubo.body.anatomy.hinge_axis`."""
+    confidence: Mapping[str, Tensor] = field(default_factory=dict)
+    """How sure the source is of points (T,), 0..1."""
+
+
+class _Build:
+    """Rotations in the world of each joint, and how sure each is, while they are made."""
+
+    def __init__(self, body: BodyPoints) -> None:
+        self.body, self.notes = body, []
+        self.points = {name: point_T3.double() for name, point_T3 in body.points.items()}
+        self.frames = len(next(iter(self.points.values())))
+        self.world: dict[str, Tensor] = {}
+        self.sure: dict[str, Tensor] = {}
+        rest_K3 = Skeleton().rest_K3.double()
+        self.rest = dict(zip(JOINT_NAMES, rest_K3, strict=False))
+
+    def known(self, *names: str) -> Tensor:
+        """In which frames (T,) all of these points are known."""
+        missing = [name for name in names if name not in self.points]
+        if missing:
+            return torch.zeros(self.frames, dtype=torch.bool)
+        return torch.stack([torch.isfinite(self.points[name]).all(-1) for name in names]).all(0)
+
+    def surety(self, known_T: Tensor, *names: str) -> Tensor:
+        """How sure (T,) something is that hangs on these points: as the least sure of them; 0 where it is not known."""
+        told = [self.body.confidence[name] for name in names if name in self.body.confidence]
+        least_T = torch.stack([sure_T.double() for sure_T in told]).amin(0) if told else torch.ones(self.frames)
+        return torch.where(known_T, least_T.double(), 0.0)
+
+    def turn(self, joint: str) -> Tensor | None:
+        """Rotations (T, 3, 3) of a part, by the source or by its points, NaN where neither tells."""
+        given = self.body.turns.get(joint)
+        return turn_of(joint, self.points) if given is None else given.double()
+
+
+def motion_from_points(
+    body: BodyPoints, name: str, frame_rate: float, source: str, notes: tuple[str, ...] = (), what: str = ""
+) -> Motion:
+    """The motion of our skeleton whose limbs, hands, feet and head are turned as a body's, seen from chest and pelvis.
+
+    Args:
+        body: what is known of it.
+        name: of the motion.
+        frame_rate: frames per second.
+        source: what the file was taken for.
+        notes: what its reader has to say.
+        what: the file, for sentences; default: the name.
+
+    Raises:
+        UserError: neither points nor turns tell how the chest is turned, in any frame.
+    """
+    build = _Build(body)
+    _trunk(build, what or name)
+    for limb in _LIMBS:
+        for side in SIDES:
+            _limb(build, limb, side)
+    _head(build)
+    world = build.world
+    order = [world[joint] for joint in JOINT_NAMES]
+    local_TJ33 = torch.stack([order[PARENTS[i]].mT @ order[i] for i in range(1, len(order))], dim=1)
+    local_TJ33 = orthonormal(local_TJ33).float()
+    sure_TJ = torch.stack([build.sure.get(joint, build.sure["spine3"]) for joint in POSED_JOINT_NAMES], dim=1)
+    pelvis_T33 = world["pelvis"]
+    middle_T3 = (build.points["left_hip"] + build.points["right_hip"]) / 2 if body_has(body, "left_hip") else None
+    position_T3 = None
+    if middle_T3 is not None:
+        offset_3 = (build.rest["left_hip"] + build.rest["right_hip"]) / 2
+        position_T3 = fill_numbers(middle_T3, torch.isfinite(middle_T3).all(-1)) - pelvis_T33 @ offset_3
+    return Motion(
+        name=name,
+        local_TJ33=local_TJ33,
+        frame_rate=float(frame_rate),
+        description=name,
+        root_rotation_T33=orthonormal(pelvis_T33).float(),
+        root_position_T3=None if position_T3 is None or not bool(position_T3.isfinite().all()) else position_T3.float(),
+        source=source,
+        notes=(*notes, *build.notes),
+        confidence_TJ=None if bool((sure_TJ == 1).all()) else sure_TJ.float().clamp(0.0, 1.0),
+    )
+
+
+def body_has(body: BodyPoints, joint: str) -> bool:
+    """Whether the points of a joint on both sides are there."""
+    name = joint.partition("_")[2]
+    return all(f"{side}_{name}" in body.points for side in SIDES)
+
+
+def _trunk(build: _Build, what: str) -> None:
+    """Pelvis, spine and collars; a pelvis that nothing tells is turned as the chest."""
+    chest_T33, pelvis_T33 = build.turn("spine3"), build.turn("pelvis")
+    if chest_T33 is None or not bool(torch.isfinite(chest_T33).flatten(1).all(-1).any()):
+        raise UserError(
+            f"{what}: nothing tells how the chest is turned; both shoulders and both hips must be known in some frame"
+        )
+    sides = [f"{side}_{joint}" for joint in ("shoulder", "hip") for side in SIDES]
+    known_T = torch.isfinite(chest_T33).flatten(1).all(-1)
+    chest_T33 = fill_rotations(chest_T33, known_T)
+    build.sure["spine3"] = build.surety(known_T, *(() if "spine3" in build.body.turns else sides))
+    if not bool(known_T.all()):
+        build.notes.append(f"how the chest is turned is not known in {_count(~known_T)}: filled in, confidence 0")
+    pelvis_T33 = chest_T33 if pelvis_T33 is None else pelvis_T33
+    pelvis_known_T = torch.isfinite(pelvis_T33).flatten(1).all(-1)
+    relative_T33 = fill_rotations(torch.nan_to_num(chest_T33.mT @ pelvis_T33), pelvis_known_T)
+    pelvis_T33 = chest_T33 @ relative_T33
+    back_T3 = matrix_to_axis_angle(pelvis_T33.mT @ chest_T33)
+    build.world["pelvis"], build.world["spine3"] = pelvis_T33, chest_T33
+    for place, joint in enumerate(("spine1", "spine2"), start=1):
+        build.world[joint] = pelvis_T33 @ axis_angle_to_matrix(back_T3 * place / 3)
+    for side in SIDES:
+        build.world[f"{side}_collar"] = chest_T33
+
+
+def _limb(build: _Build, limb: _Limb, side: str) -> None:
+    """An arm or a leg with its hand or foot; all is seen from the part that carries it until the end."""
+    upper, hinge, tip = (f"{side}_{name}" for name in limb.joints)
+    carrier_T33 = build.world[limb.carrier]
+    directions, known = [], []
+    for start, end in ((upper, hinge), (hinge, tip)):
+        known_T = build.known(start, end)
+        if bool(known_T.any()):
+            seen_T3 = (carrier_T33.mT @ (build.points[end] - build.points[start])[..., None])[..., 0]
+            known_T &= seen_T3.norm(dim=-1) > 1e-6
+        if bool(known_T.any()):
+            directions.append(fill_directions(normalize(torch.nan_to_num(seen_T3), dim=-1), known_T))
+        else:  # hangs, or goes on in the line of the upper bone
+            hangs_3 = torch.tensor(limb.hangs, dtype=torch.float64)
+            directions.append(directions[0] if directions else hangs_3.expand(build.frames, 3))
+        known.append(known_T)
+        build.sure[start] = build.surety(known_T, start, end)
+        if not bool(known_T.all()):
+            what = "is never seen" if not bool(known_T.any()) else f"is not seen in {_count(~known_T)}"
+            build.notes.append(f"{_words(start)} to {_words(end)} {what}: filled in, confidence 0")
+    upper_T3, lower_T3 = directions
+    own_T3 = build.body.hinges.get(upper)
+    own_T3 = None if own_T3 is None else (carrier_T33.mT @ own_T3.double()[..., None])[..., 0]
+    bone_3 = normalize(build.rest[hinge] - build.rest[upper], dim=0)
+    rest_axis_3 = torch.tensor(hinge_axis(hinge), dtype=torch.float64)
+    usual_T3 = (shortest_turn(bone_3.expand_as(upper_T3), upper_T3) @ rest_axis_3[:, None])[..., 0]
+    axis_T3 = _hinge(upper_T3, lower_T3, own_T3, usual_T3, known[0] & known[1], limb.one_way)
+    at_rest_33 = frame_of(bone_3[None], rest_axis_3[None])[0]
+    upper_T33 = frame_of(upper_T3, axis_T3) @ at_rest_33.T
+    lower_bone_3 = normalize(build.rest[tip] - build.rest[hinge], dim=0)
+    lower_T33 = shortest_turn((upper_T33 @ lower_bone_3[:, None])[..., 0], lower_T3) @ upper_T33
+    build.world[upper], build.world[hinge] = carrier_T33 @ upper_T33, carrier_T33 @ lower_T33
+    _tip(build, tip, hinge)
+    if limb.carrier == "pelvis":
+        build.world[f"{side}_foot"], build.sure[f"{side}_foot"] = build.world[tip], build.sure[tip]
+
+
+def _tip(build: _Build, tip: str, carrier: str) -> None:
+    """A hand or foot; in the line of its limb where nothing tells more."""
+    turn_T33 = build.turn(tip)
+    lower_T33 = build.world[carrier]
+    if turn_T33 is None:
+        build.world[tip], build.sure[tip] = lower_T33, build.sure[carrier]
+        return
+    known_T = torch.isfinite(turn_T33).flatten(1).all(-1)
+    local_T33 = fill_rotations(torch.nan_to_num(lower_T33.mT @ turn_T33), known_T)
+    build.world[tip] = lower_T33 @ local_T33
+    build.sure[tip] = torch.where(known_T, build.surety(known_T, tip), 0.0)
+
+
+def _head(build: _Build) -> None:
+    """Head and neck, which share its turn; as the chest where nothing tells."""
+    chest_T33, head_T33 = build.world["spine3"], build.turn("head")
+    if head_T33 is None:
+        head_T33 = chest_T33
+        build.sure["neck"] = build.sure["head"] = torch.zeros(build.frames, dtype=torch.float64)
+        build.notes.append("nothing tells how the head is turned: it stays as the chest, confidence 0")
+    else:
+        known_T = torch.isfinite(head_T33).flatten(1).all(-1)
+        head_T33 = chest_T33 @ fill_rotations(torch.nan_to_num(chest_T33.mT @ head_T33), known_T)
+        sure_T = build.surety(known_T, "nose", "left_ear", "right_ear")
+        build.sure["neck"] = build.sure["head"] = sure_T
+        if not bool(known_T.all()):
+            build.notes.append(f"how the head is turned is not known in {_count(~known_T)}: filled in, confidence 0")
+    half_T3 = matrix_to_axis_angle(chest_T33.mT @ head_T33) / 2
+    build.world["neck"], build.world["head"] = chest_T33 @ axis_angle_to_matrix(half_T3), head_T33
+
+
+def _hinge(
+    upper_T3: Tensor, lower_T3: Tensor, own_T3: Tensor | None, usual_T3: Tensor, known_T: Tensor, one_way: bool
+) -> Tensor:
+    """The axis (T, 3) of a limb's hinge: by the plane of its bones where it is bent, else by the upper bone's own turn,
+    else as when it was bent last.
+    """
+    cross_T3 = torch.linalg.cross(upper_T3, lower_T3)
+    bend_T = torch.atan2(cross_T3.norm(dim=-1), (upper_T3 * lower_T3).sum(-1))
+    plane_T3 = normalize(cross_T3, dim=-1)
+    told_T = known_T & (bend_T > BENT)
+    reference_T3 = usual_T3 if own_T3 is None else own_T3
+    backward_T = one_way & (bend_T < _BACKWARD) & ((plane_T3 * reference_T3).sum(-1) < 0)
+    told_T &= ~backward_T
+    if own_T3 is None:
+        own_T3 = _carried(plane_T3, upper_T3, told_T) if bool(told_T.any()) else usual_T3
+    axis_T3 = torch.where(backward_T[:, None], own_T3, bend_axis(upper_T3, lower_T3, own_T3)[0])
+    across_T3 = axis_T3 - upper_T3 * (upper_T3 * axis_T3).sum(-1, keepdim=True)
+    lost_T = across_T3.norm(dim=-1) < 1e-3
+    return torch.where(lost_T[:, None], usual_T3, normalize(across_T3, dim=-1))
+
+
+def _carried(axis_T3: Tensor, upper_T3: Tensor, told_T: Tensor) -> Tensor:
+    """Axes (T, 3) at right angles to the upper bones (T, 3), from the last frame that tells one and the next: each is
+    carried along by the shortest turn of the bone, and between the two the axis turns evenly about it.
+    """
+    near = Neighbours.of(told_T)
+    before_T3, after_T3 = (
+        (shortest_turn(upper_T3[place_T], upper_T3) @ axis_T3[place_T][..., None])[..., 0]
+        for place_T in (near.before_T, near.after_T)
+    )
+    sine_T = (upper_T3 * torch.linalg.cross(before_T3, after_T3)).sum(-1)
+    angle_T = torch.atan2(sine_T, (before_T3 * after_T3).sum(-1)) * near.share_T
+    return (axis_angle_to_matrix(upper_T3 * angle_T[:, None]) @ before_T3[..., None])[..., 0]
+
+
+def _count(missing_T: Tensor) -> str:
+    return f"{int(missing_T.sum())} of {len(missing_T)} frames"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

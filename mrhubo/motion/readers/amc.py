@@ -1,0 +1,75 @@
+"""Human motions from Acclaim's files: an .amc file with the motion, and the .asf file with its skeleton beside it.
+
+Legend: T frames.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from mrhubo.errors import UserError, listed
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.asf_file import read_amc, read_asf
+from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.tree.convert import Given, tree_motion
+from mrhubo.motion.readers.tree.given import read_map
+
+
+def is_amc(content: Content) -> bool:
+    """Whether a file looks like an .amc file: comments and colon words, a frame's number, then the root."""
+    return content.text is not None and bool(
+        re.match(r"\s*(?:[#:][^\n]*\n\s*)*\d+\s*\n\s*root(?:\s+-?[\d.]+(?:e[-+]?\d+)?){6}", content.text, re.IGNORECASE)
+    )
+
+
+def is_asf(content: Content) -> bool:
+    """Whether a file looks like an .asf file."""
+    return content.text is not None and bool(
+        re.search(r"^\s*:(?:version|units|bonedata)\b", content.text, re.MULTILINE)
+    )
+
+
+def read_asf_alone(path: Path, options: ReadOptions) -> Motion:
+    """Refuses a skeleton without a motion."""
+    raise UserError(f"{path}: is a skeleton (.asf) without a motion; name the .amc file, and leave this one beside it")
+
+
+def read_acclaim(path: Path, options: ReadOptions) -> Motion:
+    """Reads an .amc file and the .asf file beside it: that of the subject (`02.asf` for `02_01.amc`) or the only one.
+
+    The files cannot say their frame rate: it is asked for.
+
+    Raises:
+        UserError: a file is missing, damaged or too large, no human is found in them, or the frame rate is not known.
+    """
+    skeleton = read_asf(_find_skeleton(path))
+    if options.rate is None:
+        raise UserError(
+            f"{path}: an .amc file does not say how many frames a second it has; say so with --rate (most of "
+            "CMU's have 120)"
+        )
+    tree, notes = read_amc(path, skeleton)
+    given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
+    kind = f"ASF/AMC files, skeleton {skeleton.path.name}:"
+    return tree_motion(tree, motion_name(path), str(path), options.rate, kind, given, tuple(notes))
+
+
+def _find_skeleton(path: Path) -> Path:
+    try:
+        found = sorted(file for file in path.parent.iterdir() if file.suffix.lower() == ".asf")
+    except OSError as error:
+        raise UserError(f"{path.parent}: cannot be read: {error.strerror or error}") from error
+    for stem in (path.stem, path.stem.rpartition("_")[0], path.stem.partition("_")[0]):
+        named = [file for file in found if file.stem == stem]
+        if named:
+            return named[0]
+    if len(found) == 1:
+        return found[0]
+    beside = f"beside it are {listed(file.name for file in found)}" if found else "there is none beside it"
+    raise UserError(
+        f"{path}: needs the .asf file with its skeleton, {path.stem.partition('_')[0]}.asf; {beside}; put it into the "
+        "same folder"
+    )

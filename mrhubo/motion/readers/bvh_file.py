@@ -1,0 +1,226 @@
+"""The text of a BVH file, to a tree of joints and its numbers; what the joints stand for is not asked here.
+
+The format is described in J. Meredith and S. Maddock, "Motion Capture File Formats Explained" (University of Sheffield,
+2001): a hierarchy of offsets and channels, then a line of numbers a frame. Writers differ in capitals, spaces in names,
+commas for points, what stands after `Frames`, and in the number of frames that they promise.
+
+Legend: T frames, C channels. Angles in degrees; unit and axes are whatever the writer had.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from mrhubo.errors import UserError, shortened
+from mrhubo.files.regular import open_regular
+from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
+
+MAX_BYTES = 2 * 2**30
+"""Largest file."""
+MAX_FRAMES = 500_000
+"""Longest motion that is read: 70 minutes at 120 frames a second."""
+_MAX_HEADER = 4_000_000
+_MAX_JOINTS = 1_000
+_MAX_DEPTH = 100
+"""Joints on the way from a root to an end."""
+_MAX_CHANNELS = 12
+"""Of one joint."""
+_MAX_NUMBERS = 300_000_000
+_LARGEST = 1e7
+"""No angle and no coordinate is beyond this."""
+_BLOCK = 2**24
+_MOTION = re.compile(rb"^[ \t]*MOTION\b", re.MULTILINE | re.IGNORECASE)
+_FRAMES = re.compile(rb"\s*Frames\s*:?\s*(\d+)", re.IGNORECASE)
+_TIME = re.compile(rb"\s*Frame\s*Time\s*:?[ \t]*([^\s]*)", re.IGNORECASE)
+_TOKEN = re.compile(r"[{}]|[^\s{}]+")
+
+
+def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
+    """Reads a BVH file: the tree, the seconds between frames (None where the file does not say), and notes.
+
+    Raises:
+        UserError: it is missing, damaged, too large, or no BVH file; says where.
+    """
+    with open_regular(path, MAX_BYTES) as handle:
+        start = handle.read(_MAX_HEADER)
+        found = _MOTION.search(start)
+        if found is None:
+            raise UserError(
+                f"{path}: has no line 'MOTION' in its first {_MAX_HEADER // 10**6} MB, so it is no whole BVH file"
+            )
+        joints, columns = _read_hierarchy(path, start[: found.start()].decode("latin1"))
+        after = start[found.end() :]
+        frames, seconds, rest = _read_counts(path, after)
+        handle.seek(found.end() + rest)
+        value_TC, notes = _read_numbers(path, handle, columns, frames)
+    return JointTree(tuple(joints), value_TC), seconds, notes
+
+
+def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
+    """The joints, parents before children, and how many channels there are."""
+    lines = [line for line in text.replace("\r", "\n").split("\n") if line.strip()]
+    if not lines or lines[0].split()[0].upper().lstrip("\ufeff\xef\xbb\xbf") != "HIERARCHY":
+        raise UserError(f"{path}: does not begin with 'HIERARCHY', so it is no BVH file")
+    joints: list[Joint] = []
+    open_joints: list[int] = []
+    pending: tuple[str, bool] | None = None
+    columns = 0
+    for number, line in enumerate(lines[1:], start=2):
+        words = _TOKEN.findall(line)
+        keyword = words[0].upper()
+        while words:
+            keyword = words[0].upper()
+            if keyword == "{":
+                if pending is None:
+                    raise _broken(path, line, "a brace without a joint")
+                parent = open_joints[-1] if open_joints else -1
+                name = pending[0] or f"end of {joints[parent].name}" if parent >= 0 else pending[0]
+                joints.append(Joint(name, parent, (0.0, 0.0, 0.0)))
+                open_joints.append(len(joints) - 1)
+                pending, words = None, words[1:]
+                if len(joints) > _MAX_JOINTS or len(open_joints) > _MAX_DEPTH:
+                    raise UserError(
+                        f"{path}: has more than {_MAX_JOINTS} joints, or more than {_MAX_DEPTH} one inside the other"
+                    )
+            elif keyword == "}":
+                if not open_joints:
+                    raise _broken(path, line, "a closing brace too many")
+                open_joints.pop()
+                words = words[1:]
+            elif keyword in ("ROOT", "JOINT") or (keyword == "END" and len(words) > 1 and words[1].upper() == "SITE"):
+                if keyword != "ROOT" and not open_joints:
+                    raise _broken(path, line, "a joint outside a root")
+                end = words.index("{") if "{" in words else len(words)
+                name = "" if keyword == "END" else " ".join(words[1:end])
+                pending, words = (shortened(name), keyword == "END"), words[end:]
+            elif keyword == "OFFSET" and open_joints:
+                place, offset = open_joints[-1], [_number(path, line, word) for word in words[1:4]]
+                if len(offset) != 3:
+                    raise _broken(path, line, "an offset of three numbers is expected")
+                old = joints[place]
+                joints[place] = Joint(
+                    old.name, old.parent, (offset[0], offset[1], offset[2]), old.rotation, old.position
+                )
+                words = words[4:]
+            elif keyword == "CHANNELS" and open_joints:
+                place = open_joints[-1]
+                joints[place], taken = _read_channels(path, line, words, joints[place], columns)
+                columns, words = columns + taken, words[2 + taken :]
+            else:
+                raise _broken(path, line, f"'{shortened(words[0], 30)}' is not expected here (line {number})")
+    if open_joints:
+        raise UserError(
+            f"{path}: its hierarchy ends inside joint '{joints[open_joints[-1]].name}'; the file is damaged"
+        )
+    if not columns:
+        raise UserError(f"{path}: no joint has channels, so nothing moves")
+    return joints, columns
+
+
+def _read_channels(path: Path, line: str, words: list[str], joint: Joint, first: int) -> tuple[Joint, int]:
+    try:
+        count = int(words[1])
+        channels = words[2 : 2 + count]
+        if not 0 <= count <= _MAX_CHANNELS or len(channels) < count or joint.rotation or joint.position:
+            raise ValueError
+    except (ValueError, IndexError) as error:
+        raise _broken(path, line, "the number of channels does not agree with the channels") from error
+    rotation, position = [], []
+    for column, word in enumerate(channels, start=first):
+        axis, kind = word[:1].lower(), word[1:].lower()
+        if axis not in "xyz" or kind not in ("rotation", "position"):
+            raise _broken(path, line, f"channel '{shortened(word, 30)}' is not known; expected for instance Xrotation")
+        (rotation if kind == "rotation" else position).append((axis, column))
+    return Joint(joint.name, joint.parent, joint.offset_3, tuple(rotation), tuple(position)), count
+
+
+def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, int]:
+    """How many frames are promised, the seconds between them, and where the numbers begin."""
+    frames, seconds, place = None, None, 0
+    for pattern in (_FRAMES, _TIME):
+        found = pattern.match(after, place)
+        if found is None:
+            continue
+        place = found.end()
+        if pattern is _FRAMES:
+            frames = int(found[1][:12])
+        else:
+            try:
+                seconds = float(found[1].replace(b",", b"."))
+            except ValueError as error:
+                raise UserError(f"{path}: 'Frame Time' is '{shortened(found[1].decode('latin1'))}'") from error
+            seconds = seconds if math.isfinite(seconds) and seconds > 0 else None
+    return frames, seconds, place
+
+
+def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | None) -> tuple[np.ndarray, list[str]]:
+    """The frames (T, C), float32, block by block; those that the file does not hold whole are left out, with a note."""
+    blocks, total, left = [], 0, b""
+    while True:
+        block = handle.read(_BLOCK)
+        text = left + block
+        if block:  # a number may be cut at the end of a block
+            cut = max(text.rfind(b"\n"), text.rfind(b" "), text.rfind(b"\t")) + 1
+            text, left = text[:cut], text[cut:]
+        if b"," in text:
+            text = text.replace(b",", b".") if b"." not in text else text.replace(b",", b" ")
+        if text.strip():
+            blocks.append(_numbers(path, text, total, columns))
+            total += len(blocks[-1])
+        if total > _MAX_NUMBERS or total // columns > MAX_FRAMES:
+            raise UserError(
+                f"{path}: has more than {min(MAX_FRAMES, _MAX_NUMBERS // columns)} frames of {columns} numbers; cut it"
+            )
+        if not block:
+            break
+    frames, notes = total // columns, []
+    if frames == 0:
+        raise UserError(f"{path}: holds {total} numbers after 'MOTION', less than one frame of {columns}")
+    value_TC = np.concatenate(blocks)[: frames * columns].reshape(frames, columns)
+    if promised is not None and promised < frames:
+        notes.append(f"{frames - promised} frames beyond the {promised} that the file promises are left out")
+        value_TC = value_TC[: max(promised, 1)]
+    elif (promised is not None and promised > frames) or total % columns:
+        notes.append(f"the file promises {promised} frames and holds {frames}; it may have been cut off")
+    bad_TC = ~(np.abs(value_TC) <= _LARGEST)
+    if bad_TC.any():
+        frame, column = np.argwhere(bad_TC)[0].tolist()
+        raise UserError(f"{path}: frame {frame} holds {value_TC[frame, column]:g} in column {column}")
+    return value_TC, notes
+
+
+def _numbers(path: Path, text: bytes, before: int, columns: int) -> np.ndarray:
+    """The numbers of a block of text, float32."""
+    try:
+        with warnings.catch_warnings(action="error"):
+            return np.fromstring(text.decode("latin1"), dtype=np.float64, sep=" ").astype(np.float32)
+    except (ValueError, DeprecationWarning, RuntimeWarning) as error:
+        good = 0
+        for word in text.split():
+            try:
+                float(word)
+            except ValueError:
+                what = shortened(word.decode("latin1"), 30)
+                raise UserError(f"{path}: frame {(before + good) // columns} holds '{what}', no number") from error
+            good += 1
+        raise UserError(f"{path}: its numbers cannot be read") from error
+
+
+def _number(path: Path, line: str, word: str) -> float:
+    try:
+        value = float(word.replace(",", "."))
+    except ValueError as error:
+        raise _broken(path, line, f"'{shortened(word, 30)}' is no number") from error
+    if not abs(value) <= _LARGEST:
+        raise _broken(path, line, f"'{shortened(word, 30)}' is no length of a bone")
+    return value
+
+
+def _broken(path: Path, line: str, what: str) -> UserError:
+    return UserError(f"{path}: '{shortened(line.strip(), 60)}': {what}")

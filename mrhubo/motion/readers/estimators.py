@@ -1,0 +1,80 @@
+"""Motions that an estimator of human pose wrote, or whoever else keeps SMPL parameters in dictionaries of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.files.packed import is_packed
+from mrhubo.files.tree import Tree, read_tree
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.layouts import find_layout
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
+from mrhubo.motion.readers.rows import read_rows
+from mrhubo.motion.readers.sam3d import read_sam3d
+from mrhubo.motion.readers.soma import read_soma
+from mrhubo.motion.readers.tracks import choose, motion_of
+
+_MAX_PROTOCOL = 5
+_OLD_STARTS = (b"(dp", b"(lp", b"}q", b"]q", b"ccollections\n", b"cnumpy")
+"""How pickles of protocols 0 and 1 begin."""
+
+
+def is_container(content: Content) -> bool:
+    """Whether a file holds a dictionary or list of arrays, as programs in Python write them."""
+    start = content.start
+    is_pickle = start[:1] == b"\x80" and len(start) > 1 and start[1] <= _MAX_PROTOCOL
+    return (
+        is_pickle
+        or start.startswith(_OLD_STARTS)
+        or is_packed(start)
+        or content.is_torch
+        or bool(content.arrays)
+        or content.is_npy
+    )
+
+
+@np.errstate(all="ignore")  # what overflows is found out where it matters
+def read_estimated(path: Path, options: ReadOptions) -> Motion:
+    """Reads SMPL parameters from a pickle, a PyTorch file, an .npz or an .npy file, whose layout one of
+    `mrhubo.motion.readers.layouts` knows.
+
+    Raises:
+        NoMotion: nobody knows it; says what the file holds.
+        UserError: the file is damaged, hostile, too large, or what it tells is no motion.
+    """
+    tree = read_tree(path)
+
+    def rate(notes: list[str]) -> float:
+        return _rate(path, tree, options, notes)
+
+    found = read_rows(tree, options) or read_soma(tree, rate) or read_sam3d(tree, options, rate)
+    return found or _read_smpl(path, tree, options, rate)
+
+
+def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[list[str]], float]) -> Motion:
+    layout = find_layout(tree)
+    if layout is None:
+        content = Content.open(path)
+        what = content.described if content.arrays else f"{content.described} of {tree.described}"
+        raise NoMotion(
+            f"{path}: is {what}, in which there is no human motion that is known here; expected what WHAM, GVHMR, GEM,"
+            " 4D-Humans, TRAM, ROMP, PyMAF-X, SAM 3D Body or another writes, or SMPL's 'poses' (frames, 72), say;"
+            " docs/formats.md says how each is laid out"
+        )
+    notes = list(layout.notes)
+    track = choose(path, layout.tracks, options, notes)
+    arrays = track.read()
+    return motion_of(path, arrays, layout.kind, rate(notes), notes)
+
+
+def _rate(path: Path, tree: Tree, options: ReadOptions, notes: list[str]) -> float:
+    """Frames per second, as the file says on its first or second level."""
+    for node in (tree, *(child for _, child in list(tree.items())[:1] if child.is_mapping)):
+        if set(RATE_KEYS) & set(node.keys):
+            return find_rate(path, node.keys, lambda key, node=node: node[key].array(), options, notes)
+    return find_rate(path, (), lambda key: tree[key].array(), options, notes)

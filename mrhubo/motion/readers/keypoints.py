@@ -1,0 +1,214 @@
+"""Human motions from keypoints in space: points on a body, frame by frame, some of them perhaps missing.
+
+Legend: T frames, K keypoints, F some frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from mrhubo.body.skeleton import SIDES
+from mrhubo.errors import UserError, listed
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.positions import BodyPoints, motion_from_points
+from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.keypoint_files import Keypoints, holds_points, read_keypoints_file
+from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
+from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.rate import asked_rate
+from mrhubo.motion.readers.tree.world import nearest_unit, to_y_up
+
+_UNSURE = 0.3
+"""Points that their source is less sure of are taken as missing; detectors draw no point below it."""
+_SAMPLES = 256
+_NONSENSE = 0.6
+"""From this misfit on points are no body in the order of a set."""
+_CLEARLY = 2.0
+"""A set fits clearly better than another if its misfit is so many times smaller."""
+_MAX_FRAMES = 500_000
+_LARGEST = 1e7
+_PIXELS = 50.0
+"""Over more than this go a picture's coordinates, beside which numbers between 0 and 1 are scores."""
+_LEG_OVER_TRUNK = 1.7
+"""Thigh and shin over the way from hips to shoulders (Winter, fig. 4.1: 0.49 and 0.288 of the height)."""
+_LEFT_HANDED = 0.3
+"""How clearly nose and toes must point backward, of 1, to say that axes are left-handed."""
+_NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
+
+
+def is_keypoints(content: Content) -> bool:
+    """Whether a file has points of a body and no rotations; a single array of triples has, if the distances between
+    what would be the ends of bones hardly change.
+    """
+    if not holds_points(content):
+        return False
+    if not content.is_npy:
+        return True
+    try:
+        points = read_keypoints_file(content.path, ReadOptions())
+    except UserError:
+        return False
+    fits = fitting_sets(_some(points.point_TK3))
+    return bool(fits) and fits[0][0] < _NONSENSE
+
+
+def read_keypoints(path: Path, options: ReadOptions) -> Motion:
+    """Reads points (T, K, 3) of a body, with names or in the order of a set that is known.
+
+    The points' world may have any axis up, and any unit; both are found by the body.
+
+    Raises:
+        UserError: the file is damaged, it has no points of a body, which points they are or the rate is not known.
+    """
+    found = read_keypoints_file(path, options)
+    if len(found.point_TK3) > _MAX_FRAMES:
+        raise UserError(f"{path}: has {len(found.point_TK3):,} frames; at most {_MAX_FRAMES:,} are read")
+    if (np.abs(np.nan_to_num(found.point_TK3)) > _LARGEST).any():
+        raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
+    _refuse_flat(path, found)
+    places, what = _which(path, found)
+    missing = [name for name in _NEEDED if name not in places]
+    if missing:
+        raise UserError(f"{path}: has no point called {listed(missing)}; shoulders and hips are needed")
+    rate, notes = _rate(path, found, options), found.notes
+    point_TK3 = _without_missing(found)
+    points = {name: point_TK3[:, place] for name, place in places.items()}
+    points, world = _to_world(points, notes)
+    sure = {} if found.confidence_TK is None else {n: found.confidence_TK[:, place] for n, place in places.items()}
+    body = BodyPoints(
+        {name: torch.from_numpy(np.ascontiguousarray(point_T3)) for name, point_T3 in points.items()},
+        confidence={name: torch.from_numpy(np.ascontiguousarray(sure_T)) for name, sure_T in sure.items()},
+    )
+    source = f"keypoints {found.where}, {what}, {world}"
+    return motion_from_points(body, motion_name(path), rate, source, tuple(notes), str(path))
+
+
+def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
+    """Our points by place, and in words how that is known."""
+    count = found.point_TK3.shape[1]
+    if found.names is not None:
+        return by_names(found.names), "by their names"
+    fits = fitting_sets(_some(found.point_TK3))
+    if not fits or fits[0][0] >= _NONSENSE:
+        known = ", ".join(f"{name} ({len(points)})" for name, points in SETS.items())
+        raise UserError(
+            f"{path}: its {count} points have no names and fit no body in the order of a set that is known ({known}); "
+            "save an .npz with 'keypoints' and 'names', for instance 'left_shoulder'"
+        )
+    if len(fits) > 1 and fits[1][0] < _CLEARLY * fits[0][0]:
+        both = " and ".join(name for _, name in fits)
+        raise UserError(
+            f"{path}: its {count} points have no names, and both {both} fit; save an .npz with 'keypoints' and 'names'"
+        )
+    name = fits[0][1]
+    return {our: place for place, our in enumerate(SETS[name]) if our != "-"}, f"{count} points as {name} has them"
+
+
+def _refuse_flat(path: Path, found: Keypoints) -> None:
+    """Refuses points in a picture, whose third number is a score."""
+    known_X3 = found.point_TK3[np.isfinite(found.point_TK3).all(-1)]
+    spread_3, third = (np.ptp(known_X3, axis=0), known_X3[:, 2]) if len(known_X3) else (np.zeros(3), np.ones(1))
+    is_score = third.min() >= 0 and third.max() <= 1 and min(spread_3[:2]) > _PIXELS
+    if is_score or not spread_3[2] > 0:
+        raise UserError(
+            f"{path}: {found.where} has points in a picture (x, y and {'a score' if is_score else 'no depth'}); lift "
+            "them to three dimensions first, for instance with MMPose or MotionBERT"
+        )
+
+
+def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
+    if found.rate is None:
+        return asked_rate(path, options)
+    low, high = RATES
+    if not low <= found.rate <= high:
+        raise UserError(f"{path}: says {found.rate:g} frames per second; expected {low:g} to {high:g}")
+    if options.rate is not None and options.rate != found.rate:
+        found.notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {found.rate:g}")
+    return found.rate
+
+
+def _without_missing(found: Keypoints) -> np.ndarray:
+    """The points with NaN for those that are missing: of which the source is not sure, or which lie with others exactly
+    at the origin.
+    """
+    point_TK3 = np.where(np.isfinite(found.point_TK3).all(-1, keepdims=True), found.point_TK3, np.nan)
+    zero_TK = (point_TK3 == 0).all(-1)
+    missing_TK = zero_TK & (zero_TK.sum(1, keepdims=True) > 1)
+    if found.confidence_TK is not None:
+        missing_TK |= found.confidence_TK < _UNSURE
+    return np.where(missing_TK[..., None], np.nan, point_TK3)
+
+
+@np.errstate(all="ignore")
+def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str, np.ndarray], str]:
+    """The points with y up, right-handed, in metres."""
+    if _forward(points) < -_LEFT_HANDED:
+        points = {name: point_T3 * [-1.0, 1.0, 1.0] for name, point_T3 in points.items()}
+        notes.append("nose and feet point backward: the file's axes are taken to be left-handed, and x is mirrored")
+    low = next((joint for joint in ("ankle", "knee", "hip") if _seen(points, joint)), "hip")
+    up_T3 = np.sum([points[f"{side}_shoulder"] - points[f"{side}_{low}"] for side in SIDES], axis=0)
+    up_T3 = up_T3[np.isfinite(up_T3).all(-1)]
+    if not len(up_T3):
+        return points, "y up (a guess)"
+    mean_3 = (up_T3 / np.maximum(np.linalg.norm(up_T3, axis=-1, keepdims=True), 1e-12)).mean(0)
+    largest = int(np.abs(mean_3).argmax())
+    axis = ("" if mean_3[largest] > 0 else "-") + "xyz"[largest]
+    trunk_T = np.linalg.norm(sum(points[f"{s}_shoulder"] - points[f"{s}_hip"] for s in SIDES), axis=-1) / 2
+    leg = _LEG_OVER_TRUNK * _typical(trunk_T)
+    if _seen(points, "ankle") and _seen(points, "knee"):
+        legs = [_bone(points, f"{s}_hip", f"{s}_knee") + _bone(points, f"{s}_knee", f"{s}_ankle") for s in SIDES]
+        leg = float(np.mean(legs))
+    unit, name = nearest_unit(leg)
+    world_33 = to_y_up(axis)
+    return {n: unit * point_T3 @ world_33.T for n, point_T3 in points.items()}, f"{name}, {axis} up"
+
+
+def _forward(points: Mapping[str, np.ndarray]) -> float:
+    """How far nose and toes point forward, -1 to 1, for a body whose left is where the names say; 0 where nothing
+    tells.
+    """
+    left_T3 = points["left_hip"] - points["right_hip"]
+    up_T3 = sum(points[f"{side}_shoulder"] - points[f"{side}_hip"] for side in SIDES)
+    forward_T3 = _unit(np.cross(left_T3, up_T3))
+    ways = []
+    if "nose" in points:
+        for part in ("ear", "shoulder"):
+            if all(f"{side}_{part}" in points for side in SIDES):
+                way = _unit(points["nose"] - (points[f"left_{part}"] + points[f"right_{part}"]) / 2)
+                ways.append(_typical((way * forward_T3).sum(-1)))
+                break
+    for side in SIDES:
+        for toe in ("toe", "foot"):
+            if f"{side}_{toe}" in points and f"{side}_ankle" in points:
+                way = _unit(points[f"{side}_{toe}"] - points[f"{side}_ankle"])
+                ways.append(_typical((way * forward_T3).sum(-1)))
+                break
+    known = [way for way in ways if np.isfinite(way)]
+    return float(np.mean(known)) if known else 0.0
+
+
+def _seen(points: Mapping[str, np.ndarray], joint: str) -> bool:
+    return all(f"{s}_{joint}" in points and np.isfinite(points[f"{s}_{joint}"]).all(-1).any() for s in SIDES)
+
+
+def _bone(points: Mapping[str, np.ndarray], start: str, end: str) -> float:
+    return _typical(np.linalg.norm(points[end] - points[start], axis=-1))
+
+
+def _typical(value_T: np.ndarray) -> float:
+    """The median of those that are known; NaN where none is."""
+    known_X = value_T[np.isfinite(value_T)]
+    return float(np.median(known_X)) if len(known_X) else np.nan
+
+
+def _some(point_TK3: np.ndarray) -> np.ndarray:
+    return point_TK3[:: max(1, len(point_TK3) // _SAMPLES)]
+
+
+def _unit(vector_T3: np.ndarray) -> np.ndarray:
+    return vector_T3 / np.linalg.norm(vector_T3, axis=-1, keepdims=True)

@@ -1,0 +1,32 @@
+"""What the user knows of a motion file that the file does not tell."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from mrhubo.errors import UserError
+
+RATES = (1.0, 1000.0)
+"""Frames per second that are believed."""
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How a motion file is to be read, as far as the file itself does not say."""
+
+    rate: float | None = None
+    """Frames per second of a file that does not tell; where it does, the file is believed and a note says so."""
+    person: str | None = None
+    """Which of several people in a file: the name or number that the file has for them; default: whoever is seen
+    longest."""
+    bvh_map: Path | None = None
+    """A YAML file that says which joint of a BVH file is which."""
+
+    def __post_init__(self) -> None:
+        """Raises a UserError where the rate is none."""
+        if self.rate is not None:
+            low, high = RATES
+            if not (isinstance(self.rate, int | float) and math.isfinite(self.rate) and low <= self.rate <= high):
+                raise UserError(f"the rate is {self.rate} frames per second; expected {low:g} to {high:g}")

@@ -1,0 +1,58 @@
+"""How many frames a second a file has: what it says, or what the user does; it is never guessed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.motion.readers.options import RATES, ReadOptions
+
+RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "fps")
+"""What files call it; the first two are AMASS's."""
+
+
+def find_rate(
+    path: Path, keys: Collection[str], read: Callable[[str], np.ndarray], options: ReadOptions, notes: list[str]
+) -> float:
+    """Frames per second.
+
+    Args:
+        path: the file, for sentences.
+        keys: what it holds.
+        read: gives the array of a key.
+        options: may tell the rate of a file that does not.
+        notes: is told if the file and the options disagree.
+
+    Raises:
+        UserError: neither says, or what the file says is no rate.
+    """
+    key = next((key for key in RATE_KEYS if key in keys), None)
+    if key is None:
+        return asked_rate(path, options)
+    array = read(key)
+    if array.size != 1:
+        raise UserError(f"{path}: '{key}' has shape {array.shape}; expected one number")
+    rate = float(array.reshape(()))
+    low, high = RATES
+    if not low <= rate <= high:
+        raise UserError(f"{path}: '{key}' is {rate:g} frames per second; expected {low:g} to {high:g}")
+    if options.rate is not None and options.rate != rate:
+        notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {rate:g}")
+    return rate
+
+
+def asked_rate(path: Path, options: ReadOptions) -> float:
+    """The rate that the options tell.
+
+    Raises:
+        UserError: they do not.
+    """
+    if options.rate is None:
+        raise UserError(
+            f"{path}: holds no frame rate; say what it is, by --rate 30 on the command line or ReadOptions(rate=30)"
+            " in Python"
+        )
+    return float(options.rate)

@@ -1,0 +1,167 @@
+"""SMPL parameters in a dictionary of arrays, under the names that are in use.
+
+Where a name is from: `pose_world` WHAM, `smpl_poses` AIST++ (https://google.github.io/aistplusplus_dataset),
+`smpl_thetas` ROMP, `pred_rotmat` TRAM, `body_pose` the package smplx (https://github.com/vchoutas/smplx), `pose_body`
+AMASS, `poses_body` EMDB (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC),
+`fullpose` GRAB (https://github.com/otaheri/GRAB), `local_rot_mats` Kimodo, `poses` and `pose` everybody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from mrhubo.files.tree import Tree
+from mrhubo.motion.readers.rotations import Form, find_form
+from mrhubo.motion.readers.tracks import SmplArrays, Track
+
+T = TypeVar("T")
+_WITH_ROOT, _WITHOUT = (22, 24, 52, 55), (21, 23)
+"""How many joints a pose has: of body, SMPL, SMPL-H and SMPL-X; and of SMPL-X's or SMPL's body without the root."""
+_FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
+_ENTRIES = 50
+"""Of a dictionary that are looked at, to tell what the others are."""
+_DEEPEST = 3
+"""Dictionaries in dictionaries."""
+_WORLD, _CAMERA = ("global", "world"), ("incam", "cam")
+"""Parts of the names of parameters in the world, which are preferred, and of those that a camera sees."""
+
+
+@dataclass(frozen=True)
+class _Names:
+    """What the arrays of one way of writing are called."""
+
+    pose: str
+    root: tuple[str, ...] = ()
+    position: tuple[str, ...] = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig")
+    betas: tuple[str, ...] = ("betas", "beta", "shape")
+
+
+_NAMES = (
+    _Names("pose_world", position=("trans_world",)),
+    _Names("smpl_poses", position=("smpl_trans",)),
+    _Names("smpl_thetas", position=("cam_trans",), betas=("smpl_betas",)),
+    _Names("pred_rotmat", position=("pred_trans",), betas=("pred_shape",)),
+    _Names("body_pose", root=("global_orient", "root_pose", "root_orient")),
+    _Names("pose_body", root=("root_orient", "global_orient")),
+    _Names("poses_body", root=("poses_root",)),
+    _Names("pose_aa"),
+    _Names("fullpose"),
+    _Names("poses"),
+    _Names("pose"),
+    _Names("thetas"),
+    _Names("rotations"),
+    _Names("local_rot_mats", position=("root_positions",)),
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where SMPL parameters are."""
+
+    node: Tree
+    """The dictionary that has them."""
+    names: _Names
+    form: Form
+    people: int | None
+    """How many people there are, where the arrays have an axis for them before that of the frames."""
+
+    @property
+    def frames(self) -> int:
+        """How many frames there are."""
+        shape = self.node[self.names.pose].array().shape
+        return shape[0] if self.people is None else shape[1]
+
+    def read(self, person: int | None = None) -> SmplArrays:
+        """The arrays, of one of the people where there are several."""
+        node, names = self.node, self.names
+        pose = node[names.pose]
+        array = pose.array() if person is None else pose.array()[person]
+        root, position, betas, frames = (
+            self._array(keys, person) for keys in (names.root, names.position, names.betas, _FRAMES)
+        )
+        scaling = self._array(("smpl_scaling",), None) if names.pose == "smpl_poses" else None
+        if position is not None and scaling is not None and scaling.size == 1 and float(scaling.reshape(-1)[0]) > 0:
+            position = position / float(scaling.reshape(-1)[0])  # AIST++ has places in units of a scaled body
+        frames = frames if frames is not None and frames.size == len(array) else None
+        first = 1 if self.form.joints in _WITH_ROOT else 0
+        return SmplArrays(pose.where, array, self.form, first, root, position, betas, frames)
+
+    def tracks(self, person: str = "") -> list[Track]:
+        """One for each of the people; the name is for a single one."""
+        if self.people is None:
+            return [Track(person, self.frames, self.read)]
+        return [Track(str(n), self.frames, lambda n=n: self.read(n)) for n in range(self.people)]
+
+    def _array(self, keys: tuple[str, ...], person: int | None) -> np.ndarray | None:
+        found = self.node.get(*keys)
+        if found is None or found.shape() is None:
+            return None
+        array = found.array()
+        return array[person] if person is not None and len(array.shape) > 1 and len(array) == self.people else array
+
+
+def find_here(node: Tree) -> Found | None:
+    """SMPL parameters that are entries of a dictionary; None where there are none."""
+    if not node.is_mapping:
+        return None
+    keys = set(node.keys)
+    for names in _NAMES:
+        shape = node[names.pose].shape() if names.pose in keys else None
+        if shape is None or len(shape) < 2:
+            continue
+        counts = _WITH_ROOT + _WITHOUT
+        form = find_form(shape, counts)
+        if form is not None:
+            return Found(node, names, form, None)
+        form = find_form(shape[1:], counts) if len(shape) > 2 else None
+        if form is not None:
+            return Found(node, names, form, shape[0])
+    return None
+
+
+def find_inside(node: Tree) -> Found | None:
+    """The first SMPL parameters in a dictionary or in those in it; those in the world go before what a camera sees."""
+    return search(node, find_here)
+
+
+def search(node: Tree, find: Callable[[Tree], T | None], deepest: int = _DEEPEST) -> T | None:
+    """What is found first in a dictionary or in those in it; what is in the world goes before what a camera sees."""
+    found = find(node)
+    if found is not None or deepest == 0:
+        return found
+    entries = [(name, child) for name, child in _some(node) if child.is_mapping]
+    for _, child in sorted(entries, key=lambda entry: _rank(entry[0])):
+        found = search(child, find, deepest - 1)
+        if found is not None:
+            return found
+    return None
+
+
+def people_in(node: Tree) -> list[Found] | None:
+    """SMPL parameters of each entry of a dictionary of people; None where it is none."""
+    if not node.is_mapping or not len(node) or not all(find_here(child) for _, child in _some(node)):
+        return None
+    found = [(name, find_here(child)) for name, child in node.items()]
+    return [place for _, place in found if place is not None]
+
+
+def names_of(node: Tree) -> list[str]:
+    """The names of the people of such a dictionary."""
+    return [name for name, child in node.items() if find_here(child) is not None]
+
+
+def _some(node: Tree) -> Iterator[tuple[str, Tree]]:
+    for number, entry in enumerate(node.items()):
+        if number == _ENTRIES:
+            return
+        yield entry
+
+
+def _rank(name: str) -> int:
+    if any(part in name.lower() for part in _WORLD):
+        return 0
+    return 2 if any(part in name.lower() for part in _CAMERA) else 1

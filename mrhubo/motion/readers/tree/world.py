@@ -1,0 +1,81 @@
+"""Where up is in a file's world, and how long its unit is: from the body in it.
+
+Frame: the file's own world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mrhubo.motion.readers.tree.hierarchy import Pose
+from mrhubo.motion.readers.tree.reference import Reference
+
+UNITS: dict[str, float] = {
+    "metres": 1.0,
+    "centimetres": 0.01,
+    "millimetres": 0.001,
+    "inches": 0.0254,
+    "feet": 0.3048,
+    "decimetres": 0.1,
+    "CMU's units (0.0254 / 0.45 m)": 0.0254 / 0.45,
+}
+"""Units that occur, in metres."""
+_LEG = 0.84
+"""Thigh and shin of an adult [m]: 0.49 of 1.72 m (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
+_FACTOR = 1.7
+"""How far from it a leg may be in a unit that is believed: legs of 0.5 to 1.4 m."""
+_CLEAR = 0.7
+"""Share of a mean upward vector along one axis, from which on the axis is up."""
+_STEADY = 0.5
+"""Length of the mean of upward unit vectors from which on people stand more than they lie."""
+_AXES = {"x": 0, "y": 1, "z": 2}
+
+
+def up_axis(pose: Pose, place: Mapping[str, int], reference: Reference | None, given: str | None) -> tuple[str, str]:
+    """Which axis is up, for instance `z` or `-y`, and in words how that is known."""
+    if given is not None:
+        return given, "as the map says"
+    up_F3 = sum(
+        pose.point[place[f"{side}_shoulder"]] - pose.point[place[f"{side}_ankle"]] for side in ("left", "right")
+    )
+    mean_3 = np.mean(up_F3 / np.maximum(np.linalg.norm(up_F3, axis=-1, keepdims=True), 1e-12), axis=0)
+    length = float(np.linalg.norm(mean_3))
+    if length < _STEADY or np.abs(mean_3).max() < _CLEAR * length:
+        if reference is None:
+            return "y", "a guess, as the body lies"
+        mean_3 = reference.axes_33[:, 1]
+    axis = int(np.argmax(np.abs(mean_3)))
+    return ("" if mean_3[axis] > 0 else "-") + "xyz"[axis], "by how the body stands"
+
+
+def to_y_up(axis: str) -> np.ndarray:
+    """The turn (3, 3) that makes an axis, for instance `z` or `-y`, the y axis; by a quarter or half turn."""
+    unit = np.zeros(3)
+    unit[_AXES[axis[-1]]] = -1.0 if axis.startswith("-") else 1.0
+    if axis == "y":
+        return np.eye(3)
+    across = np.array([1.0, 0.0, 0.0]) if axis == "-y" else np.cross(unit, [0.0, 1.0, 0.0])
+    return np.round(Rotation.from_rotvec(across * (np.pi if axis == "-y" else np.pi / 2)).as_matrix())
+
+
+def unit_of(pose: Pose, place: Mapping[str, int], given: float | None) -> tuple[float, str]:
+    """The file's unit [m], and its name or how it was found."""
+    if given is not None:
+        return given, f"units of {given:g} m, as the map says"
+    legs = []
+    for side in ("left", "right"):
+        hip, knee, ankle = (pose.point[place[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))
+        legs.append(np.median(np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)))
+    return nearest_unit(float(np.mean(legs)))
+
+
+def nearest_unit(leg: float) -> tuple[float, str]:
+    """The unit in which a leg (thigh and shin) of this length is most like an adult's: metres and name."""
+    leg = max(leg, 1e-9) if np.isfinite(leg) else 1e-9
+    name, unit = min(UNITS.items(), key=lambda entry: abs(np.log(leg * entry[1] / _LEG)))
+    if abs(np.log(leg * unit / _LEG)) <= np.log(_FACTOR):
+        return unit, name
+    return _LEG / leg, f"no unit that is known; legs are taken to be {_LEG:g} m long"

@@ -1,0 +1,93 @@
+"""`mrhubo retarget --retargeter FOLDER --motion FILE --out FILE`: human motion files to a robot's joint angles."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from mrhubo.config import CommandParser, number, run_command
+from mrhubo.robot_motion import FORMATS, read_joint_order
+from mrhubo.runtime.progress import Reporter
+
+DESCRIPTION = (
+    "Retargets files of human motion to a robot and writes its joint angles. What is in a file, and not its ending,"
+    " says how it is read. With a package its networks and some steps of optimisation answer; with a robot alone, the"
+    " reference retargeter: by optimisation, without training, and slower. docs/formats.md specifies all formats."
+)
+
+
+def build_parser() -> CommandParser[None]:
+    """The command's arguments."""
+    parser = CommandParser[None]("mrhubo retarget", DESCRIPTION, None)
+    who = parser.add_mutually_exclusive_group(required=True)
+    package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
+    who.add_argument("--retargeter", metavar="FOLDER", help=package)
+    robot = "a robot without a package: its YAML file, or the name of one that ships with mrhubo"
+    who.add_argument("--robot", metavar="ROBOT", help=robot)
+    parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help="motion files, and folders of them")
+    out = "file to write; a folder with several motions, and where it ends in / or has no ending"
+    parser.add_argument("--out", metavar="FILE", required=True, help=out)
+    formats = "; ".join(f"{name}: {row.meaning}" for name, row in FORMATS.items())
+    parser.add_argument("--format", metavar="FORMAT", help=f"default: by the ending of --out, else npz; {formats}")
+    order = "joints in the order of this file: a MuJoCo model, a URDF, or a text with a name a line"
+    parser.add_argument("--joint-order", metavar="FILE", help=order)
+    parser.add_argument("--from", metavar="SECONDS", type=number(0), help="begin there; default: at the beginning")
+    parser.add_argument("--to", metavar="SECONDS", type=number(0), help="end there; default: at the end")
+    parser.add_argument("--rate", metavar="HERTZ", type=number(0), help="frames per second of files that do not tell")
+    out_rate = "frames per second of the robot's motion; default: those of the human's"
+    parser.add_argument("--out-rate", metavar="HERTZ", type=number(0), help=out_rate)
+    parser.add_argument("--mirror", action="store_true", help="exchange left and right of the human")
+    person = "which of several people in a file, by the name or number that it has for them; default: seen longest"
+    parser.add_argument("--person", metavar="PERSON", help=person)
+    parser.add_argument("--bvh-map", metavar="FILE", help="YAML file that says which joint of a BVH file is which")
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """The command; 2 where some of the motions could not be retargeted."""
+    options = build_parser().parse_args(argv)
+    from mrhubo.errors import UserError
+    from mrhubo.motion import ReadOptions
+    from mrhubo.retargeting import Request, find_files, plan_places, retarget_files, table
+
+    files = find_files([Path(name) for name in options.motion])
+    places = plan_places(options.out, options.format, files)
+    bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
+    request = Request(
+        options=ReadOptions(rate=options.rate, person=options.person, bvh_map=bvh_map),
+        start=getattr(options, "from") or 0.0,
+        end=options.to,
+        rate=options.out_rate,
+        mirrored=options.mirror,
+        joint_order=None if options.joint_order is None else read_joint_order(Path(options.joint_order)),
+    )
+    answerer = _answerer(options.retargeter, options.robot)
+    print(answerer.described)
+    outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
+    if outcome.summaries:
+        print(f"\n{table(outcome.summaries)}")
+    if not outcome.failures:
+        return 0
+    sentences = list(outcome.failures.values())
+    if len(files) == 1:
+        raise UserError(sentences[0])
+    sys.stdout.flush()
+    for sentence in sentences:
+        print(f"error: {' '.join(sentence.split())}", file=sys.stderr)
+    names = ", ".join(map(str, outcome.failures))
+    print(f"error: {len(sentences)} of {len(files)} motions could not be retargeted: {names}", file=sys.stderr)
+    return 2
+
+
+def _answerer(package: str | None, robot: str | None):  # noqa: ANN202 (importing its type takes torch)
+    import mrhubo
+    from mrhubo.retargeting import of_package, of_reference
+
+    if package is not None:
+        return of_package(mrhubo.load(package))
+    return of_reference(mrhubo.Robot.from_config(str(robot)))
+
+
+if __name__ == "__main__":
+    run_command(main)

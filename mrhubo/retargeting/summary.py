@@ -1,0 +1,71 @@
+"""What is told of a robot motion that was written: length, nearness to the person, trust, self-collision.
+
+Legend: T frames, D directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+
+from mrhubo.robot_motion import RobotMotion
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Figures of one motion; NaN: not known."""
+
+    name: str
+    frames: int
+    frame_rate: float
+    limb_deg: float
+    """Mean angle [deg] between the robot's and the person's limbs."""
+    confidence: float
+    """Mean over frames."""
+    collision: float
+    """Share of frames in which the robot touches itself."""
+
+    @classmethod
+    def of(cls, motion: RobotMotion, limbs: Sequence[str]) -> Summary:
+        """The figures of a motion whose directions of these names are limbs."""
+        columns = [motion.direction_names.index(name) for name in limbs if name in motion.direction_names]
+        error_TD = motion.direction_error_deg
+        return cls(
+            motion.name,
+            motion.frames,
+            nan if motion.frame_rate is None else motion.frame_rate,
+            _mean(error_TD[:, columns]) if error_TD is not None and columns else nan,
+            _mean(motion.confidence),
+            _mean(motion.collision),
+        )
+
+
+def _mean(values: np.ndarray | None) -> float:
+    return nan if values is None or not values.size else float(values.mean(dtype=np.float64))
+
+
+_HEADS = {
+    "frames": ("frames", "{:,}"),
+    "frame_rate": ("per second", "{:g}"),
+    "limb_deg": ("limbs off [deg]", "{:.1f}"),
+    "confidence": ("confidence", "{:.2f}"),
+    "collision": ("touches itself", "{:.1%}"),
+}
+
+
+def table(summaries: Sequence[Summary]) -> str:
+    """A row a motion; what is known of none has no column."""
+    shown = {name: head for name, head in _HEADS.items() if any(_known(getattr(s, name)) for s in summaries)}
+    rows = [["motion", *(head for head, _ in shown.values())]]
+    for summary in summaries:
+        values = [(getattr(summary, name), form) for name, (_, form) in shown.items()]
+        rows.append([summary.name, *(form.format(value) if _known(value) else "-" for value, form in values)])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows)
+
+
+def _known(value: float) -> bool:
+    return value == value

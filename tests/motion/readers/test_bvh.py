@@ -1,0 +1,230 @@
+"""BVH files of many makers: where limbs point must not depend on how a maker writes."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from torch import Tensor
+
+import mrhubo
+from mrhubo import UserError
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.motion import Motion
+from mrhubo.motion.readers.options import ReadOptions
+from tests.motion.bvh_writer import NAMES, Style, names_of, write_bvh
+from tests.motion.damage import Step, accidents, damaged, read_or_refused
+
+ROOT = Path(__file__).resolve().parents[3]
+_SEEN_FROM = {"shoulder": "spine3", "elbow": "spine3", "hip": "pelvis", "knee": "pelvis"}
+_ENDS = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "ankle"}
+Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+def limb_directions(local_TJ33: Tensor) -> dict[str, Tensor]:
+    """Unit directions (T, 3) of upper arms, forearms, thighs and shins, seen from chest or pelvis."""
+    skeleton = Skeleton().double()
+    turn = skeleton.global_rotations(local_TJ33.double())
+    found = {}
+    for joint, end in _ENDS.items():
+        for side in SIDES:
+            rows = [KEYPOINT_NAMES.index(f"{side}_{name}") for name in (joint, end)]
+            bone_3 = torch.nn.functional.normalize(skeleton.rest_K3[rows[1]] - skeleton.rest_K3[rows[0]], dim=0)
+            view_T33 = turn[:, JOINT_NAMES.index(_SEEN_FROM[joint])]
+            found[f"{side}_{joint}"] = (view_T33.mT @ turn[:, rows[0]] @ bone_3[:, None])[..., 0]
+    return found
+
+
+def degrees(one_T3: Tensor, other_T3: Tensor) -> Tensor:
+    sine_T = torch.linalg.cross(one_T3, other_T3).norm(dim=-1)
+    return torch.rad2deg(torch.atan2(sine_T, (one_T3 * other_T3).sum(-1)))
+
+
+def limb_error(one: Tensor, other: Tensor) -> Tensor:
+    """Degrees (T, limbs) between the limbs of two motions."""
+    first, second = limb_directions(one), limb_directions(other)
+    return torch.stack([degrees(first[name], second[name]) for name in first], dim=-1)
+
+
+def turned(motion: Motion, joint: str) -> Tensor:
+    """A joint's rotation (T, 3, 3) seen from the chest."""
+    turn = Skeleton().double().global_rotations(motion.local_TJ33.double())
+    return turn[:, JOINT_NAMES.index("spine3")].mT @ turn[:, JOINT_NAMES.index(joint)]
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    """Thirty frames in which arms, legs and head move."""
+    clip = mrhubo.read_motion(ROOT / "data" / "motions" / "wave.npz")
+    rows = torch.arange(0, len(clip), 10)[:30]
+    generator = torch.Generator().manual_seed(0)
+    local = clip.local_TJ33[rows].clone()
+    for side in SIDES:  # legs that bend, so that knees tell where forward is
+        for joint, angle in (("hip", -0.5), ("knee", 0.9)):
+            turn = torch.rand(len(rows), generator=generator)[:, None] * torch.tensor([angle, 0.0, 0.0])
+            local[:, POSED_JOINT_NAMES.index(f"{side}_{joint}")] = mrhubo.rotation.axis_angle_to_matrix(turn)
+    assert clip.root_rotation_T33 is not None and clip.root_position_T3 is not None
+    return dataclasses.replace(
+        clip,
+        local_TJ33=local,
+        root_rotation_T33=clip.root_rotation_T33[rows],
+        root_position_T3=clip.root_position_T3[rows],
+    )
+
+
+def read(motion: Motion, style: Style, folder: Path, options: ReadOptions | None = None) -> Motion:
+    path = folder / "motion.bvh"
+    path.write_text(write_bvh(motion, style))
+    return mrhubo.read_motion(path, options)
+
+
+_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+styles = st.builds(
+    Style,
+    names=st.sampled_from(sorted(NAMES)),
+    order=st.one_of(
+        st.sampled_from(_ORDERS), st.fixed_dictionaries({j: st.sampled_from(_ORDERS) for j in JOINT_NAMES})
+    ),
+    unit=st.sampled_from([1.0, 0.01, 0.001, 0.0254, 0.0254 / 0.45]),
+    world=st.sampled_from([np.eye(3), Z_UP, np.diag([-1.0, -1, 1]), np.diag([-1.0, 1, -1])]),
+    axes=st.sampled_from(["world", "bone", "random"]),
+    collars=st.booleans(),
+    toes=st.booleans(),
+    extra_root=st.booleans(),
+    rolls=st.booleans(),
+    doubled=st.booleans(),
+    positions=st.booleans(),
+    t_pose_first=st.booleans(),
+    fingers=st.booleans(),
+    prop=st.booleans(),
+    seed=st.integers(0, 1000),
+)
+
+
+@given(style=styles)
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_limbs_point_as_in_the_file_whoever_wrote_it(motion: Motion, style: Style, tmp_path: Path) -> None:
+    found = read(motion, style, tmp_path)
+    assert len(found) == len(motion)
+    assert float(limb_error(found.local_TJ33, motion.local_TJ33).max()) < 0.1
+    assert found.root_position_T3 is not None and motion.root_position_T3 is not None
+    height_T = found.root_position_T3[:, 1]
+    torch.testing.assert_close(height_T, motion.root_position_T3[:, 1], atol=2e-3, rtol=0)
+
+
+def test_head_hands_and_elbows_are_turned_as_in_the_file(motion: Motion, tmp_path: Path) -> None:
+    found = read(motion, Style(fingers=False), tmp_path)
+    for joint in ("head", "left_wrist", "right_wrist"):
+        error = mrhubo.rotation.geodesic_distance(turned(found, joint), turned(motion, joint))
+        assert float(torch.rad2deg(error).max()) < 0.1, joint
+
+
+def test_toes_and_knees_are_believed_rather_than_names(motion: Motion, tmp_path: Path) -> None:
+    found = read(motion, Style(swapped_names=True), tmp_path)
+    assert float(limb_error(found.local_TJ33, motion.local_TJ33).max()) < 0.1
+    assert "toes and knees are believed" in " ".join(found.notes)
+
+
+def test_first_frame_that_jumps_is_left_out(motion: Motion, tmp_path: Path) -> None:
+    found = read(motion, Style(t_pose_first=True), tmp_path)
+    assert len(found) == len(motion) and "first frame" in found.notes[0]
+    assert not read(motion, Style(), tmp_path).notes
+
+
+def test_frame_rate(motion: Motion, tmp_path: Path) -> None:
+    odd = dataclasses.replace(motion, frame_rate=239.01)
+    assert read(odd, Style(), tmp_path).frame_rate == pytest.approx(239.01, rel=1e-6)
+    text = write_bvh(motion, Style()).replace("Frame Time: ", "Frame Time: 0 #")
+    path = tmp_path / "still.bvh"
+    path.write_text(text.split("#")[0] + "\n" + "\n".join(text.splitlines()[-30:]))
+    with pytest.raises(UserError, match="--rate"):
+        mrhubo.read_motion(path)
+    assert mrhubo.read_motion(path, ReadOptions(rate=50.0)).frame_rate == 50.0
+
+
+def test_map_names_joints(motion: Motion, tmp_path: Path) -> None:
+    style = Style(names="nameless", toes=False)
+    names = names_of(style)
+    given_map = tmp_path / "map.yaml"
+    given_map.write_text(
+        "up: y\nunit: 0.02\n"
+        + "".join(
+            f"{joint}: {names[other]}\n"  # left and right exchanged
+            for joint, other in (
+                (f"{side}_{name}", f"{opposite}_{name}")
+                for side, opposite in (("left", "right"), ("right", "left"))
+                for name in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+            )
+        )
+        + f"spine3: {names['spine3']}\npelvis: {names['pelvis']}\n"
+    )
+    found = read(motion, style, tmp_path, ReadOptions(bvh_map=given_map))
+    assert float(limb_error(found.local_TJ33, motion.local_TJ33).mean()) > 5
+    given_map.write_text(f"left_shouldr: {names['left_shoulder']}")
+    with pytest.raises(UserError, match="nearest: 'left_shoulder'"):
+        read(motion, style, tmp_path, ReadOptions(bvh_map=given_map))
+    given_map.write_text("left_shoulder: no_such_bone")
+    with pytest.raises(UserError, match="no_such_bone"):
+        read(motion, style, tmp_path, ReadOptions(bvh_map=given_map))
+
+
+@given(steps=accidents)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_damaged_files_are_read_or_refused_in_a_sentence(motion: Motion, steps: list[Step], tmp_path: Path) -> None:
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    short = dataclasses.replace(motion, local_TJ33=motion.local_TJ33[:3], root_rotation_T33=motion.root_rotation_T33[:3],
+                                root_position_T3=motion.root_position_T3[:3])  # fmt: skip
+    path = tmp_path / "damaged.bvh"
+    path.write_bytes(damaged(write_bvh(short, Style(positions=True)).encode(), steps))
+    read_or_refused(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("HIERARCHY\n", "MOTION"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\nMOTION\n", "ends inside joint 'a'"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Wrotation\n}\nMOTION\n", "Wrotation"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\n", "three numbers"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\nFrame Time: 0.1\nx\n", "'x'"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\nFrame Time: 0.1\nnan\n", "nan"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 0\nFrame Time: 0.1\n", "0 numbers"),
+        ("HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\nFrame Time: 0.1\n1\n", "no arms"),
+        ("HIERARCHY\n" + "JOINT a\n{\n" * 3, "MOTION"),
+        ("HIERARCHY\nROOT a\n{\n" + "JOINT a\n{\n" * 200 + "\nMOTION\n", "one inside the other"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said(text: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.bvh"
+    path.write_text(text)
+    with pytest.raises(UserError) as caught:
+        mrhubo.read_motion(path)
+    assert words in str(caught.value)
+
+
+def test_the_same_take_in_two_forms(external_dir: Path) -> None:
+    """CMU's 02_05, converted for MotionBuilder, and our own conversion at 24 frames per second."""
+    samples = external_dir / "cmu" / "formats"
+    if not samples.is_dir():
+        pytest.skip("data/external/cmu/formats is not here")
+    found = mrhubo.read_motion(samples / "cmu_motionbuilder_02_05.bvh")
+    other = mrhubo.read_motion(external_dir / "cmu" / "evaluation" / "02_05.npz")
+    keys = torch.arange(1, len(found) // 5)
+    error = limb_error(found.local_TJ33[5 * keys - 1], other.local_TJ33[keys - 1]).mean(dim=0)
+    arms = [name.endswith(("shoulder", "elbow")) for name in limb_directions(other.local_TJ33[:1])]
+    assert float(error[torch.tensor(arms)].max()) < 1.0 and float(error.max()) < 3.0
+    assert "CMU's units" in found.source and "first frame" in found.notes[0]
+    assert found.root_position_T3 is not None and 0.7 < float(found.root_position_T3[:, 1].mean()) < 1.1
+
+
+def test_a_tpose_that_is_not_quite_one(external_dir: Path) -> None:
+    path = external_dir / "cmu" / "formats" / "cmu_daz_94_07.bvh"
+    if not path.is_file():
+        pytest.skip("data/external/cmu/formats is not here")
+    found = mrhubo.read_motion(path)
+    assert len(found) == 400 and "centimetres" in found.source

@@ -1,0 +1,227 @@
+"""Files of estimators are read as they are written, of whoever is in them, and hostile or damaged ones are refused."""
+
+from __future__ import annotations
+
+import os
+import pickle
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from mrhubo.body.rest_directions import from_family
+from mrhubo.errors import UserError
+from mrhubo.motion import Motion, ReadOptions, read_folder, read_motion
+from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.linking import link
+from tests.files.test_safe_pickle import attacks
+from tests.motion.damage import damaged_by, read_or_refused
+from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, padded, phalp, pymaf, romp, wham
+
+RATE = ReadOptions(rate=30)
+FRAMES = 6
+
+
+def expected(pose: np.ndarray, family: str) -> torch.Tensor:
+    local = torch.from_numpy(matrices(pose[:, 1:]))
+    return from_family(local, family) if family else local
+
+
+def close(motion: Motion, pose: np.ndarray, family: str) -> bool:
+    return torch.allclose(motion.local_TJ33, expected(pose, family), atol=1e-5)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
+    writer, pose = WRITERS[name], made_up(FRAMES, camera=WRITERS[name].camera)
+    path = tmp_path / f"clip{writer.ending}"
+    writer.write(path, {1: pose})
+    motion = read_motion(path, RATE)
+    assert close(motion, pose, writer.family) and motion.family == writer.family
+    assert motion.source.startswith(writer.source) and motion.frame_rate == 30 and motion.name == "clip"
+    assert motion.confidence_TJ is None and motion.root_rotation_T33 is not None
+    upright = matrices(made_up(FRAMES)[:, 0])  # who is seen by a camera comes out upright, and turns the same way
+    if writer.camera:
+        upright = np.diag((1.0, -1.0, -1.0)) @ matrices(pose[:, 0])
+    np.testing.assert_allclose(motion.root_rotation_T33, upright, atol=1e-5)
+    assert (motion.root_position_T3 is None) == (writer.position is None)
+    if motion.root_position_T3 is not None:
+        assert float(motion.root_position_T3[-1, 0]) == pytest.approx(writer.position)
+    if name != "phc":
+        with pytest.raises(UserError, match="--rate"):
+            read_motion(path)
+
+
+@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many and name != "pymaf"])
+def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, name: str) -> None:
+    writer = WRITERS[name]
+    lengths = (FRAMES, FRAMES) if name == "slahmr" else (4, FRAMES)
+    people = {n: made_up(length, seed=n, camera=writer.camera) for n, length in enumerate(lengths)}
+    path = tmp_path / f"clip{writer.ending}"
+    writer.write(path, people)
+    taken, others = (0, 1) if name == "slahmr" else (1, 0)
+    names = [f"0-clip_{n}" if name == "phc" else str(n) for n in people]
+    motion = read_motion(path, RATE)
+    assert close(motion, people[taken], writer.family)
+    assert f"'{names[0]}' ({lengths[0]} frames)" in motion.notes[0] and f"'{names[1]}'" in motion.notes[0]
+    other = read_motion(path, ReadOptions(rate=30, person=names[others]))
+    assert close(other, people[others], writer.family) and not other.notes
+    with pytest.raises(
+        UserError, match=rf"no person 'Bob'; there are '{names[taken]}' \(6 frames\), '{names[others]}'"
+    ):
+        read_motion(path, ReadOptions(rate=30, person="Bob"))
+
+
+def test_frames_in_which_nobody_is_seen_are_filled_in_without_confidence(tmp_path: Path) -> None:
+    pose = np.zeros((4, 22, 3), np.float32)
+    pose[:, 6] = np.linspace(0, 0.9, 4)[:, None] * (0, 1, 0)
+    wham(tmp_path / "a.pkl", {0: pose}, {0: np.array([10, 11, 14, 16])})
+    motion = read_motion(tmp_path / "a.pkl", RATE)
+    assert len(motion) == 7 and motion.confidence_TJ is not None
+    assert motion.confidence_TJ[:, 0].tolist() == [1, 1, 0, 0, 1, 0, 1] and "3 of 7 frames" in motion.notes[0]
+    turn = Rotation.from_matrix(motion.local_TJ33[:, 5].double().numpy()).magnitude()
+    np.testing.assert_allclose(turn, np.interp(range(7), [0, 1, 4, 6], np.linspace(0, 0.9, 4)), atol=1e-4)
+    assert motion.root_position_T3 is not None
+    np.testing.assert_allclose(
+        motion.root_position_T3[:, 0], np.interp(range(7), [0, 1, 4, 6], [0, 0.1, 0.2, 0.3]), atol=1e-6
+    )
+
+
+def test_frames_that_are_out_of_order_or_twice_there_are_sorted(tmp_path: Path) -> None:
+    pose = made_up(4)
+    wham(tmp_path / "a.pkl", {0: pose}, {0: np.array([3, 1, 2, 1])})
+    motion = read_motion(tmp_path / "a.pkl", RATE)
+    assert close(motion, pose[[1, 2, 0]], "smpl") and motion.confidence_TJ is None
+
+
+@pytest.mark.parametrize("frames", [np.array([0, 1_999_999]), np.array([0, 2**62]), np.array([0, np.nan])])
+def test_numbers_of_frames_that_are_none(tmp_path: Path, frames: np.ndarray) -> None:
+    wham(tmp_path / "a.pkl", {0: made_up(2)}, {0: frames})
+    with pytest.raises(UserError, match="frames"):
+        read_motion(tmp_path / "a.pkl", RATE)
+
+
+def test_old_bodies_of_phalps_tracks_are_passed_over(tmp_path: Path) -> None:
+    """A track that is lost for a while repeats its last body, with a `tracked_time` above zero."""
+    people = {1: made_up(FRAMES, camera=True)}
+    phalp(tmp_path / "a.pkl", people, compress=3)
+    content = joblib.load(tmp_path / "a.pkl")
+    for t, frame in enumerate(content.values()):
+        if t in (2, 3):
+            frame["tracked_time"] = [t - 1]
+            frame["smpl"][0]["body_pose"] = matrices(np.ones((23, 3)))
+    joblib.dump(content, tmp_path / "a.pkl")
+    motion = read_motion(tmp_path / "a.pkl", RATE)
+    assert motion.confidence_TJ is not None and motion.confidence_TJ[:, 0].tolist() == [1, 1, 0, 0, 1, 1]
+
+
+@pytest.mark.parametrize("write", [pymaf, lambda path, people: romp(path, people, tracked=False)])
+def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
+    """They come in turns: in the first frame the second person first."""
+    people = {0: made_up(FRAMES, camera=True), 1: made_up(4, seed=1, camera=True)}
+    family = "smplx" if write is pymaf else "smpl"
+    write(tmp_path / "a", people)
+    motion = read_motion(tmp_path / "a", RATE)
+    assert close(motion, people[0], family) and "does not say who is who" in motion.notes[0]
+    assert "'1' (6 frames), '0' (4 frames)" in motion.notes[1]
+    assert close(read_motion(tmp_path / "a", ReadOptions(rate=30, person="0")), people[1], family)
+
+
+def test_who_comes_back_soon_is_the_same_and_later_another() -> None:
+    here, away, none = np.zeros((1, 3)), np.full((1, 3), 5.0), np.zeros((0, 3))
+    assert link([here, none, here + 0.5, away, here], 1.0) == [[0], [], [0], [1], [0]]
+    assert link([here, *[none] * 40, here], 1.0)[-1] == [1]
+    assert link([np.stack((here, away))[:, 0], np.stack((away, here))[:, 0]], 1.0) == [[0, 1], [1, 0]]
+    assert link([np.full((2, 3), np.nan), np.full((2, 3), np.nan)], 1.0) == [[0, 1], [2, 3]]
+    with pytest.raises(UserError, match="101 people"):
+        link([np.zeros((101, 3))], 1.0)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("which", range(8))
+def test_hostile_files_run_nothing(tmp_path: Path, name: str, which: int) -> None:
+    """What runs when it is unpickled, in the place of each pose."""
+    marker = tmp_path / "ran.npy"
+    attack = attacks(marker)[which]
+    keys = ("pose_world", "body_pose", "smpl_poses", "pose_aa", "poses_body", "smpl_thetas", "pred_rotmat", "pose")
+    content = {key: attack for key in keys}
+    path = tmp_path / f"clip{WRITERS[name].ending}"
+    if path.suffix == ".pt":
+        torch.save(content, path)
+    elif path.suffix == ".npz":
+        np.savez(path.open("wb"), results=content)  # type: ignore[arg-type]
+    elif path.suffix == ".npy":
+        np.save(path.open("wb"), content)  # type: ignore[arg-type]
+    else:
+        joblib.dump({1: content}, path)
+    with pytest.raises(UserError, match="clip"):
+        read_motion(path, RATE)
+    assert not marker.exists() and os.listdir(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (
+            {"weights": np.zeros(3), "bias": 1},
+            "is a Python pickle of a dictionary with bias, weights, in which there is no human motion",
+        ),
+        ([1, 2, 3], "is a Python pickle of a list of 3, in which"),
+        ({}, "in which there is no human motion"),
+        ({"pose": np.zeros((3, 144))}, "of a dictionary with pose"),
+        ({"pose_world": np.full((3, 72), np.nan)}, "'pose_world' is not finite in frame 0, number 3"),
+        ({"smpl_poses": np.full((60, 72), 5.0)}, r"'smpl_poses' is no axis-angle in radians \(degrees\?\)"),
+        ({"pred_rotmat": np.zeros((3, 24, 3, 3))}, "'pred_rotmat' is no rotation matrix in frame 0, joint 1"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, content: object, said: str) -> None:
+    (tmp_path / "a.pkl").write_bytes(pickle.dumps(content))
+    with pytest.raises(UserError, match=said) as caught:
+        read_motion(tmp_path / "a.pkl", RATE)
+    assert str(caught.value).startswith(str(tmp_path / "a.pkl"))
+
+
+@pytest.mark.parametrize("protocol", range(6))
+def test_pickles_of_any_age(tmp_path: Path, protocol: int) -> None:
+    pose = made_up(FRAMES)
+    (tmp_path / "a").write_bytes(pickle.dumps({"smpl_poses": padded(pose, 24)}, protocol))
+    assert close(read_motion(tmp_path / "a", RATE), pose, "smpl")
+
+
+def test_a_folder_passes_over_pickles_that_hold_no_motion(tmp_path: Path) -> None:
+    wham(tmp_path / "wham_output.pkl", {0: made_up(3)})
+    joblib.dump({0: {"bbox": np.zeros((3, 4))}}, tmp_path / "tracking_results.pth")
+    np.save(tmp_path / "camera.npy", np.zeros((3, 7)))
+    assert [motion.name for motion in read_folder(tmp_path, RATE)] == ["wham_output"]
+    (tmp_path / "wham_output.pkl").unlink()
+    with pytest.raises(NoMotion, match="camera"):
+        read_folder(tmp_path, RATE)
+
+
+FILES: dict[str, bytes] = {}
+
+
+def good_file(name: str, folder: Path) -> bytes:
+    if name not in FILES:
+        path = folder / "good"
+        WRITERS[name].write(path, {1: made_up(4, camera=WRITERS[name].camera)})
+        FILES[name] = path.read_bytes()
+    return FILES[name]
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@settings(max_examples=20)
+@given(data=st.data())
+def test_damaged_files_are_read_or_refused_by_name(
+    tmp_path_factory: pytest.TempPathFactory, name: str, data: st.DataObject
+) -> None:
+    folder = Path(os.fspath(tmp_path_factory.getbasetemp()))
+    path = folder / "damaged"
+    seed = data.draw(st.integers(0, 2**32))
+    path.write_bytes(damaged_by(seed, good_file(name, folder), good_file("wham", folder)))
+    read_or_refused(path)

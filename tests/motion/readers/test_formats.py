@@ -1,0 +1,75 @@
+"""Which reader takes a file, and what is said of one that nobody reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrhubo.errors import UserError
+from mrhubo.motion import ReadOptions, find_motions, read_folder, read_motion, write_motion
+
+
+def write(path: Path) -> Path:
+    write_motion(path, np.zeros((3, 63)), np.zeros((3, 3)), np.zeros((3, 3)), 30.0, "stands")
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a", "a.txt", "a.bvh"])
+def test_the_ending_does_not_matter(tmp_path: Path, name: str) -> None:
+    write(tmp_path / "made.npz").rename(tmp_path / name)
+    assert len(read_motion(tmp_path / name)) == 3
+    assert [motion.name for motion in read_folder(tmp_path)] == ["a"] and find_motions([tmp_path]) == tmp_path
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        (b"\x89PNG\r\n\x1a\n" + bytes(99), r"is a picture \(PNG\), and no human motion"),
+        (b"\xff\xd8\xff\xe0" + bytes(99), "is a picture"),
+        (bytes(4) + b"ftypisom" + bytes(99), "is a video"),
+        (b"# Notes\n\nwalks", "is text that begins with '# Notes'"),
+        ("Spaziergänge".encode("latin1"), "is text that begins with"),
+        (b"\x00\x01\x02\x03", "is of no kind that is known"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "pointer of Git LFS"),
+    ],
+)
+def test_what_nobody_reads_is_called_what_it_is(tmp_path: Path, start: bytes, said: str) -> None:
+    path = tmp_path / "a.npz"
+    path.write_bytes(start)
+    with pytest.raises(UserError, match=said) as caught:
+        read_motion(path)
+    assert str(caught.value).startswith(str(path)) and "expected one of: AMASS" in str(caught.value)
+
+
+def test_an_empty_file_is_no_motion(tmp_path: Path) -> None:
+    (tmp_path / "a.npz").touch()
+    with pytest.raises(UserError, match="is empty; was it copied"):
+        read_motion(tmp_path / "a.npz")
+
+
+def test_a_folder_passes_over_what_nobody_reads_but_not_what_is_damaged(tmp_path: Path) -> None:
+    write(tmp_path / "a.npz")
+    (tmp_path / "readme.md").write_text("# A walk")
+    (tmp_path / "a.png").write_bytes(b"\x89PNG")
+    assert [motion.name for motion in read_folder(tmp_path)] == ["a"]
+    (tmp_path / "b.npz").write_bytes(b"PK\x03\x04, and no more")
+    with pytest.raises(UserError, match=r"b\.npz"):
+        read_folder(tmp_path)
+
+
+def test_the_rate_is_asked_for_and_never_guessed(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, pose_body=np.zeros((3, 63)))
+    with pytest.raises(UserError, match="--rate"):
+        read_motion(path)
+    assert read_motion(path, ReadOptions(rate=25)).frame_rate == 25.0
+    motion = read_motion(write(path), ReadOptions(rate=25))
+    assert motion.frame_rate == 30.0 and "25" in motion.notes[0] and "30" in motion.notes[0]
+
+
+@pytest.mark.parametrize("rate", [0, -3.0, float("nan"), float("inf"), 1e9, "fast"])
+def test_a_rate_that_is_none_is_refused(rate) -> None:
+    with pytest.raises(UserError, match="frames per second"):
+        ReadOptions(rate=rate)

@@ -1,0 +1,207 @@
+"""Keypoints: named or in the order of a known set, in any world and unit, some of them missing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import HealthCheck, given, settings
+
+import mrhubo
+from mrhubo import UserError
+from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.motion.orientations import rest_points
+from mrhubo.motion.readers.keypoint_sets import SETS, our_name
+from mrhubo.motion.readers.options import ReadOptions
+from tests.motion.damage import Step, accidents, damaged
+
+RATE = ReadOptions(rate=30.0)
+FRAMES = 20
+
+
+@pytest.fixture(scope="module")
+def pose() -> torch.Tensor:
+    """Rotations (T, 21, 3, 3) of arms, legs and head that move, and a back that does not bend."""
+    generator = torch.Generator().manual_seed(1)
+    turn = torch.zeros(FRAMES, 21, 3)
+    wave = torch.linspace(0, 3, FRAMES)[:, None]
+    for name in ("shoulder", "hip"):
+        for side in SIDES:
+            axis = torch.randn(3, generator=generator) * 0.5
+            turn[:, POSED_JOINT_NAMES.index(f"{side}_{name}")] = torch.sin(wave + axis[:1]) * axis
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        bend = 0.8 + 0.5 * torch.sin(wave)
+        turn[:, POSED_JOINT_NAMES.index(f"{side}_elbow")] = bend * torch.tensor([0.0, sign, 0.0])
+        turn[:, POSED_JOINT_NAMES.index(f"{side}_knee")] = bend * torch.tensor([1.0, 0.0, 0.0])
+        turn[:, POSED_JOINT_NAMES.index(f"{side}_wrist")] = 0.3 * torch.cos(wave) * torch.tensor([1.0, 0.0, 1.0])
+    turn[:, POSED_JOINT_NAMES.index("head")] = 0.4 * torch.sin(wave) * torch.tensor([0.3, 1.0, 0.0])
+    return mrhubo.rotation.axis_angle_to_matrix(turn.double())
+
+
+@pytest.fixture(scope="module")
+def points(pose: torch.Tensor) -> dict[str, np.ndarray]:
+    """Points (T, 3) [m] by name, y up."""
+    skeleton = Skeleton().double()
+    point, turn = skeleton.keypoints_and_rotations(pose)
+    found = dict(zip(KEYPOINT_NAMES, point.unbind(1), strict=True))
+    rest, head = rest_points(), JOINT_NAMES.index("head")
+    for name in ("nose", "left_ear", "right_ear", "head_top"):
+        found[name] = found["head"] + (turn[:, head] @ (rest[name] - rest["head"]).T)[..., 0]
+    return {name: value.numpy() + [0.3, 1.0, -2.0] for name, value in found.items()}
+
+
+def array_of(points: dict[str, np.ndarray], names: tuple[str, ...]) -> np.ndarray:
+    noise = np.random.default_rng(0)
+    return np.stack([points[n] if n != "-" else noise.normal(size=(FRAMES, 3)) for n in names], axis=1)
+
+
+def world(local: torch.Tensor, joint: str) -> torch.Tensor:
+    return Skeleton().double().global_rotations(local.double())[:, JOINT_NAMES.index(joint)]
+
+
+def bone_error(found: mrhubo.Motion, pose: torch.Tensor) -> float:
+    """The largest angle [deg] between upper arms, forearms, thighs and shins."""
+    rest = rest_points()
+    worst = 0.0
+    for joint, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")):
+        for side in SIDES:
+            bone = rest[f"{side}_{end}"] - rest[f"{side}_{joint}"]
+            ways = [(world(x, f"{side}_{joint}") @ bone.T)[..., 0] for x in (found.local_TJ33, pose)]
+            sine = torch.linalg.cross(*ways).norm(dim=-1)
+            worst = max(worst, float(torch.rad2deg(torch.atan2(sine, (ways[0] * ways[1]).sum(-1))).max()))
+    return worst
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_sets_are_told_by_their_shape(
+    name: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    path = tmp_path / "points.npy"
+    np.save(path, array_of(points, SETS[name]))
+    found = mrhubo.read_motion(path, RATE)
+    assert f"as {name} has them" in found.source and found.frame_rate == 30.0
+    assert bone_error(found, pose) < 0.2  # a straight back leaves nothing open
+    if "left_ear" in SETS[name] or "head_top" in SETS[name]:
+        error = mrhubo.rotation.geodesic_distance(world(found.local_TJ33, "head"), world(pose, "head"))
+        assert float(torch.rad2deg(error).max()) < (0.5 if "left_ear" in SETS[name] else 2.0)
+    else:
+        assert found.confidence_TJ is not None and not found.confidence_TJ[:, POSED_JOINT_NAMES.index("head")].any()
+    if "left_index" in SETS[name]:
+        error = mrhubo.rotation.geodesic_distance(world(found.local_TJ33, "left_wrist"), world(pose, "left_wrist"))
+        assert float(torch.rad2deg(error).max()) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("axes", "unit", "words"),
+    [
+        (np.eye(3), 1.0, "metres, y up"),
+        (np.diag([1.0, -1, -1]), 0.001, "millimetres, -y up"),
+        (np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), 0.01, "centimetres, z up"),
+        (np.diag([-1.0, 1, 1]), 1.0, "metres, y up"),  # left-handed
+    ],
+)
+def test_any_world(
+    axes: np.ndarray, unit: float, words: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    path = tmp_path / "points.npz"
+    np.savez(path, keypoints=array_of(points, SETS["COCO"]) @ axes.T / unit, fps=25.0)
+    found = mrhubo.read_motion(path)
+    assert words in found.source and found.frame_rate == 25.0
+    assert bone_error(found, pose) < 0.2
+    assert ("left-handed" in " ".join(found.notes)) == (np.linalg.det(axes) < 0)
+    assert found.root_position_T3 is not None
+    if np.linalg.det(axes) > 0:
+        height = found.root_position_T3[:, 1] - found.root_position_T3[0, 1]
+        assert float(height.abs().max()) < 0.01
+
+
+def test_json_with_names(points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    names = [n for n in SETS["MediaPipe"] if n != "-"][::-1]
+    array = array_of(points, tuple(names)).tolist()
+    forms = {
+        "lists": {"fps": 30, "names": [n.upper() for n in names], "keypoints": array},
+        "dictionaries": {"fps": 30, "frames": [
+            {n: {"x": x, "y": y, "z": z, "visibility": 0.9} for n, (x, y, z) in zip(names, frame, strict=True)}
+            for frame in array
+        ]},
+        "mmpose": {"fps": 30, "meta_info": {"keypoint_id2name": {str(i): n for i, n in enumerate(names)}},
+                   "instance_info": [{"frame_id": i, "instances": [{"keypoints": frame, "keypoint_scores": [0.9] * len(names)}]}
+                                     for i, frame in enumerate(array)]},
+    }  # fmt: skip
+    for form, content in forms.items():
+        path = tmp_path / f"{form}.json"
+        path.write_text(json.dumps(content))
+        found = mrhubo.read_motion(path, None if form != "mmpose" else RATE)
+        assert bone_error(found, pose) < 0.2, form
+        assert "by their names" in found.source
+
+
+def test_missing_points_are_held_and_said(points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    array = array_of(points, SETS["COCO"])
+    sure = np.ones(array.shape[:2])
+    wrist = SETS["COCO"].index("left_wrist")
+    array[5:9, wrist] = np.nan
+    sure[12:, wrist] = 0.1
+    path = tmp_path / "points.npz"
+    np.savez(path, keypoints=array, confidence=sure, fps=30.0)
+    found = mrhubo.read_motion(path)
+    assert "left elbow to left wrist is not seen in 12 of 20 frames" in " ".join(found.notes)
+    assert found.confidence_TJ is not None
+    elbow_T = found.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")]
+    assert (elbow_T == 0).nonzero().flatten().tolist() == [5, 6, 7, 8, *range(12, 20)]
+    assert bool((found.confidence_TJ[:, POSED_JOINT_NAMES.index("right_elbow")] == 1).all())
+    turn = [world(found.local_TJ33, "spine3").mT @ world(found.local_TJ33, "left_elbow"),
+            world(pose, "spine3").mT @ world(pose, "left_elbow")]  # fmt: skip
+    way = [x[..., 0] for x in turn]
+    torch.testing.assert_close(way[0][4], way[1][4], atol=3e-3, rtol=0)
+    torch.testing.assert_close(way[0][19], way[0][11], atol=1e-5, rtol=0)  # stays as it was seen last
+    middle = torch.nn.functional.normalize((3 * way[0][4] + 2 * way[0][9]) / 5, dim=0)
+    torch.testing.assert_close(way[0][6], middle, atol=1e-5, rtol=0)
+
+
+def test_what_cannot_be_told_is_asked_for(points: dict[str, np.ndarray], tmp_path: Path) -> None:
+    path = tmp_path / "points.npy"
+    np.save(path, array_of(points, SETS["COCO"]))
+    with pytest.raises(UserError, match="--rate"):
+        mrhubo.read_motion(path)
+    path = tmp_path / "points.npz"
+    np.savez(path, keypoints=np.random.default_rng(0).normal(size=(FRAMES, 17, 3)))
+    with pytest.raises(UserError, match="'names'"):
+        mrhubo.read_motion(path, RATE)
+    np.savez(path, keypoints=array_of(points, SETS["COCO"])[:, :9], names=np.array(SETS["COCO"][:9]))
+    with pytest.raises(UserError, match="left_hip"):
+        mrhubo.read_motion(path, RATE)
+    flat = array_of(points, SETS["COCO"]) * [300.0, 300.0, 0.0] + [0, 0, 0.8]
+    np.savez(path, keypoints=flat)
+    with pytest.raises(UserError, match="three dimensions"):
+        mrhubo.read_motion(path, RATE)
+
+
+@pytest.mark.parametrize(
+    ("name", "ours"),
+    [("LShoulder", "left_shoulder"), ("RIGHT_FOOT_INDEX", "right_toe"), ("left shoulder", "left_shoulder"),
+     ("lsho", "left_shoulder"), ("RAnkle", "right_ankle"), ("spine1", "spine1"), ("Nose", "nose"), ("root", "pelvis"),
+     ("mouth_left", None), ("left_eye_inner", None), ("neck_base", None), ("R_Hip", "right_hip"), ("tail", None)],
+)  # fmt: skip
+def test_names(name: str, ours: str | None) -> None:
+    assert our_name(name) == ours
+
+
+@given(steps=accidents)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_damaged_files_are_read_or_refused_in_a_sentence(
+    points: dict[str, np.ndarray], steps: list[Step], tmp_path: Path
+) -> None:
+    array = array_of(points, SETS["COCO"])[:3].round(3)
+    path = tmp_path / "points.json"
+    path.write_text(json.dumps({"names": SETS["COCO"], "fps": 30, "keypoints": array.tolist()}))
+    path.write_bytes(damaged(path.read_bytes(), steps))
+    try:
+        found = mrhubo.read_motion(path, RATE)
+    except UserError as error:
+        assert "\n" not in str(error) and "points" in str(error)
+        return
+    assert bool(found.local_TJ33.isfinite().all())

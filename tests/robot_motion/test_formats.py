@@ -1,0 +1,175 @@
+"""Whatever is written comes back with the same numbers, in every format; what a format cannot hold is said."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from mrhubo.errors import UserError
+from mrhubo.robot_motion import (
+    FORMATS,
+    FollowingJoint,
+    JointOrder,
+    RobotMotion,
+    find_format,
+    read_robot_motion,
+    write_robot_motion,
+)
+from mrhubo.robot_motion.motion import PER_FRAME
+from tests.robot_motion.motions import assert_same, motions, plain
+
+WHOLE, TABLES, ANGLES = ("npz", "json", "parquet"), ("csv",), ("mujoco", "unitree", "yaml", "mcap")
+"""Formats that hold everything, every number a frame, and joint angles alone."""
+ROOT = ("root_position", "root_quaternion_wxyz")
+
+
+def need(name: str) -> None:
+    if name == "mcap":
+        pytest.importorskip("mcap_ros2", reason="the extra `ros` is not installed")
+
+
+def there_and_back(motion: RobotMotion, folder: Path, name: str) -> RobotMotion:
+    path = folder / f"motion{FORMATS[name].ending}"
+    write_robot_motion(motion, path, name)
+    return read_robot_motion(path, motion.joint_names, motion.frame_rate)
+
+
+@pytest.mark.parametrize("name", [*WHOLE, *TABLES, *ANGLES])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(motion=motions())
+def test_the_same_numbers_come_back(tmp_path: Path, name: str, motion: RobotMotion) -> None:
+    need(name)
+    if name in ("yaml", "mcap") and motion.frame_rate is None:
+        motion = dataclasses.replace(motion, frame_rate=30.0)
+    found = there_and_back(motion, tmp_path, name)
+    if name in WHOLE:
+        assert_same(found, motion)
+        for field in ("name", "source", "branch_names", "direction_names"):
+            assert getattr(found, field) == getattr(motion, field)
+        for field in ("name", "made_by", "checksum", "others"):
+            assert getattr(found.robot, field) == getattr(motion.robot, field)
+        for field in ("lower", "upper", "velocity"):
+            np.testing.assert_array_equal(getattr(found.robot, field), getattr(motion.robot, field))
+    else:
+        root = ROOT if motion.root_position is not None and name in ("mujoco", "unitree") else ()
+        assert_same(found, motion, PER_FRAME if name in TABLES else ("q", *root))
+    if motion.frame_rate is not None and (len(motion) > 1 or name in (*WHOLE, "mujoco", "unitree")):
+        exact = 1e-5 if name in ("yaml", "mcap") else 1e-14  # whole nanoseconds
+        assert found.frame_rate == pytest.approx(motion.frame_rate, rel=exact)
+
+
+@pytest.mark.parametrize("rate", [24.0, 29.97, 60.0, 120.0, 239.01])
+@pytest.mark.parametrize("name", ["csv", "yaml"])
+def test_a_rate_comes_back_from_times(tmp_path: Path, name: str, rate: float) -> None:
+    assert there_and_back(plain(50, rate), tmp_path, name).frame_rate == rate
+
+
+@pytest.mark.parametrize("name", [*WHOLE, "csv", "mujoco", "unitree"])
+def test_bytes_depend_on_the_motion_alone(tmp_path: Path, name: str) -> None:
+    first, second = (tmp_path / f"{number}{FORMATS[name].ending}" for number in (1, 2))
+    for path in (first, second):
+        write_robot_motion(plain(), path, name)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_several_motions_fit_into_an_npz_alone(tmp_path: Path) -> None:
+    batch = RobotMotion(np.zeros((2, 3, 1)), ("a",), 30.0)
+    assert_same(there_and_back(batch, tmp_path, "npz"), batch)
+    assert_same(there_and_back(RobotMotion([0.5], ("a",)), tmp_path, "npz"), RobotMotion([0.5], ("a",)))
+    assert there_and_back(RobotMotion([0.5], ("a",)), tmp_path, "csv").q.tolist() == [[0.5]]
+    for name in ("csv", "parquet", "mujoco", "unitree", "yaml"):
+        with pytest.raises(UserError, match=r"x: .*holds one motion, found joint angles of shape \(2, 3, 1\)"):
+            write_robot_motion(batch, tmp_path / "x", name)
+    assert not (tmp_path / "x").exists()
+
+
+def test_csv_is_a_table_that_people_read(tmp_path: Path) -> None:
+    motion = RobotMotion(
+        np.float32([[0.1, -1.5], [1 / 3, 1e-9]]), ("left, elbow", "head"), 4.0, collision=[True, False]
+    )
+    write_robot_motion(motion, tmp_path / "new" / "a.csv")
+    lines = (tmp_path / "new" / "a.csv").read_text().splitlines()
+    assert lines == ['time [s],"left, elbow [rad]",head [rad],collision', "0.0,0.1,-1.5,1", "0.25,0.33333334,1e-09,0"]
+
+
+def test_unitree_has_the_base_first_and_w_last(tmp_path: Path) -> None:
+    half = np.float32(np.sqrt(0.5))
+    motion = plain(1, root_position=[[1, 2, 3]], root_quaternion_wxyz=[[half, 0, 0, -half]])
+    notes = write_robot_motion(motion, tmp_path / "a.csv", "unitree")
+    numbers = [float(number) for number in (tmp_path / "a.csv").read_text().strip().split(",")]
+    assert numbers[:7] == pytest.approx([1, 2, 3, 0, 0, -half, half])
+    assert np.float32(numbers[7:]).tolist() == motion.q[0].tolist()
+    assert notes == ("such a file names neither joints nor its frame rate, which is 30: tell who reads it",)
+    with pytest.raises(UserError, match="no header, so its joints have to be named"):
+        read_robot_motion(tmp_path / "a.csv")
+    with pytest.raises(UserError, match="has 10 columns; expected 7 of the base and 1 joints"):
+        read_robot_motion(tmp_path / "a.csv", ["a"])
+
+
+def test_qpos_has_the_models_free_joint(tmp_path: Path) -> None:
+    order = JointOrder(("knee", "left_elbow"), "model.xml", "base", (0.0, 0.0, 0.8))
+    notes = write_robot_motion(motion := plain(), tmp_path / "a.npz", "mujoco", order)
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
+        assert file["qpos"].shape == (6, 9) and str(file["free_joint"]) == "base"
+        assert str(file["quaternion_order"]) == "wxyz" and file["joint_names"].tolist() == ["knee", "left_elbow"]
+        assert file["qpos"][0, :8].tolist() == pytest.approx([0, 0, 0.8, 1, 0, 0, 0, 0])
+        np.testing.assert_array_equal(file["qpos"][:, 8], motion.q[:, 1])
+    assert notes[0] == "1 joints that the motion does not turn are held at 0 rad: knee"
+    assert notes[-1] == "the motion tells nothing of the base, which stays where model.xml has it"
+
+
+def test_an_order_turns_what_follows_and_holds_what_is_held(tmp_path: Path) -> None:
+    motion = plain()
+    order = JointOrder(("finger", "waist", "left_elbow"), "order.txt")
+    notes = write_robot_motion(motion, tmp_path / "a.npz", joint_order=order)
+    found = read_robot_motion(tmp_path / "a.npz")
+    expected = np.stack([0.5 - 2 * motion.q[:, 1], np.full(6, 0.25), motion.q[:, 1]], axis=1)
+    np.testing.assert_allclose(found.q, expected, atol=1e-6)
+    assert found.robot.others == (FollowingJoint("knee"),) and found.robot.lower is None
+    assert notes == (
+        "1 joints that the motion does not turn are held at 0.25 rad: waist",
+        "joints that mimic others follow them: finger",
+        "joints that order.txt does not have are left out: left_shoulder, right_shoulder",
+    )
+    with pytest.raises(UserError, match=r"order.txt: joint 'waits' does not exist in the robot robo; nearest: 'waist'"):
+        write_robot_motion(motion, tmp_path / "b.npz", joint_order=JointOrder(("waits",), "order.txt"))
+    assert not (tmp_path / "b.npz").exists()
+
+
+def test_limits_are_those_of_the_order(tmp_path: Path) -> None:
+    motion = plain()
+    motion = dataclasses.replace(motion, robot=dataclasses.replace(motion.robot, lower=[-3.0, -2.0, -1.0]))
+    write_robot_motion(motion, tmp_path / "a.json", joint_order=JointOrder(motion.joint_names[::-1]))
+    found = read_robot_motion(tmp_path / "a.json")
+    assert found.robot.lower is not None and found.robot.lower.tolist() == [-1.0, -2.0, -3.0]
+    assert_same(found, dataclasses.replace(motion, q=motion.q[:, ::-1], joint_names=motion.joint_names[::-1]), ["q"])
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "found"),
+    [
+        ("a.npz", None, "npz"), ("a.CSV", None, "csv"), ("a.yml", None, "yaml"), ("a.mcap", None, "mcap"),
+        ("a.anything", "unitree", "unitree"), ("a.npz", "mujoco", "mujoco"),
+    ],
+)  # fmt: skip
+def test_the_ending_says_the_format_unless_one_is_asked_for(path: str, name: str | None, found: str) -> None:
+    assert find_format(Path(path), name) == found
+
+
+def test_formats_that_do_not_exist_are_told_what_there_is() -> None:
+    with pytest.raises(UserError, match=r"a\.txt: the name must end in \.npz, .*or a format be named: lerobot, mujoco"):
+        find_format(Path("a.txt"))
+    with pytest.raises(UserError, match="format 'mujocco' does not exist; nearest: 'mujoco'"):
+        find_format(Path("a.npz"), "mujocco")
+
+
+@pytest.mark.parametrize("name", ["yaml", "mcap", "lerobot"])
+def test_times_need_a_rate(tmp_path: Path, name: str) -> None:
+    need(name)
+    with pytest.raises(UserError, match="no frame rate|frames a second, the motion's is not known"):
+        write_robot_motion(plain(rate=None), tmp_path / "a", name)
+    assert not (tmp_path / "a").exists()

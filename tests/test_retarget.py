@@ -1,0 +1,88 @@
+"""The command `mrhubo retarget` as a user runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrhubo.errors import UserError
+from mrhubo.retarget import main
+from mrhubo.robot_motion import read_robot_motion
+from tests.chain import cut_motion, new_package
+
+
+@pytest.fixture(scope="module")
+def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return new_package(root / "conf" / "nao.yaml", tmp_path_factory.mktemp("packages") / "nao", "model.hidden=8")
+
+
+@pytest.fixture
+def wave(tmp_path: Path) -> Path:
+    return cut_motion("wave", tmp_path, (1, 2), every=6)
+
+
+def test_a_package_answers_a_file(
+    root: Path, package: Path, wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["--retargeter", str(package), "--motion", str(wave), "--out", str(tmp_path / "wave.json")]
+    assert main([*given, "--from", "0.2", "--to", "0.7", "--out-rate", "20", "--mirror"]) == 0
+    found = read_robot_motion(tmp_path / "wave.json")
+    assert found.name == "wave_mirrored" and found.frame_rate == 20.0 and len(found) == 11
+    assert found.robot.name == "nao" and found.robot.made_by == "package nao" and len(found.robot.checksum) == 16
+    assert found.robot.lower is not None and (found.q >= found.robot.lower).all()
+    assert "SMPL-family" in found.source and found.confidence is not None
+    output = capsys.readouterr().out
+    assert "package nao: robot 'nao', 8 joints" in output and f"written: {tmp_path}/wave.json" in output
+    assert "touches itself" in output.splitlines()[-2] and output.splitlines()[-1].startswith("wave_mirrored")
+    order = root / "data" / "robots" / "nao" / "nao.urdf"
+    assert main([*given[:-1], str(tmp_path / "q.csv"), "--format", "unitree", "--joint-order", str(order)]) == 0
+    output = capsys.readouterr().out
+    assert "joints that the motion does not turn are held" in output and "RHipYawPitch" in output
+    assert "names neither joints nor its frame rate, which is 10" in output
+
+
+def test_a_robot_without_a_package_is_answered_by_the_reference(
+    wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--robot", "nao", "--motion", str(wave), "--out", f"{tmp_path}/out/", "--to", "0.3"]) == 0
+    found = read_robot_motion(tmp_path / "out" / "wave.npz")
+    assert found.robot.made_by == "the optimiser of mrhubo" and found.confidence is None and len(found) == 4
+    assert "by optimisation and without any training" in capsys.readouterr().out
+
+
+def test_a_bad_file_among_several_is_told_at_the_end(
+    package: Path, wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "bad.npz"
+    bad.write_text("nothing")
+    given = ["--retargeter", str(package), "--quiet", "--out", f"{tmp_path}/out/"]
+    assert main([*given, "--motion", str(bad), str(wave)]) == 2
+    said = capsys.readouterr()
+    assert said.err.splitlines()[-1] == f"error: 1 of 2 motions could not be retargeted: {bad}"
+    assert len(said.err.splitlines()) == 2 and (tmp_path / "out" / "wave.npz").is_file()
+    with pytest.raises(UserError, match="bad.npz"):
+        main([*given, "--motion", str(bad)])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--out", "a.npz"], "--retargeter --robot is required|--motion FILE"),
+        (["--robot", "nao", "--retargeter", "x"], "does not go together with"),
+        (["wave.npz", "--robot", "nao", "--motion", "a", "--out", "b"], "'wave.npz' stands alone"),
+        (["a=b", "--robot", "nao", "--motion", "a", "--out", "b"], "'a=b' is not a flag"),
+        (["--to", "-1"], "--to must be a number of at least 0"),
+        (["--robot", "nao", "--motion", "a.npz", "--out", "a.csv", "--rate", "0"], "the rate is 0"),
+        (["--robot", "nao", "--motion", "a.npz", "--out", "a.csv", "--format", "cvs"], "format 'cvs' does not exist"),
+        (
+            ["--robot", "nao", "--motion", "a.npz", "--out", "a.csv", "--joint-order", "none.txt"],
+            "none.txt: there is no",
+        ),
+        (["--robot", "nobody", "--motion", "a.npz", "--out", "a.csv"], "config 'nobody' does not exist"),
+        (["--retargeter", "nobody", "--motion", "a.npz", "--out", "a.csv"], "nobody: is no package"),
+    ],
+)
+def test_mistakes_are_said_before_any_work(arguments: list[str], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        main(arguments)
