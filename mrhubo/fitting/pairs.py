@@ -21,7 +21,7 @@ def make_pairs(setup: PairSetup, report: Reporter, ranks: Ranks | None = None) -
     ranks = ranks or Ranks()
     make_places(setup)
     device = ranks.device or device_of(setup.config)
-    generator = PairGenerator(setup.body_map.to(device), setup.prior.to(device), setup.config.pairs)
+    generator = PairGenerator(setup.body_map.to(device), setup.prior.to(device), setup.config)
     made = generate_pairs(setup.config, generator, setup.store, report, ranks)
     setup.body_map.to("cpu")
     setup.prior.to("cpu")
