@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import DamagedFile
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.fitting.preparation import device_of, make_places
 from mrhubo.pairing import PairGenerator, PairingReport, PairSetup, generate_pairs
 from mrhubo.pairing.verify import PairSummary, summarise, verify

@@ -21,7 +21,8 @@ from torch import Tensor
 from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
-from mrhubo.files.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
+from mrhubo.files.arrays import DamagedFile
+from mrhubo.files.storage import read_some_tensors, read_tensors, write_tensors
 from mrhubo.pairing.settings import pairing_settings
 from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_pairs

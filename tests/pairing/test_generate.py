@@ -12,7 +12,7 @@ from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
-from mrhubo.files.storage import DamagedFile
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
 from mrhubo.pairing.settings import pairing_settings
 from mrhubo.reference import OptimizationRetargeter
