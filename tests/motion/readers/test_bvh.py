@@ -102,6 +102,7 @@ styles = st.builds(
     t_pose_first=st.booleans(),
     fingers=st.booleans(),
     prop=st.booleans(),
+    twists=st.booleans(),
     seed=st.integers(0, 1000),
 )
 
@@ -128,6 +129,18 @@ def test_toes_and_knees_are_believed_rather_than_names(motion: Motion, tmp_path:
     found = read(motion, Style(swapped_names=True), tmp_path)
     assert float(limb_error(found.local_TJ33, motion.local_TJ33).max()) < 0.1
     assert "toes and knees are believed" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("names", ["biped", "nameless"])
+def test_limbs_that_hang_on_neck_and_spine_without_moving_with_them(names: str, motion: Motion, tmp_path: Path) -> None:
+    local = motion.local_TJ33.clone()
+    wave = 0.4 * torch.sin(torch.arange(len(local)) / 3.0)[:, None]
+    for joint, axis in (("neck", [0.3, 1.0, 0.2]), ("spine1", [0.2, 0.5, 1.0])):
+        turn = mrhubo.rotation.axis_angle_to_matrix(wave * torch.tensor(axis))
+        local[:, POSED_JOINT_NAMES.index(joint)] = local[:, POSED_JOINT_NAMES.index(joint)] @ turn
+    moving = dataclasses.replace(motion, local_TJ33=local)
+    found = read(moving, Style(names=names, biped=True, positions=True), tmp_path)
+    assert float(limb_error(found.local_TJ33, moving.local_TJ33).max()) < 0.5
 
 
 def test_first_frame_that_jumps_is_left_out(motion: Motion, tmp_path: Path) -> None:
