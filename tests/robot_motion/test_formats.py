@@ -39,7 +39,7 @@ def there_and_back(motion: RobotMotion, folder: Path, name: str) -> RobotMotion:
 
 
 @pytest.mark.parametrize("name", [*WHOLE, *TABLES, *ANGLES])
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(motion=motions())
 def test_the_same_numbers_come_back(tmp_path: Path, name: str, motion: RobotMotion) -> None:
     need(name)
