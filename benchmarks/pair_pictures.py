@@ -30,13 +30,13 @@ def main(argv: list[str]) -> None:
     for robot in options["robots"].split(","):
         config = load_config(Path(f"conf/{robot}.yaml"), [*argv, "pairs.solver=fine", "trainer.accelerator=cpu"])
         setup = prepare_pairs(config)
-        first = PairGenerator(setup.body_map, setup.prior, config.pairs)
+        first = PairGenerator(setup.body_map, setup.prior, config)
         first.prepare(setup.store)
         found = {}
         for solver in SOLVERS:
-            settings = copy.deepcopy(config.pairs)
-            settings.solver, settings.shard_size = solver, int(options["poses"])
-            maker = PairGenerator(setup.body_map, setup.prior, settings)
+            own = copy.deepcopy(config)
+            own.pairs.solver, own.pairs.shard_size = solver, int(options["poses"])
+            maker = PairGenerator(setup.body_map, setup.prior, own)
             maker.amortiser = first.amortiser
             found[solver] = maker.shard("forward", 0)
         series = {

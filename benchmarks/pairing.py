@@ -47,7 +47,7 @@ def main(argv: list[str]) -> None:
     for robot in options["robots"].split(","):
         config = load_config(Path(f"conf/{robot}.yaml"), [*argv, "pairs.solver=fine", "trainer.accelerator=cpu"])
         setup = prepare_pairs(config)
-        maker = PairGenerator(setup.body_map, setup.prior, config.pairs)
+        maker = PairGenerator(setup.body_map, setup.prior, config)
         start = time.perf_counter()
         maker.prepare(setup.store)
         seconds = time.perf_counter() - start
@@ -219,7 +219,7 @@ def whole(setup: PairSetup, count: int) -> None:
             write_amortiser(setup, mine)
             watch = Watch()
 
-            maker = PairGenerator(mine.body_map, mine.prior, config.pairs)
+            maker = PairGenerator(mine.body_map, mine.prior, config)
             generate_pairs(config, maker, mine.store, watch)
             marks = [(done / mine.store.shard_size, seconds) for done, seconds in watch.marks]
             # Until every worker has made a shard, some are still starting.

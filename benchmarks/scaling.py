@@ -38,6 +38,7 @@ def main(argv: list[str]) -> None:
     cores, counts = available_cores(), sorted({int(n) for n in options["torchrun"].split(",") if n})
     with tempfile.TemporaryDirectory() as folder:
         first = Path(folder) / "amortiser"
+        argv = ["pairs.solver=fine", *argv]  # the slowest, which is worth several processes
         given = ["--config", options["config"], "--quiet", "trainer.accelerator=cpu", *argv]
         run(["-m", "mrhubo.pair", *given, "pairs.count=100", f"pairs.dir={first}"])
         ways = {

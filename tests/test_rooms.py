@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = (
-    "errors", "rotation", "frames", "files", "robot_motion", "config", "runtime", "search", "body", "robot", "motion", "reference",
+    "errors", "rotation", "frames", "files", "robot_motion", "fast", "config", "runtime", "search", "body", "robot", "motion", "reference",
     "pairing", "retargeter", "streaming", "retargeting", "evaluation", "view", "callbacks", "body.prior_training", "fitting", "baselines", "paper",
     "commands",
 )  # fmt: skip

@@ -58,8 +58,8 @@ def _table() -> tuple[Tensor, Tensor]:
     return torch.nn.functional.normalize(torch.tensor(axes), dim=-1), torch.deg2rad(torch.tensor(limits))
 
 
-_AXES_J33, _LIMITS_J32 = _table()
-_RIGHT = torch.tensor([SIDE_OF.get(name) == "right" for name in POSED_JOINT_NAMES])
+AXES_J33, LIMITS_J32 = _table()
+RIGHT = torch.tensor([SIDE_OF.get(name) == "right" for name in POSED_JOINT_NAMES])
 _HINGES = {f"{side}_{name}": axis for side in SIDES for name, axis in (("elbow", ELBOW_AXIS), ("knee", KNEE_AXIS))}
 
 
@@ -71,9 +71,9 @@ def hinge_axis(name: str) -> tuple[float, float, float]:
 
 def joint_angles(matrix_BJ33: Tensor) -> Tensor:
     """Twist and two swings (B, 21, 3) [rad] of local rotations (B, 21, 3, 3), as of left joints."""
-    axes = _AXES_J33.to(matrix_BJ33)
+    axes = AXES_J33.to(matrix_BJ33)
     mirrored = matrix_BJ33.new_tensor([1.0, -1.0, -1.0])
-    sign = torch.where(_RIGHT.to(matrix_BJ33.device)[:, None], mirrored, torch.ones_like(mirrored))
+    sign = torch.where(RIGHT.to(matrix_BJ33.device)[:, None], mirrored, torch.ones_like(mirrored))
     quaternion = rotation.matrix_to_quaternion(matrix_BJ33)
     quaternion = quaternion * torch.where(quaternion[..., 3:] < 0, -1.0, 1.0)
     vector, scalar = quaternion[..., :3] * sign, quaternion[..., 3]
@@ -94,7 +94,7 @@ def excess(matrix_BJ33: Tensor, margin: float = 0.0) -> Tensor:
 
     The ranges are `margin` [rad] narrower at both ends.
     """
-    angles, limits = joint_angles(matrix_BJ33), _LIMITS_J32.to(matrix_BJ33)
+    angles, limits = joint_angles(matrix_BJ33), LIMITS_J32.to(matrix_BJ33)
     return torch.relu(angles - limits[..., 1] + margin) + torch.relu(limits[..., 0] + margin - angles)
 
 

@@ -105,15 +105,18 @@ class PairsConfig:
     it."""
     seed: int = bounded(0, 0, 2**63 - 1)
     """Seed of the robot poses and of the amortised solver's training."""
-    solver: str = choice("fine", "fine", "fast", "paper")
-    """Latent inverse kinematics: `fine` = amortised start, then a quasi-Newton search of every pose; `fast` = amortised
-    only; `paper` = L-BFGS over 500 poses, up to 500 iterations, strong Wolfe."""
+    solver: str = choice("auto", "auto", "direct", "fine", "fast", "paper")
+    """How the human pose of a robot pose is found. `direct` = a person at rest whose arms, hands and head point where
+    the robot's do; nothing is searched for. The others are latent inverse kinematics: `fine` = amortised start, then a
+    quasi-Newton search of every pose; `fast` = amortised only; `paper` = L-BFGS over 500 poses, up to 500 iterations,
+    strong Wolfe. `auto` = `direct` where the rest of the pose counts nowhere (`align: true`, `phi: read`,
+    `model.input_frame: directions`, `robot.scale: auto`), else `fine`."""
     reverse_share: float = bounded(0.5, 0.0, 1.0)
     """Share of the pairs that are made the other way: a human pose drawn from the prior, retargeted to the robot by
     optimisation. They teach what to do with poses that the robot cannot reach. 0 = robot poses only (the paper)."""
     reverse_spread: float = bounded(1.1, 0.1, 3.0)
     """Standard deviation of the latents that those human poses are decoded from."""
-    random_share: float = bounded(0.5, 0.0, 1.0)
+    random_share: float = bounded(0.2, 0.0, 1.0)
     """Share of those human poses that are drawn joint by joint instead, every direction of a limb alike, and not from
     the prior. They teach what no motion of the prior's data shows."""
     shard_size: int = bounded(2_500, 100, 1_000_000)
@@ -166,15 +169,15 @@ class ModelConfig:
     same however a file shares turns out among joints; `local` = the joints' local rotations (the paper)."""
     bound_output: str = choice("tanh", "tanh", "clamp")
     """How outputs are kept inside the joint limits: `tanh` squashes, `clamp` learns unbounded and cuts off."""
-    detach_student: bool = True
-    """Stop the student's gradient at the predicted links, as the authors' code does."""
+    detach_student: bool = False
+    """Stop the student's gradient at the predicted links, as the authors' code does (the paper)."""
 
 
 @dataclass
 class TrainerConfig:
     """The training."""
 
-    max_steps: int = bounded(6_000, 1, 1_000_000_000)
+    max_steps: int = bounded(7_500, 1, 1_000_000_000)
     """Optimiser steps."""
     batch_size: int = bounded(512, 1, 10_000_000)
     """Pairs per step."""

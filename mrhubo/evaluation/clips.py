@@ -16,7 +16,8 @@ from torch import Tensor
 from mrhubo.body import Skeleton
 from mrhubo.config import Config, EvaluationConfig, fingerprint
 from mrhubo.errors import UserError, unknown_name
-from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.files.arrays import DamagedFile
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion, find_motions, read_folder, reshare
 from mrhubo.pairing import pose_settings
 from mrhubo.reference import OptimizationRetargeter

@@ -15,21 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import torch
-import xxhash
 from filelock import FileLock, Timeout
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
 from mrhubo.errors import UserError
+from mrhubo.files.arrays import CHECKSUM, DamagedFile, begin_checksum
 from mrhubo.files.atomic import atomic_path, checksum_file
 from mrhubo.files.regular import check_regular, read_regular
-
-_CHECKSUM = "xxh3"
-
-
-class DamagedFile(UserError):
-    """A file that is missing, truncated, altered, or not what its name says."""
 
 
 class Locked(UserError):
@@ -102,7 +96,7 @@ def _beside(path: Path) -> Path:
 
 def checksum_tensors(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
     """xxh3 of named tensors and metadata, 16 hex digits."""
-    digest = xxhash.xxh3_64(json.dumps(dict(metadata), sort_keys=True).encode())
+    digest = begin_checksum(metadata)
     for name in sorted(tensors):
         tensor = tensors[name].detach().cpu().contiguous()
         digest.update(f"{name}{tuple(tensor.shape)}{tensor.dtype}".encode())
@@ -116,7 +110,7 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], metadata: Mapping[s
     bytes.
     """
     whole = {name: tensor.detach().cpu().contiguous() for name, tensor in sorted(tensors.items())}
-    header = {**metadata, _CHECKSUM: checksum_tensors(whole, metadata)}
+    header = {**metadata, CHECKSUM: checksum_tensors(whole, metadata)}
     content = save(whole, metadata=header)
     with atomic_path(path) as temporary:
         temporary.write_bytes(_sorted_header(content))
@@ -141,7 +135,7 @@ def read_some_tensors(path: Path, names: Iterable[str]) -> tuple[dict[str, Tenso
     with _reading(path) as handle:
         metadata = dict(handle.metadata() or {})
         tensors = {name: handle.get_tensor(name) for name in names}
-    metadata.pop(_CHECKSUM, None)
+    metadata.pop(CHECKSUM, None)
     return tensors, metadata
 
 
@@ -169,7 +163,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     with _reading(path) as handle:
         metadata = dict(handle.metadata() or {})
         tensors = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118 (not a mapping)
-    expected = metadata.pop(_CHECKSUM, None)
+    expected = metadata.pop(CHECKSUM, None)
     if expected is None:
         raise DamagedFile(f"{path}: carries no checksum, so it was not written by mrhubo")
     if checksum_tensors(tensors, metadata) != expected:

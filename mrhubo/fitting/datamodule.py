@@ -135,6 +135,7 @@ class PairData(lightning.LightningDataModule):
         self.filter = _filter(self.prepared.config, self.pairs)
         with torch.no_grad():
             features = torch.cat([self.features(part) for part in self.pairs["H"].split(16_384)])
+            features = self.features.condition(features)
         self.table = PairTable(features, self.pairs["R"], self.pairs["q"])
         if self.trainer is not None:  # so that no batch has to travel
             self.table = self.table.to(self.trainer.strategy.root_device)

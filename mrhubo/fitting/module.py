@@ -30,7 +30,7 @@ LOG_EVERY = 50
 class RetargetModule(lightning.LightningModule):
     """Loss and optimiser around a `RetargetNetwork`."""
 
-    def __init__(self, network: RetargetNetwork, settings: TrainerConfig, detach_student: bool = True) -> None:
+    def __init__(self, network: RetargetNetwork, settings: TrainerConfig, detach_student: bool = False) -> None:
         super().__init__()
         self.network, self.settings, self.detach_student = network, settings, detach_student
         self._distance = {"l1": l1_loss, "mse": mse_loss}[settings.loss]
@@ -39,15 +39,17 @@ class RetargetModule(lightning.LightningModule):
         """`loss`, and for two stages `loss_pre` (of 6D numbers) and `loss_post` (of rad), squared with `mse`."""
         network, distance = self.network, self._distance
 
-        def joint_loss(given: Tensor) -> Tensor:
-            return distance(network.limited.unlimited(network.post(given).float()), q_BN)
+        def joint_loss(given: Tensor, wanted: Tensor) -> Tensor:
+            return distance(network.limited.unlimited(network.post(given).float()), wanted)
 
         if network.pre is None:
-            return {"loss": joint_loss(features_BF)}
+            return {"loss": joint_loss(features_BF, q_BN)}
         links = R_BM6.flatten(1)
-        predicted = network.links(features_BF)
-        pre = distance(predicted.float(), links)
-        post = joint_loss(links) + joint_loss(predicted.detach() if self.detach_student else predicted)
+        predicted = network.links(features_BF).float()
+        pre = distance(predicted, links)
+        student = predicted.detach() if self.detach_student else predicted
+        # Teacher and student in one pass; the mean over both is half of their sum.
+        post = 2 * joint_loss(torch.cat((links, student)), torch.cat((q_BN, q_BN)))
         return {"loss": pre + post, "loss_pre": pre, "loss_post": post}
 
     def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
@@ -66,6 +68,8 @@ class RetargetModule(lightning.LightningModule):
     def configure_optimizers(self) -> Any:
         """AdamW with warm-up and cosine decay over `max_steps`."""
         settings = self.settings
-        optimizer = torch.optim.AdamW(self.network.parameters(), settings.lr, weight_decay=settings.weight_decay)
+        optimizer = torch.optim.AdamW(
+            self.network.parameters(), settings.lr, weight_decay=settings.weight_decay, fused=True
+        )
         schedule = cosine_schedule(optimizer, settings.max_steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}

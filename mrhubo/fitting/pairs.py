@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mrhubo.errors import UserError
-from mrhubo.files.storage import DamagedFile
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.fitting.preparation import device_of, make_places
 from mrhubo.pairing import PairGenerator, PairingReport, PairSetup, generate_pairs
 from mrhubo.pairing.verify import PairSummary, summarise, verify
@@ -21,7 +21,7 @@ def make_pairs(setup: PairSetup, report: Reporter, ranks: Ranks | None = None) -
     ranks = ranks or Ranks()
     make_places(setup)
     device = ranks.device or device_of(setup.config)
-    generator = PairGenerator(setup.body_map.to(device), setup.prior.to(device), setup.config.pairs)
+    generator = PairGenerator(setup.body_map.to(device), setup.prior.to(device), setup.config)
     made = generate_pairs(setup.config, generator, setup.store, report, ranks)
     setup.body_map.to("cpu")
     setup.prior.to("cpu")

@@ -25,8 +25,7 @@ def trim(motion: Motion, start: float = 0.0, end: float | None = None) -> Motion
     Raises:
         UserError: the times are no such span, or no frame lies between them.
     """
-    if not math.isfinite(start) or start < 0 or (end is not None and not start <= end < math.inf):
-        raise UserError(f"{motion.name}: from {start:g} to {end} s is no span of time")
+    check_span(start, end)
     first = math.ceil(start * motion.frame_rate - _SLACK)
     last = len(motion) - 1
     if end is not None:
@@ -38,6 +37,13 @@ def trim(motion: Motion, start: float = 0.0, end: float | None = None) -> Motion
     arrays = {name: getattr(motion, name) for name in _PER_FRAME}
     cut = {name: array[first : last + 1] for name, array in arrays.items() if array is not None}
     return dataclasses.replace(motion, **cut)
+
+
+def check_span(start: float, end: float | None) -> None:
+    """Refuses seconds between which no motion can be."""
+    if not math.isfinite(start) or start < 0 or (end is not None and not start <= end < math.inf):
+        until = "its end" if end is None else f"{end:g} s"
+        raise UserError(f"from {start:g} s to {until} is no span of time; motions begin at 0")
 
 
 def mirror(motion: Motion) -> Motion:

@@ -98,6 +98,7 @@ def _is_motion(file: Path) -> bool:
     if file.suffix.lower() in {ending for row in FORMATS for ending in row.endings}:
         return True
     try:
-        return find_format(Content.open(file)) is not None
+        row = find_format(Content.open(file))
     except UserError:
         return False
+    return row is not None and bool(row.endings)  # what has none is beside motions, and is none itself

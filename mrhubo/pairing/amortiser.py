@@ -16,7 +16,8 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.latent import LatentProblem
-from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.files.arrays import DamagedFile
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.trainer import cosine_schedule
 

@@ -1,6 +1,10 @@
 """Pairs of robot and human pose, shard by shard: forward, from random robot poses (algorithm 1 of MR.HuBo), and
 reverse, from human poses of the prior and from such as are drawn joint by joint.
 
+The paper searches for a forward pair's human pose by inverse kinematics in the prior's latent space. Where the pose is
+then turned until its limbs point as the robot's do, where phi is of those limbs alone, and where the networks see
+nothing else either, that search decides nothing: such a pose is put together from the robot's directions (`direct`).
+
 Forward pairs never hold a human pose that the robot cannot reach. Reverse pairs do, as the reference retargeter answers
 any pose; no human motion is needed for them either.
 
@@ -19,14 +23,15 @@ from mrhubo.body import BodyPrior
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import poses_at_once, solve_quasi_newton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
-from mrhubo.config import PairsConfig
+from mrhubo.config import Config
 from mrhubo.pairing.amortiser import Amortiser, train_amortiser
 from mrhubo.pairing.lbfgs import solve_lbfgs
 from mrhubo.pairing.random_poses import random_poses
+from mrhubo.pairing.settings import pairing_settings
 from mrhubo.pairing.store import PairStore
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap, align_pose
-from mrhubo.robot.plausibility import read_phi
+from mrhubo.robot.plausibility import read_phi, read_pose
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.threads import use_threads
 
@@ -35,9 +40,11 @@ _STARTS = 4
 
 
 class PairGenerator:
-    """Makes shards for one robot, prior and pairing config; everything is on the prior's device."""
+    """Makes shards for one robot, prior and config; everything is on the prior's device."""
 
-    def __init__(self, body_map: BodyMap, prior: BodyPrior, settings: PairsConfig) -> None:
+    def __init__(self, body_map: BodyMap, prior: BodyPrior, config: Config) -> None:
+        """The robot's body map, the prior, and the config, of which `pairing_settings` are used."""
+        settings = pairing_settings(config)
         self.body_map, self.robot, self.prior, self.settings = body_map, body_map.robot, prior, settings
         self.problem = LatentProblem(
             prior.decoder, body_map.skeleton, body_map.keypoint_indices, settings.w_data, settings.w_prior
@@ -56,7 +63,7 @@ class PairGenerator:
 
     def prepare(self, store: PairStore, report: Reporter = SILENT) -> None:
         """Reads or trains the amortised solver, if the config's solver uses one."""
-        if self.settings.solver == "paper" or not store.counts["forward"]:
+        if self.settings.solver in ("paper", "direct") or not store.counts["forward"]:
             return
         settings, header = self.settings, {**store.header, "what": "amortiser"}
         with use_threads():
@@ -71,7 +78,7 @@ class PairGenerator:
             )
 
     def solve(self, target_BK3: Tensor) -> Tensor:
-        """Latents (B, Z) for target keypoints (B, K, 3) [m], by the config's solver."""
+        """Latents (B, Z) for target keypoints (B, K, 3) [m], by the config's solver, one that searches."""
         if self.settings.solver == "paper":
             return solve_lbfgs(self.problem, target_BK3)
         if self.amortiser is None:
@@ -105,8 +112,8 @@ class PairGenerator:
                 target_BK3 = (self.body_map.upright_keypoints if upright else self.body_map.targets)(poses)
                 orientation_BM6 = self.robot.moving_orientations(poses)
             size = poses_at_once(self.device)
-            z_BZ, human_BJ33 = drawn or self._decoded(self.solve(target_BK3))
             directions = self.body_map.robot_directions(poses)
+            z_BZ, human_BJ33 = drawn or self._human(target_BK3, directions)
             chunks = (x.split(size) for x in (z_BZ, human_BJ33, target_BK3, directions))
             parts = [self._measure(z, h, target, limbs, direction) for z, h, target, limbs in zip(*chunks, strict=True)]
             found = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
@@ -122,10 +129,22 @@ class PairGenerator:
         z_BZ = settings.reverse_spread * torch.randn(count - random, self.prior.latent, generator=generator)
         z_BZ, human_BJ33 = self._decoded(z_BZ.to(self.device))
         random_BJ33 = random_poses(self.body_map.keypoints.parts, random, generator).to(self.device)
-        sixd = rotation.matrix_to_sixd(random_BJ33).split(poses_at_once(self.device))
-        z_BZ = torch.cat((z_BZ, *(self.prior.encode(part) for part in sixd)))
+        z_BZ = torch.cat((z_BZ, self._encoded(random_BJ33)))
         human_BJ33 = torch.cat((human_BJ33, random_BJ33))
         return (z_BZ, human_BJ33), self.reference.solve_frames(human_BJ33)[0]
+
+    @torch.no_grad()
+    def _human(self, target_BK3: Tensor, direction_BD3: Tensor) -> tuple[Tensor, Tensor]:
+        """Latents (B, Z) and poses (B, 21, 3, 3) of forward pairs, by the config's solver."""
+        if self.settings.solver != "direct":
+            return self._decoded(self.solve(target_BK3))
+        human_BJ33 = read_pose(self.body_map, direction_BD3)
+        return self._encoded(human_BJ33), human_BJ33
+
+    def _encoded(self, local_BJ33: Tensor) -> Tensor:
+        """The prior's latents (B, Z) of poses (B, 21, 3, 3)."""
+        parts = rotation.matrix_to_sixd(local_BJ33).split(poses_at_once(self.device))
+        return torch.cat([self.prior.encode(part) for part in parts])
 
     @torch.no_grad()
     def _decoded(self, z_BZ: Tensor) -> tuple[Tensor, Tensor]:
@@ -143,7 +162,7 @@ class PairGenerator:
         found_BJ6 = pose_BJ6 = rotation.matrix_to_sixd(matrices)
         if direction == "forward":
             points_BK3 = self.body_map.skeleton.keypoints(matrices)[:, self.body_map.keypoint_indices]
-            if self.settings.align:
+            if self.settings.align and self.settings.solver != "direct":
                 pose_BJ6 = rotation.matrix_to_sixd(align_pose(self.body_map, matrices, direction_BD3))
         else:  # these humans bend their backs; only what the robot has is compared, on an upright human
             points_BK3 = self.body_map.human_keypoints(self.body_map.human_directions(matrices))

@@ -21,7 +21,9 @@ from torch import Tensor
 from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, fingerprint, to_plain
-from mrhubo.files.storage import DamagedFile, read_some_tensors, read_tensors, write_tensors
+from mrhubo.files.arrays import DamagedFile
+from mrhubo.files.storage import read_some_tensors, read_tensors, write_tensors
+from mrhubo.pairing.settings import pairing_settings
 from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_pairs
 
@@ -43,8 +45,7 @@ def pose_settings(config: Config) -> dict[str, Any]:
 
 def pairs_header(config: Config, body_map: BodyMap, prior: BodyPrior) -> dict[str, str]:
     """What decides the pairs: settings, seed, the robot's kinematics, the checksums of prior and skeleton."""
-    plain = to_plain(config)
-    pairs = {k: v for k, v in plain["pairs"].items() if k not in _NOT_IN_PAIRS}
+    pairs = {k: v for k, v in to_plain(pairing_settings(config)).items() if k not in _NOT_IN_PAIRS}
     parts = pose_settings(config)
     header = {
         "schema": SCHEMA,

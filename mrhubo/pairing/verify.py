@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.files.storage import DamagedFile
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.pairing.filter import make_filter
 from mrhubo.pairing.store import MEASURES, PairStore
 from mrhubo.robot import Robot

@@ -33,7 +33,7 @@ def main() -> None:
             path.write_text(json.loads(next(lines)), encoding="utf-8")
             config = load_config(path)
         setup = PairSetup.open(config)
-        generator = PairGenerator(setup.body_map, setup.prior, config.pairs)
+        generator = PairGenerator(setup.body_map, setup.prior, config)
         generator.prepare(setup.store)
         for line in lines:
             answer = make_shard(generator, setup.store, int(line))

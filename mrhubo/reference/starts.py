@@ -20,6 +20,8 @@ class StartPool(nn.Module):
     """Random robot poses with their directions, sorted into cells; the same for the same seed."""
 
     q_UN: Tensor
+    cells_CU: Tensor
+    """In which cell of its joints' space each pose is, for each block."""
 
     def __init__(self, problem: DirectionProblem, starts: int, seed: int, poses: int = _POOL) -> None:
         """`starts` per frame; `seed` and number of the poses."""
@@ -31,17 +33,20 @@ class StartPool(nn.Module):
         posture, blocks, weight_D = problem.posture, problem.blocks, problem.directions.weight_D
         from_mid_UN = (q_UN - posture.mid_N) / posture.half_N
         ridge_UN = (q_UN - posture.mid_N).square() * posture.ridge_N
-        parts = []
+        parts, cells_CU = [], []
         for block, joints_N in enumerate(blocks.joints_NC.T.bool()):
             directions_D = blocks.directions_DC[:, block].bool()
             root_D1 = weight_D[directions_D].sqrt()[:, None]
             pool_UX = (directions_UD3[:, directions_D] * root_D1).flatten(1)
             # |a - b|^2 without |a|^2, which is the same for the whole pool
             constant_U = pool_UX.square().sum(1) + ridge_UN[:, joints_N].sum(1)
+            cells_CU.append(_cells(from_mid_UN[:, joints_N], starts))
+            rows = [torch.nonzero(cells_CU[-1] == k)[:, 0] for k in range(starts)]
             cells = [_Cell(pool_UX[cell_U].T.contiguous(), constant_U[cell_U], q_UN[cell_U][:, joints_N])
-                     for cell_U in _cells(from_mid_UN[:, joints_N], starts)]  # fmt: skip
+                     for cell_U in rows]  # fmt: skip
             parts.append(_BlockPool(joints_N, directions_D, root_D1, cells))
         self.blocks = nn.ModuleList(parts)
+        self.register_buffer("cells_CU", torch.stack(cells_CU), persistent=False)
 
     def near(self, target_BD3: Tensor) -> Tensor:
         """Starting angles (B, S, N) [rad] for human directions (B, D, 3)."""
@@ -85,12 +90,11 @@ class _BlockPool(nn.Module):
         self.cells = nn.ModuleList(cells)
 
 
-def _cells(points_UX: Tensor, count: int) -> list[Tensor]:
-    """Indices of the points nearest to each centre: the middle one first, then always the one farthest from all."""
+def _cells(points_UX: Tensor, count: int) -> Tensor:
+    """To which centre each point (U,) is nearest: the middle one first, then always the one farthest from all."""
     centre = int(points_UX.norm(dim=1).argmin())
     distance_UK = (points_UX - points_UX[centre]).norm(dim=1)[:, None]
     for _ in range(count - 1):
         centre = int(distance_UK.amin(1).argmax())
         distance_UK = torch.cat((distance_UK, (points_UX - points_UX[centre]).norm(dim=1)[:, None]), dim=1)
-    cell_U = distance_UK.argmin(1)
-    return [torch.nonzero(cell_U == k)[:, 0] for k in range(count)]
+    return distance_UK.argmin(1)

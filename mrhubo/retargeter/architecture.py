@@ -34,7 +34,7 @@ def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
             " body parts; leave it out, or set model.input_frame=local"
         )
     else:
-        features = DirectionFeatures(body_map, turned)
+        features = DirectionFeatures(body_map, [sorted(directions) for directions, _ in blocks])
         own = [tuple(body_map.direction_names[i] for i in sorted(directions)) for directions, _ in blocks]
     joints = tuple(range(len(robot.joint_names)))
     branches = _branches(robot, [joints for _, joints in blocks], own, features.names) if model.branches else []
@@ -56,7 +56,7 @@ def _check_size(model: ModelConfig, features: PoseFeatures, branches: Sequence[B
     """Refuses networks of more weights than a memory holds, before they are made."""
     weights = 0
     for branch in branches:
-        inputs, joints = features.width * len(branch.inputs), len(branch.joints)
+        inputs, joints = len(features.columns(branch.inputs)), len(branch.joints)
         links = 6 * joints
         sizes = [(inputs, links), (links, joints)] if model.stages == 2 else [(inputs, joints)]
         for size_in, size_out in sizes:

@@ -36,12 +36,12 @@ from mrhubo.robot.plausibility import Reading, turned_joints
 GOOD_DEG = 15.0
 """Mean angle [deg] of a branch's limbs to the person's up to which an answer is good: one sees the same gesture."""
 SIGNALS = ("miss", "implausible", "excess", "shake")
-_EXCESS_DEG, _SHAKE_DEG = 30.0, 10.0
+EXCESS_DEG, SHAKE_DEG = 30.0, 10.0
 """What makes 1 of these signals. Of a miss, GOOD_DEG does, and half of that nothing yet, as inputs err too."""
-_ACCELERATION = 60.0
+ACCELERATION = 60.0
 """Angular acceleration of limbs [rad/s^2] that people reach now and then; in 24 frames a second 0.9 of ten frames of
 lively mocap stay below it. A course that bends faster is noise, or nearly so."""
-_NEIGHBOURS = 2
+NEIGHBOURS = 2
 """Frames before and after one over which its noise is averaged."""
 _TINY = 1e-12
 
@@ -125,10 +125,10 @@ def shake(human_XTD3: Tensor, frame_rate: float) -> Tensor:
         return human_XTD3.new_zeros(*more, frames, directions)
     before, here, after = human_XTD3[..., :-2, :, :], human_XTD3[..., 1:-1, :, :], human_XTD3[..., 2:, :, :]
     off_XTD = angle_between(normalize(before + after, dim=-1), here)
-    beyond_XTD = (off_XTD - 0.5 * _ACCELERATION / frame_rate**2).clamp_min(0.0)
+    beyond_XTD = (off_XTD - 0.5 * ACCELERATION / frame_rate**2).clamp_min(0.0)
     squared_Y1T = beyond_XTD.square().transpose(-1, -2).reshape(-1, 1, frames - 2)
-    padded_Y1T = torch.nn.functional.pad(squared_Y1T, (_NEIGHBOURS + 1, _NEIGHBOURS + 1), mode="replicate")
-    mean_Y1T = torch.nn.functional.avg_pool1d(padded_Y1T, 2 * _NEIGHBOURS + 1, 1)
+    padded_Y1T = torch.nn.functional.pad(squared_Y1T, (NEIGHBOURS + 1, NEIGHBOURS + 1), mode="replicate")
+    mean_Y1T = torch.nn.functional.avg_pool1d(padded_Y1T, 2 * NEIGHBOURS + 1, 1)
     return mean_Y1T.clamp_min(0.0).sqrt().reshape(*more, directions, frames).transpose(-1, -2)
 
 
@@ -199,8 +199,8 @@ def scaled(signals: Signals, usual_phi: float) -> Tensor:
         (
             (2 * signals.miss_deg / GOOD_DEG - 1).clamp_min(0.0),
             torch.log(signals.phi.clamp_min(_TINY) / usual_phi).clamp_min(0.0),
-            signals.excess_deg / _EXCESS_DEG,
-            shaken / _SHAKE_DEG,
+            signals.excess_deg / EXCESS_DEG,
+            shaken / SHAKE_DEG,
         ),
         dim=-1,
     )

@@ -149,8 +149,8 @@ class RetargetNetwork(nn.Module):
         def branched(columns_in: list[list[int]], columns_out: list[list[int]]) -> nn.Module:
             return Branched(columns_in, columns_out, lambda a, b: net(a, hidden, layers, b))
 
-        inputs = [_columns(b.inputs, features.width) for b in branches]
-        links = [_columns(b.joints, 6) for b in branches]
+        inputs = [features.columns(b.inputs) for b in branches]
+        links = [[6 * joint + i for joint in b.joints for i in range(6)] for b in branches]
         angles = [list(b.joints) for b in branches]
         self.pre = branched(inputs, links) if stages == 2 else None
         self.post = branched(links if stages == 2 else inputs, angles)
@@ -169,8 +169,3 @@ class RetargetNetwork(nn.Module):
     def joints(self, features_BF: Tensor) -> Tensor:
         """Joint angles (B, N) [rad], inside the limits, of features (B, F)."""
         return self.limited(self.post(self.links(features_BF) if self.pre is not None else features_BF))
-
-
-def _columns(places: Sequence[int], width: int) -> list[int]:
-    """The columns of these inputs, each of which has so many numbers."""
-    return [width * place + i for place in places for i in range(width)]

@@ -19,13 +19,17 @@ from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
+from mrhubo.body.vposer import VPoser
 from mrhubo.config import Config
 from mrhubo.errors import UserError
+from mrhubo.fast.description import FILE, Description
+from mrhubo.files.storage import write_tensors
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.poses import check_frame_rate
 from mrhubo.reference import DirectionProblem, Polish, angle_between
 from mrhubo.retargeter.clip import join_frames
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, Signals, branches_of, find_signals, shake
+from mrhubo.retargeter.describing import describe
 from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.parts import pose_parts
@@ -64,7 +68,7 @@ class Retargeter(nn.Module):
         self.body_map, self.prior, self.config, self.phi_threshold = body_map, prior, config, phi_threshold
         self.directions = DirectionProblem(body_map)
         """The optimiser's cost, for `polish`."""
-        self._polish = Polish(self.directions)
+        self.polisher = Polish(self.directions)
         self.confidence, self.branches = confidence, branches_of(self.directions)
         """How much each branch of an answer is to be trusted, and what the branches are."""
         self.origin, self.checksum = "a network of mrhubo that was not saved", ""
@@ -260,12 +264,33 @@ class Retargeter(nn.Module):
             q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
         if not polish or not len(q_TN) or target_TD3 is None:
             return q_TN
-        return self._polish(q_TN, target_TD3, polish)
+        return self.polisher(q_TN, target_TD3, polish)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
         """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
         settings = {"phi_threshold": repr(self.phi_threshold), "confidence": self.confidence.to_json(), **provenance}
-        return write_package(folder, self.network, self.body_map, self.prior, self.config, settings)
+        write_package(folder, self.network, self.body_map, self.prior, self.config, settings)
+        self.origin, self.checksum = f"package {folder.resolve().name}", package_checksum(folder)
+        self.__dict__.pop("facts", None)
+        self.save_description(folder)
+        return folder
+
+    def describe(self) -> Description:
+        """All that an answer needs as plain arrays, for `mrhubo.fast`.
+
+        Raises:
+            UserError: its body prior is VPoser, with which only PyTorch works.
+        """
+        return describe(self)
+
+    def save_description(self, folder: Path) -> Path | None:
+        """Writes `describe` into a folder; None for a retargeter that has no such arrays."""
+        if isinstance(self.prior, VPoser):
+            return None
+        description = self.describe()
+        tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}
+        write_tensors(folder / FILE, tensors, description.metadata())
+        return folder / FILE
 
     @classmethod
     def load(cls, folder: Path | str) -> Retargeter:

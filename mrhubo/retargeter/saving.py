@@ -28,7 +28,7 @@ from mrhubo.retargeter.integrity import (
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.robot import BodyMap, build_body_map
 
-SCHEMA = "mrhubo.retargeter/4"
+SCHEMA = "mrhubo.retargeter/5"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
 _OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)

@@ -10,6 +10,7 @@ from pathlib import Path
 from mrhubo.errors import UserError
 from mrhubo.motion import motion_files
 from mrhubo.robot_motion import FORMATS, find_format
+from mrhubo.robot_motion.lerobot import check_lerobot_folder
 
 _DEFAULT = "npz"
 
@@ -68,7 +69,8 @@ def plan_places(out: str, format: str | None, inputs: Sequence[Path]) -> Places:
     path = Path(out)
     known = None if format is None else find_format(path, format)
     if known is not None and not FORMATS[known].ending:
-        return Places(path, known, is_folder=True)
+        check_lerobot_folder(path)
+        return _usable(Places(path, known, is_folder=True))
     is_folder = path.is_dir() or out.endswith((os.sep, "/")) or not path.suffix
     if len(inputs) > 1 and not is_folder:
         raise UserError(f"--out {out}: {len(inputs)} motions do not go into one file; name a folder, for instance "
@@ -78,4 +80,11 @@ def plan_places(out: str, format: str | None, inputs: Sequence[Path]) -> Places:
     places = Places(path, known or (_DEFAULT if is_folder else find_format(path)), is_folder)
     if not is_folder and any(os.path.exists(path) and os.path.samefile(path, file) for file in inputs if file.exists()):
         raise UserError(f"--out {out}: is the motion itself; name another file")
+    return _usable(places)
+
+
+def _usable(places: Places) -> Places:
+    """Themselves, if what writes their format is installed."""
+    if (library := FORMATS[places.format].library) is not None:
+        library()
     return places

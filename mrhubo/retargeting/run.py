@@ -8,11 +8,14 @@ from pathlib import Path
 
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, mirror, read_motion, resample, trim
+from mrhubo.motion.editing import check_span
+from mrhubo.motion.poses import check_frame_rate
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.retargeting.answering import Answerer
 from mrhubo.retargeting.places import Places
 from mrhubo.retargeting.summary import Summary
 from mrhubo.robot_motion import JointOrder, RobotMotion, in_order, write_lerobot, write_robot_motion
+from mrhubo.robot_motion.lerobot import check_lerobot_rate
 from mrhubo.runtime.progress import Reporter
 
 
@@ -31,6 +34,11 @@ class Request:
     """Whether left and right are exchanged."""
     joint_order: JointOrder | None = None
     """Order of the joints in files; None: the robot's."""
+
+    def __post_init__(self) -> None:
+        """Raises a UserError where no motion could be answered so."""
+        check_span(self.start, self.end)
+        check_frame_rate(self.rate)
 
     def prepare(self, motion: Motion) -> Motion:
         """The motion that is to be answered.
@@ -90,7 +98,10 @@ def retarget_files(
             try:
                 motion = request.prepare(read_motion(file, request.options))
                 tell(f"{file}: {motion.source}; {len(motion)} frames at {motion.frame_rate:g} per second")
-                say(motion.notes)
+                for note in motion.notes:
+                    tell(f"  {note}")
+                if places.is_dataset:
+                    check_lerobot_rate(motion.frame_rate, together[0].frame_rate if together else None)
                 answer = answerer.answer(motion)
                 if places.is_dataset:
                     together.append(answer)

@@ -23,10 +23,10 @@ from mrhubo.robot.parts import BendPart, LimbPart
 if TYPE_CHECKING:
     from mrhubo.robot.model import Robot
 
-_PLANE_DEG = (3.0, 12.0)
+PLANE_DEG = (3.0, 12.0)
 """Below the first bend the upper arm's turn alone tells the axis, from the second on the plane of the limbs alone.
 Motion capture is some two degrees exact, so the plane of limbs with less than five between them says little."""
-_NEEDED_DEG = (8.0, 25.0)
+NEEDED_DEG = (8.0, 25.0)
 """Up to the first bend the axis counts in full, from the second on not at all: the limbs say everything."""
 _PROBES, _SEED, _TURN = 64, 0, 1e-3
 _HINGE = 0.7
@@ -72,10 +72,10 @@ def bend_axis(upper_X3: Tensor, lower_X3: Tensor, own_X3: Tensor) -> tuple[Tenso
     """
     cross_X3 = torch.linalg.cross(upper_X3, lower_X3)
     bend_X = torch.atan2(cross_X3.norm(dim=-1), (upper_X3 * lower_X3).sum(-1))
-    plane_X1 = _rising(bend_X, _PLANE_DEG)[..., None]
+    plane_X1 = _rising(bend_X, PLANE_DEG)[..., None]
     own_X3 = own_X3 - upper_X3 * (upper_X3 * own_X3).sum(-1, keepdim=True)
     axis_X3 = plane_X1 * normalize(cross_X3, dim=-1) + (1 - plane_X1) * normalize(own_X3, dim=-1)
-    return axis_X3, 1 - _rising(bend_X, _NEEDED_DEG)
+    return axis_X3, 1 - _rising(bend_X, NEEDED_DEG)
 
 
 @torch.no_grad()

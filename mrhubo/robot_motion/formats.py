@@ -16,8 +16,8 @@ from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.mujoco import QPOS, read_mujoco, write_mujoco
 from mrhubo.robot_motion.npz import read_npz, write_npz
 from mrhubo.robot_motion.order import JointOrder, in_order
-from mrhubo.robot_motion.ros2 import read_mcap, read_yaml, write_mcap, write_yaml
-from mrhubo.robot_motion.tables import read_csv, read_parquet, write_csv, write_parquet
+from mrhubo.robot_motion.ros2 import import_mcap, read_mcap, read_yaml, write_mcap, write_yaml
+from mrhubo.robot_motion.tables import import_pyarrow, read_csv, read_parquet, write_csv, write_parquet
 from mrhubo.robot_motion.unitree import read_unitree, write_unitree
 
 Write = Callable[[RobotMotion, Path, JointOrder | None], tuple[str, ...]]
@@ -35,6 +35,8 @@ class Format:
     """Writes a motion whose joints are in order already, and returns what it had to assume; None for folders."""
     preset: bool = False
     """Whether it has to be asked for by name: its ending says another."""
+    library: Callable[[], object] | None = None
+    """Imports what it needs besides NumPy; raises a UserError that says how to install it."""
 
 
 def _plain(write: Callable[[RobotMotion, Path], None]) -> Write:
@@ -49,13 +51,14 @@ FORMATS: dict[str, Format] = {
     "npz": Format(".npz", "all that is known, as NumPy arrays", _plain(write_npz)),
     "csv": Format(".csv", "a table with a header", _plain(write_csv)),
     "json": Format(".json", "all that is known, as JSON", _plain(write_json)),
-    "parquet": Format(".parquet", "the table of csv, and all else in its header", _plain(write_parquet)),
+    "parquet": Format(".parquet", "the table of csv, and all else in its header", _plain(write_parquet),
+                      library=import_pyarrow),
     "mujoco": Format(".npz", "MuJoCo's qpos, quaternion w first", write_mujoco, preset=True),
     "unitree": Format(".csv", "no header, base and quaternion w last before the joints: Unitree, BeyondMimic",
                       write_unitree, preset=True),
-    "mcap": Format(".mcap", "ROS 2 bag with a JointTrajectory", _plain(write_mcap)),
+    "mcap": Format(".mcap", "ROS 2 bag with a JointTrajectory", _plain(write_mcap), library=import_mcap),
     "yaml": Format(".yaml", "ROS 2 JointTrajectory as YAML", _plain(write_yaml)),
-    "lerobot": Format("", "LeRobot dataset 3.0, a folder with an episode a motion", preset=True),
+    "lerobot": Format("", "LeRobot dataset 3.0, a folder, an episode a motion", preset=True, library=import_pyarrow),
 }  # fmt: skip
 """By name."""
 

@@ -32,6 +32,7 @@ _TEMPLATE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _STATE, _ACTION, _CONFIDENCE = "observation.state", "action", "confidence"
 _INDICES = ("frame_index", "episode_index", "index", "task_index")
 _MAX_JSON = 10_000_000
+_REMEDY = "resample them (--out-rate)"
 
 
 def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
@@ -45,18 +46,14 @@ def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
     """
     motions = [motion.single() for motion in motions]
     first = motions[0]
-    rate = first.frame_rate
-    if rate is None or rate != int(rate):
-        told = "is not known" if rate is None else f"is {rate:g}"
-        raise UserError(f"{folder}: a LeRobot dataset has a whole number of frames a second, the motion's {told}")
     for motion in motions:
-        if (motion.joint_names, motion.frame_rate) != (first.joint_names, rate):
-            raise UserError(f"{folder}: a LeRobot dataset has the same joints and frame rate throughout; "
-                            f"'{motion.name}' has others than '{first.name}'")  # fmt: skip
-    if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
-        raise UserError(f"{folder}: is there already; name a folder that is new or empty")
+        check_lerobot_rate(motion.frame_rate, first.frame_rate)
+        if motion.joint_names != first.joint_names:
+            others = f"'{motion.name}' has others than '{first.name}'"
+            raise UserError(f"{folder}: a LeRobot dataset has the same joints throughout; {others}")
+    check_lerobot_folder(folder)
     arrow, parquet = import_pyarrow()
-    frames = _frames(motions, int(rate))
+    frames = _frames(motions, int(first.frame_rate or 0))
     tasks = list(dict.fromkeys(motion.name or "motion" for motion in motions))
     frames["task_index"] = np.repeat([tasks.index(motion.name or "motion") for motion in motions],
                                      [len(motion) for motion in motions])  # fmt: skip
@@ -72,6 +69,21 @@ def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
     for name, content in texts.items():
         with atomic_path(folder / name) as temporary:
             temporary.write_text(json.dumps(content, indent=4, ensure_ascii=False), encoding="utf-8")
+
+
+def check_lerobot_rate(frame_rate: float | None, others: float | None = None) -> None:
+    """Refuses a frame rate that a dataset cannot have, or that is not that of its other motions."""
+    if frame_rate is None or frame_rate != int(frame_rate):
+        told = "is not known" if frame_rate is None else f"is {frame_rate:g}"
+        raise UserError(f"a LeRobot dataset has a whole number of frames a second, the motion's {told}; {_REMEDY}")
+    if others is not None and frame_rate != others:
+        raise UserError(f"a LeRobot dataset has one frame rate, found {others:g} and {frame_rate:g}; {_REMEDY}")
+
+
+def check_lerobot_folder(folder: Path) -> None:
+    """Refuses a folder that is not new or empty."""
+    if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
+        raise UserError(f"{folder}: is there already; name a folder that is new or empty")
 
 
 def _frames(motions: Sequence[RobotMotion], rate: int) -> dict[str, np.ndarray]:

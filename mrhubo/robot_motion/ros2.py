@@ -199,6 +199,11 @@ def _trajectories(path: Path, records: Any) -> Iterator[bytes]:
                     yield found.data
 
 
+def import_mcap() -> None:
+    """UserError where mcap-ros2-support is not installed."""
+    _import("mcap_ros2.writer")
+
+
 def _import(name: str) -> Any:
     import importlib
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mrhubo.config.shipped import shipped_root
 
-_LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yourdfpy", "roma", "safetensors", "scipy")
+_LIBRARIES = ("torch", "lightning", "mlflow", "numpy", "pytorch-kinematics", "yourdfpy", "safetensors", "scipy")
 
 
 def git_commit(folder: Path) -> str:

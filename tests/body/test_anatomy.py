@@ -63,7 +63,7 @@ def test_angles_rebuild_the_rotation() -> None:
     matrices = rotation.quaternion_to_matrix(quaternion)
     angles = anatomy.joint_angles(matrices)
     for j, name in enumerate(POSED_JOINT_NAMES):
-        axes = anatomy._AXES_J33[j].double()
+        axes = anatomy.AXES_J33[j].double()
         mirror = torch.tensor([1.0, -1.0, -1.0] if name.startswith("right_") else [1.0, 1.0, 1.0], dtype=torch.float64)
         twist = rotation.axis_angle_to_matrix(angles[:, j, :1] * axes[0] * mirror)
         swing = rotation.axis_angle_to_matrix((angles[:, j, 1:, None] * axes[1:]).sum(1) * mirror)

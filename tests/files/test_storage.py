@@ -15,8 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mrhubo.errors import UserError
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.files.atomic import atomic_path
-from mrhubo.files.storage import DamagedFile, Locked, locked, read_tensors, write_tensors
+from mrhubo.files.storage import Locked, locked, read_tensors, write_tensors
 
 TENSORS = {"b": torch.arange(12.0).reshape(3, 4), "a": torch.tensor([True, False]), "none": torch.empty(0, 3)}
 METADATA = {"seed": "7", "robot": "nao", "fingerprint": "abc"}

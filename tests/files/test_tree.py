@@ -65,6 +65,13 @@ def test_what_joblib_dumps(tmp_path: Path, packed: Any) -> None:
     check(read_tree(tmp_path / "a.pkl"))
 
 
+def test_what_joblib_before_1_2_dumped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It did not align arrays, and put no padding before them."""
+    monkeypatch.setattr(joblib.numpy_pickle.NumpyArrayWrapper.__init__, "__defaults__", (False, None))
+    joblib.dump(CONTENT, tmp_path / "a.pkl")
+    check(read_tree(tmp_path / "a.pkl"))
+
+
 @pytest.mark.parametrize("protocol", range(6))
 def test_what_pickle_dumps(tmp_path: Path, protocol: int) -> None:
     (tmp_path / "a.pkl").write_bytes(pickle.dumps(CONTENT, protocol))

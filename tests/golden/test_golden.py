@@ -55,7 +55,7 @@ def test_losses(fitted: tuple[Path, dict[str, Any]], recorded: tuple[dict[str, A
         assert np.all(np.abs(np.log(np.divide(losses, golden["losses"]))) < np.log(2))
 
 
-@pytest.mark.parametrize("solver", ["fine", "reverse", "fast", "paper"])
+@pytest.mark.parametrize("solver", ["direct", "reverse", "fine", "fast", "paper"])
 def test_shards(fitted: tuple[Path, dict[str, Any]], recorded: tuple[dict[str, Any], bool], solver: str) -> None:
     """Another rounding moves the mean of a tensor by 0.2% (`paper`, cost) or less."""
     found, (golden, same_platform) = fitted[1]["shards"][solver], recorded

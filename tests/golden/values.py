@@ -59,11 +59,11 @@ def measure(folder: Path) -> dict[str, Any]:
     """
     with one_core():
         run_fit(folder)
-        for solver in ("fast", "paper"):
+        for solver in ("fine", "fast", "paper"):
             settings = [f"pairs.solver={solver}", "pairs.reverse_share=0", "pairs.count=100", "pairs.shard_size=100"]
             quietly(pair, [*_nao(), *PAIRS, *settings, f"pairs.dir={folder / solver}"])
-    shards = {"fine": "pairs/nao-*/forward-000000", "reverse": "pairs/nao-*/reverse-000000"}
-    shards |= {solver: f"{solver}/*/forward-000000" for solver in ("fast", "paper")}
+    shards = {"direct": "pairs/nao-*/forward-000000", "reverse": "pairs/nao-*/reverse-000000"}
+    shards |= {solver: f"{solver}/*/forward-000000" for solver in ("fine", "fast", "paper")}
     (reference,) = folder.glob(f"pairs/reference/*-{_REFERENCE}-*.safetensors")
     return {
         "losses": logged(folder, "train/loss")[:LOSSES],

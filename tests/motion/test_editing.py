@@ -44,7 +44,9 @@ def test_the_frames_of_a_span_are_kept(motion: Motion, start: float, end: float 
 
 @pytest.mark.parametrize(("start", "end"), [(1.01, None), (0.31, 0.39), (-1.0, None), (0.5, 0.4), (float("nan"), None)])
 def test_no_span_is_refused(motion: Motion, start: float, end: float | None) -> None:
-    with pytest.raises(UserError, match="a: (has no frame from .*; it lasts from 0 to 1.000 s|.* is no span of time)"):
+    with pytest.raises(
+        UserError, match="a: has no frame from .*; it lasts from 0 to 1.000 s|from .* s to .* is no span of time"
+    ):
         trim(motion, start, end)
 
 

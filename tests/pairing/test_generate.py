@@ -11,8 +11,10 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import Config, load_config
-from mrhubo.files.storage import DamagedFile
+from mrhubo.errors import UserError
+from mrhubo.files.arrays import DamagedFile
 from mrhubo.pairing import PairGenerator, PairStore, amortiser, generate_pairs
+from mrhubo.pairing.settings import pairing_settings
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import build_body_map
 from mrhubo.robot.plausibility import read_phi
@@ -21,6 +23,7 @@ SMALL = [
     "pairs.count=250",
     "pairs.reverse_share=0.4",
     "pairs.shard_size=100",
+    "pairs.solver=fine",
     "pairs.amortiser_steps=30",
     "pairs.fine_steps=3",
 ]
@@ -36,7 +39,7 @@ def store_of(config: Config) -> PairStore:
 
 def generate(config: Config) -> PairStore:
     store = store_of(config)
-    generate_pairs(config, PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs), store)
+    generate_pairs(config, PairGenerator(build_body_map(config.robot), BodyPrior.open(), config), store)
     return store
 
 
@@ -65,6 +68,37 @@ def test_aligned_humans_point_where_the_robot_does(root: Path, made: PairStore, 
     assert torch.equal(after["H"][~forward], before["H"][~forward])
 
 
+def test_a_search_tells_networks_that_read_directions_nothing_more(root: Path, made: PairStore, tmp_path: Path) -> None:
+    config = config_of(root, tmp_path, "pairs.solver=auto")
+    store = generate(config)
+    assert not store.amortiser_path.exists(), "nothing is searched for"
+    searched, direct, body_map = made.read_all(), store.read_all(), build_body_map(config.robot)
+    for name in ("q", "R", "phi"):
+        torch.testing.assert_close(direct[name], searched[name], atol=1e-5, rtol=1e-4)
+    seen, expected = (body_map.human_directions(rotation.stack_columns(pairs["H"])) for pairs in (direct, searched))
+    torch.testing.assert_close(seen, expected, atol=1e-4, rtol=0)
+    forward = ~direct["reverse"]
+    assert float(direct["residual_m"][forward].max()) < 1e-5 < 1e-3 < float(searched["residual_m"][forward].mean())
+    legs = [i for i, name in enumerate(POSED_JOINT_NAMES) if name.endswith(("hip", "knee"))]
+    at_rest = rotation.matrix_to_sixd(torch.eye(3))
+    assert bool((direct["H"][forward][:, legs] == at_rest).all()) and torch.equal(
+        direct["H"][~forward], searched["H"][~forward]
+    )
+
+
+@pytest.mark.parametrize(
+    "change", ["pairs.align=false", "pairs.phi=all", "model.input_frame=local", "robot.scale=manual"]
+)
+def test_where_more_of_a_pose_is_used_it_is_searched_for(root: Path, change: str) -> None:
+    path = root / "conf" / "paper" / "nao.yaml"  # which has the numbers of a manual scale factor
+    shipped = ["pairs.align=true", "pairs.phi=read", "model.input_frame=directions", "robot.scale=auto"]
+    assert pairing_settings(load_config(path, [*shipped, "pairs.solver=auto"])).solver == "direct"
+    assert pairing_settings(load_config(path, [*shipped, "pairs.solver=auto", change])).solver == "fine"
+    assert pairing_settings(load_config(path, [*shipped, "pairs.solver=fast"])).solver == "fast"
+    with pytest.raises(UserError, match=rf"pairs\.solver: 'direct' .* {change} uses more"):
+        pairing_settings(load_config(path, [*shipped, "pairs.solver=direct", change]))
+
+
 def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
     made = generate(config_of(root, tmp_path, "pairs.align=false"))
     pairs = made.read_all()
@@ -91,7 +125,7 @@ def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
 
 def test_phi_of_the_whole_pose_is_the_papers(root: Path, tmp_path: Path) -> None:
     config, prior = config_of(root, tmp_path, "pairs.phi=all"), BodyPrior.open()
-    generator = PairGenerator(build_body_map(config.robot), prior, config.pairs)
+    generator = PairGenerator(build_body_map(config.robot), prior, config)
     pose_BJ6 = prior.decode(torch.randn(20, prior.latent))
     found = generator._measure(*generator._decoded(prior.encode(pose_BJ6)), *_targets(generator, 20), "reverse")
     torch.testing.assert_close(found["phi"], prior.reconstruction_error(found["H"]), atol=1e-6, rtol=1e-3)
@@ -207,7 +241,7 @@ def test_the_amortisers_training_resumes_exactly(root: Path, tmp_path: Path, mon
     monkeypatch.setattr(amortiser, "_CHECKPOINT_EVERY", 7)
     monkeypatch.setattr(amortiser, "_BLOCK", 4)
     config = config_of(root, tmp_path)
-    maker = PairGenerator(build_body_map(config.robot), BodyPrior.open(), config.pairs)
+    maker = PairGenerator(build_body_map(config.robot), BodyPrior.open(), config)
 
     def run(path: Path, stop_at: int | None = None) -> None:
         draws = 0

@@ -137,6 +137,8 @@ def test_what_cannot_be_written_is_said_before_any_work(tmp_path: Path, files: l
 
 def test_folders_are_taken_apart_and_names_stay_apart(tmp_path: Path, files: list[Path]) -> None:
     assert find_files([files[0].parent, files[0]]) == sorted(files)
+    (files[0].parent / "02.asf").write_text(":version 1.10\n:units\n  length 0.45\n")  # a skeleton is no motion
+    assert find_files([files[0].parent]) == sorted(files)
     with pytest.raises(UserError, match="holds no motion file"):
         (tmp_path / "empty").mkdir()
         find_files([tmp_path / "empty"])

@@ -112,7 +112,7 @@ def test_means_offsets_and_constants_are_in_the_base_frame(root: Path) -> None:
 def test_pairs_come_from_it(root: Path) -> None:
     config = load_config(root / "conf" / "paper" / "nao.yaml", ["pairs.shard_size=100"])
     body_map, prior = build_body_map(config.robot), BodyPrior.open()
-    maker = PairGenerator(body_map, prior, config.pairs)
+    maker = PairGenerator(body_map, prior, config)
     pairs = maker.shard("forward", 0)
     wanted = body_map.targets(body_map.robot.forward(pairs["q"]))
     points = body_map.skeleton.keypoints(prior.decode_matrices(torch.zeros(1, prior.latent)))[

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from mrhubo.errors import UserError
-from mrhubo.robot_motion import FORMATS, read_lerobot, read_robot_motion, write_lerobot, write_robot_motion
+from mrhubo.robot_motion import FORMATS, RobotFacts, read_lerobot, read_robot_motion, write_lerobot, write_robot_motion
 from tests.robot_motion.motions import assert_same, plain
 
 MOTIONS = [dataclasses.replace(plain(count), name=name) for count, name in ((5, "wave"), (3, "bow"), (4, "wave"))]
@@ -65,8 +65,11 @@ def test_what_no_dataset_holds_is_refused(tmp_path: Path, folder: Path) -> None:
         write_lerobot(MOTIONS, folder)
     with pytest.raises(UserError, match="a whole number of frames a second, the motion's is 29.97"):
         write_lerobot([plain(rate=29.97)], tmp_path / "a")
-    with pytest.raises(UserError, match="'wave' has others than 'wave'"):
+    with pytest.raises(UserError, match="one frame rate, found 30 and 60; resample them"):
         write_lerobot([MOTIONS[0], plain(rate=60.0)], tmp_path / "a")
+    other = dataclasses.replace(MOTIONS[1], joint_names=("a", "b", "c"), robot=RobotFacts())
+    with pytest.raises(UserError, match="the same joints throughout; 'bow' has others than 'wave'"):
+        write_lerobot([MOTIONS[0], other], tmp_path / "a")
     assert not (tmp_path / "a").exists()
     for name, text in {"meta/info.json": "{}", "data/chunk-000/file-000.parquet": "PAR1"}.items():
         whole = (folder / name).read_bytes()

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from torch import Tensor
 
 from mrhubo.evaluation import Clip
-from mrhubo.files.storage import DamagedFile, read_tensors, write_tensors
+from mrhubo.files.arrays import DamagedFile
+from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.runtime.runs import log_file
 
 if TYPE_CHECKING:

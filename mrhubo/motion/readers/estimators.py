@@ -20,16 +20,22 @@ from mrhubo.motion.readers.soma import read_soma
 from mrhubo.motion.readers.tracks import choose, motion_of
 
 _MAX_PROTOCOL = 5
-_OLD_STARTS = (b"(dp", b"(lp", b"(d.", b"ccollections\n", b"(i", b"}", b"cnumpy")
-"""How pickles of protocol 0 begin."""
+_OLD_STARTS = (b"(dp", b"(lp", b"}q", b"]q", b"ccollections\n", b"cnumpy")
+"""How pickles of protocols 0 and 1 begin."""
 
 
 def is_container(content: Content) -> bool:
     """Whether a file holds a dictionary or list of arrays, as programs in Python write them."""
     start = content.start
     is_pickle = start[:1] == b"\x80" and len(start) > 1 and start[1] <= _MAX_PROTOCOL
-    is_old = start.startswith(_OLD_STARTS) and b"\n" in start
-    return is_pickle or is_old or is_packed(start) or content.is_torch or bool(content.arrays) or content.is_npy
+    return (
+        is_pickle
+        or start.startswith(_OLD_STARTS)
+        or is_packed(start)
+        or content.is_torch
+        or bool(content.arrays)
+        or content.is_npy
+    )
 
 
 @np.errstate(all="ignore")  # what overflows is found out where it matters

@@ -21,7 +21,7 @@ from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.linking import link
 from tests.files.test_safe_pickle import attacks
 from tests.motion.damage import damaged_by, read_or_refused
-from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, phalp, pymaf, romp, wham
+from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, padded, phalp, pymaf, romp, wham
 
 RATE = ReadOptions(rate=30)
 FRAMES = 6
@@ -184,6 +184,13 @@ def test_what_is_wrong_is_said(tmp_path: Path, content: object, said: str) -> No
     with pytest.raises(UserError, match=said) as caught:
         read_motion(tmp_path / "a.pkl", RATE)
     assert str(caught.value).startswith(str(tmp_path / "a.pkl"))
+
+
+@pytest.mark.parametrize("protocol", range(6))
+def test_pickles_of_any_age(tmp_path: Path, protocol: int) -> None:
+    pose = made_up(FRAMES)
+    (tmp_path / "a").write_bytes(pickle.dumps({"smpl_poses": padded(pose, 24)}, protocol))
+    assert close(read_motion(tmp_path / "a", RATE), pose, "smpl")
 
 
 def test_a_folder_passes_over_pickles_that_hold_no_motion(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, SIDES, Skeleton
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, read_motion
 from mrhubo.motion.orientations import rest_points
-from mrhubo.motion.readers.sam3d import _ELBOWS, _PLACES
+from mrhubo.motion.readers.sam3d import _PLACES
 from mrhubo.motion.readers.soma import _ALL, _FEW_FINGERS, _OURS, _names
 from tests.motion.damage import damaged_by, read_or_refused
 from tests.motion.readers.estimator_files import made_up, matrices, padded
@@ -151,6 +151,25 @@ def test_what_is_no_motion_of_somas_skeleton_is_refused(tmp_path: Path, more: di
         read_motion(tmp_path / "clip.npz", RATE)
 
 
+MHR70 = {
+    "nose": 0, "left_eye": 1, "right_ear": 4, "left_shoulder": 5, "right_elbow": 8, "left_hip": 9, "right_knee": 12,
+    "left_ankle": 13, "left_heel": 17, "right_heel": 20, "right_thumb": 24, "right_index": 28, "right_middle": 32,
+    "right_pinky": 40, "right_wrist": 41, "left_thumb": 45, "left_index": 49, "left_middle": 53, "left_pinky": 61,
+    "left_wrist": 62, "neck": 69,
+}  # fmt: skip
+OLECRANON, CUBITAL_FOSSA = {"left": 63, "right": 64}, {"left": 65, "right": 66}
+"""As sam_3d_body/metadata/mhr70.py counts them."""
+
+
+def test_names_have_their_places() -> None:
+    assert {name: _PLACES[name] for name in MHR70} == {name: (place,) for name, place in MHR70.items()}
+    assert _PLACES["left_toe"] == (15, 16) and _PLACES["right_toe"] == (18, 19)
+    places = {"LeftShoulder": 11, "LeftHand": 14, "RightShoulder": 39, "RightArm": 40, "LeftLeg": 67, "RightToeEnd": 76}
+    assert len(_ALL) == 77 and {name: _ALL.index(name) for name in places} == places
+    places = {"Head": 6, "LeftShoulder": 10, "LeftHandMiddleEnd": 15, "RightArm": 17, "LeftLeg": 22, "RightToeBase": 29}
+    assert len(THIRTY) == 30 and {name: THIRTY.index(name) for name in places} == places
+
+
 def seventy_points(local_TJ33: torch.Tensor) -> np.ndarray:
     """SAM 3D Body's points (T, 70, 3) as a camera sees them, y down, about the pelvis."""
     ours, rotation = world_points(local_TJ33), Skeleton().global_rotations(local_TJ33)
@@ -159,9 +178,8 @@ def seventy_points(local_TJ33: torch.Tensor) -> np.ndarray:
         points[:, list(places)] = ours[name][:, None]
     for side in SIDES:
         forward = ROOT @ rotation[:, JOINT_NAMES.index(f"{side}_shoulder")] @ torch.tensor([0.0, 0.0, 0.03])
-        tip, pit = _ELBOWS[side]
-        points[:, tip] = ours[f"{side}_elbow"] - forward.numpy()
-        points[:, pit] = ours[f"{side}_elbow"] + forward.numpy()
+        points[:, OLECRANON[side]] = ours[f"{side}_elbow"] - forward.numpy()
+        points[:, CUBITAL_FOSSA[side]] = ours[f"{side}_elbow"] + forward.numpy()
     return (points - ours["pelvis"][:, None]) * (1, -1, -1)
 
 
@@ -173,7 +191,8 @@ def bent_arms() -> torch.Tensor:
         pose[:, JOINT_NAMES.index(f"{side}_shoulder")] = np.stack((0.5 * turns, sign * -turns, sign * -0.7 * turns), -1)
         pose[:, JOINT_NAMES.index(f"{side}_elbow"), 1] = -sign * 1.5 * turns
         pose[:, JOINT_NAMES.index(f"{side}_knee"), 0] = turns
-    pose[:, JOINT_NAMES.index("right_elbow")] = 0  # a straight arm
+    pose[-1, [JOINT_NAMES.index(f"{side}_elbow") for side in SIDES]] = 0  # straight arms
+    pose[:, JOINT_NAMES.index("right_elbow")] = 0
     return torch.from_numpy(matrices(pose[:, 1:]))
 
 

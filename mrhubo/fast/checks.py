@@ -1,0 +1,128 @@
+"""Whether a description that was read from a file can be used: its arrays fit together, and no place in one lies
+outside another, where compiled functions would read what is not theirs.
+
+Legend: as in `mrhubo.fast.description`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mrhubo.fast.description import Description, Layers, Part
+
+_JOINTS = 21
+_ACTIVATIONS = ("silu", "leaky_relu", "tanh")
+"""Of the body prior."""
+_CONSTANTS = (
+    "plane_low_deg", "plane_high_deg", "needed_low_deg", "needed_high_deg", "far_rad", "gain_rad", "first_steps",
+    "starts", "good_deg", "excess_deg", "shake_deg", "acceleration", "neighbours", "usual_phi",
+)  # fmt: skip
+_MOST = 1e6
+"""No constant is larger."""
+
+
+def check(d: Description) -> None:
+    """Refuses a description that does not fit together.
+
+    Raises:
+        ValueError: says what does not.
+    """
+    human, k, cost, reading, trust, capsules = d.human, d.kinematics, d.cost, d.reading, d.trust, d.capsules
+    sizes = {
+        "P": len(human.joint_P), "V": len(human.view_V), "D": len(human.place_D), "Z": len(human.bend_Z),
+        "A": len(k.parent_A), "Q": len(k.direction_Q), "N": len(cost.lower_N), "C": len(cost.cell_CU),
+        "U": len(cost.pool_UN), "K": len(reading.kind_K), "T": len(reading.joint_T), "X": len(trust.column_XD),
+        "S": len(capsules.body_S), "Y": len(capsules.pair_Y2),
+    }  # fmt: skip
+    for name, array in d.arrays().items():
+        axes = name.rpartition("_")[2] if "_" in name else ""
+        if "layers" not in name and axes and all(axis in sizes or axis.isdigit() for axis in axes):
+            wanted = tuple(sizes[axis] if axis in sizes else int(axis) for axis in axes)
+            _refuse(array.shape != wanted, f"{name} has shape {array.shape}, expected {wanted}")
+        whole, real = array.dtype in (np.int64, np.int32), array.dtype in (np.float32, np.float64)
+        _refuse(not (whole or (real and np.isfinite(array).all())), f"{name} holds what are no finite numbers")
+    _refuse(sizes["A"] < 1 or sizes["N"] < 1 or sizes["D"] < 1 or sizes["C"] < 1, "nothing moves")
+    bodies, places, slots = sizes["A"] + 1, sizes["P"] + 1, sizes["T"] + 1
+    for name, array, most in (
+        ("human.joint", human.joint_P, _JOINTS), ("human.parent", human.parent_P, np.arange(1, places)),
+        ("human.view", human.view_V, places), ("human.place", human.place_D, places),
+        ("human.seen", human.seen_D, sizes["V"]), ("human.bend", human.bend_Z, sizes["D"]),
+        ("human.upper", human.upper_Z, sizes["D"]), ("human.lower", human.lower_Z, sizes["D"]),
+        ("kinematics.parent", k.parent_A, np.arange(1, bodies)), ("kinematics.column", k.column_A, sizes["N"]),
+        ("kinematics.start", k.start_body_D, bodies), ("kinematics.end", k.end_body_D, bodies),
+        ("kinematics.view", k.view_body_V, bodies), ("kinematics.direction", k.direction_Q, sizes["D"]),
+        ("kinematics.joint", k.joint_Q, sizes["A"]), ("kinematics.column", k.column_Q, sizes["N"]),
+        ("cost.block", cost.block_N, sizes["C"]), ("cost.block", cost.block_D + 1, sizes["C"] + 1),
+        ("reading.kind", reading.kind_K, 4), ("reading.slot", reading.slot_K - 1, sizes["T"]),
+        ("reading.of", reading.of_K, slots), ("reading.seen", reading.seen_K, slots),
+        ("reading.last", reading.last_K, slots), ("reading.direction", reading.direction_K3[:, 0], sizes["D"]),
+        ("reading.direction", reading.direction_K3 + 1, sizes["D"] + 1), ("reading.joint", reading.joint_T, _JOINTS),
+        ("reading.parent", reading.parent_T, slots), ("trust.measured", trust.measured, sizes["D"]),
+        ("capsules.body", capsules.body_S, bodies), ("capsules.pair", capsules.pair_Y2, sizes["S"]),
+        ("features", d.features, sizes["D"] if d.settings.features == "directions" else _JOINTS),
+    ):  # fmt: skip
+        outside = (array < 0) | (array >= most)
+        _refuse(bool(outside.any()), f"{name} names what is not there")
+    needs_two = reading.kind_K > 0
+    _refuse(bool((reading.direction_K3[needs_two, 1] < 0).any()), "reading.direction names what is not there")
+    _refuse(
+        bool((trust.column_XD.sum(1) < 1).any() or (trust.slot_XT.sum(1) < 1).any()), "a branch is measured by nothing"
+    )
+    _refuse(set(_CONSTANTS) != set(d.settings.constants), "constants are others")
+    _refuse(not all(abs(float(x)) < _MOST for x in d.settings.constants.values()), "a constant is no number")
+    _check_names(d, sizes)
+    _check_networks(d, sizes)
+
+
+def _refuse(wrong: bool, what: str) -> None:
+    if wrong:
+        raise ValueError(what)
+
+
+def _check_names(d: Description, sizes: dict[str, int]) -> None:
+    settings = d.settings
+    for names, axis in ((settings.joint_names, "N"), (settings.direction_names, "D"), (settings.branch_names, "X")):
+        _refuse(len(names) != sizes[axis] or not _are_names(names), "names are others than there are numbers for")
+    _refuse(
+        settings.activation not in _ACTIVATIONS or settings.bound not in ("tanh", "clamp"), "an activation is unknown"
+    )
+    _refuse(settings.features not in ("directions", "local"), "features are unknown")
+
+
+def _are_names(names: Iterable[Any]) -> bool:
+    return all(isinstance(name, str) for name in names)
+
+
+def _check_networks(d: Description, sizes: dict[str, int]) -> None:
+    features = len(d.features) * (3 if d.settings.features == "directions" else 6)
+    links, numbers = 6 * sizes["N"], 6 * sizes["T"]
+    if d.pre:
+        _check_stage("pre", d.pre, features, links)
+    _check_stage("post", d.post, links if d.pre else features, sizes["N"])
+    latent = len(d.prior.encoder[-1][1]) if d.prior.encoder else 0
+    _check_layers("prior", d.prior.encoder, numbers, latent)
+    _check_layers("prior", d.prior.decoder, latent, numbers)
+
+
+def _check_stage(name: str, stage: tuple[Part, ...], inputs: int, outputs: int) -> None:
+    given = np.concatenate([part.output for part in stage]) if stage else np.zeros(0)
+    _refuse(not np.array_equal(np.sort(given), np.arange(outputs)), f"{name} gives other numbers than are needed")
+    for part in stage:
+        _refuse(bool(((part.input < 0) | (part.input >= inputs)).any()), f"{name} sees what is not there")
+        _check_layers(name, part.layers, len(part.input), len(part.output))
+
+
+def _check_layers(name: str, layers: Layers, inputs: int, outputs: int) -> None:
+    width = inputs
+    for weight, bias in layers:
+        _refuse(weight.dtype != np.float32 or bias.dtype != np.float32, f"{name} has layers that are no float32")
+        _refuse(
+            weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1],
+            f"{name} has layers that do not fit",
+        )
+        width = len(bias)
+    _refuse(not layers or width != outputs, f"{name} has layers that do not fit")

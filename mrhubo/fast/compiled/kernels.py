@@ -1,0 +1,145 @@
+"""The functions that Python calls; what is compiled of them is kept on disk, beside the source or in the user's cache.
+
+numba keeps what it compiled of a function until the function's own file changes, but not when what it calls does. So
+these functions hold a checksum of all sources, which is a part of the key.
+
+Legend: B frames, D directions, N joints, F numbers that networks see, T turned human joints, X branches.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xxhash
+from numba import njit
+
+from mrhubo.fast import plain
+from mrhubo.fast.compiled import human as humans
+from mrhubo.fast.compiled import judging, networks, steps, tables
+
+
+class Kernels(NamedTuple):
+    """Compiled functions."""
+
+    wrong: Callable[..., Any]
+    activate: Callable[..., Any]
+    directions: Callable[..., Any]
+    networks: Callable[..., Any]
+    retarget: Callable[..., Any]
+
+
+STEPS, ALL, WITHOUT_PRIOR = range(3)
+"""What `retarget` does: steps alone; steps and judging; judging alone, with the prior's answer given."""
+
+
+def _checksum() -> str:
+    """Of all that is compiled."""
+    digest = xxhash.xxh3_64()
+    for folder in (Path(__file__).parent, Path(str(plain.__file__)).parent):
+        for path in sorted(folder.glob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def make_kernels() -> Kernels:
+    """The functions; each is compiled when it is first called, which takes some seconds, or read from the cache."""
+    version = _checksum()
+
+    @njit(cache=True, **{**tables.COMPILED, "fastmath": False})
+    def wrong(local_BJ33, skew):
+        """Twice the number of the first frame that holds no rotations, one more where all is finite; else -1."""
+        _ = version
+        for b in range(len(local_BJ33)):
+            found = -1
+            for j in range(local_BJ33.shape[1]):
+                for x in range(3):
+                    for y in range(3):
+                        if not math.isfinite(local_BJ33[b, j, x, y]):
+                            return 2 * b
+                if humans.oblique(local_BJ33, b, j) > skew:
+                    found = 2 * b + 1
+            if found >= 0:
+                return found
+        return -1
+
+    @njit(cache=True, **tables.COMPILED)
+    def activate(kind, x_X, out_X):
+        """An activation of all numbers."""
+        _ = version
+        networks.activate(kind, x_X, out_X, len(x_X))
+
+    @njit(cache=True, **tables.COMPILED)
+    def directions(t, local_BJ33, out_BD3):
+        """Directions of poses."""
+        _ = version
+        places_L33 = np.empty((tables.size(t, tables.JOINT_P) + 2, 3, 3))
+        for b in range(len(local_BJ33)):
+            humans.directions(t, local_BJ33, b, places_L33, out_BD3)
+
+    @njit(cache=True, **tables.COMPILED)
+    def network(t, local_BJ33, target_BD3, out_BN):
+        """Joint angles that the networks give."""
+        _ = version
+        widest = networks.widest(t)
+        one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
+        link_M, feature_F = np.empty(6 * out_BN.shape[1], np.float32), np.empty(widest, np.float32)
+        for b in range(len(target_BD3)):
+            networks.features(t, local_BJ33, target_BD3, b, feature_F)
+            networks.joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b)
+
+    @njit(cache=True, **tables.COMPILED)
+    def retarget(
+        t, activation, polish, what, target_BD3, q_BN, six_BF, shake_BX, error_BM, phi_B, collision_B, trust_BX
+    ):  # fmt: skip
+        """Makes steps from `q_BN`, where the answers will stand, and says how good they are. `six_BF`: the numbers of
+        poses as the robot reads them (STEPS), or of their reconstructions (WITHOUT_PRIOR).
+        """
+        _ = version
+        work = steps.make_work(t)
+        turned, widest = tables.size(t, tables.PARENT_T), networks.widest(t)
+        one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
+        turn_T33, local_T33 = np.empty((turned + 1, 3, 3)), np.empty((turned, 3, 3))
+        between_333, ends_S3 = np.empty((3, 3, 3)), np.empty((2 * tables.size(t, tables.BODY_S), 3))
+        angle_D, error_T, excess_T = np.empty(target_BD3.shape[1]), np.empty(turned), np.empty(turned)
+        joints, measured, branches = q_BN.shape[1], error_BM.shape[1], trust_BX.shape[1]
+        q_N = np.empty(joints)
+        for b in range(len(target_BD3)):
+            for n in range(joints):
+                q_N[n] = q_BN[b, n]
+            if polish and what != WITHOUT_PRIOR:
+                steps.polish(t, work, target_BD3, b, q_N, polish)
+                for n in range(joints):
+                    q_BN[b, n] = q_N[n]
+                    q_N[n] = q_BN[b, n]
+            judging.read_pose(t, target_BD3, b, turn_T33, between_333, local_T33)
+            if what == STEPS:
+                judging.prior_input(local_T33, one_E)
+                for f in range(six_BF.shape[1]):
+                    six_BF[b, f] = one_E[f]
+                continue
+            steps.place(t, work, q_N)
+            judging.robot_angles(t, work, target_BD3, b, angle_D)
+            for m in range(measured):
+                error_BM[b, m] = math.degrees(angle_D[tables.whole(t, tables.MEASURED, m)])
+            collision_B[b] = judging.collides(t, work.rotation_L33, work.position_L3, ends_S3)
+            if what == ALL:
+                judging.prior_input(local_T33, one_E)
+                judging.reconstruct(t, activation, one_E, two_E, three_E)
+            else:
+                for f in range(six_BF.shape[1]):
+                    one_E[f] = six_BF[b, f]
+            for j in range(turned):
+                error_T[j] = judging.joint_error(local_T33, j, one_E, between_333)
+                excess_T[j] = judging.excess(t, j, local_T33)
+            phi_B[b] = 0.0
+            for x in range(branches):
+                miss, phi, over = judging.branch_signals(t, angle_D, error_T, excess_T, x)
+                moving = len(shake_BX) > 0
+                trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
+                phi_B[b] = max(phi_B[b], phi)
+
+    return Kernels(wrong, activate, directions, network, retarget)

@@ -1,0 +1,164 @@
+"""As `mrhubo.fast.plain.networks`, for one frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mrhubo.fast.compiled.tables import (
+    COLUMN,
+    COUNT_5,
+    FEATURE,
+    FIRST_STAGE,
+    INNER,
+    LAYER_G4,
+    LOWER_N,
+    NET_H6,
+    NUMBER,
+    RESIDUAL,
+    SEES_DIRECTIONS,
+    STAGES,
+    TANH_BOUND,
+    UPPER_N,
+    real,
+    size,
+    whole,
+)
+from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
+
+_ONE, _HALF, _ROOT, _END = np.float32(1), np.float32(0.5), np.float32(np.sqrt(0.5)), np.float32(ERF_END)
+_T0, _T1, _T2, _T3, _T4, _T5 = (np.float32(c) for c in ERF_TOP)
+_B1, _B2, _B3, _B4, _B5 = (np.float32(c) for c in ERF_BOTTOM[1:])
+# SiLU is x (1 + tanh(x / 2)) / 2, and tanh(x) = x P(x^2) / Q(x^2) up to |x| = 9, within 2e-9; found as erf.
+_P0, _P1, _P2 = np.float32(0.999999993874719), np.float32(0.1367634767328113), np.float32(0.0038639344509989746)
+_P3, _P4, _P5 = (
+    np.float32(2.7923397012698077e-05),
+    np.float32(3.040097713206052e-08),
+    np.float32(-1.2083086259850131e-11),
+)
+_Q1, _Q2 = np.float32(0.4700967835194308), np.float32(0.0272295624610154)
+_Q3, _Q4 = np.float32(0.00039310490211471395), np.float32(1.2817356684709363e-06)
+_TANH_END = np.float32(9)
+GELU, SILU, LEAKY, TANH = range(4)
+ACTIVATIONS = {"gelu": GELU, "silu": SILU, "leaky_relu": LEAKY, "tanh": TANH}
+
+
+@njit(**INNER)
+def activate(kind, x_E, out_E, count):
+    """An activation of the first numbers; GELU and SiLU are written so that several are worked out at a time."""
+    if kind == GELU:
+        for e in range(count):
+            z = min(max(x_E[e] * _ROOT, -_END), _END)
+            s = z * z
+            top = ((((_T5 * s + _T4) * s + _T3) * s + _T2) * s + _T1) * s + _T0
+            bottom = ((((_B5 * s + _B4) * s + _B3) * s + _B2) * s + _B1) * s + _ONE
+            out_E[e] = (z * top / bottom + _ONE) * x_E[e] * _HALF
+    elif kind == SILU:
+        for e in range(count):
+            z = min(max(x_E[e] * _HALF, -_TANH_END), _TANH_END)
+            s = z * z
+            top = ((((_P5 * s + _P4) * s + _P3) * s + _P2) * s + _P1) * s + _P0
+            bottom = (((_Q4 * s + _Q3) * s + _Q2) * s + _Q1) * s + _ONE
+            out_E[e] = (z * top / bottom + _ONE) * x_E[e] * _HALF
+    elif kind == LEAKY:
+        for e in range(count):
+            out_E[e] = max(x_E[e], np.float32(0.01) * x_E[e])
+    else:
+        for e in range(count):
+            out_E[e] = np.float32(math.tanh(x_E[e]))
+
+
+@njit(**INNER)
+def affine(t, layer, x_I, out_O):
+    """A layer: weights x + biases. Four rows at a time use each number of x four times."""
+    inputs, outputs = whole(t, LAYER_G4, 4 * layer), whole(t, LAYER_G4, 4 * layer + 1)
+    number, begin = t[2], t[0][2 * NUMBER]
+    weights, biases = begin + whole(t, LAYER_G4, 4 * layer + 2), begin + whole(t, LAYER_G4, 4 * layer + 3)
+    # A view tells that places are not negative, without which numba is five times slower.
+    weight_OI = t[2][weights : weights + outputs * inputs].reshape(outputs, inputs)
+    done = outputs - outputs % 4
+    for o in range(0, done, 4):
+        a, b = number[biases + o], number[biases + o + 1]
+        c, d = number[biases + o + 2], number[biases + o + 3]
+        for i in range(inputs):
+            a += weight_OI[o, i] * x_I[i]
+            b += weight_OI[o + 1, i] * x_I[i]
+            c += weight_OI[o + 2, i] * x_I[i]
+            d += weight_OI[o + 3, i] * x_I[i]
+        out_O[o], out_O[o + 1], out_O[o + 2], out_O[o + 3] = a, b, c, d
+    for o in range(done, outputs):
+        a = number[biases + o]
+        for i in range(inputs):
+            a += weight_OI[o, i] * x_I[i]
+        out_O[o] = a
+
+
+@njit(**INNER)
+def mlp(t, net, kind, residual, one_E, two_E, three_E):
+    """A network of what stands in `one_E`, with these activations; the output stands in `one_E` again. Hidden layers
+    after the first are added to what came in where it is residual.
+    """
+    first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
+    width = whole(t, LAYER_G4, 4 * first + 1)
+    affine(t, first, one_E, three_E)
+    for e in range(width):
+        one_E[e] = three_E[e]
+    for layer in range(first + 1, first + layers):
+        before, width = width, whole(t, LAYER_G4, 4 * layer + 1)
+        activate(kind, one_E, two_E, before)
+        affine(t, layer, two_E, three_E)
+        adds = residual and layer < first + layers - 1
+        for e in range(width):
+            one_E[e] = one_E[e] + three_E[e] if adds else three_E[e]
+
+
+@njit(**INNER)
+def joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b):
+    """Joint angles [rad], inside the limits, of what the networks see (F,)."""
+    first_stage = whole(t, COUNT_5, FIRST_STAGE)
+    for net in range(whole(t, COUNT_5, STAGES)):
+        inputs, outputs = whole(t, NET_H6, 6 * net + 3), whole(t, NET_H6, 6 * net + 5)
+        last = net >= first_stage
+        for i in range(inputs):
+            c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 2) + i)
+            one_E[i] = link_M[c] if last and first_stage else feature_F[c]
+        mlp(t, net, GELU, whole(t, COUNT_5, RESIDUAL), one_E, two_E, three_E)
+        for o in range(outputs):
+            c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 4) + o)
+            if last:
+                out_BN[b, c] = one_E[o]
+            else:
+                link_M[c] = one_E[o]
+    for n in range(out_BN.shape[1]):
+        low, high, raw = np.float32(real(t, LOWER_N, n)), np.float32(real(t, UPPER_N, n)), out_BN[b, n]
+        if whole(t, COUNT_5, TANH_BOUND):
+            raw = np.float32(math.tanh(raw))
+        angle = (high + low) * _HALF + (high - low) * _HALF * raw
+        if math.isnan(angle):
+            angle = np.float32(0)
+        out_BN[b, n] = min(max(angle, low), high)
+
+
+@njit(**INNER)
+def features(t, local_BJ33, target_BD3, b, feature_F):
+    """What the networks see of a pose and its directions."""
+    for f in range(size(t, FEATURE)):
+        chosen = whole(t, FEATURE, f)
+        if whole(t, COUNT_5, SEES_DIRECTIONS):
+            for i in range(3):
+                feature_F[3 * f + i] = target_BD3[b, chosen, i]
+        else:
+            for column in range(2):
+                for line in range(3):
+                    feature_F[6 * f + 3 * column + line] = local_BJ33[b, chosen, line, column]
+
+
+@njit(**INNER)
+def widest(t):
+    """The most numbers between layers."""
+    found = 0
+    for g in range(size(t, LAYER_G4) // 4):
+        found = max(found, whole(t, LAYER_G4, 4 * g), whole(t, LAYER_G4, 4 * g + 1))
+    return found

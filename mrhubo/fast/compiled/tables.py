@@ -1,0 +1,176 @@
+"""A description in three flat arrays, which a compiled function takes at once: handing over sixty takes 14 us.
+
+Legend: as in `mrhubo.fast.description`; and G layers, H networks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mrhubo.fast.description import Description, Layers, Part
+from mrhubo.fast.plain.steps import blocks_of
+
+_KEYS = (
+    "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
+    "parent_A", "rotary_A", "column_A", "limb_D", "start_body_D", "end_body_D", "view_body_V", "direction_Q",
+    "joint_Q", "column_Q", "ratio_A", "offset_A", "axis_A3", "position_A3", "origin_A33", "across_A33", "twice_A33",
+    "start_D3", "end_D3", "view_V33", "factor_Q4",
+    "block_N", "order_N", "first_C", "order_D", "first_D", "partial_D", "cell_CU", "lower_N", "upper_N", "middle_N",
+    "ridge_N", "weight_D", "polish_4", "pool_ridge_CU", "pool_UD3", "pool_UN",
+    "kind_K", "slot_K", "of_K", "seen_K", "last_K", "direction_K3", "parent_T", "mirror_T", "rest_K23", "share_K",
+    "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
+    "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S",
+    "net_H6", "layer_G4", "column", "feature", "count_5", "number",
+)  # fmt: skip
+"""The tables, as in `mrhubo.fast.description` but for these:
+
+bend_4: ends of the bend axes' ranges [rad]. A joint's turn by the angle t is origin + sin t * across + (1 - cos t) *
+twice, across = origin [axis]x and twice = origin [axis]x^2. The joints of block c are order_N[first_C[c] : first_C[c +
+1]], its directions likewise. polish_4: squares of the angles [rad^2] that are far, and that are a gain; starts, and
+their first steps. scale_4: good and excessive angle, shaking [degrees], usual phi. reach_S: half of a capsule's length
+and its radius. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
+network, the prior's coders last; layer_G4: numbers in and out, and where weights and biases begin in `number`; column:
+all columns; count_5: networks of the first stage, of both; whether directions are seen, tanh bounds, nets are residual.
+"""
+(
+    JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
+    PARENT_A, ROTARY_A, COLUMN_A, LIMB_D, START_BODY_D, END_BODY_D, VIEW_BODY_V, DIRECTION_Q,
+    JOINT_Q, COLUMN_Q, RATIO_A, OFFSET_A, AXIS_A3, POSITION_A3, ORIGIN_A33, ACROSS_A33, TWICE_A33,
+    START_D3, END_D3, VIEW_V33, FACTOR_Q4,
+    BLOCK_N, ORDER_N, FIRST_C, ORDER_D, FIRST_D, PARTIAL_D, CELL_CU, LOWER_N, UPPER_N, MIDDLE_N,
+    RIDGE_N, WEIGHT_D, POLISH_4, POOL_RIDGE_CU, POOL_UD3, POOL_UN,
+    KIND_K, SLOT_K, OF_K, SEEN_K, LAST_K, DIRECTION_K3, PARENT_T, MIRROR_T, REST_K23, SHARE_K,
+    AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
+    BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S,
+    NET_H6, LAYER_G4, COLUMN, FEATURE, COUNT_5, NUMBER,
+) = np.arange(len(_KEYS))  # fmt: skip
+# Numbers of NumPy, as numba compiles a function anew for each of Python's that it is called with.
+PLANE_LOW, PLANE_HIGH, NEEDED_LOW, NEEDED_HIGH = FAR, GAIN, STARTS, FIRST_STEPS = np.arange(4)
+"""Places in bend_4, and in polish_4."""
+GOOD, EXCESS, SHAKE, USUAL_PHI = np.arange(4)
+"""Places in scale_4."""
+FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL = np.arange(5)
+"""Places in count_5."""
+
+
+class Packed(NamedTuple):
+    """A description in three arrays."""
+
+    integers: np.ndarray
+    """First where each table begins and how long it is; then the tables of integers."""
+    floats: np.ndarray
+    singles: np.ndarray
+    """float32."""
+
+
+def pack(description: Description) -> Packed:
+    """The arrays of a description."""
+    found = {}
+    for section in (description.human, description.kinematics, description.cost, description.reading,
+                    description.trust, description.capsules):  # fmt: skip
+        found |= {field.name: getattr(section, field.name) for field in fields(section)}
+    found |= {**_derived(description), **_nets(description)}
+    integers: list[np.ndarray] = [np.zeros(2 * len(_KEYS), np.int64)]
+    floats, singles = [np.zeros(0)], [np.zeros(0, np.float32)]
+    for place, key in enumerate(_KEYS):
+        table = np.asarray(found[key]).reshape(-1)
+        into = {"i": integers, "f": floats if table.dtype == np.float64 else singles}[table.dtype.kind]
+        integers[0][2 * place : 2 * place + 2] = _append(into, table)
+    return Packed(
+        np.concatenate(integers).astype(np.int64), np.concatenate(floats), np.ascontiguousarray(np.concatenate(singles))
+    )
+
+
+def _derived(d: Description) -> dict[str, np.ndarray]:
+    """What is worked out of a description's arrays."""
+    constants, capsules, k = d.settings.constants, d.capsules, d.kinematics
+    x, y, z = k.axis_A3.T
+    across_A33 = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]).transpose(2, 0, 1)
+    origin_A33 = k.origin_A34[..., :3]
+    orders, firsts = [], []
+    for own_XC in blocks_of(d.cost):
+        orders.append(np.concatenate([np.flatnonzero(column) for column in own_XC.T]))
+        firsts.append(np.concatenate(([0], own_XC.sum(axis=0).cumsum())).astype(np.int64))
+    half_S = np.linalg.norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0], axis=-1) / 2
+    ends = [constants[f"{name}_deg"] for name in ("plane_low", "plane_high", "needed_low", "needed_high")]
+    polish = [constants["far_rad"] ** 2, constants["gain_rad"] ** 2, constants["starts"], constants["first_steps"]]
+    scale = [constants[name] for name in ("good_deg", "excess_deg", "shake_deg", "usual_phi")]
+    return {
+        "position_A3": k.origin_A34[..., 3], "origin_A33": origin_A33, "across_A33": origin_A33 @ across_A33,
+        "twice_A33": origin_A33 @ across_A33 @ across_A33, "order_N": orders[0], "first_C": firsts[0],
+        "order_D": orders[1], "first_D": firsts[1], "bend_4": np.radians(ends), "polish_4": np.array(polish),
+        "scale_4": np.array(scale), "reach_S": half_S + capsules.radius_S,
+    }  # fmt: skip
+
+
+def _nets(d: Description) -> dict[str, np.ndarray]:
+    nets, layers, columns, numbers = [], [], [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
+
+    def add(part: Part) -> None:
+        nets.append([len(layers), len(part.layers), *_append(columns, part.input), *_append(columns, part.output)])
+        for weight, bias in part.layers:
+            places = [_append(numbers, array.reshape(-1))[0] for array in (weight, bias)]
+            layers.append([weight.shape[1], weight.shape[0], *places])
+
+    for part in (*d.pre, *d.post):
+        add(part)
+    for coder in (d.prior.encoder, d.prior.decoder):
+        add(_alone(coder))
+    kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual]
+    return {
+        "net_H6": np.array(nets), "layer_G4": np.array(layers), "column": np.concatenate(columns),
+        "feature": d.features, "count_5": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
+        "number": np.concatenate(numbers),
+    }  # fmt: skip
+
+
+def _alone(layers: Layers) -> Part:
+    nothing = np.zeros(0, np.int64)
+    return Part(nothing, nothing, layers)
+
+
+def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:
+    place = sum(map(len, into))
+    into.append(array)
+    return place, len(array)
+
+
+COMPILED = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}, "nogil": True}
+"""How functions are compiled: sums in any order, division by zero as NumPy has it."""
+INNER = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""The same for those that compiled functions alone call."""
+
+
+@njit(**INNER)
+def size(t, key):
+    """How many numbers a table has."""
+    return t[0][2 * key + 1]
+
+
+@njit(**INNER)
+def whole(t, key, place):
+    """A number of a table of integers."""
+    return t[0][t[0][2 * key] + place]
+
+
+@njit(**INNER)
+def real(t, key, place):
+    """A number of a table of float64."""
+    return t[1][t[0][2 * key] + place]
+
+
+@njit(**INNER)
+def single(t, key, place):
+    """A number of a table of float32."""
+    return t[2][t[0][2 * key] + place]
+
+
+@njit(**INNER)
+def vector(t, key, place):
+    """Three numbers of a table of float64, of which each row has three."""
+    at = t[0][2 * key] + 3 * place
+    return t[1][at], t[1][at + 1], t[1][at + 2]

@@ -1,0 +1,107 @@
+"""The networks (`mrhubo.retargeter.networks`) and the body prior's layers, float32.
+
+Legend: B frames, F numbers that the networks see, N joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.fast.description import Description, Layers, Part
+
+# erf(x) = x P(x^2) / Q(x^2) up to |x| = 4, beyond which it is 1 in float32: a rational fit with an error below 3e-8,
+# found by iteratively reweighted least squares on the values of scipy.special.erf.
+ERF_TOP = (1.1283789765461936, 0.19624791356658905, 0.053467330137303405, 0.004003595034881348,
+           0.00028803932033508314, 1.974827287362027e-06)  # fmt: skip
+ERF_BOTTOM = (1.0, 0.5072513450242637, 0.11647597831624709, 0.015444325421374245, 0.001216345537898967,
+              3.7480720233753056e-05)  # fmt: skip
+ERF_END = 4.0
+Activation = Callable[[np.ndarray], np.ndarray]
+_HALF, _ROOT = np.float32(0.5), np.float32(np.sqrt(0.5))
+
+
+def gelu(x_X: np.ndarray) -> np.ndarray:
+    """x (1 + erf(x / sqrt 2)) / 2, of float32 numbers; NumPy has no erf, and SciPy takes long to import."""
+    z_X = np.clip(x_X * _ROOT, np.float32(-ERF_END), np.float32(ERF_END))
+    square_X = z_X * z_X
+    top_X, bottom_X = _polynomial(ERF_TOP, square_X), _polynomial(ERF_BOTTOM, square_X)
+    z_X *= top_X
+    z_X /= bottom_X
+    z_X += np.float32(1)
+    z_X *= x_X
+    z_X *= _HALF
+    return z_X
+
+
+def _polynomial(coefficients: tuple[float, ...], x_X: np.ndarray) -> np.ndarray:
+    found_X = x_X * np.float32(coefficients[-1])
+    for coefficient in coefficients[-2:0:-1]:
+        found_X += np.float32(coefficient)
+        found_X *= x_X
+    found_X += np.float32(coefficients[0])
+    return found_X
+
+
+def silu(x_X: np.ndarray) -> np.ndarray:
+    """x / (1 + exp(-x))."""
+    with np.errstate(over="ignore"):
+        return x_X / (np.float32(1) + np.exp(-x_X))
+
+
+@dataclass(frozen=True)
+class Activations:
+    """How activations of the networks and of the body prior are worked out."""
+
+    gelu: Activation
+    prior: Activation
+
+
+ACTIVATIONS: dict[str, Activation] = {
+    "silu": silu,
+    "leaky_relu": lambda x_X: np.where(x_X > 0, x_X, np.float32(0.01) * x_X),
+    "tanh": np.tanh,
+}
+"""Of the body prior, by name."""
+
+
+def joint_angles(description: Description, features_BF: np.ndarray, act: Activation = gelu) -> np.ndarray:
+    """Joint angles (B, N) [rad], inside the limits, of what the networks see (B, F); all float32. `act`: GELU."""
+    residual, cost = description.settings.residual, description.cost
+    raw_BN = features_BF
+    for stage in (description.pre, description.post):
+        raw_BN = _branched(stage, raw_BN, residual, act) if stage else raw_BN
+    lower_N, upper_N = cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32)
+    middle_N, half_N = (upper_N + lower_N) / 2, (upper_N - lower_N) / 2
+    angles_BN = middle_N + half_N * (np.tanh(raw_BN) if description.settings.bound == "tanh" else raw_BN)
+    return np.minimum(np.maximum(np.nan_to_num(angles_BN, nan=0.0), lower_N), upper_N)
+
+
+def features_of(description: Description, local_BJ33: np.ndarray, direction_BD3: np.ndarray) -> np.ndarray:
+    """What the networks see (B, F), of poses (B, 21, 3, 3) and of their directions (B, D, 3)."""
+    if description.settings.features == "directions":
+        return direction_BD3[:, description.features].reshape(len(direction_BD3), -1).astype(np.float32)
+    columns_BX32 = local_BJ33[:, description.features, :, :2]
+    return columns_BX32.swapaxes(-1, -2).reshape(len(local_BJ33), -1).astype(np.float32)
+
+
+def _branched(stage: tuple[Part, ...], x_BI: np.ndarray, residual: bool, act: Activation) -> np.ndarray:
+    found = np.empty((len(x_BI), sum(len(part.output) for part in stage)), np.float32)
+    for part in stage:
+        (weight, bias), *others = part.layers
+        x = x_BI[:, part.input] @ weight.T + bias
+        for number, (weight, bias) in enumerate(others):
+            y = act(x) @ weight.T
+            y += bias
+            x = x + y if residual and number < len(others) - 1 else y
+        found[:, part.output] = x
+    return found
+
+
+def mlp(layers: Layers, x_BI: np.ndarray, act: Activation) -> np.ndarray:
+    """A multilayer perceptron of the body prior."""
+    for number, (weight, bias) in enumerate(layers):
+        x_BI = act(x_BI) @ weight.T + bias if number else x_BI @ weight.T + bias
+    return x_BI

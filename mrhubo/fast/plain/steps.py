@@ -1,0 +1,168 @@
+"""Steps of optimisation and other starts (`mrhubo.reference.solve`, `mrhubo.reference.polish`).
+
+Legend: B frames, D directions, N joints, C blocks, U poses of the pool, S starts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.fast.description import Cost, Description
+from mrhubo.fast.plain.human import norm
+from mrhubo.fast.plain.robot import jacobian, place, unseen
+
+TOLERANCE = 1e-4
+"""A block whose joints all move by less [rad] in a step has converged."""
+DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, FLOOR = 1e-2, 0.1, 10.0, 1e-7, 1e6, 1e3, 0.01
+"""At first; after a step that helped; after one that did not; its bounds; above which a step that does not help is the
+last; and what is added to the Hessian's diagonal, which it multiplies. As `DirectionProblem` has them."""
+SHORTEST = 1e-6
+
+
+@dataclass
+class Model:
+    """Costs of blocks (B, C), and halves of gradient (B, N) and Hessian (B, N, N)."""
+
+    cost_BC: np.ndarray
+    gradient_BN: np.ndarray
+    hessian_BNN: np.ndarray
+
+    def rows(self, keep_B: np.ndarray) -> Model:
+        """Of some frames alone."""
+        return Model(self.cost_BC[keep_B], self.gradient_BN[keep_B], self.hessian_BNN[keep_B])
+
+    def where(self, better_BC: np.ndarray, block_N: np.ndarray, other: Model) -> Model:
+        """`other` in the blocks that are better."""
+        better_BN = better_BC[:, block_N]
+        return Model(
+            np.where(better_BC, other.cost_BC, self.cost_BC),
+            np.where(better_BN, other.gradient_BN, self.gradient_BN),
+            np.where(better_BN[..., None], other.hessian_BNN, self.hessian_BNN),
+        )
+
+
+def blocks_of(cost: Cost) -> tuple[np.ndarray, np.ndarray]:
+    """1 where a joint (N, C), or a direction (D, C), belongs to a block."""
+    count = int(cost.block_N.max()) + 1
+    return (cost.block_N[:, None] == np.arange(count)) * 1.0, (cost.block_D[:, None] == np.arange(count)) * 1.0
+
+
+def quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
+    """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
+    kinematics, cost, human = description.kinematics, description.cost, description.human
+    joints_NC, directions_DC = blocks_of(cost)
+    placed = place(kinematics, q_BN)
+    jacobian_BDN3 = jacobian(kinematics, placed, len(cost.lower_N))
+    length_BD = np.where(cost.partial_D > 0, norm(target_BD3), 1.0)
+    unit_BD3 = target_BD3 / np.maximum(length_BD, SHORTEST)[..., None]
+    miss_BD3 = placed.direction_BD3 - unseen(human.seen_D, placed.view_BV33, unit_BD3)
+    weight_BD = cost.weight_D * length_BD
+    from_middle_BN = q_BN - cost.middle_N
+    cost_BC = ((miss_BD3 * miss_BD3).sum(-1) * weight_BD) @ directions_DC
+    cost_BC += (from_middle_BN * from_middle_BN * cost.ridge_N) @ joints_NC
+    rows_BNR = jacobian_BDN3.swapaxes(1, 2).reshape(len(q_BN), len(cost.lower_N), -1)
+    weighted_BNR = rows_BNR * np.repeat(weight_BD, 3, axis=1)[:, None]
+    gradient_BN = (weighted_BNR @ miss_BD3.reshape(len(q_BN), -1, 1))[..., 0] + from_middle_BN * cost.ridge_N
+    hessian_BNN = weighted_BNR @ rows_BNR.swapaxes(1, 2)
+    diagonal(hessian_BNN)[:] += cost.ridge_N
+    return Model(cost_BC, gradient_BN, hessian_BNN)
+
+
+def diagonal(matrix_BNN: np.ndarray) -> np.ndarray:
+    """A view (B, N) of the diagonals, which can be written to."""
+    return np.einsum("bnn->bn", matrix_BNN)
+
+
+def step(
+    cost: Cost, q_BN: np.ndarray, model: Model, damping_BN: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
+    """Damped Gauss-Newton step (B, N) [rad] of joints that no limit holds; `lower`, `upper`: limits (N,) or (B, N)."""
+    frozen_BN = ((q_BN <= lower) & (model.gradient_BN > 0)) | ((q_BN >= upper) & (model.gradient_BN < 0))
+    free_BN = 1.0 - frozen_BN
+    diagonal_BN = diagonal(model.hessian_BNN)
+    system_BNN = model.hessian_BNN * (free_BN[:, :, None] * free_BN[:, None, :])
+    diagonal(system_BNN)[:] += np.where(frozen_BN, 1.0, damping_BN * (diagonal_BN + FLOOR))
+    return -np.linalg.solve(system_BNN, (model.gradient_BN * free_BN)[..., None])[..., 0]
+
+
+def minimise(
+    description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles (B, N) [rad] after as many steps at most, and what each block costs there (B, C)."""
+    cost = description.cost
+    block_N, joints_NC = cost.block_N, blocks_of(cost)[0]
+    model = quadratic(description, q_BN, target_BD3)
+    found_BN, found_cost_BC = q_BN.copy(), model.cost_BC.copy()
+    damping_BC = np.full_like(model.cost_BC, DAMPING)
+    row_B = np.arange(len(q_BN))
+    for _ in range(steps):
+        moved_BN = step(cost, q_BN, model, damping_BC[:, block_N], cost.lower_N, cost.upper_N)
+        trial_BN = np.clip(q_BN + moved_BN, cost.lower_N, cost.upper_N)
+        trial = quadratic(description, trial_BN, target_BD3)
+        better_BC = trial.cost_BC < model.cost_BC
+        moved_BC = (np.abs(trial_BN - q_BN)[..., None] * joints_NC).max(axis=1)
+        going_B = ~((moved_BC < TOLERANCE) | (~better_BC & (damping_BC > STUCK))).all(axis=1)
+        q_BN = np.where(better_BC[:, block_N], trial_BN, q_BN)
+        model = model.where(better_BC, block_N, trial)
+        damping_BC = np.clip(np.where(better_BC, damping_BC * EASIER, damping_BC * HARDER), LEAST, MOST)
+        found_BN[row_B], found_cost_BC[row_B] = q_BN, model.cost_BC
+        if not going_B.any():
+            break
+        if not going_B.all():
+            row_B, q_BN, target_BD3, model = row_B[going_B], q_BN[going_B], target_BD3[going_B], model.rows(going_B)
+            damping_BC = damping_BC[going_B]
+    return found_BN, found_cost_BC
+
+
+def polish(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, steps: int) -> np.ndarray:
+    """Joint angles (B, N) [rad] that cost no more than the given ones in any block: steps from there, and from other
+    places for the blocks that are far off then.
+    """
+    cost, constants = description.cost, description.settings.constants
+    q_BN, cost_BC = minimise(description, q_BN, target_BD3, steps)
+    weight_BC = weights(cost, target_BD3)
+    far_BC = cost_BC > weight_BC * constants["far_rad"] ** 2
+    if not steps or not far_BC.any():
+        return q_BN
+    row_X = np.flatnonzero(far_BC.any(axis=1))
+    other_XN, other_cost_XC = _again(description, q_BN[row_X], target_BD3[row_X], far_BC[row_X], steps)
+    enough_XC = cost_BC[row_X] - weight_BC[row_X] * constants["gain_rad"] ** 2
+    better_XC = far_BC[row_X] & (other_cost_XC < enough_XC)
+    q_BN[row_X] = np.where(better_XC[:, cost.block_N], other_XN, q_BN[row_X])
+    return q_BN
+
+
+def weights(cost: Cost, target_BD3: np.ndarray) -> np.ndarray:
+    """How much the directions of each block count together (B, C)."""
+    return (norm(target_BD3) * cost.weight_D) @ blocks_of(cost)[1]
+
+
+def _again(
+    description: Description, q_XN: np.ndarray, target_XD3: np.ndarray, far_XC: np.ndarray, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the blocks that are far off find from other starts, and its cost; the others stay."""
+    cost, constants = description.cost, description.settings.constants
+    starts, first = int(constants["starts"]), int(constants["first_steps"])
+    start_XSN = np.where(far_XC[:, None, cost.block_N], near(cost, target_XD3, starts), q_XN[:, None])
+    target_YD3 = np.repeat(target_XD3, starts, axis=0)
+    found_YN, cost_YC = minimise(description, start_XSN.reshape(-1, q_XN.shape[1]), target_YD3, min(steps, first))
+    best_XC = cost_YC.reshape(len(q_XN), starts, -1).argmin(axis=1)
+    best_XN = best_XC[:, cost.block_N]
+    begin_XN = np.take_along_axis(found_YN.reshape(len(q_XN), starts, -1), best_XN[:, None], axis=1)[:, 0]
+    return minimise(description, begin_XN, target_XD3, steps)
+
+
+def near(cost: Cost, target_XD3: np.ndarray, starts: int) -> np.ndarray:
+    """The pool's best pose of each cell, block by block (X, S, N) [rad]."""
+    found_XSN = np.empty((len(target_XD3), starts, len(cost.lower_N)))
+    for block in range(len(cost.cell_CU)):
+        own_D, own_N = np.flatnonzero(cost.block_D == block), np.flatnonzero(cost.block_N == block)
+        wanted_XR = (target_XD3[:, own_D] * cost.weight_D[own_D, None]).reshape(len(target_XD3), -1)
+        pool_UR = cost.pool_UD3[:, own_D].reshape(len(cost.pool_UD3), -1)
+        for start in range(starts):
+            cell_U = np.flatnonzero(cost.cell_CU[block] == start)
+            score_XU = cost.pool_ridge_CU[block, cell_U] - 2 * wanted_XR.astype(np.float32) @ pool_UR[cell_U].T
+            found_XSN[:, start, own_N] = cost.pool_UN[cell_U[score_XU.argmin(axis=1)]][:, own_N]
+    return found_XSN

@@ -1,0 +1,108 @@
+"""Human poses that a retargeter without PyTorch is given, in the three forms of `mrhubo.motion.read_poses`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.fast.plain.human import cross, norm
+
+_JOINTS = 21
+_MOST_TURN = 6 * math.pi
+_FLAT = 1e-4
+"""As `mrhubo.motion.poses` has them."""
+_SMALL = 1e-6
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Local rotations (T, 21, 3, 3), float32, with the leading axes that they had and what is known of them."""
+
+    local_TJ33: np.ndarray
+    shape: tuple[int, ...]
+    frame_rate: float | None
+    name: str
+
+
+def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
+    """Poses of a motion or an array. Matrices are not looked at; other forms are.
+
+    Raises:
+        UserError: it is neither, has another shape, or the frame rate is not positive; the axis-angle or 6D numbers
+            are no rotations; or a motion's rotations refer to another rest pose than the retargeter's (`own_rest`).
+    """
+    name = ""
+    if hasattr(given, "local_TJ33"):  # a Motion, which needs PyTorch and so is not imported
+        if not own_rest:
+            raise UserError(
+                "this retargeter is for a body model with a rest pose of its own; give it an array for that"
+            )
+        frame_rate, name, given = given.frame_rate, given.name, given.local_TJ33
+    array = np.asarray(given)
+    if array.dtype.kind not in "fiu":
+        raise UserError(f"human motion: expected a Motion or an array of numbers, found {array.dtype}")
+    if frame_rate is not None and not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
+        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
+    for axes, read in ((_JOINTS, 3, 3), None), ((_JOINTS, 6), _of_sixd), ((3 * _JOINTS,), _of_axis_angle):
+        if array.shape[-len(axes) :] == axes:
+            shape = array.shape[: -len(axes)]
+            array = array.reshape(math.prod(shape), *axes)
+            with np.errstate(over="ignore"):
+                local_TJ33 = np.ascontiguousarray(array if read is None else read(array, shape), np.float32)
+            return Poses(local_TJ33, shape, frame_rate, name)
+    raise UserError(
+        f"human poses must have the shape (..., {_JOINTS}, 3, 3) (matrices), (..., {3 * _JOINTS}) (axis-angle, rad) or"
+        f" (..., {_JOINTS}, 6) (6D), found {array.shape}"
+    )
+
+
+def refuse(wrong: tuple[int, str] | None, shape: tuple[int, ...]) -> None:
+    """Refuses poses of which a frame is wrong; names it by the leading axes.
+
+    Raises:
+        UserError: one is.
+    """
+    if wrong is not None:
+        index = tuple(map(int, np.unravel_index(wrong[0], shape))) if shape else ()
+        frame = f" {index[0]}" if len(index) == 1 else f" {index}" if index else ""
+        raise UserError(f"human pose{frame} holds {wrong[1]}")
+
+
+def _of_sixd(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """6D: two columns, one after the other."""
+    first, second = array[..., :3].astype(np.float64), array[..., 3:].astype(np.float64)
+    third = cross(first, second)
+    parallel_T = ~(norm(third) > _FLAT * norm(first) * norm(second)).all(axis=1)
+    if parallel_T.any():
+        finite = np.isfinite(array[parallel_T.argmax()]).all()
+        refuse(
+            (int(parallel_T.argmax()), "six numbers that are no rotation" if finite else "NaN or infinite numbers"),
+            shape,
+        )
+    x = first / norm(first)[..., None]
+    second = second - (x * second).sum(-1, keepdims=True) * x
+    y = second / norm(second)[..., None]
+    return np.stack((x, y, cross(x, y)), axis=-1)
+
+
+def _of_axis_angle(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Axis times angle [rad], by Rodrigues' formula."""
+    vector = array.reshape(len(array), _JOINTS, 3).astype(np.float64)
+    angle = norm(vector)
+    wrong_T = ~(angle <= _MOST_TURN).all(axis=1)
+    if wrong_T.any():
+        finite = np.isfinite(array[wrong_T.argmax()]).all()
+        what = "no axis-angle in radians (degrees?)" if finite else "NaN or infinite numbers"
+        refuse((int(wrong_T.argmax()), what), shape)
+    x, y, z = np.moveaxis(vector / np.maximum(angle, _SMALL)[..., None], -1, 0)
+    sine, rest = np.sin(angle), 1 - np.cos(angle)
+    rows = (
+        1 - rest * (y * y + z * z), rest * x * y - sine * z, rest * x * z + sine * y,
+        rest * x * y + sine * z, 1 - rest * (x * x + z * z), rest * y * z - sine * x,
+        rest * x * z - sine * y, rest * y * z + sine * x, 1 - rest * (x * x + y * y),
+    )  # fmt: skip
+    return np.stack(rows, axis=-1).reshape(*angle.shape, 3, 3)

@@ -1,0 +1,178 @@
+"""A trained retargeter without PyTorch.
+
+    retargeter = mrhubo.load_fast("package")        # or the file runtime.safetensors of one, by itself
+    answer = retargeter(pose)                       # joint angles of one frame or of many, with confidence, in NumPy
+
+It answers each frame on its own, as `Retargeter` does with `together=False`, with the same numbers.
+
+Legend: T frames, J = 21 posed joints, D directions, N joints, X branches.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.fast.description import Description
+from mrhubo.fast.engines import FORMS, Answers, Engine, make_engine
+from mrhubo.fast.plain import judging
+from mrhubo.fast.poses import read_poses, refuse
+from mrhubo.robot_motion import FollowingJoint, RobotFacts, RobotMotion
+
+POLISH = 10
+"""Steps of optimisation at most, unless told otherwise: as many as `Retargeter` makes."""
+
+
+class FastRetargeter:
+    """A retargeter in NumPy's arrays; several threads may use it at a time."""
+
+    def __init__(self, description: Description, form: str | None = None) -> None:
+        """Prepares the form that shall answer.
+
+        Args:
+            description: the retargeter's arrays.
+            form: "compiled" (needs numba), or "numpy"; None: compiled where numba is installed. The first use of the
+                compiled form ever takes some twenty seconds, for compiling; what it made is kept for the next.
+
+        Raises:
+            UserError: there is no such form, or numba is missing.
+        """
+        self.description = description
+        self._engine: Engine = make_engine(description, form)
+        self._made: dict[str, Any] = {
+            "joint_names": self.joint_names, "branch_names": self.branch_names,
+            "direction_names": tuple(description.settings.direction_names[d] for d in description.trust.measured),
+            "robot": self.facts, "source": "", "root_position": None, "root_quaternion_wxyz": None,
+        }  # fmt: skip
+
+    @classmethod
+    def load(cls, path: Path | str, form: str | None = None) -> FastRetargeter:
+        """Reads the folder of a package, or its file `runtime.safetensors` alone.
+
+        Raises:
+            UserError: it is missing, damaged, or of another version; or `form` is wrong.
+        """
+        return cls(Description.read(Path(path)), form)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joints of the output, in order."""
+        return self.description.settings.joint_names
+
+    @property
+    def branch_names(self) -> tuple[str, ...]:
+        """Parts of the robot that have a confidence each."""
+        return self.description.settings.branch_names
+
+    @cached_property
+    def facts(self) -> RobotFacts:
+        """What files of the robot's motion tell of it."""
+        settings, cost = self.description.settings, self.description.cost
+        others = tuple(FollowingJoint(**other) for other in settings.facts["others"])
+        limits = {"lower": cost.lower_N, "upper": cost.upper_N, "velocity": cost.velocity_N}
+        return RobotFacts(
+            settings.robot, settings.facts["made_by"], settings.facts["checksum"], others=others, **limits
+        )
+
+    def __call__(self, motion: Any, polish: int = POLISH, frame_rate: float | None = None) -> RobotMotion:
+        """Joint angles of human poses, each on its own, with their confidence.
+
+        Args:
+            motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
+                axis-angle [rad] (..., 63) or 6D (..., 21, 6). The answer has its leading axes, none for a single pose.
+            polish: steps of optimisation after the networks at most; 0: none.
+            frame_rate: frames per second of an array that is one motion (the last leading axis is the time): confidence
+                then knows how much it shakes. A `Motion` has its own.
+
+        Raises:
+            UserError: the array has another shape, or holds what is no rotation (says in which frame); `polish` is
+                negative, or the frame rate not positive.
+        """
+        _check(polish)
+        poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
+        refuse(self._engine.wrong(poses.local_TJ33), poses.shape)
+        target_TD3 = self._engine.directions(poses.local_TJ33)
+        q_TN = self._engine.network(poses.local_TJ33, target_TD3)
+        shake_TX = self._shake(target_TD3, poses.shape, poses.frame_rate)
+        found = self._engine.answer(q_TN, target_TD3, polish, shake_TX)
+        return self._told(found, poses.shape, poses.frame_rate, poses.name)
+
+    def predict(self, motion: Any, polish: int = 0) -> np.ndarray:
+        """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
+        _check(polish)
+        poses = read_poses(motion, None, self.description.settings.own_rest)
+        refuse(self._engine.wrong(poses.local_TJ33), poses.shape)
+        target_TD3 = self._engine.directions(poses.local_TJ33)
+        q_TN = self._engine.polish(self._engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
+        return q_TN.reshape(*poses.shape, -1)
+
+    def imitate(self, directions: Any, polish: int = POLISH) -> RobotMotion:
+        """The answer to directions (..., D, 3) in place of poses: unit vectors in human axes (x left, y up, z forward)
+        of the part that each is seen from, in the order of `description.settings.direction_names`; the length of a bend
+        axis is how much it counts, 0 to 1.
+
+        Raises:
+            UserError: the networks see rotations, the array has another shape, or holds NaN or infinite numbers or a
+                limb's direction that is no unit vector.
+        """
+        _check(polish)
+        settings, cost = self.description.settings, self.description.cost
+        if settings.features != "directions":
+            raise UserError("this retargeter's networks see rotations, not directions; give it poses")
+        target_XD3 = np.asarray(directions, np.float64)
+        if target_XD3.shape[-2:] != (len(cost.weight_D), 3):
+            raise UserError(f"directions must have the shape (..., {len(cost.weight_D)}, 3), found {target_XD3.shape}")
+        length_XD = np.sqrt((target_XD3**2).sum(-1))
+        full_XD = np.where(cost.partial_D > 0, length_XD < 1 + 1e-3, np.abs(length_XD - 1) < 1e-3)
+        if not full_XD.all():  # nor NaN
+            raise UserError("directions hold one that is no unit vector, or a bend axis longer than 1")
+        shape = target_XD3.shape[:-2]
+        target_TD3 = np.ascontiguousarray(target_XD3.reshape(math.prod(shape), *target_XD3.shape[-2:]))
+        nobody_TJ33 = np.zeros((len(target_TD3), 21, 3, 3), np.float32)
+        q_TN = self._engine.network(nobody_TJ33, target_TD3)
+        return self._told(self._engine.answer(q_TN, target_TD3, polish, None), shape, None, "")
+
+    def directions(self, motion: Any) -> np.ndarray:
+        """Directions (..., D, 3) of human poses, as `imitate` takes them."""
+        poses = read_poses(motion, None, self.description.settings.own_rest)
+        refuse(self._engine.wrong(poses.local_TJ33), poses.shape)
+        found_TD3 = self._engine.directions(poses.local_TJ33)
+        return found_TD3.reshape(*poses.shape, *found_TD3.shape[1:])
+
+    def _shake(self, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float | None) -> np.ndarray | None:
+        """How much each branch shakes (T, X) [degrees]; None where no frame rate is known."""
+        if frame_rate is None:
+            return None
+        column_XD, constants = self.description.trust.column_XD, self.description.settings.constants
+        length = shape[-1] if shape else 1
+        clips = target_TD3.reshape(-1, length, *target_TD3.shape[1:]) if len(target_TD3) else target_TD3[None]
+        shake_TD = np.concatenate([judging.shake(clip, frame_rate, constants) for clip in clips])
+        return np.degrees(shake_TD @ (column_XD / np.maximum(column_XD.sum(axis=1, keepdims=True), 1)).T)
+
+    def _told(self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str) -> RobotMotion:
+        trust_TX = found.trust_BX
+        confidence_T = trust_TX.min(axis=1) if trust_TX.shape[1] else np.zeros_like(found.phi_B)
+        return RobotMotion.trusted(
+            q=found.q_BN.reshape(*shape, -1) if found.q_BN.size else found.q_BN.reshape(*shape, len(self.joint_names)),
+            confidence=confidence_T.reshape(shape),
+            branch_confidence=trust_TX.reshape(*shape, trust_TX.shape[1]),
+            direction_error_deg=found.error_BM.reshape(*shape, found.error_BM.shape[1]),
+            phi=found.phi_B.reshape(shape),
+            collision=found.collision_B.reshape(shape),
+            frame_rate=frame_rate,
+            name=name,
+            **self._made,
+        )
+
+
+def _check(polish: int) -> None:
+    if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
+        raise UserError(f"polish must be 0 or more steps, found {polish}")
+
+
+__all__ = ["FORMS", "POLISH", "FastRetargeter"]

@@ -1,0 +1,114 @@
+"""Every form gives PyTorch's numbers."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo.errors import UserError
+from mrhubo.fast import FastRetargeter
+from mrhubo.fast.engines import FORMS
+from mrhubo.retargeter import Retargeter
+
+SAME_RAD = 2e-6
+FIELDS = ("confidence", "branch_confidence", "direction_error_deg", "phi", "collision")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread(one_thread: None) -> None:
+    """Small batches."""
+
+
+@pytest.fixture(scope="module", params=FORMS)
+def fast(retargeter: Retargeter, request: pytest.FixtureRequest) -> FastRetargeter:
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    return FastRetargeter(retargeter.describe(), request.param)
+
+
+def largest(found: np.ndarray, wanted: Tensor) -> float:
+    assert found.shape == tuple(wanted.shape)
+    return float(np.abs(found - wanted.numpy()).max())
+
+
+def test_directions(fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor) -> None:
+    exact = copy.deepcopy(retargeter.body_map.shared).double().of_human(poses.double())
+    assert largest(fast.directions(array), exact) < 1e-6
+
+
+def test_networks(fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor) -> None:
+    assert largest(fast.predict(array), retargeter.predict(poses)) < SAME_RAD
+    single = np.stack([fast.predict(pose) for pose in array])
+    assert np.abs(single - fast.predict(array)).max() < SAME_RAD
+
+
+def test_steps_are_those_of_the_optimiser(
+    fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
+) -> None:
+    """In float64, which leaves rounding no say: PyTorch's own float32 ends up to 1e-3 rad elsewhere where a joint hardly
+    matters.
+    """
+    exact = copy.deepcopy(retargeter).double()
+    target = exact.body_map.human_directions(poses.double())
+    start = torch.from_numpy(fast.predict(array)).double()
+    for steps in (1, 10):
+        wanted = exact.polisher(start.clone(), target, steps)
+        found = fast.predict(array, steps)
+        assert largest(found, wanted) < SAME_RAD
+        assert np.abs(fast.predict(array[3], steps) - found[3]).max() < SAME_RAD
+
+
+def test_what_is_told_of_an_answer(
+    fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
+) -> None:
+    for rate in (None, 30.0):
+        found = fast(array, frame_rate=rate)
+        wanted = retargeter.judge(torch.from_numpy(found.q), poses, rate)
+        for name, most in zip(FIELDS, (1e-4, 1e-4, 2e-3, 1e-4, 0), strict=True):
+            assert largest(getattr(found, name).astype(float), getattr(wanted, name).double()) <= most, name
+        assert (found.joint_names, found.branch_names) == (wanted.joint_names, wanted.branch_names)
+        assert found.direction_names == retargeter.body_map.measured_names and found.frame_rate == rate
+
+
+def test_answers_are_inside_the_limits_and_no_worse_than_pytorchs(
+    fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
+) -> None:
+    found = torch.from_numpy(fast(array).q)
+    assert bool(((found >= retargeter.directions.lower_N) & (found <= retargeter.directions.upper_N)).all())
+    target = retargeter.body_map.human_directions(poses)
+    cost = [retargeter.directions.cost(q, target) for q in (found, retargeter.predict(poses, 10))]
+    assert bool((cost[0] <= cost[1] + 1e-4).all())
+
+
+def test_a_frame_alone_and_among_many(fast: FastRetargeter, array: np.ndarray) -> None:
+    many = fast(np.tile(array, (3, 1, 1, 1)))
+    for frame in (0, 25, 42):
+        one = fast(array[frame])
+        for name in ("q", *FIELDS):
+            np.testing.assert_allclose(
+                getattr(one, name), getattr(many, name)[frame + len(array)], atol=SAME_RAD if name == "q" else 2e-3
+            )
+        assert one.q.shape == (len(one.joint_names),) and one.confidence.shape == ()
+
+
+def test_directions_in_place_of_poses(make: Callable[[str], Retargeter], array: np.ndarray) -> None:
+    fast = FastRetargeter(make("nao").describe(), "numpy")
+    found = fast.imitate(fast.directions(array).reshape(4, 11, -1, 3))
+    np.testing.assert_array_equal(found.q.reshape(44, -1), fast(array).q)
+    with pytest.raises(UserError, match="no unit vector"):
+        fast.imitate(2 * fast.directions(array))
+    with pytest.raises(UserError, match="see rotations"):
+        FastRetargeter(make("reachy").describe(), "numpy").imitate(fast.directions(array))
+
+
+def test_both_forms_agree_to_the_bit_but_for_rounding(make: Callable[[str], Retargeter], array: np.ndarray) -> None:
+    pytest.importorskip("numba")
+    description = make("reachy").describe()
+    one, other = (FastRetargeter(description, form)(array) for form in FORMS)
+    assert np.abs(one.q - other.q).max() < SAME_RAD
+    np.testing.assert_array_equal(one.collision, other.collision)
