@@ -45,7 +45,8 @@ class Style:
     world: np.ndarray = field(default_factory=lambda: np.eye(3))
     """From our world to the file's."""
     axes: str = "world"
-    """How bones lie at all angles 0: "world" as at rest, "bone" each along its own x axis, "random" turned anyhow."""
+    """How bones lie at all angles 0: "world" as at rest, "bone" each along its own x axis, "random" turned anyhow,
+    "hanging" as at rest but for the arms, which hang."""
     collars: bool = True
     """Whether there are joints of the collars."""
     toes: bool = True
@@ -170,8 +171,11 @@ def write_bvh(motion: Motion, style: Style) -> str:
         children.setdefault(nodes[key][0], []).append(key)
     frame: dict[str | None, Rotation] = {}
     for key in nodes:
-        if style.axes == "world" or key == "extra":
-            frame[key] = to_file.inv()
+        if style.axes in ("world", "hanging") or key == "extra":
+            arm = any(part in key for part in ("shoulder", "elbow", "wrist", "Thumb", "Index", "Ring", "hand"))
+            hangs = style.axes == "hanging" and arm and not key.endswith("_base")
+            turn = Rotation.from_euler("z", (90.0 if key.startswith("left") else -90.0) * hangs, degrees=True)
+            frame[key] = turn * to_file.inv()
         elif style.axes == "random":
             frame[key] = Rotation.from_quat(rng.normal(size=4))
         else:  # x along the bone to the first child

@@ -92,7 +92,7 @@ styles = st.builds(
     ),
     unit=st.sampled_from([1.0, 0.01, 0.001, 0.0254, 0.0254 / 0.45]),
     world=st.sampled_from([np.eye(3), Z_UP, np.diag([-1.0, -1, 1]), np.diag([-1.0, 1, -1])]),
-    axes=st.sampled_from(["world", "bone", "random"]),
+    axes=st.sampled_from(["world", "bone", "random", "hanging"]),
     collars=st.booleans(),
     toes=st.booleans(),
     extra_root=st.booleans(),
@@ -118,8 +118,9 @@ def test_limbs_point_as_in_the_file_whoever_wrote_it(motion: Motion, style: Styl
     torch.testing.assert_close(height_T, motion.root_position_T3[:, 1], atol=2e-3, rtol=0)
 
 
-def test_head_hands_and_elbows_are_turned_as_in_the_file(motion: Motion, tmp_path: Path) -> None:
-    found = read(motion, Style(fingers=False), tmp_path)
+@pytest.mark.parametrize("axes", ["world", "hanging"])
+def test_head_and_hands_are_turned_as_in_the_file(axes: str, motion: Motion, tmp_path: Path) -> None:
+    found = read(motion, Style(axes=axes, fingers=False), tmp_path)
     for joint in ("head", "left_wrist", "right_wrist"):
         error = mrhubo.rotation.geodesic_distance(turned(found, joint), turned(motion, joint))
         assert float(torch.rad2deg(error).max()) < 0.1, joint
