@@ -3,7 +3,7 @@
     angles = load("NAME.npz")(poses)            poses: local rotations (frames, 21, 3, 3) of SMPL's joints 1..21
     python NAME.py poses.npy angles.npy         the same with files; the weights NAME.npz lie beside NAME.py
 
-Written by `mrhubo export --to numpy`; licence of the code: Apache-2.0. x to the body's left, y up, z forward, T-pose at
+Written by mrhubo; licence of the code: Apache-2.0. x to the body's left, y up, z forward, T-pose at
 rest; angles in rad, inside the limits, in the order of `load(...).joint_names`. Each frame is answered by itself.
 """
 

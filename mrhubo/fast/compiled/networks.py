@@ -13,7 +13,7 @@ from mrhubo.fast.compiled.tables import (
     FEATURE,
     FIRST_STAGE,
     INNER,
-    LAYER_G4,
+    LAYER_G5,
     LOWER_N,
     NET_H6,
     NUMBER,
@@ -28,7 +28,13 @@ from mrhubo.fast.compiled.tables import (
 )
 from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
 
-_ONE, _HALF, _ROOT, _END = np.float32(1), np.float32(0.5), np.float32(np.sqrt(0.5)), np.float32(ERF_END)
+_ZERO, _ONE, _HALF, _ROOT, _END = (
+    np.float32(0),
+    np.float32(1),
+    np.float32(0.5),
+    np.float32(np.sqrt(0.5)),
+    np.float32(ERF_END),
+)
 _T0, _T1, _T2, _T3, _T4, _T5 = (np.float32(c) for c in ERF_TOP)
 _B1, _B2, _B3, _B4, _B5 = (np.float32(c) for c in ERF_BOTTOM[1:])
 # SiLU is x (1 + tanh(x / 2)) / 2, and tanh(x) = x P(x^2) / Q(x^2) up to |x| = 9, within 2e-9; found as erf.
@@ -72,26 +78,39 @@ def activate(kind, x_E, out_E, count):
 
 @njit(**INNER)
 def affine(t, layer, x_I, out_O):
-    """A layer: weights x + biases. Four rows at a time use each number of x four times."""
-    inputs, outputs = whole(t, LAYER_G4, 4 * layer), whole(t, LAYER_G4, 4 * layer + 1)
+    """A layer: weights x + biases."""
+    inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
     number, begin = t[2], t[0][2 * NUMBER]
-    weights, biases = begin + whole(t, LAYER_G4, 4 * layer + 2), begin + whole(t, LAYER_G4, 4 * layer + 3)
+    weights, biases = whole(t, LAYER_G5, 5 * layer + 2), begin + whole(t, LAYER_G5, 5 * layer + 3)
     # A view tells that places are not negative, without which numba is five times slower.
-    weight_OI = t[2][weights : weights + outputs * inputs].reshape(outputs, inputs)
+    if whole(t, LAYER_G5, 5 * layer + 4):
+        _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_I, out_O)
+        for o in range(outputs):
+            out_O[o] = out_O[o] * number[biases + outputs + o] + number[biases + o]
+        return
+    weights += begin
+    _products(number[weights : weights + outputs * inputs].reshape(outputs, inputs), x_I, out_O)
+    for o in range(outputs):
+        out_O[o] += number[biases + o]
+
+
+@njit(**INNER)
+def _products(weight_OI, x_I, out_O):
+    """Four rows at a time use each number of x four times."""
+    outputs, inputs = weight_OI.shape
     done = outputs - outputs % 4
     for o in range(0, done, 4):
-        a, b = number[biases + o], number[biases + o + 1]
-        c, d = number[biases + o + 2], number[biases + o + 3]
+        a, b, c, d = _ZERO, _ZERO, _ZERO, _ZERO
         for i in range(inputs):
-            a += weight_OI[o, i] * x_I[i]
-            b += weight_OI[o + 1, i] * x_I[i]
-            c += weight_OI[o + 2, i] * x_I[i]
-            d += weight_OI[o + 3, i] * x_I[i]
+            a += np.float32(weight_OI[o, i]) * x_I[i]
+            b += np.float32(weight_OI[o + 1, i]) * x_I[i]
+            c += np.float32(weight_OI[o + 2, i]) * x_I[i]
+            d += np.float32(weight_OI[o + 3, i]) * x_I[i]
         out_O[o], out_O[o + 1], out_O[o + 2], out_O[o + 3] = a, b, c, d
     for o in range(done, outputs):
-        a = number[biases + o]
+        a = _ZERO
         for i in range(inputs):
-            a += weight_OI[o, i] * x_I[i]
+            a += np.float32(weight_OI[o, i]) * x_I[i]
         out_O[o] = a
 
 
@@ -101,12 +120,12 @@ def mlp(t, net, kind, residual, one_E, two_E, three_E):
     after the first are added to what came in where it is residual.
     """
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
-    width = whole(t, LAYER_G4, 4 * first + 1)
+    width = whole(t, LAYER_G5, 5 * first + 1)
     affine(t, first, one_E, three_E)
     for e in range(width):
         one_E[e] = three_E[e]
     for layer in range(first + 1, first + layers):
-        before, width = width, whole(t, LAYER_G4, 4 * layer + 1)
+        before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
         activate(kind, one_E, two_E, before)
         affine(t, layer, two_E, three_E)
         adds = residual and layer < first + layers - 1
@@ -159,6 +178,6 @@ def features(t, local_BJ33, target_BD3, b, feature_F):
 def widest(t):
     """The most numbers between layers."""
     found = 0
-    for g in range(size(t, LAYER_G4) // 4):
-        found = max(found, whole(t, LAYER_G4, 4 * g), whole(t, LAYER_G4, 4 * g + 1))
+    for g in range(size(t, LAYER_G5) // 5):
+        found = max(found, whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1))
     return found
