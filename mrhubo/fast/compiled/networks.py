@@ -7,22 +7,34 @@ import math
 import numpy as np
 from numba import njit
 
+from mrhubo.fast.compiled.human import add, cross, dot, put, row, row3, unit
 from mrhubo.fast.compiled.tables import (
+    AXIS_M,
+    BEND_W,
+    CENTER_F,
     COLUMN,
     COUNT_5,
-    FEATURE,
+    FIRST_O,
     FIRST_STAGE,
     INNER,
+    INPUT_I,
     LAYER_G5,
+    LIMB_M,
     LOWER_N,
+    LOWER_W,
     NET_H6,
     NUMBER,
     RESIDUAL,
+    SCALE_F,
+    SECOND_O,
+    SEEN_M,
     SEES_DIRECTIONS,
     STAGES,
     TANH_BOUND,
     UPPER_N,
+    UPPER_W,
     real,
+    single,
     size,
     whole,
 )
@@ -161,17 +173,40 @@ def joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b):
 
 
 @njit(**INNER)
-def features(t, local_BJ33, target_BD3, b, feature_F):
-    """What the networks see of a pose and its directions."""
-    for f in range(size(t, FEATURE)):
-        chosen = whole(t, FEATURE, f)
-        if whole(t, COUNT_5, SEES_DIRECTIONS):
-            for i in range(3):
-                feature_F[3 * f + i] = target_BD3[b, chosen, i]
-        else:
+def features(t, local_BJ33, target_BD3, b, unit_I3, feature_F):
+    """What the networks see of a pose and its directions. `unit_I3`: room for the directions in full length."""
+    inputs = size(t, INPUT_I)
+    if whole(t, COUNT_5, SEES_DIRECTIONS):
+        for i in range(inputs):
+            own = row3(target_BD3, b, whole(t, INPUT_I, i))
+            put(unit_I3, i, own)
+            feature_F[3 * i], feature_F[3 * i + 1], feature_F[3 * i + 2] = own
+        at = 3 * inputs
+        for w in range(size(t, BEND_W)):
+            upper, lower = row(unit_I3, whole(t, UPPER_W, w)), row(unit_I3, whole(t, LOWER_W, w))
+            own, plane = row(unit_I3, whole(t, BEND_W, w)), unit(cross(upper, lower))
+            own = add(own, plane, max(1 - math.sqrt(dot(own, own)), 0.0))
+            put(unit_I3, whole(t, BEND_W, w), own)
+            feature_F[at], feature_F[at + 1], feature_F[at + 2] = own
+            at += 3
+        for o in range(size(t, FIRST_O)):
+            feature_F[at] = dot(row(unit_I3, whole(t, FIRST_O, o)), row(unit_I3, whole(t, SECOND_O, o)))
+            at += 1
+        for m in range(size(t, LIMB_M)):
+            along, axis = row(unit_I3, whole(t, LIMB_M, m)), row(unit_I3, whole(t, AXIS_M, m))
+            seen = row(unit_I3, whole(t, SEEN_M, m))
+            axis = unit(add(axis, along, -dot(along, axis)))
+            feature_F[at], feature_F[at + 1] = dot(seen, along), dot(seen, axis)
+            feature_F[at + 2] = dot(seen, cross(along, axis))
+            at += 3
+    else:
+        for i in range(inputs):
+            chosen = whole(t, INPUT_I, i)
             for column in range(2):
                 for line in range(3):
-                    feature_F[6 * f + 3 * column + line] = local_BJ33[b, chosen, line, column]
+                    feature_F[6 * i + 3 * column + line] = local_BJ33[b, chosen, line, column]
+    for f in range(size(t, CENTER_F)):
+        feature_F[f] = (feature_F[f] - single(t, CENTER_F, f)) * single(t, SCALE_F, f)
 
 
 @njit(**INNER)

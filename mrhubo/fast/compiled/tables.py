@@ -24,7 +24,9 @@ _KEYS = (
     "kind_K", "slot_K", "of_K", "seen_K", "last_K", "direction_K3", "parent_T", "mirror_T", "rest_K23", "share_K",
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
     "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S",
-    "net_H6", "layer_G5", "column", "feature", "count_5", "number",
+    "net_H6", "layer_G5", "column", "count_5", "number",
+    "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
+    "scale_F",
 )  # fmt: skip
 """The tables, as in `mrhubo.fast.description` but for these:
 
@@ -47,7 +49,8 @@ all columns; count_5: networks of the first stage, of both; whether directions a
     KIND_K, SLOT_K, OF_K, SEEN_K, LAST_K, DIRECTION_K3, PARENT_T, MIRROR_T, REST_K23, SHARE_K,
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
     BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S,
-    NET_H6, LAYER_G5, COLUMN, FEATURE, COUNT_5, NUMBER,
+    NET_H6, LAYER_G5, COLUMN, COUNT_5, NUMBER,
+    INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
 ) = np.arange(len(_KEYS))  # fmt: skip
 # Numbers of NumPy, as numba compiles a function anew for each of Python's that it is called with.
 PLANE_LOW, PLANE_HIGH, NEEDED_LOW, NEEDED_HIGH = FAR, GAIN, STARTS, FIRST_STEPS = np.arange(4)
@@ -78,8 +81,8 @@ class Packed(NamedTuple):
 def pack(description: Description) -> Packed:
     """The arrays of a description."""
     found = {}
-    for section in (description.human, description.kinematics, description.cost, description.reading,
-                    description.trust, description.capsules):  # fmt: skip
+    for name in ("human", "features", "kinematics", "cost", "reading", "trust", "capsules"):
+        section = getattr(description, name)
         found |= {field.name: getattr(section, field.name) for field in fields(section)}
     shorts = [np.zeros(0, np.int16)]
     found |= {**_derived(description), **_nets(description, shorts)}
@@ -141,7 +144,7 @@ def _nets(d: Description, shorts: list[np.ndarray]) -> dict[str, np.ndarray]:
     kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual]
     return {
         "net_H6": np.array(nets), "layer_G5": np.array(layers), "column": np.concatenate(columns),
-        "feature": d.features, "count_5": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
+        "count_5": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
         "number": np.concatenate(numbers),
     }  # fmt: skip
 
