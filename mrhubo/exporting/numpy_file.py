@@ -14,7 +14,7 @@ from mrhubo.exporting.meaning import checked_poses, compared, meaning
 from mrhubo.files.atomic import atomic_path
 from mrhubo.retargeter import Retargeter
 
-_KEPT = ("human.", "features", "pre.", "post.")
+_KEPT = ("human.", "features.", "pre.", "post.")
 """The arrays of a description that the file needs."""
 
 

@@ -59,15 +59,12 @@ def _model(onnx: Any, description: Description, inputs: str) -> Any:
     single = onnx.TensorProto.FLOAT
     directions, joints = len(description.cost.weight_D), len(description.cost.lower_N)
     name, shape = ("local_rotations", [21, 3, 3]) if inputs == "poses" else ("directions", [directions, 3])
-    seen = description.settings.features == "directions"
-    if not seen:
-        rows = graph.gather(name, description.features, 1)
+    if description.settings.features == "local":
+        rows = graph.gather(name, description.features.input_I, 1)
         columns = graph.node("Transpose", graph.gather(rows, [0, 1], 3), perm=[0, 1, 3, 2])
-        features = graph.node("Reshape", columns, graph.numbers([-1, 6 * len(description.features)]))
+        features = graph.flat(columns, 6 * len(description.features.input_I))
     else:
-        found = _directions(graph, description, name) if inputs == "poses" else name
-        chosen = graph.gather(found, description.features, 1)
-        features = graph.node("Reshape", chosen, graph.numbers([-1, 3 * len(description.features)]))
+        features = _features(graph, description, _directions(graph, description, name) if inputs == "poses" else name)
     raw = features
     for stage in (description.pre, description.post):
         raw = _branched(graph, stage, raw, description.settings.residual) if stage else raw
@@ -129,6 +126,10 @@ class _Graph:
         a1, b2 = self.gather(a, [1, 2, 0], -1), self.gather(b, [2, 0, 1], -1)
         a2, b1 = self.gather(a, [2, 0, 1], -1), self.gather(b, [1, 2, 0], -1)
         return self.node("Sub", self.node("Mul", a1, b2), self.node("Mul", a2, b1))
+
+    def flat(self, value: str, count: int) -> str:
+        """One axis after the batch's."""
+        return self.node("Reshape", value, self.numbers([-1, count]))
 
     def stack(self, values: Sequence[str], axis: int) -> str:
         """Along a new axis."""
@@ -199,6 +200,32 @@ def _with_bends(graph: _Graph, description: Description, found: str) -> str:
     order = np.arange(len(human.place_D))
     order[human.bend_Z] = len(order) + np.arange(len(human.bend_Z))
     return graph.gather(graph.node("Concat", found, axis, axis=1), order, 1)
+
+
+def _features(graph: _Graph, description: Description, directions: str) -> str:
+    """What the networks see of directions, as `mrhubo.fast.plain.networks.features_of`."""
+    f = description.features
+    vectors, count = graph.gather(directions, f.input_I, 1), len(f.input_I)
+    parts, unit = [graph.flat(vectors, 3 * count)], vectors
+    if len(f.bend_W):
+        bend, upper, lower = (graph.gather(vectors, places, 1) for places in (f.bend_W, f.upper_W, f.lower_W))
+        length = graph.node("Sqrt", graph.dot(bend, bend))
+        missing = graph.node("Max", graph.node("Sub", graph.constant(1.0), length), graph.constant(0.0))
+        bend = graph.node("Add", bend, graph.node("Mul", missing, graph.unit(graph.cross(upper, lower))))
+        parts.append(graph.flat(bend, 3 * len(f.bend_W)))
+        order = np.arange(count)
+        order[f.bend_W] = count + np.arange(len(f.bend_W))
+        unit = graph.gather(graph.node("Concat", vectors, bend, axis=1), order, 1)
+    if len(f.first_O):
+        cosine = graph.dot(graph.gather(unit, f.first_O, 1), graph.gather(unit, f.second_O, 1))
+        parts.append(graph.flat(cosine, len(f.first_O)))
+    if len(f.limb_M):
+        along, axis, seen = (graph.gather(unit, places, 1) for places in (f.limb_M, f.axis_M, f.seen_M))
+        axis = graph.unit(graph.node("Sub", axis, graph.node("Mul", along, graph.dot(along, axis))))
+        views = [graph.dot(seen, view) for view in (along, axis, graph.cross(along, axis))]
+        parts.append(graph.flat(graph.node("Concat", *views, axis=2), 3 * len(f.limb_M)))
+    shifted = graph.node("Sub", graph.node("Concat", *parts, axis=1), graph.constant(f.center_F))
+    return graph.node("Mul", shifted, graph.constant(f.scale_F))
 
 
 def _branched(graph: _Graph, stage: tuple[Part, ...], x: str, residual: bool) -> str:

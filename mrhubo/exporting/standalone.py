@@ -3,7 +3,7 @@
     angles = load("NAME.npz")(poses)            poses: local rotations (frames, 21, 3, 3) of SMPL's joints 1..21
     python NAME.py poses.npy angles.npy         the same with files; the weights NAME.npz lie beside NAME.py
 
-Written by `mrhubo export --to numpy`; licence of the code: Apache-2.0. x to the body's left, y up, z forward, T-pose at
+Written by mrhubo; licence of the code: Apache-2.0. x to the body's left, y up, z forward, T-pose at
 rest; angles in rad, inside the limits, in the order of `load(...).joint_names`. Each frame is answered by itself.
 """
 
@@ -39,13 +39,22 @@ class Retargeter:
             raise ValueError(f"poses must be finite, of shape (frames, 21, 3, 3); found {poses.shape}")
         if self.settings["features"] == "directions":
             return self.of_directions(self.directions(poses))
-        columns = poses[:, self.arrays["features"], :, :2].swapaxes(-1, -2)
-        return self._joints(columns.reshape(len(poses), -1))
+        columns = poses[:, self.arrays["features.input_I"], :, :2].swapaxes(-1, -2)
+        return self._joints([columns])
 
     def of_directions(self, directions: np.ndarray) -> np.ndarray:
         """Joint angles (frames, joints) [rad] of directions (frames, D, 3), as `directions` gives them."""
-        seen = np.asarray(directions, np.float32)[:, self.arrays["features"]]
-        return self._joints(seen.reshape(len(seen), -1))
+        a = {name[9:]: array for name, array in self.arrays.items() if name.startswith("features.")}
+        vectors = np.asarray(directions, np.float64)[:, a["input_I"]]
+        bends, unit = vectors[:, a["bend_W"]], vectors.copy()
+        plane = _unit(np.cross(vectors[:, a["upper_W"]], vectors[:, a["lower_W"]]))
+        bends = bends + np.maximum(1 - np.linalg.norm(bends, axis=-1, keepdims=True), 0) * plane
+        unit[:, a["bend_W"]] = bends
+        cosines = (unit[:, a["first_O"]] * unit[:, a["second_O"]]).sum(-1)
+        along, axis, seen = (unit[:, a[f"{name}_M"]] for name in ("limb", "axis", "seen"))
+        axis = _unit(axis - along * (along * axis).sum(-1, keepdims=True))
+        views = np.stack([(seen * view).sum(-1) for view in (along, axis, np.cross(along, axis))], axis=-1)
+        return self._joints([vectors, bends, cosines, views])
 
     def directions(self, poses: np.ndarray) -> np.ndarray:
         """Where limbs, hands, head and elbow axes point (frames, D, 3), each in the axes of the part that sees it."""
@@ -79,8 +88,9 @@ class Retargeter:
         share = np.clip((angle - low) / (high - low), 0, 1)
         return share * share * (3 - 2 * share)
 
-    def _joints(self, x: np.ndarray) -> np.ndarray:
-        x = x.astype(np.float32)
+    def _joints(self, seen: list[np.ndarray]) -> np.ndarray:
+        flat = np.concatenate([part.reshape(len(part), int(np.prod(part.shape[1:]))) for part in seen], axis=1)
+        x = (flat.astype(np.float32) - self.arrays["features.center_F"]) * self.arrays["features.scale_F"]
         for stage in ("pre", "post"):
             if f"{stage}.0.input" in self.arrays:
                 x = self._stage(stage, x)
