@@ -88,9 +88,8 @@ def test_numpy(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> N
         weights(np.full((1, 21, 3, 3), np.nan))
 
 
+@pytest.mark.parametrize("retargeter", ["nao"], indirect=True)
 def test_the_numpy_file_runs_without_mrhubo(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> None:
-    if retargeter.body_map.robot.name != "nao":
-        pytest.skip("one is enough")
     write_numpy(retargeter, tmp_path / "robot.py")
     np.save(tmp_path / "poses.npy", poses.numpy())
     refuse = "import sys; sys.modules.update(mrhubo=None, torch=None, scipy=None); sys.argv = ['robot.py', 'poses.npy', 'a.npy'];"
@@ -100,9 +99,8 @@ def test_the_numpy_file_runs_without_mrhubo(retargeter: Retargeter, poses: torch
     np.testing.assert_allclose(np.load(tmp_path / "a.npy"), retargeter.predict(poses).numpy(), atol=SAME_RAD)
 
 
+@pytest.mark.parametrize("retargeter", ["nao"], indirect=True)
 def test_the_command(retargeter: Retargeter, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    if retargeter.body_map.robot.name != "nao":
-        pytest.skip("one is enough")
     package = str(retargeter.save(tmp_path / "package", {}))
     export.main(["--retargeter", package, "--to", "numpy", "--out", str(tmp_path / "nao.py")])
     assert "robot 'nao'" in capsys.readouterr().out.replace("joints of", "robot")
