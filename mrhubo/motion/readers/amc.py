@@ -21,20 +21,12 @@ from mrhubo.motion.readers.tree.given import read_map
 def is_amc(content: Content) -> bool:
     """Whether a file looks like an .amc file: comments and colon words, a frame's number, then the root."""
     return content.text is not None and bool(
-        re.match(r"\s*(?:[#:][^\n]*\n\s*)*\d+\s*\n\s*root(?:\s+-?[\d.]+(?:e[-+]?\d+)?){6}", content.text, re.IGNORECASE)
+        re.match(
+            r"\s*+(?:[#:][^\n]*+\n\s*+)*+\d++[ \t\r]*+\n\s*+root(?:\s++-?[\d.]++(?:e[-+]?\d++)?){6}",
+            content.text,
+            re.IGNORECASE,
+        )
     )
-
-
-def is_asf(content: Content) -> bool:
-    """Whether a file looks like an .asf file."""
-    return content.text is not None and bool(
-        re.search(r"^\s*:(?:version|units|bonedata)\b", content.text, re.MULTILINE)
-    )
-
-
-def read_asf_alone(path: Path, options: ReadOptions) -> Motion:
-    """Refuses a skeleton without a motion."""
-    raise UserError(f"{path}: is a skeleton (.asf) without a motion; name the .amc file, and leave this one beside it")
 
 
 def read_acclaim(path: Path, options: ReadOptions) -> Motion:

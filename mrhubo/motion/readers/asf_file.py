@@ -23,7 +23,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
 
-_MAX_ASF, MAX_AMC = 4_000_000, 512 * 2**20
+_MAX_ASF, MAX_AMC = 4_000_000, 2**28
 _MAX_BONES = 500
 _MAX_FRAMES = 500_000
 _MAX_NUMBERS = 100_000_000
@@ -91,7 +91,7 @@ def read_amc(path: Path, skeleton: Skeleton) -> tuple[JointTree, list[str]]:
     columns = {bone: len(data.dof) for bone, data in skeleton.bones.items() if data.dof}
     starts = dict(zip(columns, np.cumsum([0, *columns.values()]).tolist(), strict=False))
     width = sum(columns.values())
-    rows: list[list[float]] = []
+    rows: list[np.ndarray] = []
     seen: set[str] = set()
     degrees = skeleton.degrees
     for number, line in enumerate(read_regular(path, MAX_AMC).decode("latin1").splitlines(), start=1):
@@ -102,7 +102,7 @@ def read_amc(path: Path, skeleton: Skeleton) -> tuple[JointTree, list[str]]:
             degrees = {":degrees": True, ":radians": False}.get(words[0].lower(), degrees)
         elif len(words) == 1 and words[0].isdigit():
             _check_whole(path, rows, seen, columns)
-            rows.append([0.0] * width)
+            rows.append(np.zeros(width, dtype=np.float32))
             seen = set()
             if len(rows) > _MAX_FRAMES or len(rows) * width > _MAX_NUMBERS:
                 raise UserError(f"{path}: has more than {len(rows) - 1} frames; cut it")
@@ -125,10 +125,10 @@ def read_amc(path: Path, skeleton: Skeleton) -> tuple[JointTree, list[str]]:
         notes.append("the last frame is not whole and is left out; the file may have been cut off")
     if not rows:
         raise UserError(f"{path}: holds no whole frame")
-    return _tree(skeleton, starts, np.array(rows, dtype=np.float32), degrees), notes
+    return _tree(skeleton, starts, np.stack(rows), degrees), notes
 
 
-def _check_whole(path: Path, rows: list[list[float]], seen: set[str], columns: dict[str, int]) -> None:
+def _check_whole(path: Path, rows: list[np.ndarray], seen: set[str], columns: dict[str, int]) -> None:
     if rows and seen < columns.keys():
         missing = next(bone for bone in columns if bone not in seen)
         raise UserError(f"{path}: frame {len(rows) - 1} has no line for '{missing}'")

@@ -21,7 +21,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import open_regular
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
 
-MAX_BYTES = 2 * 2**30
+MAX_BYTES = 2**30
 """Largest file."""
 MAX_FRAMES = 500_000
 """Longest motion that is read: 70 minutes at 120 frames a second."""
@@ -31,13 +31,13 @@ _MAX_DEPTH = 100
 """Joints on the way from a root to an end."""
 _MAX_CHANNELS = 12
 """Of one joint."""
-_MAX_NUMBERS = 300_000_000
+_MAX_NUMBERS = 100_000_000
 _LARGEST = 1e7
 """No angle and no coordinate is beyond this."""
 _BLOCK = 2**24
 _MOTION = re.compile(rb"^[ \t]*MOTION\b", re.MULTILINE | re.IGNORECASE)
-_FRAMES = re.compile(rb"\s*Frames\s*:?\s*(\d+)", re.IGNORECASE)
-_TIME = re.compile(rb"\s*Frame\s*Time\s*:?[ \t]*([^\s]*)", re.IGNORECASE)
+_FRAMES = re.compile(rb"\s*+Frames\s*+:?\s*+(\d+)", re.IGNORECASE)
+_TIME = re.compile(rb"\s*+Frame\s*+Time\s*+:?[ \t]*+([^\s]*+)", re.IGNORECASE)
 _TOKEN = re.compile(r"[{}]|[^\s{}]+")
 
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.advice import advice
 from mrhubo.motion.readers.amass import is_amass, read_amass
-from mrhubo.motion.readers.amc import is_amc, is_asf, read_acclaim, read_asf_alone
+from mrhubo.motion.readers.amc import is_amc, read_acclaim
 from mrhubo.motion.readers.bvh import is_bvh, read_bvh
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.estimators import is_container, read_estimated
@@ -36,7 +37,6 @@ FORMATS: tuple[Format, ...] = (
     Format("AMASS and SMPL-family .npz", is_amass, read_amass, (".npz",)),
     Format("BVH", is_bvh, read_bvh, (".bvh",)),
     Format("ASF/AMC", is_amc, read_acclaim, (".amc",)),
-    Format("ASF without AMC", is_asf, read_asf_alone, ()),
     Format("keypoints (.json, .npy, .npz)", is_keypoints, read_keypoints, ()),
     # the last row: whatever else holds arrays in dictionaries
     Format("what an estimator of human pose writes", is_container, read_estimated, _PYTHON),
@@ -58,8 +58,10 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
     """
     content = Content.open(path)
     row = find_format(content)
+    if row is None and (what_to_do := advice(content)) is not None:
+        raise NoMotion(f"{path}: {what_to_do}")
     if row is None:
-        expected = ", ".join(row.name for row in FORMATS if row.endings)
+        expected = ", ".join(row.name for row in FORMATS)
         raise NoMotion(
             f"{path}: is {content.described}, and no human motion that is read here; expected one of: {expected}"
             " (docs/formats.md says how each is laid out)"

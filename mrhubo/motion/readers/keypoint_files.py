@@ -21,7 +21,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import read_regular
 from mrhubo.files.tree import Tree, read_tree
-from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS
 
@@ -37,7 +37,7 @@ _POSE_KEYS = {"poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_wor
 _JSON = re.compile(
     r"\s*(?:\[\s*[\[{]|\{.*\"(?:" + "|".join((*POINT_KEYS, "instance_info", "frames")) + r")\"\s*:)", re.DOTALL
 )
-_MAX_JSON = 512 * 2**20
+_MAX_JSON = 2**27
 _MAX_NAMES = 1_000_000
 _MOST_POINTS = 1_000
 
@@ -122,7 +122,7 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
         )
         key = next((key for key in (*POINT_KEYS, "frames", "data") if key in value), None)
         if key is None:
-            raise UserError(
+            raise NoMotion(
                 f"{path}: is JSON with {shortened(', '.join(map(str, list(value)[:10])), 120)}; expected 'keypoints'"
             )
         value, where = value[key], f"'{key}'"

@@ -7,7 +7,7 @@ Where each layout is defined is said at its function.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.linking import LINKED, link
 from mrhubo.motion.readers.rotations import Form, find_form
-from mrhubo.motion.readers.smpl_names import Found, find_here, find_inside, names_of, people_in
+from mrhubo.motion.readers.smpl_names import Found, find_here, find_inside, people_in, search
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, Track
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
 
@@ -57,13 +57,15 @@ def _phalp(tree: Tree) -> Layout | None:
         return None
     seen: dict[str, list[tuple[int, Tree]]] = {}
     for number, (_, frame) in enumerate(tree.items()):
-        people, names = frame.get("smpl"), frame.get("tid", "tracked_ids")
-        if people is None or names is None or not people.is_list:
+        people, names = frame.get("smpl"), [frame.get(key) for key in ("tid", "tracked_ids")]
+        if people is None or not people.is_list or not any(names):
             return None
         ages = frame.get("tracked_time")
-        ids = list(names)
-        if len(ids) != len(people):
-            raise UserError(f"{frame.named}: has {len(people)} bodies for {len(ids)} people")
+        ids = next((list(given) for given in names if given is not None and len(given) == len(people)), None)
+        if ids is None:
+            raise UserError(
+                f"{frame.named}: has {len(people)} bodies, and numbers of tracks for another number of people"
+            )
         old = (
             [float(age.array()) > 0 for age in ages]
             if ages is not None and len(ages) == len(ids)
@@ -104,7 +106,7 @@ def _romp(tree: Tree) -> Layout | None:
     tracked = tree.get("sequence_results")
     people = None if tracked is None else people_in(tracked)
     if tracked is not None and people:
-        return Layout(kind, _named(tracked, people))
+        return Layout(kind, _named(people))
     frames = [results] if "smpl_thetas" in results.keys else [frame for _, frame in results.items()]
     if not frames or not any("smpl_thetas" in frame.keys for frame in frames):
         return None
@@ -177,19 +179,24 @@ def _people(tree: Tree) -> Layout | None:
 
     `joblib.dump(results, ...)` of https://github.com/yohanshin/WHAM/blob/main/demo.py: `pose_world` (T, 72) and
     `trans_world` (T, 3) in the world, `pose` and `trans` as the camera sees them, `betas`, `frame_ids`. Those of
-    https://github.com/mkocabas/VIBE/blob/master/demo.py have `pose`, and no world.
+    https://github.com/mkocabas/VIBE/blob/master/demo.py have `pose`, and no world. PromptHMR has `people`, each with
+    `frames`, and `pose` (T, 165), `shape` and `trans` in `smplx_world` and `smplx_cam`
+    (https://github.com/yufu-wang/PromptHMR).
     """
-    people = people_in(tree)
+    people = search(tree, people_in, deepest=1)
     if not people:
         return None
-    keys = set(people[0].node.keys)
+    _, first = people[0]
+    keys, inside = set(first.node.keys), first.node is not first.outer
     if "pose_world" in keys:
         kind = Kind("WHAM", "smpl", ANY_WORLD)
     elif "pred_cam" in keys or "orig_cam" in keys:
         kind = Kind("VIBE or one of its kin", "smpl", CAMERAS)
     else:
-        kind = _kind("SMPL parameters of people", people[0], people[0].node)
-    return Layout(kind, _named(tree, people))
+        kind = _kind("SMPL parameters of people", first, first.node)
+    if inside and first.node.where.endswith(("_cam]", "_incam]")):
+        kind = replace(kind, worlds=CAMERAS)
+    return Layout(kind, _named(people))
 
 
 def _single(tree: Tree) -> Layout | None:
@@ -213,6 +220,8 @@ def _single(tree: Tree) -> Layout | None:
         return Layout(Kind("TRAM", "smpl", CAMERAS), found.tracks())
     if found.names.pose == "local_rot_mats":
         return Layout(Kind("Kimodo with SMPL-X's skeleton", "smplx", ANY_WORLD), found.tracks())
+    if "pred_thetas" in keys:
+        return Layout(Kind("HybrIK", "smpl", CAMERAS), found.tracks())
     if "smpl_scaling" in keys:
         return Layout(Kind("AIST++", "smpl", ANY_WORLD), found.tracks())
     return Layout(_kind("SMPL parameters", found, tree), found.tracks())
@@ -234,8 +243,8 @@ def _said(node: Tree) -> str:
     return (model.text() or "") if model is not None else ""
 
 
-def _named(node: Tree, people: list[Found]) -> list[Track]:
-    return [track for name, found in zip(names_of(node), people, strict=True) for track in found.tracks(name)]
+def _named(people: list[tuple[str, Found]]) -> list[Track]:
+    return [track for name, found in people for track in found.tracks(name)]
 
 
 def _needed_form(array: np.ndarray | None, node: Tree, counts: tuple[int, ...]) -> Form:

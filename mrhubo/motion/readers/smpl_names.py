@@ -1,15 +1,16 @@
 """SMPL parameters in a dictionary of arrays, under the names that are in use.
 
 Where a name is from: `pose_world` WHAM, `smpl_poses` AIST++ (https://google.github.io/aistplusplus_dataset),
-`smpl_thetas` ROMP, `pred_rotmat` TRAM, `body_pose` the package smplx (https://github.com/vchoutas/smplx), `pose_body`
-AMASS, `poses_body` EMDB (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC),
-`fullpose` GRAB (https://github.com/otaheri/GRAB), `local_rot_mats` Kimodo, `poses` and `pose` everybody.
+`smpl_thetas` ROMP, `pred_rotmat` TRAM, `pred_thetas` HybrIK (https://github.com/Jeff-sjtu/HybrIK), `body_pose` the
+package smplx (https://github.com/vchoutas/smplx), `pose_body` AMASS, `poses_body` EMDB
+(https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC), `fullpose` GRAB
+(https://github.com/otaheri/GRAB), `local_rot_mats` Kimodo, `poses` and `pose` everybody.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -45,6 +46,7 @@ _NAMES = (
     _Names("smpl_poses", position=("smpl_trans",)),
     _Names("smpl_thetas", position=("cam_trans",), betas=("smpl_betas",)),
     _Names("pred_rotmat", position=("pred_trans",), betas=("pred_shape",)),
+    _Names("pred_thetas", position=("transl_camsys", "transl"), betas=("pred_betas",)),
     _Names("body_pose", root=("global_orient", "root_pose", "root_orient")),
     _Names("pose_body", root=("root_orient", "global_orient")),
     _Names("poses_body", root=("poses_root",)),
@@ -68,6 +70,8 @@ class Found:
     form: Form
     people: int | None
     """How many people there are, where the arrays have an axis for them before that of the frames."""
+    outer: Tree | None = None
+    """The dictionary around it, if that is the person's."""
 
     @property
     def frames(self) -> int:
@@ -80,9 +84,10 @@ class Found:
         node, names = self.node, self.names
         pose = node[names.pose]
         array = pose.array() if person is None else pose.array()[person]
-        root, position, betas, frames = (
-            self._array(keys, person) for keys in (names.root, names.position, names.betas, _FRAMES)
-        )
+        root, position, betas = (self._array(keys, person) for keys in (names.root, names.position, names.betas))
+        frames = self._array(_FRAMES, person)
+        if frames is None and self.outer is not None:
+            frames = replace(self, node=self.outer)._array(_FRAMES, person)
         scaling = self._array(("smpl_scaling",), None) if names.pose == "smpl_poses" else None
         if position is not None and scaling is not None and scaling.size == 1 and float(scaling.reshape(-1)[0]) > 0:
             position = position / float(scaling.reshape(-1)[0])  # AIST++ has places in units of a scaled body
@@ -141,17 +146,21 @@ def search(node: Tree, find: Callable[[Tree], T | None], deepest: int = _DEEPEST
     return None
 
 
-def people_in(node: Tree) -> list[Found] | None:
-    """SMPL parameters of each entry of a dictionary of people; None where it is none."""
-    if not node.is_mapping or not len(node) or not all(find_here(child) for _, child in _some(node)):
+def people_in(node: Tree) -> list[tuple[str, Found]] | None:
+    """SMPL parameters of each entry of a dictionary of people, with their names; None where it is none.
+
+    An entry has them itself, or in dictionaries one deeper, the numbers of frames beside those.
+    """
+    entries = list(_some(node))
+    if not entries or not all(_rank(name) == 1 and _of_person(child) for name, child in entries):
         return None
-    found = [(name, find_here(child)) for name, child in node.items()]
-    return [place for _, place in found if place is not None]
+    found = [(name, _of_person(child)) for name, child in node.items()]
+    return [(name, place) for name, place in found if place is not None]
 
 
-def names_of(node: Tree) -> list[str]:
-    """The names of the people of such a dictionary."""
-    return [name for name, child in node.items() if find_here(child) is not None]
+def _of_person(node: Tree) -> Found | None:
+    found = search(node, find_here, deepest=1)
+    return None if found is None else replace(found, outer=node)
 
 
 def _some(node: Tree) -> Iterator[tuple[str, Tree]]:

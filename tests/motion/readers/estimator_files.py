@@ -187,6 +187,38 @@ def aist(path: Path, people: dict[int, np.ndarray]) -> None:
     path.write_bytes(pickle.dumps(content))
 
 
+def prompthmr(path: Path, people: dict[int, np.ndarray]) -> None:
+    persons = {}
+    for person, pose in people.items():
+        params = {
+            "pose": padded(pose, 55),
+            "shape": np.zeros((len(pose), 10)),
+            "trans": np.ones((len(pose), 3)),
+            "rotmat": torch.zeros(len(pose), 55, 3, 3),
+        }
+        persons[person] = {
+            "track_id": person,
+            "frames": np.arange(len(pose)) + 7,
+            "bboxes": np.zeros((len(pose), 4)),
+            "smplx_cam": params | {"pose": np.zeros((len(pose), 165))},
+            "smplx_world": params,
+        }
+    content = {"camera": {"img_focal": 1000.0}, "people": persons, "camera_world": {"Rwc": np.zeros((9, 3, 3))}}
+    joblib.dump(content, path)
+
+
+def hybrik(path: Path, people: dict[int, np.ndarray]) -> None:
+    ((_, pose),) = people.items()
+    content = {
+        "pred_xyz_17": np.zeros((len(pose), 17, 3)),
+        "pred_thetas": matrices(padded(pose, 24).reshape(len(pose), 24, 3)).reshape(len(pose), 216),
+        "pred_betas": np.zeros((len(pose), 10)),
+        "transl_camsys": np.ones((len(pose), 3)),
+        "img_path": [f"{t:06}.jpg" for t in range(len(pose))],
+    }
+    path.write_bytes(pickle.dumps(content))
+
+
 def slahmr(path: Path, people: dict[int, np.ndarray]) -> None:
     poses = np.stack(list(people.values()))
     content = {
@@ -262,6 +294,8 @@ WRITERS: dict[str, Writer] = {
     "gvhmr": Writer(gvhmr, ".pt", "GVHMR", "smplx"),
     "genmo": Writer(genmo, ".pt", "GENMO or GEM", "smplx"),
     "aist": Writer(aist, ".pkl", "AIST++", "smpl"),
+    "prompthmr": Writer(prompthmr, ".pkl", "SMPL parameters of people", "smplx", many=True),
+    "hybrik": Writer(hybrik, ".pk", "HybrIK", "smpl", camera=True),
     "slahmr": Writer(slahmr, ".npz", "SMPL parameters", "", many=True),
     "phc": Writer(phc, ".pkl", "SMPL parameters of people", "smpl", many=True),
     "emdb": Writer(emdb, ".pkl", "SMPL parameters", "smpl"),

@@ -31,9 +31,9 @@ _CALLED = 6.0
 """What it is worth that all joints of a leg are called after a leg, and all of an arm after an arm."""
 _HEADED = 6.0
 """What it is worth that a head hangs where the arms do, or that the arms hang farther from the root than the legs."""
-_MOST_JOINTS = 40
+_MOST_JOINTS = 24
 """Of a limb, that are looked at."""
-_BEST_PAIRS = 12
+_BEST_PAIRS = 8
 """Pairs that are looked at, the longest."""
 
 Triple = tuple[int, int, int]

@@ -1,0 +1,43 @@
+"""What to do with files that hold human motion in a form that is not read here.
+
+No library that is maintained, permissive and small reads the skins and animations of GLB and FBX files that animators'
+programs write: pygltflib leaves decoding and skeletons to its user, trimesh reads shapes alone, and FBX is closed. So
+they are to be converted, which Blender does.
+"""
+
+from __future__ import annotations
+
+import re
+
+from mrhubo.motion.readers.content import Content
+
+_BLENDER = "convert it to BVH, for instance in Blender: import it, then File > Export > Motion Capture (.bvh)"
+_MARKERS = (
+    "it has markers, and not joints; solve it for a skeleton first, and export that as BVH, or convert it to SMPL with "
+    "MoSh++ or SOMA"
+)
+_ADVICE: tuple[tuple[str, str, str], ...] = (
+    (r"glTF", "a GLB file", _BLENDER),
+    (r"Kaydara FBX|; FBX", "an FBX file", _BLENDER),
+    (r'\s*\{(?=.*"asset"\s*:)(?=.*"(?:nodes|scenes|meshes|animations|buffers)"\s*:)', "a glTF file", _BLENDER),
+    (r"\s*<\?xml.{0,400}<COLLADA|\s*<COLLADA", "a COLLADA file", _BLENDER),
+    (r"PXR-USDC|#usda", "a USD file", _BLENDER),
+    (r"BLENDER", "a Blender file", "export the skeleton by File > Export > Motion Capture (.bvh)"),
+    (r"[\x02-\x05]P", "a C3D file", _MARKERS),
+    (r"PathFileType", "a TRC file", _MARKERS),
+    (
+        r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b",
+        "a skeleton (.asf) without a motion",
+        "name the .amc file, and leave this one beside it",
+    ),
+)
+"""How such files begin, what they are, and what to do."""
+
+
+def advice(content: Content) -> str | None:
+    """What a file is and what to do with it, for a sentence; None where there is nothing to say."""
+    start = content.start.decode("latin1")
+    for pattern, what, then in _ADVICE:
+        if re.match(pattern, start, re.DOTALL):
+            return f"is {what}, which is not read here; {then}"
+    return None

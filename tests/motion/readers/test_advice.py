@@ -1,0 +1,38 @@
+"""Files that are to be converted first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import mrhubo
+from mrhubo.motion import NoMotion
+
+_FILES = {
+    "GLB": (b"glTF\x02\0\0\0", "Blender"),
+    "FBX": (b"Kaydara FBX Binary  \x00\x1a\x00", "Blender"),
+    "an FBX": (b"; FBX 7.4.0 project file\n", "Blender"),
+    "glTF": (b'{"asset": {"version": "2.0"}, "nodes": []}', "Blender"),
+    "C3D": (b"\x02P\0\0\0", "markers"),
+    "TRC": (b"PathFileType\t4\t(X/Y/Z)\n", "markers"),
+    "COLLADA": (b'<?xml version="1.0"?>\n<COLLADA xmlns="x">', "Blender"),
+    r"\.asf": (b"# a comment\n:version 1.10\n:name VICON\n", "amc"),
+}
+
+
+@pytest.mark.parametrize("what", _FILES)
+def test_what_to_do_is_said(what: str, tmp_path: Path) -> None:
+    content, words = _FILES[what]
+    path = tmp_path / "dance.bvh"
+    path.write_bytes(content)
+    with pytest.raises(NoMotion, match=f"{what}.*{words}"):
+        mrhubo.read_motion(path)
+
+
+def test_a_skeleton_beside_its_motion_is_no_motion_of_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "07.asf").write_text(":version 1.10\n")
+    (tmp_path / "scene.glb").write_bytes(b"glTF\x02\0\0\0")
+    (tmp_path / "notes.json").write_text('{"title": "a dance"}')
+    with pytest.raises(mrhubo.UserError, match="holds no motion file"):
+        mrhubo.motion.load.motion_files(tmp_path)
