@@ -15,9 +15,9 @@ MODULES = (
 )
 """What such a pickle may mention: what arrays, tensors, plain values and paths are made of."""
 _FEW_STEPS, _BYTES_A_STEP, _MOST_STEPS = 2_000_000, 4, 20_000_000
-"""Steps that any pickle may take, after how many bytes of its one more, and steps that none may exceed: numbers in lists
-take one each nine bytes, a video's small arrays, frame by frame, one each seven. So neither time nor memory is out of
-proportion to the file; the most take some twenty seconds."""
+"""Steps that any pickle may take, after how many bytes of its one more, and steps that none may exceed: numbers in
+lists take one each nine bytes, a video's small arrays, frame by frame, one each seven. So neither time nor memory is
+out of proportion to the file; the most take some twenty seconds."""
 
 
 def load_pickle(handle: BinaryIO) -> Any:

@@ -108,12 +108,12 @@ class Tree:
     def items(self) -> Iterator[tuple[str, Tree]]:
         """Keys and nodes of a dictionary; none of anything else."""
         for name, value in self._entries():
-            yield name, Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else name)
+            yield name, self._child(name, value)
 
     def get(self, *names: str) -> Tree | None:
         """The node under the first of some keys that there is."""
-        entries = dict(self.items())
-        return next((entries[name] for name in names if name in entries), None)
+        entries = dict(self._entries())
+        return next((self._child(name, entries[name]) for name in names if name in entries), None)
 
     def __getitem__(self, name: str) -> Tree:
         """The node under a key; UserError where there is none."""
@@ -177,6 +177,9 @@ class Tree:
         if isinstance(self._value, np.ndarray):
             return f"an array of shape {self._value.shape}"
         return f"a {type(self._value).__name__}"
+
+    def _child(self, name: str, value: Any) -> Tree:
+        return Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else shortened(name, 40))
 
     def _entries(self) -> Iterator[tuple[str, Any]]:
         if isinstance(self._value, dict):
