@@ -45,7 +45,8 @@ class Style:
     world: np.ndarray = field(default_factory=lambda: np.eye(3))
     """From our world to the file's."""
     axes: str = "world"
-    """How bones lie at all angles 0: "world" as at rest, "bone" each along its own x axis, "random" turned anyhow."""
+    """How bones lie at all angles 0: "world" as at rest, "bone" each along its own x axis, "random" turned anyhow,
+    "hanging" as at rest but for the arms, which hang."""
     collars: bool = True
     """Whether there are joints of the collars."""
     toes: bool = True
@@ -61,6 +62,10 @@ class Style:
     fingers: bool = True
     prop: bool = False
     """A stick in the right hand."""
+    biped: bool = False
+    """3ds Max's habit: collars hang on the neck, thighs on the spine, and move against them."""
+    twists: bool = False
+    """Ends of bones on upper arms, forearms and thighs, as skins need them."""
     seed: int = 0
     """Of the order of children and of random axes."""
 
@@ -109,6 +114,10 @@ def write_bvh(motion: Motion, style: Style) -> str:
         parent = JOINT_NAMES[PARENTS[joint]] if joint else ("extra" if style.extra_root else None)
         if kind == "shoulder" and not style.collars:
             parent = "spine3"
+        if style.biped and (kind == "collar" or (kind == "shoulder" and not style.collars)):
+            parent = "neck"
+        if style.biped and kind == "hip":
+            parent = "spine1"
         if kind in ("knee", "elbow") and style.rolls:
             roll = f"{parent}_roll"
             nodes[roll] = (parent, index[parent], offsets[joint] / 2)
@@ -130,6 +139,10 @@ def write_bvh(motion: Motion, style: Style) -> str:
             nodes[f"{side}hand*"] = (f"{side}_wrist", index[f"{side}_wrist"], np.array([0.1 * sign, 0, 0]))
         end = f"{side}_foot" if style.toes else f"{side}_ankle"
         nodes[f"{side}toe*"] = (end, index[end], np.array([0.0, -0.015, 0.07]))
+        for joint, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee")):
+            if style.twists:
+                row = index[f"{side}_{joint}"]
+                nodes[f"{side}{joint}Twist*"] = (f"{side}_{joint}", row, 0.5 * offsets[index[f"{side}_{end}"]])
     if style.prop:
         nodes["stick*"] = ("right_wrist", index["right_wrist"], np.array([0.0, 0.0, 1.2]))
     nodes["head*"] = ("head", index["head"], np.array([0.0, 0.18, 0.0]))
@@ -141,14 +154,16 @@ def write_bvh(motion: Motion, style: Style) -> str:
             return place_T3 if key == "pelvis" or not style.extra_root else np.zeros_like(place_T3)
         assert parent is not None
         # all nodes between two joints of ours hang on the upper one
+        if style.biped and parent in ("neck", "spine1") and key not in ("head", "spine2"):
+            parent = "spine3" if parent == "neck" else "pelvis"
         carrier = nodes[parent][1] if key in index or key.endswith(("_roll", "_base")) else joint
         base = points(parent)
         if key in index and (parent.endswith("_base")):
             return base
         if key in index and parent.endswith("_roll"):
             offset = offset / 2
-        if key in index and parent == "spine3" and not style.collars and key.endswith("shoulder"):
-            offset = offset + offsets[index[key.replace("shoulder", "collar")]]
+        if parent == "spine3" and not style.collars and "_shoulder" in key:
+            offset = offset + offsets[index[key.removesuffix("_base").replace("shoulder", "collar")]]
         return base + world[carrier].apply(offset) if carrier >= 0 else base + offset
 
     children: dict[str | None, list[str]] = {}
@@ -156,8 +171,11 @@ def write_bvh(motion: Motion, style: Style) -> str:
         children.setdefault(nodes[key][0], []).append(key)
     frame: dict[str | None, Rotation] = {}
     for key in nodes:
-        if style.axes == "world" or key == "extra":
-            frame[key] = to_file.inv()
+        if style.axes in ("world", "hanging") or key == "extra":
+            arm = any(part in key for part in ("shoulder", "elbow", "wrist", "Thumb", "Index", "Ring", "hand"))
+            hangs = style.axes == "hanging" and arm and not key.endswith("_base")
+            turn = Rotation.from_euler("z", (90.0 if key.startswith("left") else -90.0) * hangs, degrees=True)
+            frame[key] = turn * to_file.inv()
         elif style.axes == "random":
             frame[key] = Rotation.from_quat(rng.normal(size=4))
         else:  # x along the bone to the first child

@@ -33,7 +33,11 @@ POINT_KEYS = (
 """What files call points, the best first."""
 NAME_KEYS = ("names", "joint_names", "keypoint_names", "landmark_names", "keypoints_names")
 CONFIDENCE_KEYS = ("confidence", "confidences", "conf", "scores", "visibility", "keypoint_scores", "presence")
-_POSE_KEYS = {"poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa"}
+_POSE_KEYS = {
+    "poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa",
+    "pred_rotmat", "smpl_thetas", "poses_body", "local_rot_mats", "rotations", "pred_keypoints_3d",
+}  # fmt: skip
+"""Beside rotations, points say nothing new."""
 _JSON = re.compile(
     r"\s*(?:\[\s*[\[{]|\{.*\"(?:" + "|".join((*POINT_KEYS, "instance_info", "frames")) + r")\"\s*:)", re.DOTALL
 )

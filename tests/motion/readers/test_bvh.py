@@ -92,7 +92,7 @@ styles = st.builds(
     ),
     unit=st.sampled_from([1.0, 0.01, 0.001, 0.0254, 0.0254 / 0.45]),
     world=st.sampled_from([np.eye(3), Z_UP, np.diag([-1.0, -1, 1]), np.diag([-1.0, 1, -1])]),
-    axes=st.sampled_from(["world", "bone", "random"]),
+    axes=st.sampled_from(["world", "bone", "random", "hanging"]),
     collars=st.booleans(),
     toes=st.booleans(),
     extra_root=st.booleans(),
@@ -102,6 +102,7 @@ styles = st.builds(
     t_pose_first=st.booleans(),
     fingers=st.booleans(),
     prop=st.booleans(),
+    twists=st.booleans(),
     seed=st.integers(0, 1000),
 )
 
@@ -117,8 +118,9 @@ def test_limbs_point_as_in_the_file_whoever_wrote_it(motion: Motion, style: Styl
     torch.testing.assert_close(height_T, motion.root_position_T3[:, 1], atol=2e-3, rtol=0)
 
 
-def test_head_hands_and_elbows_are_turned_as_in_the_file(motion: Motion, tmp_path: Path) -> None:
-    found = read(motion, Style(fingers=False), tmp_path)
+@pytest.mark.parametrize("axes", ["world", "hanging"])
+def test_head_and_hands_are_turned_as_in_the_file(axes: str, motion: Motion, tmp_path: Path) -> None:
+    found = read(motion, Style(axes=axes, fingers=False), tmp_path)
     for joint in ("head", "left_wrist", "right_wrist"):
         error = mrhubo.rotation.geodesic_distance(turned(found, joint), turned(motion, joint))
         assert float(torch.rad2deg(error).max()) < 0.1, joint
@@ -128,6 +130,18 @@ def test_toes_and_knees_are_believed_rather_than_names(motion: Motion, tmp_path:
     found = read(motion, Style(swapped_names=True), tmp_path)
     assert float(limb_error(found.local_TJ33, motion.local_TJ33).max()) < 0.1
     assert "toes and knees are believed" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("names", ["biped", "nameless"])
+def test_limbs_that_hang_on_neck_and_spine_without_moving_with_them(names: str, motion: Motion, tmp_path: Path) -> None:
+    local = motion.local_TJ33.clone()
+    wave = 0.4 * torch.sin(torch.arange(len(local)) / 3.0)[:, None]
+    for joint, axis in (("neck", [0.3, 1.0, 0.2]), ("spine1", [0.2, 0.5, 1.0])):
+        turn = mrhubo.rotation.axis_angle_to_matrix(wave * torch.tensor(axis))
+        local[:, POSED_JOINT_NAMES.index(joint)] = local[:, POSED_JOINT_NAMES.index(joint)] @ turn
+    moving = dataclasses.replace(motion, local_TJ33=local)
+    found = read(moving, Style(names=names, biped=True, positions=True), tmp_path)
+    assert float(limb_error(found.local_TJ33, moving.local_TJ33).max()) < 0.5
 
 
 def test_first_frame_that_jumps_is_left_out(motion: Motion, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ Legend: F frames.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +17,14 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.limbs import Limbs, find_limbs
-from mrhubo.motion.readers.tree.names import is_head, left_votes
+from mrhubo.motion.readers.tree.names import is_head, is_neck, is_spine, left_votes
 from mrhubo.motion.readers.tree.shape import Chain, Shape
 
 _STEADIER = 0.6
-"""A joint above the one that carries the arms is the chest if shoulders move less in its axes than this share."""
+"""A joint above the one that carries limbs is the part that they belong to, if they move less in its axes than this
+share of how they move in the carrier's."""
 _MOVES = 0.02
-"""Shoulders that move by less, of their distance, do not tell."""
+"""Shoulders and hips that move by less, of their distance, do not tell."""
 _SURE, _PLAIN, _HINT = 0.3, 0.6, 0.1
 """How clear toes and knees must be, of 1, to be sure together which side is left; how clear toes by themselves; and how
 clear either must be to be asked where names do not say."""
@@ -68,8 +69,11 @@ def find_anatomy(tree: JointTree, given: Mapping[str, int] | None = None, what: 
             "--bvh-map"
         )
     notes: list[str] = []
-    chest, head_chain = _chest(shape, limbs), _head_chain(shape, limbs)
-    place = {"pelvis": limbs.leg_carrier, "spine3": chest}
+    shoulders, hips = ([triple[0] for triple in pair] for pair in (limbs.arms, limbs.legs))
+    spine, above = _spine(shape, limbs), tree.above(limbs.leg_carrier)[1:]
+    chest = _steadiest(shape, limbs.arm_carrier, shoulders, spine[1:], is_neck)
+    place = {"pelvis": _steadiest(shape, limbs.leg_carrier, hips, above, is_spine), "spine3": chest}
+    head_chain = _head_chain(shape, limbs)
     legs, arms = _sides(shape, limbs, notes, what)
     for side, leg, arm in zip(("left", "right"), legs, arms, strict=True):
         place |= {f"{side}_{name}": limbs.legs[leg][i] for i, name in enumerate(_LEG)}
@@ -91,22 +95,29 @@ def _toes(shape: Shape, limbs: Limbs, leg: int) -> int | None:
     return chain.places[beyond[0]] if beyond else None
 
 
-def _chest(shape: Shape, limbs: Limbs) -> int:
-    """The joint with whose turn the shoulders go: that which carries the arms, or, where that is a neck, one above."""
-    shoulders = [triple[0] for triple in limbs.arms]
-    width = max(shape.distance(*shoulders), 1e-9)
+def _steadiest(shape: Shape, carrier: int, ends: list[int], above: list[int], misplaced: Callable[[str], bool]) -> int:
+    """The joint with whose turn two points go, shoulders or hips: that which carries them, or one above it.
+
+    Who makes bipeds hangs collars on the neck and thighs on the spine, though they move with neither.
+
+    Args:
+        shape: of the tree.
+        carrier: the joint on which the limbs hang.
+        ends: the two points.
+        above: the joints above that come into question, the nearest first.
+        misplaced: whether a name says that limbs hang on it by such a habit.
+    """
+    width = max(shape.distance(*ends), 1e-9)
 
     def moves(place: int) -> float:
-        seen = [
-            shape.pose.turn[place].inv().apply(shape.pose.point[s] - shape.pose.point[place]) / width for s in shoulders
-        ]
+        back, base_F3 = shape.pose.turn[place].inv(), shape.pose.point[place]
+        seen = [back.apply(shape.pose.point[end] - base_F3) / width for end in ends]
         return float(np.sqrt(np.mean([np.var(x_F3, axis=0).sum() for x_F3 in seen])))
 
-    best = limbs.arm_carrier
-    least = moves(best)
-    for place in shape.tree.above(best)[1:]:
-        if place == limbs.leg_carrier or place not in _spine(shape, limbs):
-            break
+    if above and misplaced(shape.tree.names[carrier]):
+        carrier, above = above[0], above[1:]
+    best, least = carrier, moves(carrier)
+    for place in above:
         if least > _MOVES and moves(place) < _STEADIER * least:
             best, least = place, moves(place)
     return best

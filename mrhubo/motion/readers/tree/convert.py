@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from scipy.spatial.transform import Rotation
 
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
@@ -92,7 +91,6 @@ def _read(
 ) -> Frames:
     """Our joints in some frames, in the y-up world."""
     pose = tree.pose(frames, list(place.values()))
-    to_world = Rotation.from_matrix(world_33)
     point = {name: torch.from_numpy(unit * pose.point[p] @ world_33.T) for name, p in place.items()}
-    turn = {name: torch.from_numpy((to_world * pose.turn[p]).as_matrix()) for name, p in place.items()}
+    turn = {name: torch.from_numpy(world_33 @ pose.matrix[p]) for name, p in place.items()}
     return Frames(point, turn)

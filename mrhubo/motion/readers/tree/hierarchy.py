@@ -80,27 +80,32 @@ class JointTree:
     def _pose(self, value_FC: np.ndarray, places: Sequence[int] | None, rest: bool) -> Pose:
         wanted = range(len(self.joints)) if places is None else places
         needed = sorted({above for place in wanted for above in self.above(place)})
-        turn: dict[int, Rotation] = {}
+        # Frames as the last axis: turning two columns is a few operations on whole arrays.
+        turn: dict[int, np.ndarray] = {}
         point: dict[int, np.ndarray] = {}
         for place in needed:
             joint = self.joints[place]
-            offset_F3 = self._offset(place, value_FC)
-            local = None if rest else _local(joint, value_FC)
+            offset_3F = self._offset(place, value_FC)
             if joint.parent < 0:
-                point[place] = offset_F3
-                turn[place] = Rotation.identity(len(value_FC)) if local is None else local
-                continue
-            point[place] = point[joint.parent] + turn[joint.parent].apply(offset_F3)
-            turn[place] = turn[joint.parent] if local is None else turn[joint.parent] * local
-        return Pose({place: point[place] for place in wanted}, {place: turn[place] for place in wanted})
+                point[place] = offset_3F
+                above_33F = np.repeat(np.eye(3)[:, :, None], len(value_FC), axis=2)
+            else:
+                above_33F = turn[joint.parent]
+                point[place] = point[joint.parent] + (above_33F * offset_3F).sum(1)
+            turn[place] = above_33F if rest or not joint.rotation else _turned(joint, above_33F, value_FC)
+        return Pose(
+            {place: np.ascontiguousarray(point[place].T) for place in wanted},
+            {place: np.ascontiguousarray(turn[place].transpose(2, 0, 1)) for place in wanted},
+        )
 
     def _offset(self, place: int, value_FC: np.ndarray) -> np.ndarray:
+        """From the parent (3, F), in its axes."""
         joint = self.joints[place]
-        offset_F3 = np.tile(np.asarray(joint.offset_3, dtype=np.float64), (len(value_FC), 1))
+        offset_3F = np.repeat(np.asarray(joint.offset_3, dtype=np.float64)[:, None], len(value_FC), axis=1)
         for axis, column in joint.position:
-            base = offset_F3[:, "xyz".index(axis)] if place in self._added else 0.0
-            offset_F3[:, "xyz".index(axis)] = base + value_FC[:, column]
-        return offset_F3
+            base = offset_3F["xyz".index(axis)] if place in self._added else 0.0
+            offset_3F["xyz".index(axis)] = base + value_FC[:, column]
+        return offset_3F
 
     @cached_property
     def _added(self) -> set[int]:
@@ -122,27 +127,32 @@ class Pose:
 
     point: dict[int, np.ndarray]
     """(F, 3) by joint."""
-    turn: dict[int, Rotation]
-    """F rotations by joint, relative to how it is turned when all angles are 0."""
+    matrix: dict[int, np.ndarray]
+    """Rotations (F, 3, 3) by joint, relative to how it is turned when all angles are 0."""
+
+    @cached_property
+    def turn(self) -> dict[int, Rotation]:
+        """The same as SciPy has them; for some frames, as it takes time."""
+        return {place: Rotation.from_matrix(matrix_F33) for place, matrix_F33 in self.matrix.items()}
 
 
-def _local(joint: Joint, value_FC: np.ndarray) -> Rotation | None:
-    """A joint's own rotations; None where it has no angles."""
-    if not joint.rotation:
-        return None
-    axes, columns = "".join(axis for axis, _ in joint.rotation), [column for _, column in joint.rotation]
-    local = _euler(axes, value_FC[:, columns])
-    if joint.axes:
-        own = _euler("".join(axis for axis, _ in joint.axes), np.array([[angle for _, angle in joint.axes]]))
-        local = own * local * own.inv()
-    return local
+def _turned(joint: Joint, above_33F: np.ndarray, value_FC: np.ndarray) -> np.ndarray:
+    """How a joint is turned (3, 3, F), by how its parent is and by its own angles."""
+    turn_33F = above_33F.copy()
+    own = [(axis, np.radians(angle)) for axis, angle in joint.axes]
+    for axis, angle in own:
+        _turn(turn_33F, axis, angle)
+    for axis, column in joint.rotation:
+        _turn(turn_33F, axis, np.radians(value_FC[:, column]))
+    for axis, angle in own[::-1]:
+        _turn(turn_33F, axis, -angle)
+    return turn_33F
 
 
-def _euler(axes: str, angle_FX: np.ndarray) -> Rotation:
-    """Turns [deg] about `axes`, the outermost first."""
-    if len(axes) <= 3 and all(one != other for one, other in zip(axes, axes[1:], strict=False)):
-        return Rotation.from_euler(axes.upper(), angle_FX, degrees=True)
-    turn = Rotation.identity(len(angle_FX))
-    for place, axis in enumerate(axes):
-        turn = turn * Rotation.from_euler(axis.upper(), angle_FX[:, place : place + 1], degrees=True)
-    return turn
+def _turn(matrix_33F: np.ndarray, axis: str, angle_F: np.ndarray | float) -> None:
+    """Turns by angles [rad] about an axis of what is turned already, in place."""
+    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    sine_F, cosine_F = np.sin(angle_F), np.cos(angle_F)
+    one_3F, other_3F = matrix_33F[:, first].copy(), matrix_33F[:, second]
+    matrix_33F[:, first] = cosine_F * one_3F + sine_F * other_3F
+    matrix_33F[:, second] = cosine_F * other_3F - sine_F * one_3F

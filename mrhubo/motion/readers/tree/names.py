@@ -18,7 +18,6 @@ _ARM = (
 )  # fmt: skip
 _THUMB, _HEAD, _HAND = ("thumb",), ("head", "skull"), ("hand", "wrist", "palm")
 _END = ("end", "top", "nub", "tip", "effector", "site")
-_TOES = ("toe", "ball")
 
 
 def is_thumb(name: str) -> bool:
@@ -36,9 +35,14 @@ def is_head(name: str) -> bool:
     return _has(name, _HEAD) and not _has(name, _END)
 
 
-def is_toe(name: str) -> bool:
-    """Whether a name says toes."""
-    return _has(name, _TOES)
+def is_neck(name: str) -> bool:
+    """Whether a name says neck."""
+    return _has(name, ("neck",))
+
+
+def is_spine(name: str) -> bool:
+    """Whether a name says spine."""
+    return _has(name, ("spine",))
 
 
 def limb_votes(names: Iterable[str]) -> float:
