@@ -119,10 +119,12 @@ def write_bvh(motion: Motion, style: Style) -> str:
         if style.biped and kind == "hip":
             parent = "spine1"
         if kind in ("knee", "elbow") and style.rolls:
+            assert parent is not None
             roll = f"{parent}_roll"
             nodes[roll] = (parent, index[parent], offsets[joint] / 2)
             parent = roll
         if kind in ("hip", "shoulder") and style.doubled:
+            assert parent is not None
             nodes[f"{name}_base"] = (parent, index[parent], offsets[joint])
             parent = f"{name}_base"
         nodes[name] = (parent, joint, offsets[joint])
