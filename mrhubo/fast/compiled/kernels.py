@@ -50,7 +50,7 @@ def make_kernels() -> Kernels:
     """The functions; each is compiled when it is first called, which takes some seconds, or read from the cache."""
     version = _checksum()
 
-    @njit(cache=True, **{**tables.COMPILED, "fastmath": False})
+    @njit(cache=True, **tables.EXACT)
     def wrong(local_BJ33, skew):
         """Twice the number of the first frame that holds no rotations, one more where all is finite; else -1."""
         _ = version

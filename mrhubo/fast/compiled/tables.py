@@ -162,6 +162,8 @@ def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:
 
 COMPILED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}, "nogil": True}
 """How functions are compiled: sums in any order, division by zero as NumPy has it."""
+EXACT: dict[str, Any] = {**COMPILED, "fastmath": False}
+"""The same for what must see NaN as it is."""
 INNER: dict[str, Any] = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """The same for those that compiled functions alone call."""
 
