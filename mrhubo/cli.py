@@ -21,6 +21,7 @@ VERBS = {
     "pair": Verb("mrhubo.pair", "make, check or show the pairs alone"),
     "retarget": Verb("mrhubo.retarget", "make a robot's joint angles of files of human motion"),
     "evaluate": Verb("mrhubo.evaluate", "measure a trained retargeter on human motion"),
+    "export": Verb("mrhubo.export", "write a retargeter's networks as ONNX, or as a file that needs NumPy alone"),
     "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit"),
     "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE"),
     "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours"),

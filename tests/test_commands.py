@@ -22,7 +22,7 @@ from mrhubo.errors import UserError
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = {
     name: f"mrhubo.{name}"
-    for name in ("fit", "pair", "retarget", "evaluate", "sweep", "baseline", "reproduce", "prior")
+    for name in ("fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
 }
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
 """Of the config; elsewhere `Config`."""
@@ -205,8 +205,19 @@ GIVEN = {
     "--predictions": "wave.npz",
     "--out": "wave.csv",
     "--robot": "nao",
+    "--to": "numpy",
 }
-NEEDED = {"fit": 1, "pair": 1, "retarget": 3, "evaluate": 2, "sweep": 2, "baseline": 1, "reproduce": 0, "prior": 1}
+NEEDED = {
+    "fit": 1,
+    "pair": 1,
+    "retarget": 3,
+    "evaluate": 2,
+    "export": 3,
+    "sweep": 2,
+    "baseline": 1,
+    "reproduce": 0,
+    "prior": 1,
+}
 """How many things each command cannot do without."""
 
 

@@ -135,6 +135,13 @@ def test_code_that_retargets_runs(page: str, package: str) -> None:
         assert bool(((result.confidence >= 0) & (result.confidence <= 1)).all())
 
 
+def test_code_without_pytorch_runs(package: str) -> None:
+    (code,) = [code for code in blocks("docs/fast.md") if "load_fast" in code]
+    names: dict[str, Any] = {"poses": np.tile(np.eye(3), (2, 21, 1, 1))}
+    exec(re.sub(r"mlruns/packages/nao-\w+", package, code), names)
+    assert names["answer"].q.shape == (433, 8) and names["angles"].shape == (2, 8)
+
+
 def test_the_readme_shows_six_lines() -> None:
     (code,) = blocks("README.md")
     assert len([line for line in code.splitlines() if line]) == 6

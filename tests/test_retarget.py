@@ -38,7 +38,7 @@ def test_a_package_answers_a_file(
     order = root / "data" / "robots" / "nao" / "nao.urdf"
     assert main([*given[:-1], str(tmp_path / "q.csv"), "--format", "unitree", "--joint-order", str(order)]) == 0
     output = capsys.readouterr().out
-    assert "joints that the motion does not turn are held" in output and "RHipYawPitch" in output
+    assert "as the motion does not turn them" in output and "RHipYawPitch" in output
     assert "names neither joints nor its frame rate, which is 10" in output
 
 

@@ -21,6 +21,7 @@ _CONSTANTS = (
     "plane_low_deg", "plane_high_deg", "needed_low_deg", "needed_high_deg", "far_rad", "gain_rad", "first_steps",
     "starts", "good_deg", "excess_deg", "shake_deg", "acceleration", "neighbours", "usual_phi",
 )  # fmt: skip
+_INPUTS = ("bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M")
 _MOST = 1e6
 """No constant is larger."""
 
@@ -36,7 +37,9 @@ def check(d: Description) -> None:
         "P": len(human.joint_P), "V": len(human.view_V), "D": len(human.place_D), "Z": len(human.bend_Z),
         "A": len(k.parent_A), "Q": len(k.direction_Q), "N": len(cost.lower_N), "C": len(cost.cell_CU),
         "U": len(cost.pool_UN), "K": len(reading.kind_K), "T": len(reading.joint_T), "X": len(trust.column_XD),
-        "S": len(capsules.body_S), "Y": len(capsules.pair_Y2),
+        "I": len(d.features.input_I), "W": len(d.features.bend_W), "O": len(d.features.first_O),
+        "M": len(d.features.limb_M), "F": len(d.features.center_F), "S": len(capsules.body_S),
+        "Y": len(capsules.pair_Y2),
     }  # fmt: skip
     for name, array in d.arrays().items():
         axes = name.rpartition("_")[2] if "_" in name else ""
@@ -63,7 +66,8 @@ def check(d: Description) -> None:
         ("reading.direction", reading.direction_K3 + 1, sizes["D"] + 1), ("reading.joint", reading.joint_T, _JOINTS),
         ("reading.parent", reading.parent_T, slots), ("trust.measured", trust.measured, sizes["D"]),
         ("capsules.body", capsules.body_S, bodies), ("capsules.pair", capsules.pair_Y2, sizes["S"]),
-        ("features", d.features, sizes["D"] if d.settings.features == "directions" else _JOINTS),
+        ("features", d.features.input_I, sizes["D"] if d.settings.features == "directions" else _JOINTS),
+        *(("features", getattr(d.features, name), sizes["I"]) for name in _INPUTS),
     ):  # fmt: skip
         outside = (array < 0) | (array >= most)
         _refuse(bool(outside.any()), f"{name} names what is not there")
@@ -98,7 +102,9 @@ def _are_names(names: Iterable[Any]) -> bool:
 
 
 def _check_networks(d: Description, sizes: dict[str, int]) -> None:
-    features = len(d.features) * (3 if d.settings.features == "directions" else 6)
+    more = sizes["W"] * 3 + sizes["O"] + sizes["M"] * 3
+    features = sizes["I"] * 3 + more if d.settings.features == "directions" else sizes["I"] * 6
+    _refuse(sizes["F"] != features, "features are others than there are numbers for")
     links, numbers = 6 * sizes["N"], 6 * sizes["T"]
     if d.pre:
         _check_stage("pre", d.pre, features, links)

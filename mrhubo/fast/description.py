@@ -5,7 +5,7 @@ computer needs that one file, NumPy, and no PyTorch.
 
 Legend: J = 21 posed human joints, P of them that are looked at; D directions, V parts that they are seen from, Z bend
 axes; A driven joints of the robot, N joints of q, C blocks of joints, U poses to start again from; K steps of a
-reading, T turned human joints; X branches, S capsules.
+reading, T turned human joints; X branches, S capsules; I inputs of the networks and F numbers that they see.
 """
 
 from __future__ import annotations
@@ -59,6 +59,36 @@ class Human:
     """which limb carries each,"""
     lower_Z: np.ndarray
     """and which one bends."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """What the networks see (`mrhubo.retargeter.features`): I directions, then what follows from them, or the 6D
+    rotations of I joints.
+    """
+
+    input_I: np.ndarray
+    """Which of the directions, or of the 21 posed joints; what follows are places in these."""
+    bend_W: np.ndarray
+    """Bend axes,"""
+    upper_W: np.ndarray
+    """the limbs that carry them,"""
+    lower_W: np.ndarray
+    """and those that bend."""
+    first_O: np.ndarray
+    """Pairs of directions whose cosine is seen,"""
+    second_O: np.ndarray
+    """the second of each."""
+    limb_M: np.ndarray
+    """Directions seen from limbs: the limb,"""
+    axis_M: np.ndarray
+    """the bend axis,"""
+    seen_M: np.ndarray
+    """and the direction."""
+    center_F: np.ndarray
+    """What all is shifted"""
+    scale_F: np.ndarray
+    """and scaled by, float32."""
 
 
 @dataclass(frozen=True)
@@ -229,8 +259,7 @@ class Description:
     """All of it."""
 
     human: Human
-    features: np.ndarray
-    """Columns of directions, or posed joints, that the networks see."""
+    features: Features
     pre: tuple[Part, ...]
     """Networks from features to links; none of one stage."""
     post: tuple[Part, ...]
@@ -245,7 +274,7 @@ class Description:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every array, by a name that `Description.of` reads."""
-        found = {"features": self.features}
+        found: dict[str, np.ndarray] = {}
         for name in _SECTIONS:
             section = getattr(self, name)
             found |= {f"{name}.{field.name}": getattr(section, field.name) for field in fields(section)}
@@ -274,9 +303,7 @@ class Description:
         sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in _SECTIONS.items()}
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
-        return cls(
-            features=arrays["features"], prior=prior, settings=Settings(**{**told, **names}), **sections, **stages
-        )
+        return cls(prior=prior, settings=Settings(**{**told, **names}), **sections, **stages)
 
     @classmethod
     def read(cls, path: Path) -> Description:
@@ -302,6 +329,7 @@ class Description:
 
 _SECTIONS: dict[str, type] = {
     "human": Human,
+    "features": Features,
     "kinematics": Kinematics,
     "cost": Cost,
     "reading": Reading,

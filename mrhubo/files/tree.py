@@ -11,26 +11,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from mrhubo.errors import UserError, listed, shortened
-from mrhubo.files.joblib_stream import Later, take_array
+from mrhubo.files.array_pickle import MODULES, load_pickle, steps_of
+from mrhubo.files.joblib_stream import Later
 from mrhubo.files.npz import open_npz, read_member
-from mrhubo.files.packed import open_unpacked
+from mrhubo.files.packed import is_packed, open_unpacked
 from mrhubo.files.regular import MAX_BYTES as MAX_FILE
 from mrhubo.files.regular import check_regular, open_regular
 from mrhubo.files.safe_pickle import MAX_BYTES, is_old_torch, read_torch, to_array, to_number, to_tensor
-from mrhubo.files.unpickler import RecordedObject, unpickle
+from mrhubo.files.unpickler import RecordedObject, UnreadablePickle
 
-_MODULES = (
-    *("numpy", "torch", "collections", "joblib", "copyreg", "copy_reg", "_codecs", "pathlib"),
-    *(f"{module}.{name}" for module in ("builtins", "__builtin__") for name in ("dict", "list", "set", "object")),
-    *(f"builtins.{name}" for name in ("bytearray", "slice", "range", "complex")),
-)
-_MAX_STEPS = 20_000_000
-"""Of a pickle: half an hour of a video, a dozen arrays a frame, takes as many; some twenty seconds."""
 _MAX_MADE = 2**26
 """Numbers that lists of arrays are put together to, in one file."""
 _DEEPEST = 4
@@ -63,7 +57,7 @@ class _Source:
         """
         if key not in self.members:
             with open_npz(self.path) as file:
-                self.members[key] = file.read_any(key, _unpickle, MAX_BYTES)
+                self.members[key] = file.read_any(key, load_pickle, MAX_BYTES)
         return self.members[key]
 
     def count(self, numbers: int) -> None:
@@ -114,12 +108,12 @@ class Tree:
     def items(self) -> Iterator[tuple[str, Tree]]:
         """Keys and nodes of a dictionary; none of anything else."""
         for name, value in self._entries():
-            yield name, Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else name)
+            yield name, self._child(name, value)
 
     def get(self, *names: str) -> Tree | None:
         """The node under the first of some keys that there is."""
-        entries = dict(self.items())
-        return next((entries[name] for name in names if name in entries), None)
+        entries = dict(self._entries())
+        return next((self._child(name, entries[name]) for name in names if name in entries), None)
 
     def __getitem__(self, name: str) -> Tree:
         """The node under a key; UserError where there is none."""
@@ -184,6 +178,9 @@ class Tree:
             return f"an array of shape {self._value.shape}"
         return f"a {type(self._value).__name__}"
 
+    def _child(self, name: str, value: Any) -> Tree:
+        return Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else shortened(name, 40))
+
     def _entries(self) -> Iterator[tuple[str, Any]]:
         if isinstance(self._value, dict):
             for key, value in self._value.items():
@@ -240,15 +237,16 @@ def read_tree(path: Path) -> Tree:
         with open_unpacked(path, MAX_BYTES, MAX_FILE) as handle:
             if start.startswith(_NPY):
                 size = check_regular(path, MAX_BYTES)
-                return Tree(read_member(handle, size, _unpickle), _Source(path))
-            return Tree(_unpickle(handle), _Source(path))
+                return Tree(read_member(handle, size, load_pickle), _Source(path))
+            try:
+                return Tree(load_pickle(handle), _Source(path))
+            except UnreadablePickle as error:
+                if not is_packed(start):
+                    raise
+                raise UserError("is packed, and what is in it is no pickle; unpack it first") from error
     except UserError as error:
         said = str(error)
         raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
-
-
-def _unpickle(handle: BinaryIO) -> Any:
-    return unpickle(handle, _MODULES, _MAX_STEPS, take_array)
 
 
 def _read_zip(path: Path) -> Tree:
@@ -256,7 +254,7 @@ def _read_zip(path: Path) -> Tree:
         keys = sorted(file.keys)
     if keys:
         return Tree({key: _Member(key) for key in keys}, _Source(path))
-    content, storages = read_torch(path, _MODULES, _MAX_STEPS)
+    content, storages = read_torch(path, MODULES, steps_of(check_regular(path)))
     return Tree(content, _Source(path, storages))
 
 

@@ -55,6 +55,10 @@ class RecordedObject:
         return f"{self.module}.{type(self).__name__}"
 
 
+class UnreadablePickle(UserError):
+    """What is no pickle at all, or a damaged one."""
+
+
 class Stream(Protocol):
     """A pickle that is being read, for who finds something else in the midst of it."""
 
@@ -91,14 +95,15 @@ def unpickle(
             raw bytes into a pickle's stream read them here.
 
     Raises:
-        UserError: it is no pickle, is truncated, mentions another module, or wants too much.
+        UnreadablePickle: it is no pickle, or is truncated.
+        UserError: it mentions another module, or wants too much.
     """
     try:
         return _RestrictedUnpickler(_Reader(file), modules, max_steps or MAX_STEPS, replace).load()
     except UserError:
         raise
     except Exception as error:  # whatever the unpickler makes of a stranger's bytes
-        raise UserError("it is no readable pickle") from error
+        raise UnreadablePickle("it is no readable pickle") from error
 
 
 class _Reader:

@@ -27,6 +27,7 @@ from mrhubo.fast.description import (
     Capsules,
     Cost,
     Description,
+    Features,
     Human,
     Kinematics,
     Layers,
@@ -38,7 +39,7 @@ from mrhubo.fast.description import (
 )
 from mrhubo.reference import DirectionProblem, polish
 from mrhubo.retargeter import confidence
-from mrhubo.retargeter.features import DirectionFeatures, RotationFeatures
+from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures, RotationFeatures
 from mrhubo.retargeter.networks import Branched, ResidualMLP
 from mrhubo.robot import BodyMap, Robot, bending
 from mrhubo.robot.joint import drive
@@ -58,8 +59,6 @@ def describe(retargeter: Retargeter) -> Description:
     """
     network, body_map = retargeter.network, retargeter.body_map
     features, first, last = network.features, network.pre, network.post
-    seen = "_columns" if isinstance(features, DirectionFeatures) else "_rows"
-    assert isinstance(features, DirectionFeatures | RotationFeatures)
     parts = [part for stage in (first, last) if isinstance(stage, Branched) for part in stage.parts]
     constants = {
         "plane_low_deg": bending.PLANE_DEG[0], "plane_high_deg": bending.PLANE_DEG[1],
@@ -72,7 +71,7 @@ def describe(retargeter: Retargeter) -> Description:
     reading, prior = _reading(body_map), retargeter.prior
     return Description(
         _human(body_map),
-        _int(features.get_buffer(seen)),
+        _features(features),
         _parts(first) if isinstance(first, Branched) else (),
         _parts(last),
         _kinematics(retargeter.directions),
@@ -129,6 +128,17 @@ def _human(body_map: BodyMap) -> Human:
         upper_Z=_int(upper),
         lower_Z=_int(lower),
     )
+
+
+def _features(features: PoseFeatures) -> Features:
+    if isinstance(features, RotationFeatures):
+        rows, nothing = features.get_buffer("_rows"), np.zeros(0, np.int64)
+        center_F = np.zeros(features.size, np.float32)
+        return Features(_int(rows), *[nothing] * 8, center_F, center_F + 1)
+    assert isinstance(features, DirectionFeatures)
+    names = ("columns_I", "bend_X", "upper_X", "lower_X", "first_P", "second_P", "limb_V", "axis_V", "seen_V")
+    places = [_int(features.get_buffer(f"_{name}")) for name in names]
+    return Features(*places, _single(features.center_F), _single(features.scale_F))
 
 
 def _layers(linear: Iterable[nn.Module]) -> Layers:

@@ -25,6 +25,8 @@ _MAX_JOINTS = 4_096
 _MAX_INCLUDES = 50
 _FREE = "free"
 _ONE_NUMBER = ("hinge", "slide")
+_OTHER_TURNS = ("axisangle", "xyaxes", "zaxis", "euler")
+"""What says how a body is turned besides `quat`."""
 _ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 
 
@@ -105,9 +107,7 @@ def in_order(motion: RobotMotion, order: JointOrder) -> tuple[RobotMotion, tuple
     if held:
         angles = sorted({f"{other.offset:.4g}" for other in held})
         where = f"at {angles[0]} rad" if len(angles) == 1 else "where the robot holds them, not all at 0 rad"
-        notes.append(
-            f"{len(held)} joints that the motion does not turn are held {where}: {listed(o.name for o in held)}"
-        )
+        notes.append(f"held {where}, as the motion does not turn them: {listed(other.name for other in held)}")
     if following:
         notes.append(f"joints that mimic others follow them: {listed(other.name for other in following)}")
     if left := [name for name in motion.joint_names if name not in order.names]:
@@ -182,6 +182,8 @@ class _Model:
         if self.free is None:
             return JointOrder(tuple(self.names), str(self.path))
         name, body = self.free
+        if other := next((key for key in _OTHER_TURNS if body.get(key)), None):
+            raise UserError(f"{self.path}, line {body.sourceline}: the base is turned by '{other}'; write it as 'quat'")
         place, turn = self._numbers(body, "pos", _ORIGIN), self._numbers(body, "quat", _UPRIGHT)
         return JointOrder(tuple(self.names), str(self.path), name, place, turn)
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from mrhubo.errors import UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
-from mrhubo.files.regular import open_regular
+from mrhubo.files.regular import check_regular, open_regular
 from mrhubo.robot_motion.clock import find_rate, nanoseconds
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.plain import build, short
-from mrhubo.robot_motion.tables import MAX_TEXT, read_text
+from mrhubo.robot_motion.tables import read_text
 
 TOPIC = "/joint_trajectory"
 _TYPE = "trajectory_msgs/msg/JointTrajectory"
@@ -179,8 +179,9 @@ def _trajectories(path: Path, records: Any) -> Iterator[bytes]:
     """The JointTrajectory messages of a bag, as bytes."""
     stream = _import("mcap.stream_reader")
     schemas, channels = set(), set()
+    size = check_regular(path, _MAX_BAG)  # as much memory is made as a record claims, however short the file
     with open_regular(path, _MAX_BAG) as file:
-        for record in stream.StreamReader(file, emit_chunks=True, record_size_limit=MAX_TEXT).records:
+        for record in stream.StreamReader(file, emit_chunks=True, record_size_limit=size).records:
             inner = [record]
             if isinstance(record, records.Chunk):
                 if record.compression not in ("", "zstd") or record.uncompressed_size > _MAX_CHUNK:

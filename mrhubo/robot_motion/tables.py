@@ -52,7 +52,10 @@ def read_csv(path: Path) -> RobotMotion:
         UserError: the file is missing, too large, or holds no robot motion.
     """
     text = read_text(path)
-    header = next(csv.reader(io.StringIO(text[: 2**20].partition("\n")[0])), [])
+    try:
+        header = next(csv.reader(io.StringIO(text[: 2**20].partition("\n")[0])), [])
+    except csv.Error as error:
+        raise UserError(f"{path}: its header is none of a table: {error}") from error
     repeated = sorted({name for name in header if header.count(name) > 1}) if len(header) <= _MAX_COLUMNS else []
     if repeated or len(header) > _MAX_COLUMNS:
         raise UserError(

@@ -26,6 +26,7 @@ from mrhubo.robot import build_body_map
 
 SCRIPTS = [
     "confidence",
+    "inference",
     "pair_pictures",
     "pair_quality",
     "pairing",
@@ -194,6 +195,21 @@ def test_confidence(run: Run, package: Path, clips: Path, tmp_path: Path) -> Non
 def test_retarget(run: Run, package: Path) -> None:
     ((_, one, twenty),) = rows(run("retarget", package, "--frames", "1,20", "--rounds", 2), "commit")
     assert 0 < float(one.split()[0]) < 1_000 and 0 < float(twenty.split()[0]) < 1_000
+
+
+def test_inference(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In NumPy's form; others need packages and time, and PyTorch takes seconds to start."""
+    inference = importlib.import_module("inference")
+    start = inference.start
+    monkeypatch.setattr(inference, "there", lambda *names: False)
+    monkeypatch.setattr(
+        inference, "start", lambda package, form: start(package, form) if form == "numpy" else [form, "9", "9", "yes"]
+    )
+    text = run("inference", "--batch", 40, "--rounds", 2, "--frames", 4, package)
+    assert {row[0] for row in rows(text, "form")} >= {"PyTorch", "numpy"}
+    assert re.search(r"^\| numpy +\| \d+\.\d+ +\| \d+ +\| no +\|$", text, re.M), text
+    over = {(row[0], row[1]): float(row[2]) for row in rows(text, "motion")}
+    assert over["wide", "10 steps"] < over["wide", "1 step"] < over["wide", "network"]
 
 
 def test_polish(run: Run, package: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError
 from mrhubo.fast import FastRetargeter
 from mrhubo.fast.engines import FORMS
@@ -94,6 +95,18 @@ def test_a_frame_alone_and_among_many(fast: FastRetargeter, array: np.ndarray) -
                 getattr(one, name), getattr(many, name)[frame + len(array)], atol=SAME_RAD if name == "q" else 2e-3
             )
         assert one.q.shape == (len(one.joint_names),) and one.confidence.shape == ()
+
+
+def test_a_large_prior_is_coarser_but_for_a_hundredth(make: Callable[[str], Retargeter], array: np.ndarray) -> None:
+    """The compiled form keeps its large layers in 16 bits, for frames one by one."""
+    pytest.importorskip("numba")
+    nao = make("nao")
+    whole = Retargeter(nao.network, nao.body_map, BodyPrior.open(), nao.config, nao.phi_threshold)
+    one, other = (FastRetargeter(whole.describe(), form)(array[:30]) for form in FORMS)
+    assert one.phi is not None and other.phi is not None
+    np.testing.assert_allclose(one.phi, other.phi, rtol=1e-2)
+    np.testing.assert_allclose(one.branch_confidence, other.branch_confidence, atol=5e-3)
+    assert np.abs(one.phi - other.phi).max() > 0
 
 
 def test_directions_in_place_of_poses(make: Callable[[str], Retargeter], array: np.ndarray) -> None:

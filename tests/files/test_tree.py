@@ -22,7 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrhubo.errors import UserError
-from mrhubo.files import tree
+from mrhubo.files import array_pickle, tree
 from mrhubo.files.tree import Tree, read_tree
 from tests.files.bounded import bounded
 from tests.files.test_safe_pickle import BOMBS, attacks
@@ -224,6 +224,13 @@ def visit(node: Tree, deepest: int) -> None:
         visit(child, deepest - 1)
 
 
+@pytest.mark.parametrize("pack", PACKERS)
+def test_what_is_packed_but_no_pickle_is_to_be_unpacked(tmp_path: Path, pack: Any) -> None:
+    (tmp_path / "a.bvh.gz").write_bytes(pack(b"HIERARCHY\nROOT Hips\n"))
+    with pytest.raises(UserError, match="what is in it is no pickle; unpack it first"):
+        read_tree(tmp_path / "a.bvh.gz")
+
+
 def test_large_arrays_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
     """Estimators write the mesh of every frame beside the pose."""
     large = np.arange(4_000_000, dtype=np.float64).reshape(1000, 4000)
@@ -239,3 +246,12 @@ def test_large_arrays_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
     os.truncate(path, 2_000_000)
     with pytest.raises(UserError, match="was changed while it was read"):
         found["verts"].array()
+
+
+def test_steps_are_in_proportion_to_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(array_pickle, "_FEW_STEPS", 1_000)
+    (tmp_path / "a.pkl").write_bytes(b"\x80\x04" + b"N0" * 5_000 + b"N.")
+    with pytest.raises(UserError, match="takes more than 3,501 steps"):
+        read_tree(tmp_path / "a.pkl")
+    (tmp_path / "a.pkl").write_bytes(pickle.dumps({"poses": np.zeros((300, 72)).tolist()}))
+    assert read_tree(tmp_path / "a.pkl")["poses"].shape() == (300, 72)

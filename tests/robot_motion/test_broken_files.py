@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from mrhubo.errors import UserError
 from mrhubo.robot_motion import FORMATS, RobotMotion, read_robot_motion, write_robot_motion
 from tests.files.bounded import bounded
+from tests.motion.damage import Step, accidents, damaged
 from tests.robot_motion.motions import plain
 
 FILES = [name for name, row in FORMATS.items() if row.ending]
@@ -37,23 +37,11 @@ def good(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return path
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(data=st.data())
-def test_damage_is_noticed_or_does_not_matter(good: Path, data: st.DataObject) -> None:
-    content = bytearray(good.read_bytes())
-    for _ in range(data.draw(st.integers(1, 3))):
-        start = data.draw(st.integers(0, len(content) - 1))
-        kind = data.draw(st.sampled_from(["flip", "cut", "splice", "insert"]))
-        if kind == "flip":
-            content[start] ^= 1 << data.draw(st.integers(0, 7))
-        elif kind == "cut":
-            content = content[: start + 1]
-        elif kind == "splice":
-            content[start : start + 8] = content[: data.draw(st.integers(0, len(content)))]
-        else:
-            content[start:start] = data.draw(st.binary(min_size=1, max_size=8))
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(steps=accidents)
+def test_damage_is_noticed_or_does_not_matter(good: Path, steps: list[Step]) -> None:
     path = good.with_name("bad")
-    path.write_bytes(content)
+    path.write_bytes(damaged(good.read_bytes(), steps))
     with bounded(megabytes=200, seconds=10):
         try:
             found = read(path)
@@ -108,6 +96,7 @@ class Hostile:
         (b"time [s],a [rad]\n1,1\n0,1\n", "do not rise evenly"),
         (b"a [rad],a [rad]\n0,1\n", r"its header has 'a \[rad\]' twice"),
         (b"a [rad],\xff\n", "is no text"),
+        (b"a [rad],b\rc\n1,2\n", "its header is none of a table"),
         (b"joint_names: &a [x]\npoints: *a\n", "has YAML aliases"),
         (b"joint_names: !!python/object/apply:os.system ['touch executed']\n", "is no YAML"),
         (b"joint_names: [a]\npoints: [1]\n", "is no JointTrajectory"),

@@ -75,6 +75,10 @@ def test_other_files_list_them_as_they_stand(tmp_path: Path, root: Path) -> None
         ),
         (MODEL.replace("0 0 0.8", "0 0"), "pos='0 0' are not 3 numbers"),
         (MODEL.replace("<frame>", "<frame><replicate/>"), "has <replicate>, which only MuJoCo can take apart"),
+        (
+            MODEL.replace('quat="2 0 0 0"', 'euler="0 0 90"'),
+            "line 6: the base is turned by 'euler'; write it as 'quat'",
+        ),
         (MODEL.replace("arm.xml", "none.xml"), "none.xml: there is no such file"),
         (MODEL.replace("arm.xml", "robot.xml"), "includes more than 50 files"),
     ],

@@ -86,9 +86,11 @@ def make_kernels() -> Kernels:
         _ = version
         widest = networks.widest(t)
         one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
-        link_M, feature_F = np.empty(6 * out_BN.shape[1], np.float32), np.empty(widest, np.float32)
+        link_M = np.empty(6 * out_BN.shape[1], np.float32)
+        feature_F = np.empty(tables.size(t, tables.CENTER_F), np.float32)
+        unit_I3 = np.empty((tables.size(t, tables.INPUT_I), 3))
         for b in range(len(target_BD3)):
-            networks.features(t, local_BJ33, target_BD3, b, feature_F)
+            networks.features(t, local_BJ33, target_BD3, b, unit_I3, feature_F)
             networks.joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b)
 
     @njit(cache=True, **tables.COMPILED)

@@ -7,28 +7,46 @@ import math
 import numpy as np
 from numba import njit
 
+from mrhubo.fast.compiled.human import add, cross, dot, put, row, row3, unit
 from mrhubo.fast.compiled.tables import (
+    AXIS_M,
+    BEND_W,
+    CENTER_F,
     COLUMN,
     COUNT_5,
-    FEATURE,
+    FIRST_O,
     FIRST_STAGE,
     INNER,
-    LAYER_G4,
+    INPUT_I,
+    LAYER_G5,
+    LIMB_M,
     LOWER_N,
+    LOWER_W,
     NET_H6,
     NUMBER,
     RESIDUAL,
+    SCALE_F,
+    SECOND_O,
+    SEEN_M,
     SEES_DIRECTIONS,
     STAGES,
     TANH_BOUND,
     UPPER_N,
+    UPPER_W,
     real,
+    single,
     size,
     whole,
 )
 from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
 
-_ONE, _HALF, _ROOT, _END = np.float32(1), np.float32(0.5), np.float32(np.sqrt(0.5)), np.float32(ERF_END)
+_ZERO, _ONE, _HALF, _ROOT, _END = (
+    np.float32(0),
+    np.float32(1),
+    np.float32(0.5),
+    np.float32(np.sqrt(0.5)),
+    np.float32(ERF_END),
+)
 _T0, _T1, _T2, _T3, _T4, _T5 = (np.float32(c) for c in ERF_TOP)
 _B1, _B2, _B3, _B4, _B5 = (np.float32(c) for c in ERF_BOTTOM[1:])
 # SiLU is x (1 + tanh(x / 2)) / 2, and tanh(x) = x P(x^2) / Q(x^2) up to |x| = 9, within 2e-9; found as erf.
@@ -72,26 +90,39 @@ def activate(kind, x_E, out_E, count):
 
 @njit(**INNER)
 def affine(t, layer, x_I, out_O):
-    """A layer: weights x + biases. Four rows at a time use each number of x four times."""
-    inputs, outputs = whole(t, LAYER_G4, 4 * layer), whole(t, LAYER_G4, 4 * layer + 1)
+    """A layer: weights x + biases."""
+    inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
     number, begin = t[2], t[0][2 * NUMBER]
-    weights, biases = begin + whole(t, LAYER_G4, 4 * layer + 2), begin + whole(t, LAYER_G4, 4 * layer + 3)
+    weights, biases = whole(t, LAYER_G5, 5 * layer + 2), begin + whole(t, LAYER_G5, 5 * layer + 3)
     # A view tells that places are not negative, without which numba is five times slower.
-    weight_OI = t[2][weights : weights + outputs * inputs].reshape(outputs, inputs)
+    if whole(t, LAYER_G5, 5 * layer + 4):
+        _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_I, out_O)
+        for o in range(outputs):
+            out_O[o] = out_O[o] * number[biases + outputs + o] + number[biases + o]
+        return
+    weights += begin
+    _products(number[weights : weights + outputs * inputs].reshape(outputs, inputs), x_I, out_O)
+    for o in range(outputs):
+        out_O[o] += number[biases + o]
+
+
+@njit(**INNER)
+def _products(weight_OI, x_I, out_O):
+    """Four rows at a time use each number of x four times."""
+    outputs, inputs = weight_OI.shape
     done = outputs - outputs % 4
     for o in range(0, done, 4):
-        a, b = number[biases + o], number[biases + o + 1]
-        c, d = number[biases + o + 2], number[biases + o + 3]
+        a, b, c, d = _ZERO, _ZERO, _ZERO, _ZERO
         for i in range(inputs):
-            a += weight_OI[o, i] * x_I[i]
-            b += weight_OI[o + 1, i] * x_I[i]
-            c += weight_OI[o + 2, i] * x_I[i]
-            d += weight_OI[o + 3, i] * x_I[i]
+            a += np.float32(weight_OI[o, i]) * x_I[i]
+            b += np.float32(weight_OI[o + 1, i]) * x_I[i]
+            c += np.float32(weight_OI[o + 2, i]) * x_I[i]
+            d += np.float32(weight_OI[o + 3, i]) * x_I[i]
         out_O[o], out_O[o + 1], out_O[o + 2], out_O[o + 3] = a, b, c, d
     for o in range(done, outputs):
-        a = number[biases + o]
+        a = _ZERO
         for i in range(inputs):
-            a += weight_OI[o, i] * x_I[i]
+            a += np.float32(weight_OI[o, i]) * x_I[i]
         out_O[o] = a
 
 
@@ -101,12 +132,12 @@ def mlp(t, net, kind, residual, one_E, two_E, three_E):
     after the first are added to what came in where it is residual.
     """
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
-    width = whole(t, LAYER_G4, 4 * first + 1)
+    width = whole(t, LAYER_G5, 5 * first + 1)
     affine(t, first, one_E, three_E)
     for e in range(width):
         one_E[e] = three_E[e]
     for layer in range(first + 1, first + layers):
-        before, width = width, whole(t, LAYER_G4, 4 * layer + 1)
+        before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
         activate(kind, one_E, two_E, before)
         affine(t, layer, two_E, three_E)
         adds = residual and layer < first + layers - 1
@@ -142,23 +173,46 @@ def joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b):
 
 
 @njit(**INNER)
-def features(t, local_BJ33, target_BD3, b, feature_F):
-    """What the networks see of a pose and its directions."""
-    for f in range(size(t, FEATURE)):
-        chosen = whole(t, FEATURE, f)
-        if whole(t, COUNT_5, SEES_DIRECTIONS):
-            for i in range(3):
-                feature_F[3 * f + i] = target_BD3[b, chosen, i]
-        else:
+def features(t, local_BJ33, target_BD3, b, unit_I3, feature_F):
+    """What the networks see of a pose and its directions. `unit_I3`: room for the directions in full length."""
+    inputs = size(t, INPUT_I)
+    if whole(t, COUNT_5, SEES_DIRECTIONS):
+        for i in range(inputs):
+            own = row3(target_BD3, b, whole(t, INPUT_I, i))
+            put(unit_I3, i, own)
+            feature_F[3 * i], feature_F[3 * i + 1], feature_F[3 * i + 2] = own
+        at = 3 * inputs
+        for w in range(size(t, BEND_W)):
+            upper, lower = row(unit_I3, whole(t, UPPER_W, w)), row(unit_I3, whole(t, LOWER_W, w))
+            own, plane = row(unit_I3, whole(t, BEND_W, w)), unit(cross(upper, lower))
+            own = add(own, plane, max(1 - math.sqrt(dot(own, own)), 0.0))
+            put(unit_I3, whole(t, BEND_W, w), own)
+            feature_F[at], feature_F[at + 1], feature_F[at + 2] = own
+            at += 3
+        for o in range(size(t, FIRST_O)):
+            feature_F[at] = dot(row(unit_I3, whole(t, FIRST_O, o)), row(unit_I3, whole(t, SECOND_O, o)))
+            at += 1
+        for m in range(size(t, LIMB_M)):
+            along, axis = row(unit_I3, whole(t, LIMB_M, m)), row(unit_I3, whole(t, AXIS_M, m))
+            seen = row(unit_I3, whole(t, SEEN_M, m))
+            axis = unit(add(axis, along, -dot(along, axis)))
+            feature_F[at], feature_F[at + 1] = dot(seen, along), dot(seen, axis)
+            feature_F[at + 2] = dot(seen, cross(along, axis))
+            at += 3
+    else:
+        for i in range(inputs):
+            chosen = whole(t, INPUT_I, i)
             for column in range(2):
                 for line in range(3):
-                    feature_F[6 * f + 3 * column + line] = local_BJ33[b, chosen, line, column]
+                    feature_F[6 * i + 3 * column + line] = local_BJ33[b, chosen, line, column]
+    for f in range(size(t, CENTER_F)):
+        feature_F[f] = (feature_F[f] - single(t, CENTER_F, f)) * single(t, SCALE_F, f)
 
 
 @njit(**INNER)
 def widest(t):
     """The most numbers between layers."""
     found = 0
-    for g in range(size(t, LAYER_G4) // 4):
-        found = max(found, whole(t, LAYER_G4, 4 * g), whole(t, LAYER_G4, 4 * g + 1))
+    for g in range(size(t, LAYER_G5) // 5):
+        found = max(found, whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1))
     return found

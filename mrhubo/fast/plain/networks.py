@@ -5,12 +5,14 @@ Legend: B frames, F numbers that the networks see, N joints.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from mrhubo.fast.description import Description, Layers, Part
+from mrhubo.fast.plain.human import cross, norm, normalize
 
 # erf(x) = x P(x^2) / Q(x^2) up to |x| = 4, beyond which it is 1 in float32: a rational fit with an error below 3e-8,
 # found by iteratively reweighted least squares on the values of scipy.special.erf.
@@ -81,10 +83,24 @@ def joint_angles(description: Description, features_BF: np.ndarray, act: Activat
 
 def features_of(description: Description, local_BJ33: np.ndarray, direction_BD3: np.ndarray) -> np.ndarray:
     """What the networks see (B, F), of poses (B, 21, 3, 3) and of their directions (B, D, 3)."""
-    if description.settings.features == "directions":
-        return direction_BD3[:, description.features].reshape(len(direction_BD3), -1).astype(np.float32)
-    columns_BX32 = local_BJ33[:, description.features, :, :2]
-    return columns_BX32.swapaxes(-1, -2).reshape(len(local_BJ33), -1).astype(np.float32)
+    f, batch = description.features, len(direction_BD3)
+    if description.settings.features == "local":
+        columns_BI32 = local_BJ33[:, f.input_I, :, :2].swapaxes(-1, -2)
+        return (columns_BI32.reshape(batch, 6 * len(f.input_I)).astype(np.float32) - f.center_F) * f.scale_F
+    vector_BI3 = direction_BD3[:, f.input_I]
+    bend_BW3 = vector_BI3[:, f.bend_W]
+    plane_BW3 = normalize(cross(vector_BI3[:, f.upper_W], vector_BI3[:, f.lower_W]))
+    bend_BW3 = bend_BW3 + np.maximum(1 - norm(bend_BW3), 0.0)[..., None] * plane_BW3
+    unit_BI3 = vector_BI3.copy()
+    unit_BI3[:, f.bend_W] = bend_BW3
+    cosine_BO = (unit_BI3[:, f.first_O] * unit_BI3[:, f.second_O]).sum(-1)
+    along_BM3, axis_BM3, seen_BM3 = (unit_BI3[:, places] for places in (f.limb_M, f.axis_M, f.seen_M))
+    axis_BM3 = normalize(axis_BM3 - along_BM3 * (along_BM3 * axis_BM3).sum(-1, keepdims=True))
+    views = (along_BM3, axis_BM3, cross(along_BM3, axis_BM3))
+    view_BM3 = np.stack([(seen_BM3 * axis).sum(-1) for axis in views], axis=-1)
+    several = (vector_BI3, bend_BW3, cosine_BO, view_BM3)
+    flat = [numbers.reshape(batch, math.prod(numbers.shape[1:])).astype(np.float32) for numbers in several]
+    return (np.concatenate(flat, axis=1) - f.center_F) * f.scale_F
 
 
 def _branched(stage: tuple[Part, ...], x_BI: np.ndarray, residual: bool, act: Activation) -> np.ndarray:

@@ -98,7 +98,8 @@ class Content:
     def is_torch(self) -> bool:
         """Whether it is a zip archive that `torch.save` wrote, perhaps a damaged one."""
         size = int.from_bytes(self.start[26:28], "little")
-        return self.is_zip and self.start[30 : 30 + size].endswith((b"/data.pkl", b"/.format_version"))
+        begins = self.start[30 : 30 + size].endswith((b"/data.pkl", b"/.format_version"))
+        return self.is_zip and (begins or any(name.endswith("/data.pkl") for name in self.names))
 
     @property
     def is_npy(self) -> bool:

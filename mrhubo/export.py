@@ -1,0 +1,42 @@
+"""`mrhubo export --retargeter FOLDER --to onnx --out nao.onnx`: a package's networks for programs without mrhubo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mrhubo.config import CommandParser, run_command
+
+DESCRIPTION = (
+    "Writes the networks of a package as one ONNX file, or as a Python file that needs NumPy alone with its weights"
+    " beside it, and compares their answers with PyTorch's. docs/export.md says what is in them."
+)
+
+
+def build_parser() -> CommandParser[None]:
+    """The command's arguments."""
+    parser = CommandParser[None]("mrhubo export", DESCRIPTION, None)
+    package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
+    parser.add_argument("--retargeter", metavar="FOLDER", required=True, help=package)
+    parser.add_argument("--to", choices=("onnx", "numpy"), required=True, help="what to write")
+    out = "file to write: NAME.onnx, or NAME.py, beside which NAME.npz will lie"
+    parser.add_argument("--out", metavar="FILE", required=True, help=out)
+    inputs = "what an ONNX file takes; a NumPy file takes both (default: %(default)s)"
+    parser.add_argument("--input", choices=("poses", "directions"), default="poses", help=inputs)
+    return parser
+
+
+def main(argv: list[str]) -> None:
+    """The command."""
+    options = build_parser().parse_args(argv)
+    import mrhubo
+    from mrhubo.exporting import write_numpy, write_onnx
+
+    retargeter, out = mrhubo.load(options.retargeter), Path(options.out)
+    off = write_onnx(retargeter, out, options.input) if options.to == "onnx" else write_numpy(retargeter, out)
+    beside = f" and {out.with_suffix('.npz')}" if options.to == "numpy" else ""
+    print(f"{out}{beside}: {len(retargeter.joint_names)} joints of '{retargeter.body_map.robot.name}'")
+    print(f"its answers are at most {off:.1e} rad from PyTorch's")
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,76 @@
+"""What an exported file tells of itself, as names and texts."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import mrhubo
+from mrhubo.errors import UserError
+from mrhubo.fast import Description
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from mrhubo.retargeter import Retargeter
+
+_SAME, _WORST, _MOST = 1e-5, 1e-4, 0.999
+"""How near to PyTorch's answers those of a file must be [rad]: nearly all numbers, all of them, and what nearly all is.
+Both are float32, and where a network is steep, an order of summing shows in the fifth digit."""
+_CHECKED = 256
+
+POSES = (
+    "local_rotations (batch, 21, 3, 3): rotation matrices of SMPL's body joints 1..21, each relative to its parent;"
+    " x to the body's left, y up, z forward; T-pose at rest"
+)
+DIRECTIONS = (
+    "directions (batch, D, 3): unit vectors, in the order of direction_names, in human axes (x left, y up, z forward)"
+    " of the part that each is seen from; an elbow axis counts as much as it is long, 0 to 1"
+)
+
+
+def meaning(description: Description, inputs: str) -> dict[str, str]:
+    """Names, limits, units, rate and the definition of input and output."""
+    settings, cost = description.settings, description.cost
+    return {
+        "robot": settings.robot,
+        "joint_names": json.dumps(settings.joint_names),
+        "lower_rad": json.dumps(cost.lower_N.tolist()),
+        "upper_rad": json.dumps(cost.upper_N.tolist()),
+        "velocity_rad_s": json.dumps(cost.velocity_N.tolist()),
+        "direction_names": json.dumps(settings.direction_names),
+        "input": POSES if inputs == "poses" else DIRECTIONS,
+        "output": "joint_angles (batch, N): rad, inside the limits, in the order of joint_names",
+        "rate": "any: each frame is answered by itself",
+        "steps": "none: the networks alone; mrhubo.load_fast makes steps of optimisation after them",
+        "package": settings.facts["checksum"],
+        "mrhubo": mrhubo.__version__,
+    }
+
+
+def checked_poses(retargeter: Retargeter) -> Tensor:
+    """Poses (B, 21, 3, 3) of the body prior on which a file's answers are compared with PyTorch's."""
+    import torch
+
+    latent_BZ = torch.randn(_CHECKED, retargeter.prior.latent, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        return retargeter.prior.decode_matrices(latent_BZ.to(retargeter.device)).cpu()
+
+
+def compared(found_BN: np.ndarray, retargeter: Retargeter) -> float:
+    """How far a file's answers to `checked_poses` are from PyTorch's at most [rad].
+
+    Raises:
+        UserError: more than they may be.
+    """
+    wanted_BN = retargeter.predict(checked_poses(retargeter)).cpu().numpy()
+    off_BN = np.abs(found_BN - wanted_BN)
+    usual, worst = float(np.quantile(off_BN, _MOST)), float(off_BN.max())
+    if not (usual <= _SAME and worst <= _WORST):
+        raise UserError(
+            f"the exported file's answers are up to {worst:.1e} rad from PyTorch's, nearly all within {usual:.1e};"
+            f" at most {_WORST:g} and {_SAME:g} are let through"
+        )
+    return worst

@@ -1,0 +1,46 @@
+"""The networks as a short Python file that needs NumPy alone, and their weights beside it."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.exporting import standalone
+from mrhubo.exporting.meaning import checked_poses, compared, meaning
+from mrhubo.files.atomic import atomic_path
+from mrhubo.retargeter import Retargeter
+
+_KEPT = ("human.", "features.", "pre.", "post.")
+"""The arrays of a description that the file needs."""
+
+
+def write_numpy(retargeter: Retargeter, path: Path) -> float:
+    """Writes NAME.py and NAME.npz and returns how far their answers are from PyTorch's at most [rad].
+
+    Args:
+        retargeter: whose networks.
+        path: NAME.py.
+
+    Raises:
+        UserError: the name has another ending, the answers are others than PyTorch's, or the disk refuses.
+    """
+    if path.suffix != ".py" or not path.stem.isidentifier():
+        raise UserError(f"{path}: the name must be one of a Python module, such as nao.py")
+    description = retargeter.describe()
+    arrays = {name: array for name, array in description.arrays().items() if name.startswith(_KEPT)}
+    arrays["meaning"] = np.array(json.dumps(meaning(description, "poses")))
+    arrays["settings"] = np.array(description.metadata()["settings"])
+    off = compared(standalone.Retargeter(arrays)(checked_poses(retargeter).numpy()), retargeter)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # pyright: ignore[reportArgumentType]
+    for file, content in (
+        (path.with_suffix(".npz"), buffer.getvalue()),
+        (path, Path(standalone.__file__).read_bytes()),
+    ):
+        with atomic_path(file) as temporary:
+            temporary.write_bytes(content)
+    return off

@@ -1,0 +1,118 @@
+"""What is exported answers as PyTorch does, without mrhubo."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from mrhubo import export, rotation
+from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
+from mrhubo.errors import UserError
+from mrhubo.exporting import standalone, write_numpy, write_onnx
+from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.robot import build_body_map
+
+KINDS = {
+    "nao": ["model.hidden=12"],
+    "coman": ["model.hidden=9", "model.stages=1", "model.residual=false", "model.bound_output=clamp"],
+    "reachy": ["model.hidden=10", "model.branches=false", "model.input_frame=local"],
+}
+SAME_RAD = 2e-6
+MOST_LINES = 150
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def retargeter(root: Path, request: pytest.FixtureRequest) -> Retargeter:
+    config = load_config(root / "conf" / f"{request.param}.yaml", KINDS[request.param])
+    body_map = build_body_map(config.robot)
+    torch.manual_seed(0)
+    return Retargeter(build_network(config, body_map), body_map, BodyPrior(hidden=8).eval(), config, phi_threshold=0.01)
+
+
+@pytest.fixture(scope="module")
+def poses() -> torch.Tensor:
+    turns = torch.randn(12, 21, 3, generator=torch.Generator().manual_seed(0))
+    turns[8:] = 0
+    return rotation.axis_angle_to_matrix(turns)
+
+
+def test_onnx(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> None:
+    onnx, reference = pytest.importorskip("onnx"), pytest.importorskip("onnx.reference")
+    path = tmp_path / "robot.onnx"
+    assert write_onnx(retargeter, path) < SAME_RAD
+    model = onnx.load(path)
+    evaluator = reference.ReferenceEvaluator(model)
+    for batch in (poses, poses[:1]):
+        (found,) = evaluator.run(["joint_angles"], {"local_rotations": batch.numpy()})
+        np.testing.assert_allclose(found, retargeter.predict(batch).numpy(), atol=SAME_RAD)
+    told = {entry.key: entry.value for entry in model.metadata_props}
+    assert json.loads(told["joint_names"]) == list(retargeter.joint_names)
+    assert json.loads(told["upper_rad"]) == pytest.approx(retargeter.directions.upper_N.tolist())
+    assert told["input"].startswith("local_rotations") and told["output"].startswith("joint_angles")
+    if retargeter.body_map.robot.name == "reachy":
+        with pytest.raises(UserError, match="see rotations"):
+            write_onnx(retargeter, path, "directions")
+        return
+    write_onnx(retargeter, path, "directions")
+    evaluator = reference.ReferenceEvaluator(onnx.load(path))
+    directions = retargeter.body_map.human_directions(poses).numpy()
+    (found,) = evaluator.run(None, {"directions": directions})
+    np.testing.assert_allclose(found, retargeter.predict(poses).numpy(), atol=SAME_RAD)
+
+
+def test_onnx_runtime_reads_it(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    write_onnx(retargeter, tmp_path / "robot.onnx")
+    session = runtime.InferenceSession(tmp_path / "robot.onnx")
+    (found,) = session.run(None, {"local_rotations": poses.numpy()})
+    np.testing.assert_allclose(found, retargeter.predict(poses).numpy(), atol=1e-5)
+
+
+def test_numpy(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> None:
+    assert write_numpy(retargeter, tmp_path / "robot.py") < SAME_RAD
+    weights = standalone.load(tmp_path / "robot.npz")
+    assert weights.joint_names == list(retargeter.joint_names)
+    wanted = retargeter.predict(poses).numpy()
+    np.testing.assert_allclose(weights(poses.numpy()), wanted, atol=SAME_RAD)
+    np.testing.assert_allclose(weights(poses[0].numpy()), wanted[0], atol=SAME_RAD)
+    assert len((tmp_path / "robot.py").read_text().splitlines()) < MOST_LINES
+    with pytest.raises(ValueError, match="finite"):
+        weights(np.full((1, 21, 3, 3), np.nan))
+
+
+def test_the_numpy_file_runs_without_mrhubo(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> None:
+    if retargeter.body_map.robot.name != "nao":
+        pytest.skip("one is enough")
+    write_numpy(retargeter, tmp_path / "robot.py")
+    np.save(tmp_path / "poses.npy", poses.numpy())
+    refuse = "import sys; sys.modules.update(mrhubo=None, torch=None, scipy=None); sys.argv = ['robot.py', 'poses.npy', 'a.npy'];"
+    run = "import runpy; runpy.run_path('robot.py', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", refuse + run], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    np.testing.assert_allclose(np.load(tmp_path / "a.npy"), retargeter.predict(poses).numpy(), atol=SAME_RAD)
+
+
+def test_the_command(retargeter: Retargeter, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    if retargeter.body_map.robot.name != "nao":
+        pytest.skip("one is enough")
+    package = str(retargeter.save(tmp_path / "package", {}))
+    export.main(["--retargeter", package, "--to", "numpy", "--out", str(tmp_path / "nao.py")])
+    assert "robot 'nao'" in capsys.readouterr().out.replace("joints of", "robot")
+    assert (tmp_path / "nao.npz").is_file()
+    with pytest.raises(UserError, match="Python module"):
+        export.main(["--retargeter", package, "--to", "numpy", "--out", str(tmp_path / "nao-1.txt")])
+
+
+def test_a_wrong_file_is_not_written(retargeter: Retargeter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(standalone, "_gelu", lambda x: x)
+    with pytest.raises(UserError, match="from PyTorch's"):
+        write_numpy(retargeter, tmp_path / "robot.py")
+    assert not list(tmp_path.iterdir())
