@@ -38,8 +38,8 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
             PyTorch's, or the disk refuses.
     """
     try:
-        import onnx
-        import onnx.reference
+        import onnx  # pyright: ignore[reportMissingImports]
+        import onnx.reference  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise UserError("an ONNX file needs the package onnx: pip install 'mrhubo[onnx]'") from error
     if inputs not in INPUTS:
@@ -169,7 +169,7 @@ def _directions(graph: _Graph, description: Description, poses: str) -> str:
     )
     if len(human.bend_Z):
         found = _with_bends(graph, description, found)
-    seen = graph.stack([places[human.view_V[view]] for view in human.seen_D.tolist()], 1)
+    seen = graph.stack([places[int(human.view_V[view])] for view in human.seen_D.tolist()], 1)
     rows = graph.node("MatMul", graph.node("Unsqueeze", found, graph.numbers([2])), seen)
     return graph.node("Squeeze", rows, graph.numbers([2]))
 

@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xxhash
-from numba import njit
+from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast import plain
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import judging, networks, steps, tables
+from mrhubo.fast.compiled import robot as robots
 
 
 class Kernels(NamedTuple):
@@ -49,7 +50,7 @@ def make_kernels() -> Kernels:
     """The functions; each is compiled when it is first called, which takes some seconds, or read from the cache."""
     version = _checksum()
 
-    @njit(cache=True, **{**tables.COMPILED, "fastmath": False})
+    @njit(cache=True, **tables.EXACT)
     def wrong(local_BJ33, skew):
         """Twice the number of the first frame that holds no rotations, one more where all is finite; else -1."""
         _ = version
@@ -101,7 +102,7 @@ def make_kernels() -> Kernels:
         poses as the robot reads them (STEPS), or of their reconstructions (WITHOUT_PRIOR).
         """
         _ = version
-        work = steps.make_work(t)
+        work = robots.make_work(t)
         turned, widest = tables.size(t, tables.PARENT_T), networks.widest(t)
         one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
         turn_T33, local_T33 = np.empty((turned + 1, 3, 3)), np.empty((turned, 3, 3))
@@ -123,7 +124,7 @@ def make_kernels() -> Kernels:
                 for f in range(six_BF.shape[1]):
                     six_BF[b, f] = one_E[f]
                 continue
-            steps.place(t, work, q_N)
+            robots.place(t, work, q_N)
             judging.robot_angles(t, work, target_BD3, b, angle_D)
             for m in range(measured):
                 error_BM[b, m] = math.degrees(angle_D[tables.whole(t, tables.MEASURED, m)])

@@ -6,10 +6,10 @@ Legend: as in `mrhubo.fast.description`; and G layers, H networks.
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.description import Description, Layers, Part
 from mrhubo.fast.plain.steps import blocks_of
@@ -160,9 +160,11 @@ def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:
     return place, len(array)
 
 
-COMPILED = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}, "nogil": True}
+COMPILED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}, "nogil": True}
 """How functions are compiled: sums in any order, division by zero as NumPy has it."""
-INNER = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+EXACT: dict[str, Any] = {**COMPILED, "fastmath": False}
+"""The same for what must see NaN as it is."""
+INNER: dict[str, Any] = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """The same for those that compiled functions alone call."""
 
 

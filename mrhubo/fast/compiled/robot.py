@@ -1,0 +1,206 @@
+"""As `mrhubo.fast.plain.robot`, and the cost of `mrhubo.fast.plain.steps`, for one frame."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportMissingImports]
+
+from mrhubo.fast.compiled.human import add, cross, dot, identity, multiply, put, put3, row, row3, turn
+from mrhubo.fast.compiled.tables import (
+    ACROSS_A33,
+    AXIS_A3,
+    BLOCK_N,
+    COLUMN_A,
+    COLUMN_Q,
+    DIRECTION_Q,
+    END_BODY_D,
+    END_D3,
+    FACTOR_Q4,
+    FIRST_C,
+    FIRST_D,
+    INNER,
+    JOINT_Q,
+    LIMB_D,
+    LOWER_N,
+    MIDDLE_N,
+    OFFSET_A,
+    ORDER_D,
+    ORDER_N,
+    ORIGIN_A33,
+    PARENT_A,
+    POSITION_A3,
+    RATIO_A,
+    RIDGE_N,
+    ROTARY_A,
+    SEEN_D,
+    START_BODY_D,
+    START_D3,
+    TWICE_A33,
+    UPPER_N,
+    VIEW_BODY_V,
+    VIEW_V33,
+    real,
+    size,
+    vector,
+    whole,
+)
+
+
+class Work(NamedTuple):
+    """Where a frame's numbers are while it is worked on."""
+
+    rotation_L33: np.ndarray
+    position_L3: np.ndarray
+    axis_A3: np.ndarray
+    start_D3: np.ndarray
+    end_D3: np.ndarray
+    direction_D3: np.ndarray
+    length_D: np.ndarray
+    view_V33: np.ndarray
+    jacobian_DN3: np.ndarray
+    scratch_133: np.ndarray
+    goal_D3: np.ndarray
+    """The human's directions, length 1."""
+    weight_D: np.ndarray
+    """How much each counts."""
+    cost_C: np.ndarray
+    gradient_N: np.ndarray
+    hessian_NN: np.ndarray
+    next_cost_C: np.ndarray
+    next_gradient_N: np.ndarray
+    next_hessian_NN: np.ndarray
+    trial_N: np.ndarray
+    damping_C: np.ndarray
+    system_NN: np.ndarray
+    step_N: np.ndarray
+    weight_C: np.ndarray
+    lower_N: np.ndarray
+    upper_N: np.ndarray
+    own_cost_C: np.ndarray
+    best_C: np.ndarray
+    start_N: np.ndarray
+    begin_N: np.ndarray
+
+
+@njit(**INNER)
+def make_work(t):
+    """Room for one frame."""
+    bodies, joints, directions = size(t, PARENT_A) + 1, size(t, BLOCK_N), size(t, LIMB_D)
+    blocks = size(t, FIRST_C) - 1
+    rotation_L33 = np.zeros((bodies, 3, 3))
+    identity(rotation_L33, 0)
+    lower_N, upper_N = np.empty(joints), np.empty(joints)
+    for n in range(joints):
+        lower_N[n], upper_N[n] = real(t, LOWER_N, n), real(t, UPPER_N, n)
+    return Work(
+        rotation_L33, np.zeros((bodies, 3)), np.empty((bodies - 1, 3)), np.zeros((directions, 3)),
+        np.empty((directions, 3)), np.empty((directions, 3)), np.empty(directions),
+        np.empty((size(t, VIEW_BODY_V), 3, 3)), np.zeros((directions, joints, 3)), np.empty((1, 3, 3)),
+        np.empty((directions, 3)), np.empty(directions), np.empty(blocks), np.empty(joints),
+        np.zeros((joints, joints)), np.empty(blocks), np.empty(joints), np.zeros((joints, joints)), np.empty(joints),
+        np.empty(blocks), np.empty((joints, joints)), np.empty(joints), np.empty(blocks), lower_N, upper_N,
+        np.empty(blocks), np.empty(blocks), np.empty(joints), np.empty(joints),
+    )  # fmt: skip
+
+
+@njit(**INNER)
+def place(t, work, q_N):
+    """Bodies and directions at joint angles [rad], base frame."""
+    rotation_L33, position_L3 = work.rotation_L33, work.position_L3
+    for a in range(size(t, PARENT_A)):
+        angle = q_N[whole(t, COLUMN_A, a)] * real(t, RATIO_A, a) + real(t, OFFSET_A, a)
+        parent = whole(t, PARENT_A, a)
+        sine, rest, slide = 0.0, 0.0, angle
+        if whole(t, ROTARY_A, a):
+            sine, rest, slide = math.sin(angle), 1 - math.cos(angle), 0.0
+        for i in range(3):
+            for j in range(3):
+                x = 9 * a + 3 * i + j
+                work.scratch_133[0, i, j] = (
+                    real(t, ORIGIN_A33, x) + sine * real(t, ACROSS_A33, x) + rest * real(t, TWICE_A33, x)
+                )
+        multiply(rotation_L33, parent, work.scratch_133, 0, rotation_L33, a + 1)
+        moved = turn(rotation_L33, parent, vector(t, POSITION_A3, a))
+        axis = turn(rotation_L33, a + 1, vector(t, AXIS_A3, a))
+        put(work.axis_A3, a, axis)
+        above = row(position_L3, parent)
+        put(position_L3, a + 1, (
+            above[0] + moved[0] + slide * axis[0], above[1] + moved[1] + slide * axis[1],
+            above[2] + moved[2] + slide * axis[2],
+        ))  # fmt: skip
+    for v in range(size(t, VIEW_BODY_V)):
+        for i in range(3):
+            for j in range(3):
+                work.scratch_133[0, i, j] = real(t, VIEW_V33, 9 * v + 3 * i + j)
+        multiply(rotation_L33, whole(t, VIEW_BODY_V, v), work.scratch_133, 0, work.view_V33, v)
+    for d in range(size(t, LIMB_D)):
+        end_body = whole(t, END_BODY_D, d)
+        start, end = (0.0, 0.0, 0.0), turn(rotation_L33, end_body, vector(t, END_D3, d))
+        if whole(t, LIMB_D, d):
+            start_body = whole(t, START_BODY_D, d)
+            start = add(turn(rotation_L33, start_body, vector(t, START_D3, d)), row(position_L3, start_body), 1.0)
+            end = add(end, row(position_L3, end_body), 1.0)
+        put(work.start_D3, d, start)
+        put(work.end_D3, d, end)
+        along = add(end, start, -1.0)
+        length = math.sqrt(dot(along, along))
+        work.length_D[d] = length
+        put(work.direction_D3, d, (along[0] / length, along[1] / length, along[2] / length))
+
+
+@njit(**INNER)
+def _jacobian(t, work):
+    pairs = size(t, DIRECTION_Q)
+    jacobian_DN3 = work.jacobian_DN3
+    for p in range(pairs):
+        put3(jacobian_DN3, whole(t, DIRECTION_Q, p), whole(t, COLUMN_Q, p), (0.0, 0.0, 0.0))
+    for p in range(pairs):
+        d, a, n = whole(t, DIRECTION_Q, p), whole(t, JOINT_Q, p), whole(t, COLUMN_Q, p)
+        end, start = real(t, FACTOR_Q4, 4 * p), real(t, FACTOR_Q4, 4 * p + 1)
+        bend, slide = real(t, FACTOR_Q4, 4 * p + 2), real(t, FACTOR_Q4, 4 * p + 3)
+        axis, direction = row(work.axis_A3, a), row(work.direction_D3, d)
+        e, s, o = row(work.end_D3, d), row(work.start_D3, d), row(work.position_L3, a + 1)
+        lever = (
+            e[0] * end - s[0] * start - o[0] * bend,
+            e[1] * end - s[1] * start - o[1] * bend,
+            e[2] * end - s[2] * start - o[2] * bend,
+        )
+        moved = add(cross(axis, lever), axis, slide)
+        moved = add(moved, direction, -dot(direction, moved))
+        put3(jacobian_DN3, d, n, add(row3(jacobian_DN3, d, n), moved, 1 / work.length_D[d]))
+
+
+@njit(**INNER)
+def quadratic(t, work, q_N, cost_C, gradient_N, hessian_NN):
+    """Cost and Gauss-Newton model at joint angles, for the goal in `work`."""
+    place(t, work, q_N)
+    _jacobian(t, work)
+    for c in range(len(cost_C)):
+        first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
+        found = 0.0
+        for x in range(first, last):
+            n = whole(t, ORDER_N, x)
+            off = q_N[n] - real(t, MIDDLE_N, n)
+            found += real(t, RIDGE_N, n) * off * off
+            gradient_N[n] = real(t, RIDGE_N, n) * off
+            for y in range(first, x + 1):
+                hessian_NN[n, whole(t, ORDER_N, y)] = 0.0
+            hessian_NN[n, n] = real(t, RIDGE_N, n)
+        for r in range(whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)):
+            d = whole(t, ORDER_D, r)
+            goal = turn(work.view_V33, whole(t, SEEN_D, d), row(work.goal_D3, d))
+            miss = add(row(work.direction_D3, d), goal, -1.0)
+            weight = work.weight_D[d]
+            found += weight * dot(miss, miss)
+            for x in range(first, last):
+                n = whole(t, ORDER_N, x)
+                own = row3(work.jacobian_DN3, d, n)
+                own = (weight * own[0], weight * own[1], weight * own[2])
+                gradient_N[n] += dot(own, miss)
+                for y in range(first, x + 1):
+                    m = whole(t, ORDER_N, y)
+                    hessian_NN[n, m] += dot(own, row3(work.jacobian_DN3, d, m))
+        cost_C[c] = found
