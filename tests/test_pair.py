@@ -25,7 +25,7 @@ from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
 
 SMALL = [
-    "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=10", "pairs.fine_steps=4",
+    "pairs.solver=fine", "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=10", "pairs.fine_steps=4",
 ]  # fmt: skip
 
 

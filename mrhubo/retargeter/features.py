@@ -74,7 +74,7 @@ class DirectionFeatures(PoseFeatures):
         self._keep("columns_I", directions)
         parts = [body_map.directions[i].part for i in directions]
         limbs = {part.name: i for i, part in enumerate(parts) if isinstance(part, LimbPart)}
-        own = [[directions.index(i) for i in sorted(group)] for group in groups]
+        own = sorted([directions.index(i) for i in sorted(group)] for group in groups)  # whatever the joints' order
         bends = [
             (i, *(limbs[name] for name in part.limbs))
             for i, part in enumerate(parts)

@@ -289,10 +289,13 @@ def test_the_usage_line_tells_what_is_needed(command: str) -> None:
     found = importlib.import_module(f"mrhubo.{command}").build_parser()
     usage = " ".join(found.format_usage().split())
     needed = [action.option_strings[0] for action in found._flags() if action.required]
+    groups = [group for group in found._mutually_exclusive_groups if group.required]
+    either = [action.option_strings[0] for group in groups for action in group._group_actions]
     assert ("(CONFIG | --config CONFIG)" in usage) == found.needs_config
     for action in found._flags():
         flag = action.option_strings[0]
-        assert (f"[{flag}" in usage or f"| {flag}" in usage) == (flag not in needed) and flag in usage
+        optional = f"[{flag}" in usage or (f"| {flag}" in usage and flag not in either)
+        assert optional == (flag not in [*needed, *either]) and flag in usage
 
 
 def test_verify_and_inspect_exclude_each_other() -> None:

@@ -75,8 +75,9 @@ def test_networks_answer_the_same(robot: str, seed: int, motions: dict[str, Moti
     changed = changed_package(package, change, tmp_path / "changed")
     for motion in motions.values():
         # No steps: what is far off after them, as untrained networks are, starts again at random poses of the robot, which
-        # are others where joints are in another order. Trained ones: tests/golden.
-        answers_alike(package, changed, change, motion, polish=0)
+        # are others where joints are in another order. Frame by frame: what is solved for whole motions ends, from so far
+        # off, a few thousandths of a radian apart where a joint hardly matters. Trained ones: tests/golden.
+        answers_alike(package, changed, change, motion, close=2e-5, polish=0, together=False)
 
 
 @pytest.mark.parametrize("robot", ["nao", "reachy"])

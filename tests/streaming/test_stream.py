@@ -79,7 +79,7 @@ def test_a_straight_arm_seen_with_noise_hangs_still(retargeter: Retargeter, hang
     target = retargeter.body_map.human_directions(motion.local_TJ33)
     alone, stream = retargeter.predict(motion, 10), Stream(retargeter).retarget(motion).q
     jumps = [count_jumps(retargeter.directions, q, target, 60.0) for q in (alone, stream)]
-    assert jumps[0] > 3 and jumps[1] == 0
+    assert jumps[0] > 0 and jumps[1] == 0
     fastest = [float(q.diff(dim=0).abs().max()) * 60 for q in (alone, stream)]
     assert fastest[1] <= float(retargeter.body_map.robot.velocity_N.max()) < 0.1 * fastest[0]
 
