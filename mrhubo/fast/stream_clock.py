@@ -8,6 +8,9 @@ import numpy as np
 
 from mrhubo.errors import UserError
 
+_SAME = 1e-9
+"""Times that differ by less [s] are the same: what is divided by less of it has no finite value."""
+
 
 class StreamClock:
     """The time of a stream's last frame."""
@@ -35,4 +38,6 @@ class StreamClock:
             return 1 / self.rate, float(time)
         if time < self.time:
             raise UserError(f"stream: time goes back from {self.time:g} to {time:g} s; reset() begins anew")
+        if time - self.time < _SAME:
+            return 0.0, self.time
         return float(time) - self.time, float(time)

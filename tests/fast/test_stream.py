@@ -179,6 +179,9 @@ def test_times_gaps_and_where_the_robot_stands(
         with pytest.raises(UserError, match="stream: (time goes back|the time of a frame)"):
             stream.joints(poses[3], time)  # type: ignore[arg-type]
     after = stream.joints(poses[5], np.float64(60.0))
+    stream.reset(later)
+    np.testing.assert_array_equal(stream.joints(poses[9], 0.0), stream.joints(poses[3], 1e-300))
+    assert np.isfinite(stream.joints(poses[3], 0.1)).all()
     assert (np.abs(after - later) <= velocity * stream.settings.longest_gap + 1e-6).all()
     stream.reset(upper)
     first = stream.joints(poses[0], 5.0)
