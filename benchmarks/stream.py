@@ -1,4 +1,4 @@
-"""How long a frame takes, alone, and how the robot moves: networks, `retarget` and a stream side by side.
+"""How long a frame takes, alone, and how the robot moves: networks, `retarget` and streams side by side.
 
     python benchmarks/stream.py PACKAGE [--motions data/motions] [--rate 60] [--noise 2] [--seconds 1]
 
@@ -13,6 +13,7 @@ human's, and by how many frames the robot lags (where the correlation of both sp
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import itertools
 import math
 import time
@@ -23,8 +24,11 @@ import torch
 from common import print_header, print_table
 from torch import Tensor
 
+import mrhubo
 from mrhubo import rotation
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.fast import FastStream
+from mrhubo.fast.engines import FORMS
 from mrhubo.motion import Motion, read_folder, resample
 from mrhubo.reference import OptimizationRetargeter, direction_jerk
 from mrhubo.reference.metrics import angle_between
@@ -111,6 +115,10 @@ def main(argv: list[str] | None = None) -> None:
         "stream, all of the answer": stream,
         "stream, joint angles alone": stream.joints,
     }
+    for form in FORMS if importlib.util.find_spec("numba") else FORMS[1:]:
+        fast = FastStream(mrhubo.load_fast(given.package, form), given.rate)
+        ways[f"`FastStream`, {form}, all of the answer"] = lambda pose, fast=fast: fast(pose.numpy())
+        ways[f"`FastStream`, {form}, joint angles alone"] = lambda pose, fast=fast: fast.joints(pose.numpy())
     with use_threads(1):
         rows = [[name, milliseconds(answer, poses, given.seconds)] for name, answer in ways.items()]
     print_table(["a frame alone", "ms (90th percentile)"], rows)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mrhubo.errors import UserError
-    from mrhubo.fast import FastRetargeter
+    from mrhubo.fast import FastRetargeter, FastStream
     from mrhubo.motion import Motion, ReadOptions, read_motion
     from mrhubo.reference import OptimizationRetargeter
     from mrhubo.retargeter import Retargeter, RetargetResult
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FastRetargeter",
+    "FastStream",
     "Motion",
     "OptimizationRetargeter",
     "ReadOptions",
@@ -48,6 +49,7 @@ __all__ = [
 
 _HOMES = {
     "FastRetargeter": "mrhubo.fast",
+    "FastStream": "mrhubo.fast",
     "Motion": "mrhubo.motion",
     "OptimizationRetargeter": "mrhubo.reference",
     "ReadOptions": "mrhubo.motion",

@@ -2,5 +2,7 @@
 
 from mrhubo.fast.description import Description
 from mrhubo.fast.retargeter import FastRetargeter
+from mrhubo.fast.stream import FastStream
+from mrhubo.fast.stream_settings import StreamSettings
 
-__all__ = ["Description", "FastRetargeter"]
+__all__ = ["Description", "FastRetargeter", "FastStream", "StreamSettings"]

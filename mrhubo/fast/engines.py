@@ -70,6 +70,12 @@ class Engine(Protocol):
         """Joint angles (B, N) [rad] after steps of optimisation, float32."""
         ...
 
+    def follow(
+        self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `mrhubo.fast.plain.steps.follow`: joint angles (B, N) [rad] and costs of blocks (B, C), float64."""
+        ...
+
     def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """After steps of optimisation, with all that is told of them; shaking of branches in degrees, where known."""
         ...
@@ -105,6 +111,12 @@ class NumpyEngine:
         if not polish or not len(q_BN):
             return q_BN
         return steps.polish(self.description, q_BN.astype(np.float64), target_BD3, polish).astype(np.float32)
+
+    def follow(
+        self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `Engine.follow`."""
+        return steps.follow(self.description, q_BN, target_BD3, pull_B, lower_BN, upper_BN)
 
     def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """As `Engine.answer`."""
@@ -188,6 +200,14 @@ class CompiledEngine:
                 len(q_BN), lambda rows: self._retarget(self._steps, polish, rows, q_BN, target_BD3, None, None, found)
             )
         return q_BN
+
+    def follow(
+        self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `Engine.follow`."""
+        q_BN, cost_BC = q_BN.copy(), np.empty((len(q_BN), len(self.description.cost.cell_CU)))
+        self._kernels.follow(self._tables, target_BD3, pull_B, lower_BN, upper_BN, q_BN, cost_BC)
+        return q_BN, cost_BC
 
     def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """As `Engine.answer`."""

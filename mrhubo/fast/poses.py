@@ -45,8 +45,8 @@ def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
     array = np.asarray(given)
     if array.dtype.kind not in "fiu":
         raise UserError(f"human motion: expected a Motion or an array of numbers, found {array.dtype}")
-    if frame_rate is not None and not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
-        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
+    if frame_rate is not None:
+        check_frame_rate(frame_rate)
     for axes, read in ((_JOINTS, 3, 3), None), ((_JOINTS, 6), _of_sixd), ((3 * _JOINTS,), _of_axis_angle):
         if array.shape[-len(axes) :] == axes:
             shape = array.shape[: -len(axes)]
@@ -58,6 +58,12 @@ def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
         f"human poses must have the shape (..., {_JOINTS}, 3, 3) (matrices), (..., {3 * _JOINTS}) (axis-angle, rad) or"
         f" (..., {_JOINTS}, 6) (6D), found {array.shape}"
     )
+
+
+def check_frame_rate(frame_rate: float) -> None:
+    """Refuses what is no positive number of frames per second."""
+    if not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
+        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
 
 
 def refuse(wrong: tuple[int, str] | None, shape: tuple[int, ...]) -> None:

@@ -43,7 +43,7 @@ class FastRetargeter:
             UserError: there is no such form, or numba is missing.
         """
         self.description = description
-        self._engine: Engine = make_engine(description, form)
+        self.engine: Engine = make_engine(description, form)
         self._made: dict[str, Any] = {
             "joint_names": self.joint_names, "branch_names": self.branch_names,
             "direction_names": tuple(description.settings.direction_names[d] for d in description.trust.measured),
@@ -95,20 +95,20 @@ class FastRetargeter:
         """
         _check(polish)
         poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
-        refuse(self._engine.wrong(poses.local_TJ33), poses.shape)
-        target_TD3 = self._engine.directions(poses.local_TJ33)
-        q_TN = self._engine.network(poses.local_TJ33, target_TD3)
+        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
+        target_TD3 = self.engine.directions(poses.local_TJ33)
+        q_TN = self.engine.network(poses.local_TJ33, target_TD3)
         shake_TX = self._shake(target_TD3, poses.shape, poses.frame_rate)
-        found = self._engine.answer(q_TN, target_TD3, polish, shake_TX)
-        return self._told(found, poses.shape, poses.frame_rate, poses.name)
+        found = self.engine.answer(q_TN, target_TD3, polish, shake_TX)
+        return self.told(found, poses.shape, poses.frame_rate, poses.name)
 
     def predict(self, motion: Any, polish: int = 0) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
         _check(polish)
         poses = read_poses(motion, None, self.description.settings.own_rest)
-        refuse(self._engine.wrong(poses.local_TJ33), poses.shape)
-        target_TD3 = self._engine.directions(poses.local_TJ33)
-        q_TN = self._engine.polish(self._engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
+        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
+        target_TD3 = self.engine.directions(poses.local_TJ33)
+        q_TN = self.engine.polish(self.engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
         return q_TN.reshape(*poses.shape, -1)
 
     def imitate(self, directions: Any, polish: int = POLISH) -> RobotMotion:
@@ -134,14 +134,14 @@ class FastRetargeter:
         shape = target_XD3.shape[:-2]
         target_TD3 = np.ascontiguousarray(target_XD3.reshape(math.prod(shape), *target_XD3.shape[-2:]))
         nobody_TJ33 = np.zeros((len(target_TD3), 21, 3, 3), np.float32)
-        q_TN = self._engine.network(nobody_TJ33, target_TD3)
-        return self._told(self._engine.answer(q_TN, target_TD3, polish, None), shape, None, "")
+        q_TN = self.engine.network(nobody_TJ33, target_TD3)
+        return self.told(self.engine.answer(q_TN, target_TD3, polish, None), shape, None, "")
 
     def directions(self, motion: Any) -> np.ndarray:
         """Directions (..., D, 3) of human poses, as `imitate` takes them."""
         poses = read_poses(motion, None, self.description.settings.own_rest)
-        refuse(self._engine.wrong(poses.local_TJ33), poses.shape)
-        found_TD3 = self._engine.directions(poses.local_TJ33)
+        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
+        found_TD3 = self.engine.directions(poses.local_TJ33)
         return found_TD3.reshape(*poses.shape, *found_TD3.shape[1:])
 
     def _shake(self, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float | None) -> np.ndarray | None:
@@ -154,7 +154,8 @@ class FastRetargeter:
         shake_TD = np.concatenate([judging.shake(clip, frame_rate, constants) for clip in clips])
         return np.degrees(shake_TD @ (column_XD / np.maximum(column_XD.sum(axis=1, keepdims=True), 1)).T)
 
-    def _told(self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str) -> RobotMotion:
+    def told(self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str) -> RobotMotion:
+        """A form's answers, with the leading axes of the poses and what is known of the retargeter."""
         trust_TX = found.trust_BX
         confidence_T = trust_TX.min(axis=1) if trust_TX.shape[1] else np.zeros_like(found.phi_B)
         return RobotMotion.trusted(

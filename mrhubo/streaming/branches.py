@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from mrhubo.fast import StreamSettings
 from mrhubo.reference import DirectionProblem
 from mrhubo.reference.terms import REFERENCE_RATE, Quadratic
 from mrhubo.streaming.people import OfPeople
-from mrhubo.streaming.settings import StreamSettings
 
 _STEPS = 2
 _DAMPING, _EASIER, _HARDER = 1e-2, 0.1, 10.0

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from mrhubo.fast import StreamSettings
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.streaming.branches import Branches, BranchState
 from mrhubo.streaming.limits import JointLimits, JointState
 from mrhubo.streaming.one_euro import OneEuroState, one_euro
-from mrhubo.streaming.settings import StreamSettings
 
 
 @dataclass(frozen=True)

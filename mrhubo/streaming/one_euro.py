@@ -19,8 +19,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from mrhubo.fast import StreamSettings
 from mrhubo.streaming.people import OfPeople
-from mrhubo.streaming.settings import StreamSettings
 
 
 @dataclass(frozen=True)

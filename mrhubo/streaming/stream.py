@@ -11,23 +11,21 @@ Legend: B people, T frames, D directions, N joints, J = 21 human joints.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.fast import StreamSettings
+from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.motion import Motion, MotionLike, read_poses, to_tensor
 from mrhubo.motion.poses import check_frame_rate
 from mrhubo.retargeter import Retargeter, RetargetResult, join_results
 from mrhubo.streaming.follow import Follower, StreamState
-from mrhubo.streaming.settings import StreamSettings
 
 _MOST_PEOPLE = 10_000
-_FRAMES_PER_GAP = 1.5
 _PART = 8_192
 """Frames that are worked on at a time where that is possible."""
 
@@ -72,12 +70,11 @@ class Stream:
         Raises:
             UserError: q has another shape, is no number, or lies outside the joints' limits.
         """
-        self._follower = Follower(self.retargeter, self.settings, self._longest_step(self.rate))
+        self._follower = Follower(self.retargeter, self.settings, self.settings.longest_step(self.rate))
         self._state = self._follower.begin(self.people or 1, None if q is None else self._standing(q))
         rest_33 = torch.eye(3, device=self.retargeter.device)
         self._seen_BJ33 = rest_33.expand(self.people or 1, len(POSED_JOINT_NAMES), 3, 3)
-        self._time: float | None = None
-        self._frames = 0
+        self._clock = StreamClock(self.rate)
 
     def __call__(self, pose: MotionLike | None, time: float | None = None) -> RetargetResult:
         """The answer to one frame, as a retargeter gives it for a single pose, or for (people,) poses.
@@ -107,11 +104,11 @@ class Stream:
     def _advance(self, pose: MotionLike | None, time: float | None) -> Tensor:
         """Works on a frame; who is seen (B,)."""
         local_BJ33, seen_B = self._read(pose)
-        passed, time = self._passed(time)
+        passed, time = self._clock.passed(time)
         if passed > 0:
             target_BD3 = self.retargeter.body_map.human_directions(local_BJ33)
             self._state = self._follower.advance(self._state, local_BJ33, target_BD3, seen_B, passed)
-        self._seen_BJ33, self._time, self._frames = local_BJ33, time, self._frames + 1
+        self._seen_BJ33, self._clock.time = local_BJ33, time
         return seen_B
 
     def _read(self, pose: MotionLike | None) -> tuple[Tensor, Tensor]:
@@ -132,19 +129,6 @@ class Stream:
         local_BJ33[seen_B] = poses.local_TJ33.to(local_BJ33)
         return local_BJ33, seen_B
 
-    def _passed(self, time: float | None) -> tuple[float, float]:
-        """Time since the last frame [s], and the time of this one."""
-        if time is None:
-            time = 0.0 if self._time is None else self._time + 1 / self.rate
-            return 1 / self.rate, time
-        if isinstance(time, bool) or not isinstance(time, int | float | np.number) or not math.isfinite(time):
-            raise UserError(f"stream: the time of a frame must be a number of seconds, found {time}")
-        if self._time is None:
-            return 1 / self.rate, float(time)
-        if time < self._time:
-            raise UserError(f"stream: time goes back from {self._time:g} to {time:g} s; reset() begins anew")
-        return float(time) - self._time, float(time)
-
     def _standing(self, q: MotionLike) -> Tensor:
         robot, people = self.retargeter.body_map.robot, self.people or 1
         q_BN = to_tensor(q).to(self.retargeter.device, torch.float32)
@@ -154,9 +138,6 @@ class Stream:
         if not bool(((q_BN >= robot.lower_N) & (q_BN <= robot.upper_N)).all()):  # nor NaN
             raise UserError("stream: q lies outside the joints' limits")
         return q_BN
-
-    def _longest_step(self, rate: float) -> float:
-        return max(self.settings.longest_gap, _FRAMES_PER_GAP / rate)
 
     def retarget(self, motion: Motion) -> RetargetResult:
         """A motion as this stream's settings would have it: all of its frames, one after the other. The stream itself
@@ -185,7 +166,7 @@ class Stream:
 
     def _run(self, motions: Sequence[Motion], rate: float) -> list[Tensor]:
         """Joint angles (T, N) of motions of one rate, each of which is a person."""
-        follower = Follower(self.retargeter, self.settings, self._longest_step(rate))
+        follower = Follower(self.retargeter, self.settings, self.settings.longest_step(rate))
         poses = [self._poses(motion) for motion in motions]
         targets = [torch.cat([self.retargeter.body_map.human_directions(part) for part in local.split(_PART)])
                    for local in poses]  # fmt: skip

@@ -30,6 +30,7 @@ class Kernels(NamedTuple):
     activate: Callable[..., Any]
     directions: Callable[..., Any]
     networks: Callable[..., Any]
+    follow: Callable[..., Any]
     retarget: Callable[..., Any]
 
 
@@ -95,6 +96,18 @@ def make_kernels() -> Kernels:
             networks.joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b)
 
     @njit(cache=True, **tables.COMPILED)
+    def follow(t, target_BD3, pull_B, lower_BN, upper_BN, q_BN, cost_BC):
+        """A stream's steps from `q_BN`, where the answers will stand."""
+        _ = version
+        work = robots.make_work(t)
+        for b in range(len(q_BN)):
+            for n in range(q_BN.shape[1]):
+                work.lower_N[n], work.upper_N[n] = lower_BN[b, n], upper_BN[b, n]
+            steps.follow(t, work, target_BD3, b, pull_B[b], q_BN[b])
+            for c in range(cost_BC.shape[1]):
+                cost_BC[b, c] = work.cost_C[c]
+
+    @njit(cache=True, **tables.COMPILED)
     def retarget(
         t, activation, polish, what, target_BD3, q_BN, six_BF, shake_BX, error_BM, phi_B, collision_B, trust_BX
     ):  # fmt: skip
@@ -145,4 +158,4 @@ def make_kernels() -> Kernels:
                 trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
                 phi_B[b] = max(phi_B[b], phi)
 
-    return Kernels(wrong, activate, directions, network, retarget)
+    return Kernels(wrong, activate, directions, network, follow, retarget)

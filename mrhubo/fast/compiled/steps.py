@@ -33,7 +33,7 @@ from mrhubo.fast.compiled.tables import (
     size,
     whole,
 )
-from mrhubo.fast.plain.steps import DAMPING, EASIER, FLOOR, HARDER, LEAST, MOST, SHORTEST, STUCK, TOLERANCE
+from mrhubo.fast.plain.steps import DAMPING, EASIER, FLOOR, FOLLOWED, HARDER, LEAST, MOST, SHORTEST, STUCK, TOLERANCE
 
 
 @njit(**INNER)
@@ -134,6 +134,39 @@ def minimise(t, work, q_N, steps):
             break
         for c in range(blocks):
             solve(t, work, q_N, c, work.damping_C[c], 0.0, work.lower_N, work.upper_N)
+        for n in range(len(q_N)):
+            work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
+
+
+@njit(**INNER)
+def follow(t, work, target_BD3, b, pull, q_N):
+    """A stream's steps from `q_N` [rad], where the answer will stand, inside the bounds in `work`; the costs stand in
+    `work.cost_C`.
+    """
+    blocks = len(work.cost_C)
+    aim(t, work, target_BD3, b)
+    for n in range(len(q_N)):
+        work.begin_N[n] = work.trial_N[n] = q_N[n]
+    for number in range(FOLLOWED + 1):  # the first looks at where it begins
+        quadratic(t, work, work.trial_N, work.next_cost_C, work.next_gradient_N, work.next_hessian_NN)
+        for c in range(blocks):
+            first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
+            more = 0.0
+            for x in range(first, last):
+                n = whole(t, ORDER_N, x)
+                trial, own = work.trial_N[n] - work.begin_N[n], q_N[n] - work.begin_N[n]
+                more += pull * (trial * trial - own * own)
+            better = number == 0 or work.next_cost_C[c] + more < work.cost_C[c]
+            if better:
+                accept(t, work, c, q_N)
+                for x in range(first, last):  # the gradient has the pull from here on, the cost has not
+                    n = whole(t, ORDER_N, x)
+                    work.gradient_N[n] += pull * (q_N[n] - work.begin_N[n])
+            work.damping_C[c] = DAMPING if number == 0 else work.damping_C[c] * (EASIER if better else HARDER)
+        if number == FOLLOWED:
+            return
+        for c in range(blocks):
+            solve(t, work, q_N, c, work.damping_C[c], pull, work.lower_N, work.upper_N)
         for n in range(len(q_N)):
             work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
 

@@ -19,6 +19,8 @@ DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, FLOOR = 1e-2, 0.1, 10.0, 1e-7, 1e6,
 """At first; after a step that helped; after one that did not; its bounds; above which a step that does not help is the
 last; and what is added to the Hessian's diagonal, which it multiplies. As `DirectionProblem` has them."""
 SHORTEST = 1e-6
+FOLLOWED = 2
+"""Steps of a stream with each frame."""
 
 
 @dataclass
@@ -114,6 +116,37 @@ def minimise(
             row_B, q_BN, target_BD3, model = row_B[going_B], q_BN[going_B], target_BD3[going_B], model.rows(going_B)
             damping_BC = damping_BC[going_B]
     return found_BN, found_cost_BC
+
+
+def follow(
+    description: Description,
+    q_BN: np.ndarray,
+    target_BD3: np.ndarray,
+    pull_B: np.ndarray,
+    lower_BN: np.ndarray,
+    upper_BN: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles (B, N) [rad] after a stream's steps on  cost + pull |q - where they began|^2,  inside bounds, and
+    what each block costs there (B, C), without the pull. As `mrhubo.streaming.branches` makes them.
+    """
+    cost, centre_BN = description.cost, q_BN
+    block_N, joints_NC = cost.block_N, blocks_of(cost)[0]
+    pull_B1 = pull_B[:, None]
+    model = quadratic(description, q_BN, target_BD3)
+    damping_BC = np.full_like(model.cost_BC, DAMPING)
+    for _ in range(FOLLOWED):
+        hessian_BNN = model.hessian_BNN.copy()
+        diagonal(hessian_BNN)[:] += pull_B1
+        pulled = Model(model.cost_BC, model.gradient_BN + pull_B1 * (q_BN - centre_BN), hessian_BNN)
+        moved_BN = step(cost, q_BN, pulled, damping_BC[:, block_N], lower_BN, upper_BN)
+        trial_BN = np.clip(q_BN + moved_BN, lower_BN, upper_BN)
+        trial = quadratic(description, trial_BN, target_BD3)
+        pull_BC = pull_B1 * ((trial_BN - centre_BN) ** 2 - (q_BN - centre_BN) ** 2) @ joints_NC
+        better_BC = trial.cost_BC + pull_BC < model.cost_BC
+        q_BN = np.where(better_BC[:, block_N], trial_BN, q_BN)
+        model = model.where(better_BC, block_N, trial)
+        damping_BC = damping_BC * np.where(better_BC, EASIER, HARDER)
+    return q_BN, model.cost_BC
 
 
 def polish(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, steps: int) -> np.ndarray:

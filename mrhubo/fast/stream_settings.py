@@ -1,4 +1,4 @@
-"""What can be set about a stream: times, speeds, angles, in their units."""
+"""What can be set about a stream, with PyTorch or without: times, speeds, angles, in their units."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, fields
 
 from mrhubo.errors import UserError
+
+_FRAMES_PER_GAP = 1.5
 
 
 @dataclass(frozen=True)
@@ -44,3 +46,7 @@ class StreamSettings:
             if not number or value < 0 or (positive and value == 0):
                 least = "more than 0" if positive else "0 or more"
                 raise UserError(f"stream settings: {field.name} must be {least}, found {value}")
+
+    def longest_step(self, rate: float) -> float:
+        """No more time [s] than this counts as passed when joints move, at a rate of frames per second."""
+        return max(self.longest_gap, _FRAMES_PER_GAP / rate)

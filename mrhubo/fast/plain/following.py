@@ -1,0 +1,140 @@
+"""What a stream does with a frame beside steps of optimisation, for one person: the One-Euro filter, the two answers
+that are followed, and the limits of speed and acceleration. As `mrhubo.streaming` does it, where the reasons stand
+(`one_euro`, `branches`, `limits`).
+
+Legend: D directions, N joints, C blocks of joints.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.fast.description import Cost
+from mrhubo.fast.plain.human import norm, normalize
+from mrhubo.fast.plain.steps import weights
+from mrhubo.fast.stream_settings import StreamSettings
+
+_REFERENCE_RATE = 24.0
+"""Frames per second at which `StreamSettings.smoothness` is the pull's weight."""
+_WITHIN = 1 - 1e-6
+"""Share of the speed limit that is used."""
+_SMALL = 1e-9
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What the filter remembers."""
+
+    raw_D3: np.ndarray
+    velocity_D3: np.ndarray
+    """Low-passed [1/s]."""
+    filtered_D3: np.ndarray
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What is followed, and since when it has been worse."""
+
+    kept_N: np.ndarray
+    """The answer that the robot takes [rad], before limits of acceleration and of crossing over."""
+    worse_C: np.ndarray
+    """Since how long [s] the network's answer has been clearly better."""
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Where joints are, and how fast they turn."""
+
+    q_N: np.ndarray
+    """Angles [rad], float32, inside the limits."""
+    velocity_N: np.ndarray
+    """[rad/s]"""
+
+
+def one_euro(
+    last: Filtered, raw_D3: np.ndarray, passed: float, partial_D: np.ndarray, settings: StreamSettings
+) -> Filtered:
+    """The filter's next state, some time [s] later. `partial_D`: 1 for directions whose length is how much they count,
+    which is filtered along; the others have length 1.
+    """
+    velocity_D3 = (raw_D3 - last.raw_D3) / passed
+    velocity_D3 = last.velocity_D3 + passed / (passed + settings.speed_time) * (velocity_D3 - last.velocity_D3)
+    time_D = settings.rest_time / (1 + norm(velocity_D3) / settings.half_speed)
+    share_D1 = (passed / (passed + time_D))[:, None]
+    filtered_D3 = last.filtered_D3 + share_D1 * (raw_D3 - last.filtered_D3)
+    return Filtered(raw_D3, velocity_D3, np.where(partial_D[:, None] > 0, filtered_D3, normalize(filtered_D3)))
+
+
+def room(
+    cost: Cost, settings: StreamSettings, kept_N: np.ndarray, passed: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The pull (2,) and the bounds (2, N), (2, N) [rad] of the steps of the kept answer and of the network's."""
+    reach_N = cost.velocity_N * passed
+    lower_2N = np.stack((np.maximum(cost.lower_N, kept_N - reach_N), cost.lower_N))
+    upper_2N = np.stack((np.minimum(cost.upper_N, kept_N + reach_N), cost.upper_N))
+    return np.array([settings.smoothness / (_REFERENCE_RATE * passed) ** 2, 0.0]), lower_2N, upper_2N
+
+
+def cross_over(
+    cost: Cost,
+    settings: StreamSettings,
+    last: Followed,
+    both_2N: np.ndarray,
+    cost_2C: np.ndarray,
+    aim_D3: np.ndarray,
+    passed: float,
+) -> tuple[Followed, np.ndarray]:
+    """The next state, and how fast the kept answer moves (N,) [rad/s]: 0 where it has been left for the other.
+
+    Args:
+        cost: the robot's.
+        settings: of the stream.
+        last: the last state.
+        both_2N: the kept answer and the network's, after steps,
+        cost_2C: and what they cost.
+        aim_D3: the human's directions.
+        passed: time since the last state [s].
+    """
+    root_2C, moved_N = np.sqrt(cost_2C), both_2N[0]
+    excess_C = (root_2C[0] - root_2C[1]) / np.sqrt(np.maximum(weights(cost, aim_D3[None])[0], _SMALL))
+    worse_C = np.where(excess_C > math.radians(settings.worse_deg), last.worse_C + passed, 0.0)
+    leave_C = worse_C > max(settings.worse_time, _SMALL)
+    leave_N = leave_C[cost.block_N]
+    velocity_N = np.where(leave_N, 0.0, (moved_N - last.kept_N) / passed)
+    return Followed(np.where(leave_N, both_2N[1], moved_N), np.where(leave_C, 0.0, worse_C)), velocity_N
+
+
+class Limits:
+    """The limits of one robot's joints."""
+
+    def __init__(self, cost: Cost, ramp_time: float) -> None:
+        """`ramp_time`: seconds from rest to full speed; 0: acceleration is not limited."""
+        self._lower_N, self._upper_N = cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32)
+        self._speed_N = cost.velocity_N.astype(np.float64) * _WITHIN
+        self._acceleration_N = self._speed_N / ramp_time if ramp_time else np.full_like(self._speed_N, np.inf)
+
+    def follow(self, last: Joints, goal_N: np.ndarray, goal_velocity_N: np.ndarray, passed: float) -> Joints:
+        """The joints' next state, some time [s] later: as near to the goal [rad], which has moved there at a velocity
+        [rad/s], as they may come.
+        """
+        q_N = last.q_N.astype(np.float64)
+        behind_N = goal_N - goal_velocity_N * passed - q_N
+        wanted_N = goal_velocity_N + np.sign(behind_N) * self._stopping(np.abs(behind_N), passed)
+        least_N = -np.minimum(self._stopping(q_N - self._lower_N, passed), self._speed_N)
+        most_N = np.minimum(self._stopping(self._upper_N - q_N, passed), self._speed_N)
+        change_N = self._acceleration_N * passed
+        least_N = np.maximum(least_N, last.velocity_N - change_N)
+        most_N = np.minimum(most_N, last.velocity_N + change_N)
+        wanted_N = np.minimum(np.maximum(wanted_N, least_N), most_N)
+        found_N = (q_N + wanted_N * passed).astype(np.float32)
+        found_N = np.minimum(np.maximum(found_N, self._lower_N), self._upper_N)
+        fast_N = np.abs(found_N - q_N) > self._speed_N * passed
+        found_N = np.where(fast_N, np.nextafter(found_N, last.q_N), found_N)
+        return Joints(found_N, (found_N - q_N) / passed)
+
+    def _stopping(self, distance_N: np.ndarray, passed: float) -> np.ndarray:
+        """The largest speed [rad/s] of a step after which a joint can still stop in time."""
+        return 2 * distance_N / (passed + np.sqrt(passed * passed + 2 * distance_N / self._acceleration_N))

@@ -1,0 +1,179 @@
+"""Poses come in one after the other, joint angles go out at once, without PyTorch: `mrhubo.Stream` for one person.
+
+    stream = FastStream(mrhubo.load_fast("package"), rate=60)
+    for pose in camera:                     # local rotations of SMPL's joints 1..21, or None where nobody is seen
+        answer = stream(pose)
+        robot.move(answer.q)
+
+Legend: D directions, N joints, C blocks of joints, J = 21 human joints; 1 and 2 answers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, one_euro, room
+from mrhubo.fast.poses import check_frame_rate, read_poses, refuse
+from mrhubo.fast.retargeter import POLISH, FastRetargeter
+from mrhubo.fast.stream_clock import StreamClock
+from mrhubo.fast.stream_settings import StreamSettings
+from mrhubo.robot_motion import RobotMotion
+
+_REST_J33 = np.tile(np.eye(3, dtype=np.float32), (21, 1, 1))
+
+
+class FastStream:
+    """A retargeter that goes on from its last answer. One thread at a time may use a stream."""
+
+    def __init__(self, retargeter: FastRetargeter, rate: float = 60.0, settings: StreamSettings | None = None) -> None:
+        """A stream that has seen nobody. Everything is compiled by now, so that no frame waits for it.
+
+        Args:
+            retargeter: as it was loaded.
+            rate: frames per second, for frames that come without a time.
+            settings: times and speeds; default: `StreamSettings()`.
+
+        Raises:
+            UserError: the rate is not positive.
+        """
+        check_frame_rate(rate)
+        self.retargeter, self.rate, self.settings = retargeter, float(rate), settings or StreamSettings()
+        self._engine, self._cost = retargeter.engine, retargeter.description.cost
+        self._longest_step = self.settings.longest_step(self.rate)
+        self._limits = Limits(self._cost, self.settings.ramp_time)
+        self.reset()
+        for _ in range(2):  # a first frame, and one that follows
+            self(_REST_J33)
+        self.reset()
+
+    def reset(self, q: Any = None) -> None:
+        """Forgets everything. The next pose may have any time, and its answer is taken up at once.
+
+        Args:
+            q: where the robot stands (N,) [rad]: it then goes from there within its limits.
+
+        Raises:
+            UserError: q has another shape, is no number, or lies outside the joints' limits.
+        """
+        cost = self._cost
+        stand_N = np.clip(0.0, cost.lower_N, cost.upper_N).astype(np.float32) if q is None else self._standing(q)
+        self._filtered: Filtered | None = None
+        """None: nobody has been seen."""
+        self._followed = Followed(stand_N.astype(np.float64), np.zeros(len(cost.cell_CU)))
+        self._joints = Joints(stand_N, np.zeros(len(stand_N)))
+        self._unseen, self._placed = math.inf, q is not None
+        self._seen_1J33 = _REST_J33[None].copy()
+        self._clock = StreamClock(self.rate)
+
+    def __call__(self, pose: Any, time: float | None = None) -> RobotMotion:
+        """The answer to one frame, as a retargeter gives it for a single pose.
+
+        Args:
+            pose: local rotations in any form that a retargeter takes, (21, 3, 3), (63,) or (21, 6). None: nobody is
+                seen, so the robot goes to where it was going, and stays; the same where the pose holds NaN or infinite
+                numbers. Confidence is then 0.
+            time: of the frame [s], on any clock; default: 1 / rate after the last one. A time that has already been
+                answered gets the same answer again.
+
+        Raises:
+            UserError: the pose has another shape or holds what is no rotation, or the time is no number or before the
+                last one. The stream is as it was.
+        """
+        seen, target_1D3 = self._advance(pose, time)
+        found = self._engine.answer(self._joints.q_N[None], target_1D3, 0, None)
+        if not seen:
+            found.trust_BX[:] = 0.0
+        return self.retargeter.told(found, (), None, "")
+
+    def joints(self, pose: Any, time: float | None = None) -> np.ndarray:
+        """The joint angles (N,) [rad] of `__call__` alone, in less time."""
+        self._advance(pose, time)
+        return self._joints.q_N.copy()
+
+    def _advance(self, pose: Any, time: float | None) -> tuple[bool, np.ndarray]:
+        """Works on a frame; whether somebody is seen, and the directions (1, D, 3) of the last pose that was."""
+        local_1J33, seen = self._read(pose)
+        passed, time = self._clock.passed(time)
+        target_1D3 = self._engine.directions(local_1J33)
+        if passed > 0:
+            self._work(local_1J33, target_1D3[0], seen, passed)
+        self._seen_1J33, self._clock.time = local_1J33, time
+        return seen, target_1D3
+
+    def _work(self, local_1J33: np.ndarray, target_D3: np.ndarray, seen: bool, passed: float) -> None:
+        """Filter, two answers, limits, for a frame some time [s] after the last one."""
+        self._unseen += passed
+        velocity_N = np.zeros(len(self._joints.q_N))
+        if seen:
+            if self._filtered is None:
+                self._begin(local_1J33, target_D3)
+            else:
+                velocity_N = self._follow(self._filtered, local_1J33, target_D3)
+            self._unseen = 0.0
+        step = min(passed, self._longest_step)
+        self._joints = self._limits.follow(self._joints, self._followed.kept_N, velocity_N, step)
+        self._placed = True
+
+    def _begin(self, local_1J33: np.ndarray, target_D3: np.ndarray) -> None:
+        """Takes up the whole answer to a person who is seen for the first time."""
+        self._filtered = Filtered(target_D3, np.zeros_like(target_D3), target_D3)
+        network_1N = self._engine.network(local_1J33, target_D3[None])
+        first_N = self._engine.polish(network_1N, target_D3[None], POLISH)[0]
+        self._followed = Followed(first_N.astype(np.float64), np.zeros_like(self._followed.worse_C))
+        if not self._placed:
+            self._joints = Joints(first_N, np.zeros(len(first_N)))
+
+    def _follow(self, last: Filtered, local_1J33: np.ndarray, target_D3: np.ndarray) -> np.ndarray:
+        """Follows both answers; how fast the kept one moves (N,) [rad/s]."""
+        cost, settings, since = self._cost, self.settings, min(self._unseen, self._longest_step)
+        self._filtered = one_euro(last, target_D3, self._unseen, cost.partial_D, settings)
+        aim_D3 = self._filtered.filtered_D3
+        network_1N = self._engine.network(local_1J33, aim_D3[None])
+        start_2N = np.concatenate((self._followed.kept_N[None], network_1N))
+        limits = room(cost, settings, self._followed.kept_N, since)
+        both_2N, cost_2C = self._engine.follow(start_2N, np.stack((aim_D3, aim_D3)), *limits)
+        self._followed, velocity_N = cross_over(cost, settings, self._followed, both_2N, cost_2C, aim_D3, since)
+        return velocity_N
+
+    def _read(self, pose: Any) -> tuple[np.ndarray, bool]:
+        """A pose (1, 21, 3, 3), the last one where nobody is seen, and whether somebody is."""
+        if pose is None:
+            return self._seen_1J33, False
+        own_rest = self.retargeter.description.settings.own_rest
+        if hasattr(pose, "local_TJ33"):
+            poses = read_poses(pose, None, own_rest)
+            raise UserError(
+                f"stream: expected a pose, found a motion of {poses.shape[0]} frames; give its frames one by one"
+            )
+        given = np.asarray(pose)[None]
+        seen = not _has_gaps(given)
+        poses = read_poses(given if seen else given[:0], None, own_rest)
+        if len(poses.shape) != 1:
+            raise UserError(
+                f"stream: expected poses of one frame, a single one, found an array of shape {given.shape[1:]}"
+            )
+        if not seen:
+            return self._seen_1J33, False
+        local_1J33 = poses.local_TJ33.copy()  # the caller's array may hold another pose by the next frame
+        refuse(self._engine.wrong(local_1J33), ())
+        return local_1J33, True
+
+    def _standing(self, q: Any) -> np.ndarray:
+        """Joint angles (N,), float32, that a user gives."""
+        cost, q_N = self._cost, np.asarray(q)
+        if q_N.dtype.kind not in "fiu" or q_N.shape != cost.lower_N.shape:
+            raise UserError(f"stream: q must have {len(cost.lower_N)} angles, found {q_N.dtype} of shape {q_N.shape}")
+        q_N = q_N.astype(np.float32)
+        if not ((q_N >= cost.lower_N) & (q_N <= cost.upper_N)).all():  # nor NaN
+            raise UserError("stream: q lies outside the joints' limits")
+        return q_N
+
+
+def _has_gaps(given: np.ndarray) -> bool:
+    """Whether an array of numbers holds some that float32 cannot."""
+    with np.errstate(over="ignore"):
+        return given.dtype.kind == "f" and not bool(np.isfinite(given.astype(np.float32)).all())
