@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import shutil
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +24,7 @@ from mrhubo.retargeter import build_network
 from mrhubo.runtime import locations
 from mrhubo.runtime.progress import SILENT
 from mrhubo.runtime.tracking import open_client
+from tests.chain import cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
@@ -35,11 +35,10 @@ SMALL = [
 
 
 @pytest.fixture
-def home(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in which everything lies that no config places."""
-    (tmp_path / "data" / "motions").mkdir(parents=True)
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "data" / "motions")
+        cut_motion(name, tmp_path / "data" / "motions", (1, 3), every=2)
     monkeypatch.setattr(locations, "project_root", lambda: tmp_path)
     monkeypatch.setattr(locations, "shipped_root", lambda: tmp_path)
     return tmp_path
