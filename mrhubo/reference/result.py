@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 from torch import Tensor
 
@@ -11,7 +12,25 @@ from mrhubo.robot_motion import JointOrder, RobotFacts, RobotMotion, write_robot
 
 
 @dataclass(frozen=True, eq=False)
-class OptimizationResult:
+class Answer:
+    """What any answer in PyTorch's tensors can do. Each of its fields is a field of `RobotMotion`."""
+
+    @property
+    def robot_motion(self) -> RobotMotion:
+        """The same without PyTorch, which any program can read from a file (`mrhubo.robot_motion`)."""
+        return RobotMotion(**{f.name: _without_torch(getattr(self, f.name)) for f in fields(self)})
+
+    def save(
+        self, path: Path | str, format: str | None = None, joint_order: JointOrder | None = None
+    ) -> tuple[str, ...]:
+        """Writes a file, by the path's ending or as a format of `mrhubo.robot_motion.FORMATS`; arguments, what is
+        returned and raised as for `write_robot_motion`.
+        """
+        return write_robot_motion(self.robot_motion, path, format, joint_order)
+
+
+@dataclass(frozen=True, eq=False)
+class OptimizationResult(Answer):
     """Joint angles and how near they bring the robot to the human; the names are those of `RetargetResult`, which has a
     confidence besides. T stands for the leading axes of the human poses, none for a single pose.
 
@@ -37,17 +56,6 @@ class OptimizationResult:
     robot: RobotFacts = field(default_factory=RobotFacts)
     """What is known of the robot, and of who answered."""
 
-    @property
-    def robot_motion(self) -> RobotMotion:
-        """The same without PyTorch, which any program can read from a file (`mrhubo.robot_motion`)."""
-        names = ("joint_names", "direction_names", "frame_rate", "name", "source", "robot")
-        arrays = {name: getattr(self, name).cpu().numpy() for name in ("q", "direction_error_deg", "collision")}
-        return RobotMotion(**arrays, **{name: getattr(self, name) for name in names})
 
-    def save(
-        self, path: Path | str, format: str | None = None, joint_order: JointOrder | None = None
-    ) -> tuple[str, ...]:
-        """Writes a file, by the path's ending or as a format of `mrhubo.robot_motion.FORMATS`; arguments, what is
-        returned and raised as for `write_robot_motion`.
-        """
-        return write_robot_motion(self.robot_motion, path, format, joint_order)
+def _without_torch(value: Any) -> Any:
+    return value.cpu().numpy() if isinstance(value, Tensor) else value

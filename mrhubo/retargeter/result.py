@@ -5,16 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from mrhubo.robot_motion import JointOrder, RobotFacts, RobotMotion, write_robot_motion
+from mrhubo.reference.result import Answer
+from mrhubo.robot_motion import RobotFacts
 
 
 @dataclass(frozen=True, eq=False)
-class RetargetResult:
+class RetargetResult(Answer):
     """Joint angles and how far to trust them; T stands for the leading axes of the human poses, none for a single pose.
 
     N robot joints, D directions (limbs, hands, head), C branches.
@@ -57,21 +57,6 @@ class RetargetResult:
             field: getattr(self, field).unflatten(0, shape) if shape else getattr(self, field)[0] for field in _TENSORS
         }
         return dataclasses.replace(self, **tensors, frame_rate=frame_rate, name=name, source=source)
-
-    @property
-    def robot_motion(self) -> RobotMotion:
-        """The same without PyTorch, which any program can read from a file (`mrhubo.robot_motion`)."""
-        names = ("joint_names", "branch_names", "direction_names", "frame_rate", "name", "source", "robot")
-        arrays = {name: getattr(self, name).cpu().numpy() for name in _TENSORS}
-        return RobotMotion(**arrays, **{name: getattr(self, name) for name in names})
-
-    def save(
-        self, path: Path | str, format: str | None = None, joint_order: JointOrder | None = None
-    ) -> tuple[str, ...]:
-        """Writes a file, by the path's ending or as a format of `mrhubo.robot_motion.FORMATS`; arguments, what is
-        returned and raised as for `write_robot_motion`.
-        """
-        return write_robot_motion(self.robot_motion, path, format, joint_order)
 
 
 _TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision", "branch_confidence")
