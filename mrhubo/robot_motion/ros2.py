@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -179,9 +179,10 @@ def _trajectories(path: Path, records: Any) -> Iterator[bytes]:
     """The JointTrajectory messages of a bag, as bytes."""
     stream = _import("mcap.stream_reader")
     schemas, channels = set(), set()
-    size = check_regular(path, _MAX_BAG)  # as much memory is made as a record claims, however short the file
+    size = check_regular(path, _MAX_BAG)
     with open_regular(path, _MAX_BAG) as file:
-        for record in stream.StreamReader(file, emit_chunks=True, record_size_limit=size).records:
+        reader = stream.StreamReader(_Sparing(file, size), emit_chunks=True, record_size_limit=size)
+        for record in reader.records:
             inner = [record]
             if isinstance(record, records.Chunk):
                 if record.compression not in ("", "zstd") or record.uncompressed_size > _MAX_CHUNK:
@@ -198,6 +199,20 @@ def _trajectories(path: Path, records: Any) -> Iterator[bytes]:
                     channels.add(found.id)
                 elif isinstance(found, records.Message) and found.channel_id in channels:
                     yield found.data
+
+
+class _Sparing:
+    """A file of which never more is asked than it has left: records, and texts and arrays in them, claim any length,
+    and as much memory would be made.
+    """
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file, self._left = file, size
+
+    def read(self, count: int) -> bytes:
+        content = self._file.read(min(count, self._left))
+        self._left -= len(content)
+        return content
 
 
 def import_mcap() -> None:
