@@ -7,7 +7,8 @@ arm, the head), D directions (limbs, hands, head).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -167,11 +168,15 @@ class RobotMotion:
         return replace(self, **{name: array[None] for name, array in arrays.items() if array is not None})
 
 
+def find_repeated(names: Iterable[str]) -> str | None:
+    """The name that is there twice, of several the first in order; None: there is none."""
+    return min((name for name, count in Counter(names).items() if count > 1), default=None)
+
+
 def _names(field_name: str, given: Sequence[str]) -> tuple[str, ...]:
     names = tuple(map(str, given))
-    repeated = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
-    if repeated:
-        raise UserError(f"{field_name} has '{shortened(repeated[0])}' twice")
+    if (repeated := find_repeated(names)) is not None:
+        raise UserError(f"{field_name} has '{shortened(repeated)}' twice")
     if any(not name or not name.isprintable() for name in names):
         raise UserError(f"{field_name} has a name that is empty or no text")
     return names

@@ -18,7 +18,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.errors import UserError, listed, shortened, unknown_name
 from mrhubo.files.regular import read_regular
-from mrhubo.robot_motion.motion import RobotMotion
+from mrhubo.robot_motion.motion import RobotMotion, find_repeated
 
 _MAX_BYTES = 20_000_000
 _MAX_JOINTS = 4_096
@@ -72,10 +72,10 @@ def read_joint_order(path: Path) -> JointOrder:
             raise UserError(f"{path}: is no text; expected the name of a joint a line, or an XML model") from error
     if not order.names or len(order.names) > _MAX_JOINTS:
         raise UserError(f"{path}: names {len(order.names)} joints; expected 1 to {_MAX_JOINTS}")
-    repeated = sorted({name for name in order.names if order.names.count(name) > 1})
-    if repeated or not all(order.names):
-        wrong = f"names joint '{shortened(repeated[0])}' twice" if repeated else "has a joint without a name"
-        raise UserError(f"{path}: {wrong}")
+    if (repeated := find_repeated(order.names)) is not None:
+        raise UserError(f"{path}: names joint '{shortened(repeated)}' twice")
+    if not all(order.names):
+        raise UserError(f"{path}: has a joint without a name")
     return order
 
 

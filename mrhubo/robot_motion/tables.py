@@ -18,7 +18,7 @@ from mrhubo.errors import UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import check_regular, read_regular
 from mrhubo.robot_motion.columns import from_columns, to_columns
-from mrhubo.robot_motion.motion import RobotMotion
+from mrhubo.robot_motion.motion import RobotMotion, find_repeated
 from mrhubo.robot_motion.plain import build, facts_of
 
 MAX_TEXT = 2**29
@@ -56,11 +56,10 @@ def read_csv(path: Path) -> RobotMotion:
         header = next(csv.reader(io.StringIO(text[: 2**20].partition("\n")[0])), [])
     except csv.Error as error:
         raise UserError(f"{path}: its header is none of a table: {error}") from error
-    repeated = sorted({name for name in header if header.count(name) > 1}) if len(header) <= _MAX_COLUMNS else []
-    if repeated or len(header) > _MAX_COLUMNS:
-        raise UserError(
-            f"{path}: its header has {f'{shortened(repeated[0])!r} twice' if repeated else 'too many names'}"
-        )
+    if len(header) > _MAX_COLUMNS:
+        raise UserError(f"{path}: its header has too many names")
+    if (repeated := find_repeated(header)) is not None:
+        raise UserError(f"{path}: its header has {shortened(repeated)!r} twice")
     rows_TX = read_rows(path, text.partition("\n")[2], len(header))
     return _from_columns(path, dict(zip(header, rows_TX.T, strict=True)))
 
