@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mrhubo.errors import UserError, listed, nearest, shortened
+from mrhubo.errors import UserError, listed, shortened, unknown_name
 from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import open_regular
 from mrhubo.robot_motion.json_file import read_json, write_json
@@ -77,9 +77,7 @@ def find_format(path: Path, name: str | None = None) -> str:
             raise UserError(f"{path}: the name must end in {', '.join(endings)}, or a format be named: {presets}")
         return found
     if name not in FORMATS:
-        near = nearest(name, FORMATS)
-        known = f"nearest: '{near}'" if near else f"there are: {listed(FORMATS)}"
-        raise UserError(f"format '{shortened(name)}' does not exist; {known}")
+        raise UserError(unknown_name("format", shortened(name), FORMATS))
     return name
 
 
