@@ -31,8 +31,8 @@ class Format:
     """Of the file's name; empty: it is a folder, of any number of motions."""
     meaning: str
     """In words, for `--help`."""
-    write: Write | None = None
-    """Writes a motion whose joints are in order already, and returns what it had to assume; None for folders."""
+    write: Write
+    """Writes a motion whose joints are in order already, and returns what it had to assume."""
     preset: bool = False
     """Whether it has to be asked for by name: its ending says another."""
     library: Callable[[], object] | None = None
@@ -58,7 +58,8 @@ FORMATS: dict[str, Format] = {
                       write_unitree, preset=True),
     "mcap": Format(".mcap", "ROS 2 bag with a JointTrajectory", _plain(write_mcap), library=import_mcap),
     "yaml": Format(".yaml", "ROS 2 JointTrajectory as YAML", _plain(write_yaml)),
-    "lerobot": Format("", "LeRobot dataset 3.0, a folder, an episode a motion", preset=True, library=import_pyarrow),
+    "lerobot": Format("", "LeRobot dataset 3.0, a folder, an episode a motion",
+                      _plain(lambda motion, path: write_lerobot([motion], path)), preset=True, library=import_pyarrow),
 }  # fmt: skip
 """By name."""
 
@@ -104,9 +105,6 @@ def write_robot_motion(
     notes: tuple[str, ...] = ()
     if joint_order is not None:
         motion, notes = in_order(motion, joint_order)
-    if row.write is None:
-        write_lerobot([motion], path)
-        return notes
     try:
         return notes + row.write(motion, path, joint_order)
     except UserError as error:
