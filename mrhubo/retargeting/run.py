@@ -10,7 +10,6 @@ from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, mirror, read_motion, resample, trim
 from mrhubo.motion.editing import check_span
 from mrhubo.motion.poses import check_frame_rate
-from mrhubo.motion.readers.names import motion_name
 from mrhubo.retargeting.answering import Answerer
 from mrhubo.retargeting.places import Places
 from mrhubo.retargeting.summary import Summary
@@ -106,7 +105,7 @@ def retarget_files(
                 if places.is_dataset:
                     together.append(answer)
                 else:
-                    path = places.path(motion_name(file) + ("_mirrored" if request.mirrored else ""))
+                    path = places.path(motion.name)
                     say(write_robot_motion(answer, path, places.format, request.joint_order))
                     tell(f"  written: {path}")
                 outcome.summaries.append(Summary.of(answer, answerer.limb_names))
