@@ -54,12 +54,12 @@ def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
     check_lerobot_folder(folder)
     arrow, parquet = import_pyarrow()
     frames = _frames(motions, int(first.frame_rate or 0))
-    tasks = list(dict.fromkeys(motion.name or "motion" for motion in motions))
-    frames["task_index"] = np.repeat([tasks.index(motion.name or "motion") for motion in motions],
-                                     [len(motion) for motion in motions])  # fmt: skip
+    names = [motion.name or "motion" for motion in motions]
+    tasks = list(dict.fromkeys(names))
+    frames["task_index"] = np.repeat([tasks.index(name) for name in names], [len(motion) for motion in motions])
     tables = {
         _DATA: arrow.table({name: _column(arrow, array) for name, array in frames.items()}),
-        _EPISODES: _episodes(arrow, motions),
+        _EPISODES: _episodes(arrow, motions, names),
         _TASKS: _tasks(arrow, tasks),
     }
     texts = {_STATS: _statistics(frames), _INFO: _info(motions, frames, len(tasks))}  # the last one makes it a dataset
@@ -109,14 +109,14 @@ def _column(arrow: Any, array: np.ndarray) -> Any:
     return arrow.FixedSizeListArray.from_arrays(arrow.array(array.reshape(-1)), array.shape[1])
 
 
-def _episodes(arrow: Any, motions: Sequence[RobotMotion]) -> Any:
+def _episodes(arrow: Any, motions: Sequence[RobotMotion], names: Sequence[str]) -> Any:
     lengths = np.array([len(motion) for motion in motions])
     ends = np.cumsum(lengths)
     nothing = np.zeros(len(motions), np.int64)
     return arrow.table(
         {
             "episode_index": np.arange(len(motions)),
-            "tasks": arrow.array([[motion.name or "motion"] for motion in motions]),
+            "tasks": arrow.array([[name] for name in names]),
             "length": lengths,
             "data/chunk_index": nothing,
             "data/file_index": nothing,

@@ -7,6 +7,8 @@ takes; the bag is what `ros2 bag play` takes. MCAP: https://mcap.dev/spec and /s
 
 from __future__ import annotations
 
+import importlib
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -64,8 +66,6 @@ def write_yaml(motion: RobotMotion, path: Path) -> None:
 
 def _yaml(motion: RobotMotion, path: Path) -> Iterator[str]:
     """The message's lines. A library's dumper takes a minute for what these take a second for."""
-    import json
-
     points = _points(motion, path)
     yield "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}\n"
     yield f"joint_names: {json.dumps(motion.joint_names, ensure_ascii=False)}\n"  # JSON's strings are YAML's
@@ -115,8 +115,7 @@ def _from_points(path: Path, names: Any, times: Any, positions: Any) -> RobotMot
     """A motion of what a message holds."""
     try:
         q = np.array(positions, np.float64)
-        time_T = [int(sec) * _SECOND + int(nanosec) for sec, nanosec in times]
-        time_T = np.array(time_T, np.int64)
+        time_T = np.array([int(sec) * _SECOND + int(nanosec) for sec, nanosec in times], np.int64)
         if q.ndim != 2 or not isinstance(names, list):
             raise ValueError
     except Exception as error:
@@ -221,8 +220,6 @@ def import_mcap() -> None:
 
 
 def _import(name: str) -> Any:
-    import importlib
-
     try:
         return importlib.import_module(name)
     except ImportError as error:
