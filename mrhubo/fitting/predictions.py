@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError, listed, unknown_name
-from mrhubo.evaluation import Clip, Motions, evaluate_clips, motion_table, solve_references, table
+from mrhubo.evaluation import Motions, evaluate_clips, motion_table, solve_references, table
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.motion import Motion, resample, trim
 from mrhubo.robot import Robot
@@ -63,14 +63,13 @@ def measure_predictions(prepared: Prepared, report: Reporter, files: Sequence[Pa
     motions = Motions(prepared.motions.folder, [], [prediction.motion for prediction in predictions])
     clips = solve_references(prepared.config, prepared.body_map, motions, prepared.references_dir, report)[1]
     key_links = prepared.config.robot.key_links
-    answers = {"predictions": [prediction.q_TN for prediction in predictions], "reference": _references(clips)}
+    answers = {
+        "predictions": [prediction.q_TN for prediction in predictions],
+        "reference": [clip.reference_TN for clip in clips],
+    }
     ways = {way: evaluate_clips(q, clips, prepared.body_map, key_links) for way, q in answers.items()}
     notes = dict.fromkeys(note for prediction in predictions for note in prediction.notes)
     return "\n".join([table(ways["predictions"]), "", motion_table(ways), *notes])
-
-
-def _references(clips: Sequence[Clip]) -> list[Tensor]:
-    return [clip.reference_TN for clip in clips]
 
 
 def _match(file: Path, found: RobotMotion, known: dict[str, Motion], robot: Robot) -> _Prediction:
