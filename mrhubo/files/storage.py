@@ -12,18 +12,16 @@ import platform
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import torch
 from filelock import FileLock, Timeout
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.files.arrays import CHECKSUM, DamagedFile, begin_checksum
+from mrhubo.files.arrays import CHECKSUM, begin_checksum, read_checked, reading
 from mrhubo.files.atomic import atomic_path, checksum_file
-from mrhubo.files.regular import check_regular, read_regular
+from mrhubo.files.regular import read_regular
 
 
 class Locked(UserError):
@@ -132,26 +130,11 @@ def read_some_tensors(path: Path, names: Iterable[str]) -> tuple[dict[str, Tenso
     Raises:
         DamagedFile: the file is missing, truncated, no safetensors file, or holds no tensor of a name.
     """
-    with _reading(path) as handle:
+    with reading(path, "pt") as handle:
         metadata = dict(handle.metadata() or {})
         tensors = {name: handle.get_tensor(name) for name in names}
     metadata.pop(CHECKSUM, None)
     return tensors, metadata
-
-
-@contextmanager
-def _reading(path: Path) -> Iterator[Any]:
-    try:
-        check_regular(path)
-    except UserError as error:
-        said = str(error).removeprefix(f"{path}: ")
-        raise DamagedFile(f"{path}: cannot be read as safetensors: {said}") from error
-    try:
-        with safe_open(path, framework="pt") as handle:
-            yield handle
-    except Exception as error:  # whatever safetensors and torch make of a stranger's bytes
-        said = str(error) if isinstance(error, OSError | SafetensorError) else type(error).__name__
-        raise DamagedFile(f"{path}: cannot be read as safetensors: {said}") from error
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
@@ -160,12 +143,4 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     Raises:
         DamagedFile: the file is missing, truncated, no safetensors file, or its checksum does not match.
     """
-    with _reading(path) as handle:
-        metadata = dict(handle.metadata() or {})
-        tensors = {name: handle.get_tensor(name) for name in handle.keys()}  # noqa: SIM118 (not a mapping)
-    expected = metadata.pop(CHECKSUM, None)
-    if expected is None:
-        raise DamagedFile(f"{path}: carries no checksum, so it was not written by mrhubo")
-    if checksum_tensors(tensors, metadata) != expected:
-        raise DamagedFile(f"{path}: the content does not match its checksum; the file is damaged")
-    return tensors, metadata
+    return read_checked(path, "pt", checksum_tensors)
