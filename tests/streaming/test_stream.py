@@ -75,11 +75,11 @@ def test_who_stands_still_gets_the_frames_own_optimum_and_the_robot_stays_there(
 
 
 def test_a_straight_arm_seen_with_noise_hangs_still(retargeter: Retargeter, hanging: Hanging) -> None:
-    motion = hanging(2.0, 100)
+    motion = hanging(2.0, 300)
     target = retargeter.body_map.human_directions(motion.local_TJ33)
     alone, stream = retargeter.predict(motion, 10), Stream(retargeter).retarget(motion).q
     jumps = [count_jumps(retargeter.directions, q, target, 60.0) for q in (alone, stream)]
-    assert jumps[0] > 0 and jumps[1] == 0
+    assert jumps[0] > 3 and jumps[1] == 0
     fastest = [float(q.diff(dim=0).abs().max()) * 60 for q in (alone, stream)]
     assert fastest[1] <= float(retargeter.body_map.robot.velocity_N.max()) < 0.1 * fastest[0]
 
