@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mrhubo.evaluation.measures import Evaluation
+from mrhubo.runtime.tables import aligned
 
 _HEADS = {
     "frames": ("frames", "{:,}"),
@@ -37,7 +38,7 @@ _MOTION_HEADS = {
 def table(evaluations: Sequence[Evaluation]) -> str:
     """What `evaluate_clips` gave, a row each; parts that the robot does not have are left out."""
     means = len(evaluations) - 2
-    lines = _lines("clip", evaluations, _HEADS)
+    lines = aligned("clip", evaluations, _HEADS)
     lines.insert(1 + means, "-" * len(lines[0]))
     return "\n".join(lines)
 
@@ -45,14 +46,4 @@ def table(evaluations: Sequence[Evaluation]) -> str:
 def motion_table(ways: Mapping[str, Sequence[Evaluation]]) -> str:
     """The means over clips of what `evaluate_clips` gave for each way of answering, a row each: as motions."""
     rows = [replace(evaluations[-2], name=way) for way, evaluations in ways.items()]
-    return "\n".join(_lines("mean over clips", rows, _MOTION_HEADS))
-
-
-def _lines(first: str, evaluations: Sequence[Evaluation], heads: Mapping[str, tuple[str, str]]) -> list[str]:
-    shown = {n: h for n, h in heads.items() if any(getattr(e, n) == getattr(e, n) for e in evaluations)}
-    rows = [[first, *(head for head, _ in shown.values())]]
-    for evaluation in evaluations:
-        values = [(getattr(evaluation, name), form) for name, (_, form) in shown.items()]
-        rows.append([evaluation.name, *(form.format(value) if value == value else "-" for value, form in values)])
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows]
+    return "\n".join(aligned("mean over clips", rows, _MOTION_HEADS))

@@ -12,6 +12,7 @@ from math import nan
 import numpy as np
 
 from mrhubo.robot_motion import RobotMotion
+from mrhubo.runtime.tables import aligned
 
 
 @dataclass(frozen=True)
@@ -58,14 +59,4 @@ _HEADS = {
 
 def table(summaries: Sequence[Summary]) -> str:
     """A row a motion; what is known of none has no column."""
-    shown = {name: head for name, head in _HEADS.items() if any(_known(getattr(s, name)) for s in summaries)}
-    rows = [["motion", *(head for head, _ in shown.values())]]
-    for summary in summaries:
-        values = [(getattr(summary, name), form) for name, (_, form) in shown.items()]
-        rows.append([summary.name, *(form.format(value) if _known(value) else "-" for value, form in values)])
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows)
-
-
-def _known(value: float) -> bool:
-    return value == value
+    return "\n".join(aligned("motion", summaries, _HEADS))
