@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
-from mrhubo.config import CommandParser, number, run_command
+from mrhubo.config import CommandParser, number, print_error, run_command
 from mrhubo.robot_motion import FORMATS, read_joint_order
 from mrhubo.runtime.progress import Reporter
 
@@ -72,12 +71,10 @@ def main(argv: list[str]) -> int:
     sentences = list(outcome.failures.values())
     if len(files) == 1:
         raise UserError(sentences[0])
-    sys.stdout.flush()
     for sentence in sentences:
-        print(f"error: {' '.join(sentence.split())}", file=sys.stderr)
+        print_error(sentence)
     names = ", ".join(map(str, outcome.failures))
-    print(f"error: {len(sentences)} of {len(files)} motions could not be retargeted: {names}", file=sys.stderr)
-    return 2
+    return print_error(f"{len(sentences)} of {len(files)} motions could not be retargeted: {names}")
 
 
 def _answerer(package: str | None, robot: str | None):  # noqa: ANN202 (importing its type takes torch)

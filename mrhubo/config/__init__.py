@@ -1,7 +1,7 @@
 """Settings: YAML plus ``key.sub=value`` -> typed dataclasses; every mistake is one sentence."""
 
 from mrhubo.config.arguments import CommandParser, nonempty, number, parse_arguments, whole_number
-from mrhubo.config.command import run_command
+from mrhubo.config.command import print_error, run_command
 from mrhubo.config.entries import (
     ConstantEntry,
     FrameEntry,
@@ -77,6 +77,7 @@ __all__ = [
     "number",
     "parse_arguments",
     "places_named",
+    "print_error",
     "run_command",
     "shipped_root",
     "nonempty",

@@ -51,7 +51,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
             status = stop.code
         _flush()
     except UserError as error:
-        status = _end(f"error: {shortened(' '.join(str(error).split()), _LONGEST)}", 2)
+        status = print_error(str(error))
     except KeyboardInterrupt:
         status = _interrupted()
     except BrokenPipeError:
@@ -68,6 +68,11 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
         else:
             status = _bug()
     sys.exit(status)
+
+
+def print_error(sentence: str) -> int:
+    """What is wrong, as one line on stderr without what nobody should read; the exit status that it means."""
+    return _end(f"error: {shortened(' '.join(sentence.split()), _LONGEST)}", 2)
 
 
 def _begin() -> None:
