@@ -25,7 +25,7 @@ from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
-from mrhubo.motion.readers.amass import MAX_FRAMES
+from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES
 from mrhubo.motion.readers.linking import LINKED, link
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
@@ -35,7 +35,6 @@ from mrhubo.motion.readers.world import ANY_WORLD, find_up
 
 _KEY, _CAMERA = "pred_keypoints_3d", "pred_cam_t"
 _POINTS = 70
-_FARTHEST_M = 1e5
 _REACH = 1.0
 """How far anybody gets from one frame to the next [m], with the noise of a depth that is guessed."""
 _FACE = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
@@ -80,8 +79,8 @@ def read_sam3d(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]]
     chosen = choose(tree.path, tracks, options, notes)
     seen = people[chosen.person][1]()
     points_TK3 = torch.from_numpy(seen.points.astype(np.float64))
-    if not bool((points_TK3.nan_to_num().abs() < _FARTHEST_M).all()):
-        raise UserError(f"{tree.path}: '{_KEY}' holds infinite numbers, or some beyond {_FARTHEST_M:g} m")
+    if not bool((points_TK3.nan_to_num().abs() < FARTHEST_M).all()):
+        raise UserError(f"{tree.path}: '{_KEY}' holds infinite numbers, or some beyond {FARTHEST_M:g} m")
     if seen.camera is not None:
         points_TK3 = points_TK3 + torch.from_numpy(seen.camera.astype(np.float64))[:, None]
     up_T3 = points_TK3[:, [5, 6]].mean(dim=1) - points_TK3[:, [9, 10]].mean(dim=1)

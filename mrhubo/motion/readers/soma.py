@@ -10,7 +10,7 @@ Legend: T frames, K joints of SOMA's, J = 21: SMPL's joints 1..21.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -21,15 +21,13 @@ from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES,
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.amass import MAX_FRAMES
-from mrhubo.motion.readers.assemble import upright
+from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES, MAX_ROOT_TURN, upright
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.rotations import find_form, to_matrices
 from mrhubo.motion.readers.smpl_names import search
 from mrhubo.motion.readers.world import WORLDS
 from mrhubo.rotation import orthonormal, shortest_turn
 
-_MAX_TURN = 8 * np.pi
 _FINGERS = tuple(
     f"Hand{finger}{part}"
     for finger, parts in (("Thumb", "123"), ("Index", "1234"), ("Middle", "1234"), ("Ring", "1234"), ("Pinky", "1234"))
@@ -133,12 +131,11 @@ def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | N
         description=name,
         root_rotation_T33=world["Hips"].float(),
         root_position_T3=_root(arrays, len(local_TJ33), notes),
+        source=f"{arrays.source}, '{arrays.key}'",
         notes=tuple(notes),
     )
-    motion, up = upright(motion, WORLDS)
     limbs = "limbs point as the joints' places say" if arrays.places is not None else "rotations refer to a T-pose"
-    source = f"{arrays.source}, '{arrays.key}'{up}; {limbs}"
-    return replace(motion, source=source)
+    return upright(motion, WORLDS, limbs)
 
 
 def _find(node: Tree) -> _Arrays | None:
@@ -199,7 +196,7 @@ def _world(tree: Tree, arrays: _Arrays) -> dict[str, Tensor]:
         raise UserError(
             f"{tree.path}: '{arrays.key}' has shape {arrays.local.shape}; expected (frames, {joints}, 3, 3)"
         )
-    local_TK33 = to_matrices(arrays.local.reshape(frames, -1), form, _MAX_TURN)
+    local_TK33 = to_matrices(arrays.local.reshape(frames, -1), form, MAX_ROOT_TURN)
     if local_TK33 is None:
         raise UserError(f"{tree.path}: '{arrays.key}' holds NaN, infinite numbers, or what is no rotation")
     identity_T33 = torch.eye(3, dtype=torch.float64).expand(frames, 3, 3)
@@ -232,7 +229,7 @@ def _root(arrays: _Arrays, frames: int, notes: list[str]) -> Tensor | None:
     if root is None:
         return None
     rows_TX = root.reshape(len(root), -1) if root.ndim else root.reshape(1, 1)
-    if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < 1e5).all():
+    if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < FARTHEST_M).all():
         notes.append(f"where the root goes is left out: its shape is {root.shape}, or it holds no finite numbers")
         return None
     return torch.from_numpy(rows_TX.astype(np.float32))
