@@ -19,8 +19,8 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.keypoint_files import Keypoints, holds_points, read_keypoints_file
 from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import RATES, ReadOptions
-from mrhubo.motion.readers.rate import asked_rate
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.tree.world import nearest_unit, to_y_up
 
 _UNSURE = 0.3
@@ -124,12 +124,7 @@ def _refuse_flat(path: Path, found: Keypoints) -> None:
 def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
     if found.rate is None:
         return asked_rate(path, options)
-    low, high = RATES
-    if not low <= found.rate <= high:
-        raise UserError(f"{path}: says {found.rate:g} frames per second; expected {low:g} to {high:g}")
-    if options.rate is not None and options.rate != found.rate:
-        found.notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {found.rate:g}")
-    return found.rate
+    return told_rate(path, "says", found.rate, options, found.notes)
 
 
 def _without_missing(found: Keypoints) -> np.ndarray:
