@@ -148,6 +148,11 @@ class Tree:
         except UserError:
             return None
 
+    def find_array(self, *names: str) -> np.ndarray | None:
+        """The array under the first of some keys that there is; None where there is none, or it is no array."""
+        found = self.get(*names)
+        return None if found is None or found.shape() is None else found.array()
+
     def text(self) -> str | None:
         """The text that it is; None where it is none."""
         value = self._value
@@ -169,13 +174,11 @@ class Tree:
             return f"a dictionary with {shortened(listed(self.keys), 200)}"
         if self.is_list:
             return f"a list of {len(self):,}"
-        if isinstance(self._value, Later):
+        if isinstance(self._value, Later | np.ndarray):
             return f"an array of shape {self._value.shape}"
         if isinstance(self._value, RecordedObject):
             shape = self.shape()
             return f"an array of shape {shape}" if shape is not None else f"an object '{shortened(self._value.kind)}'"
-        if isinstance(self._value, np.ndarray):
-            return f"an array of shape {self._value.shape}"
         return f"a {type(self._value).__name__}"
 
     def _child(self, name: str, value: Any) -> Tree:

@@ -123,7 +123,7 @@ def _romp(tree: Tree) -> Layout | None:
 def _romp_reader(found: list[tuple[int, Tree, int]]) -> Callable[[], SmplArrays]:
     def read() -> SmplArrays:
         pose, betas, position = (
-            _stack_rows([(frame.get(key), row) for _, frame, row in found])
+            _stack_rows([(frame, row) for _, frame, row in found], key)
             for key in ("smpl_thetas", "smpl_betas", "cam_trans")
         )
         if pose is None:
@@ -282,11 +282,11 @@ def _stack(nodes: list[Tree]) -> np.ndarray:
     return np.stack(arrays)
 
 
-def _stack_rows(places: list[tuple[Tree | None, int]]) -> np.ndarray | None:
-    """A row of each of some arrays; None where some have none, or others."""
+def _stack_rows(places: list[tuple[Tree, int]], key: str) -> np.ndarray | None:
+    """A row of an array of each of some frames; None where some have none, or others."""
     rows = []
-    for node, row in places:
-        array = None if node is None or node.shape() is None else node.array()
+    for frame, row in places:
+        array = frame.find_array(key)
         if array is None or array.ndim != 2 or len(array) <= row or array.shape[1] > _SMALL:
             return None
         rows.append(array[row])

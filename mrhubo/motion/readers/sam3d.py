@@ -129,9 +129,8 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
 
 def _place(person: Tree) -> np.ndarray:
     """Where somebody is, (3,); the origin where it is not told."""
-    place = person.get(_CAMERA)
-    array = place.array() if place is not None and place.shape() is not None else np.zeros(0)
-    return array.reshape(3).astype(np.float64) if array.size == 3 else np.zeros(3)
+    place = person.find_array(_CAMERA)
+    return place.reshape(3).astype(np.float64) if place is not None and place.size == 3 else np.zeros(3)
 
 
 def _stacked(node: Tree) -> _Seen | None:
@@ -140,8 +139,7 @@ def _stacked(node: Tree) -> _Seen | None:
     if shape is None or shape[-2:] != (_POINTS, 3) or len(shape) not in (3, 4) or (len(shape) == 4 and shape[1] != 1):
         return None
     points = node[_KEY].array().reshape(-1, _POINTS, 3)
-    camera = node.get(_CAMERA)
-    place = camera.array() if camera is not None and camera.shape() is not None else None
+    place = node.find_array(_CAMERA)
     if not 0 < len(points) <= MAX_FRAMES:
         raise UserError(f"{node.path}: '{_KEY}' has {len(points):,} frames; expected 1 to {MAX_FRAMES:,}")
     return _Seen(points, place.reshape(-1, 3) if place is not None and place.size == 3 * len(points) else None)

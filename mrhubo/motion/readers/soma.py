@@ -155,23 +155,23 @@ def _find(node: Tree) -> _Arrays | None:
         if len(shape) == 4 and shape[1] in _ORDERS:
             names, places = _ORDERS[shape[1]], node.get("posed_joints")
             joints = places.array() if places is not None and places.shape() == (*shape[:2], 3) else None
-            local, root = node["local_rot_mats"].array(), _array(node, "root_positions")
+            local, root = node["local_rot_mats"].array(), node.find_array("root_positions")
             return _Arrays("Kimodo", "local_rot_mats", local, names, joints, root)
     if {"body_pose", "global_orient"} <= keys:
-        body, root = _array(node, "body_pose"), _array(node, "global_orient")
+        body, root = node.find_array("body_pose"), node.find_array("global_orient")
         if body is not None and root is not None and body.size == 76 * 3 * len(body) and root.size == 3 * len(body):
             local = np.concatenate((root.reshape(-1, 1, 3), body.reshape(-1, 76, 3)), axis=1)
-            return _Arrays("GEM-X", f"{node.where}[body_pose]", local, _ALL, None, _array(node, "transl"))
+            return _Arrays("GEM-X", f"{node.where}[body_pose]", local, _ALL, None, node.find_array("transl"))
     if {"poses", "joint_names"} <= keys:
         names = tuple(node["joint_names"].texts())
-        poses = _array(node, "poses")
+        poses = node.find_array("poses")
         if poses is not None and poses.ndim in (3, 4) and len(names) == poses.shape[1] and "Hips" in names:
             return _soma_x(node, poses, names)
     return None
 
 
 def _soma_x(node: Tree, poses: np.ndarray, names: tuple[str, ...]) -> _Arrays:
-    absolute = _array(node, "absolute_pose")
+    absolute = node.find_array("absolute_pose")
     if absolute is not None and absolute.size == 1 and bool(absolute.reshape(-1)[0]):
         raise UserError(
             f"{node.path}: its rotations are absolute ('absolute_pose'), which only SOMA's own rig can read; save them"
@@ -179,13 +179,8 @@ def _soma_x(node: Tree, poses: np.ndarray, names: tuple[str, ...]) -> _Arrays:
         )
     unit = node.get("unit")
     metres = {"centimeters": 0.01, "millimeters": 0.001}.get((unit.text() or "") if unit is not None else "", 1.0)
-    root = _array(node, "transl")
+    root = node.find_array("transl")
     return _Arrays("SOMA-X", "poses", poses, names, None, None if root is None else root * metres)
-
-
-def _array(node: Tree, key: str) -> np.ndarray | None:
-    found = node.get(key)
-    return None if found is None or found.shape() is None else found.array()
 
 
 def _world(tree: Tree, arrays: _Arrays) -> dict[str, Tensor]:
