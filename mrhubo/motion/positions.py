@@ -24,7 +24,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from mrhubo.body.anatomy import hinge_axis
-from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton, local_rotations
 from mrhubo.errors import UserError
 from mrhubo.motion.gaps import Neighbours, fill_directions, fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
@@ -129,9 +129,7 @@ def motion_from_points(
             _limb(build, limb, side)
     _head(build)
     world = build.world
-    order = [world[joint] for joint in JOINT_NAMES]
-    local_TJ33 = torch.stack([order[PARENTS[i]].mT @ order[i] for i in range(1, len(order))], dim=1)
-    local_TJ33 = orthonormal(local_TJ33).float()
+    local_TJ33 = local_rotations(torch.stack([world[joint] for joint in JOINT_NAMES], dim=1))
     sure_TJ = torch.stack([build.sure.get(joint, build.sure["spine3"]) for joint in POSED_JOINT_NAMES], dim=1)
     pelvis_T33 = world["pelvis"]
     middle_T3 = (build.points["left_hip"] + build.points["right_hip"]) / 2 if body_has(body, "left_hip") else None
@@ -141,7 +139,7 @@ def motion_from_points(
         position_T3 = fill_numbers(middle_T3, torch.isfinite(middle_T3).all(-1)) - pelvis_T33 @ offset_3
     return Motion(
         name=name,
-        local_TJ33=local_TJ33,
+        local_TJ33=orthonormal(local_TJ33).float(),
         frame_rate=float(frame_rate),
         description=name,
         root_rotation_T33=orthonormal(pelvis_T33).float(),

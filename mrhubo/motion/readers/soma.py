@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton, local_rotations
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
@@ -119,10 +119,7 @@ def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | N
     world = _world(tree, arrays)
     if arrays.places is not None:
         _point(world, arrays, notes)
-    stacked_TK33 = torch.stack([world[_OURS[joint]] for joint in JOINT_NAMES], dim=1)
-    local_TJ33 = torch.stack(
-        [stacked_TK33[:, PARENTS[j]].mT @ stacked_TK33[:, j] for j in range(1, len(JOINT_NAMES))], dim=1
-    )
+    local_TJ33 = local_rotations(torch.stack([world[_OURS[joint]] for joint in JOINT_NAMES], dim=1))
     name = motion_name(tree.path)
     motion = Motion(
         name=name,
