@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.files.regular import naming
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.linking import LINKED, link
@@ -267,10 +268,8 @@ def _places(node: Tree, key: str, people: int) -> np.ndarray:
 
 
 def _linked(tree: Tree, places: list[np.ndarray], reach: float) -> list[list[int]]:
-    try:
+    with naming(tree.path):
         return link(places, reach)
-    except UserError as error:
-        raise UserError(f"{tree.path}: {error}") from error
 
 
 def _stack(nodes: list[Tree]) -> np.ndarray:

@@ -22,6 +22,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import SIDES
 from mrhubo.errors import UserError
+from mrhubo.files.regular import naming
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
@@ -112,12 +113,9 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
     people = [[person for person in (frame if frame.is_list else (frame,)) if _KEY in person.keys] for frame in frames]
     if not any(people):
         return {}
-    try:
-        numbers = link(
-            [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for here in people], _REACH
-        )
-    except UserError as error:
-        raise UserError(f"{tree.path}: {error}") from error
+    places = [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for here in people]
+    with naming(tree.path):
+        numbers = link(places, _REACH)
     if max(map(len, people)) > 1:
         notes.append(LINKED)
     seen: dict[int, dict[int, Tree]] = {}
