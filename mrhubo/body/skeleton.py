@@ -146,6 +146,13 @@ def mirror_joints(values_BJ: Tensor) -> Tensor:
     return values_BJ[..., _MIRROR]
 
 
+def local_rotations(world_BJ33: Tensor) -> Tensor:
+    """Rotations (..., 22, 3, 3) of all joints in one frame, whichever, to those of joints 1..21 relative to their
+    parents (..., 21, 3, 3); undoes `Skeleton.global_rotations`.
+    """
+    return world_BJ33[..., PARENTS[1:], :, :].mT @ world_BJ33[..., 1:, :, :]
+
+
 class Skeleton(nn.Module):
     """Rest offsets as buffers, so that they follow the module's device and precision.
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -21,6 +23,16 @@ _KINDS = {
 
 class MissingFile(UserError):
     """There is no file of that name."""
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Puts a file's name before what a UserError says of it, unless it begins so."""
+    try:
+        yield
+    except UserError as error:
+        said = str(error)
+        raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
 
 
 def check_regular(path: Path, max_bytes: int = MAX_BYTES) -> int:

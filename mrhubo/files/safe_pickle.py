@@ -17,7 +17,7 @@ from torch import Tensor
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.archive import check_member, open_archive
-from mrhubo.files.regular import open_regular
+from mrhubo.files.regular import naming, open_regular
 from mrhubo.files.unpickler import RecordedObject, unpickle
 
 MAX_BYTES = 2**30
@@ -193,11 +193,8 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
     Raises:
         UserError: the file is missing, too large, no such checkpoint, or names a module that it has no use for.
     """
-    try:
+    with naming(path):
         content, storages = _read_old(path) or read_torch(path)
-    except UserError as error:
-        said = str(error)
-        raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: expected a dictionary, found {type(content).__name__}")
     return content, storages
@@ -208,8 +205,8 @@ def _read_old(path: Path) -> tuple[Any, dict[str, bytes]] | None:
     with open_regular(path, MAX_BYTES) as handle:
         start = handle.read(512)
         if start[257:262] == b"ustar":
-            raise UserError(f"is a checkpoint of torch before 0.2; {_SAVE_ANEW}")
-        if not start.startswith(_OLD_MAGIC):
+            raise UserError(f"is a checkpoint of torch before 0.2; {SAVE_ANEW}")
+        if not is_old_torch(start):
             return None
         handle.seek(0)
         for _ in range(_OLD_PICKLES):
@@ -217,7 +214,7 @@ def _read_old(path: Path) -> tuple[Any, dict[str, bytes]] | None:
         return unpickle(handle, _CHECKPOINT_MODULES), {}
 
 
-_SAVE_ANEW = "load it with a torch that you trust it with, and save it anew"
+SAVE_ANEW = "load it with a torch that you trust it with, and save it anew"
 
 
 def is_old_torch(start: bytes) -> bool:
@@ -275,7 +272,7 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
             raise UserError("a tensor's storage is of another type than numbers, or has no name")
         if key not in storages:
             raise UserError(
-                f"the numbers of a tensor are not in the file, or were saved by torch before 1.6: {_SAVE_ANEW}"
+                f"the numbers of a tensor are not in the file, or were saved by torch before 1.6: {SAVE_ANEW}"
             )
         numbers = np.frombuffer(storages[key], dtype=_TORCH_TYPES[kind])
         last = offset + sum((n - 1) * s for n, s in zip(shape, stride, strict=True))
@@ -301,7 +298,7 @@ def _inner_storage(value: RecordedObject) -> tuple[Any, dict[str, bytes]]:
     if value.kind != "torch.storage._load_from_bytes":
         raise UserError(f"expected a tensor's storage, found a {shortened(value.kind)}")
     content = _bytes(value.args[0])
-    if not content.startswith(_OLD_MAGIC):
+    if not is_old_torch(content):
         raise UserError("a tensor's storage is not one that torch pickles")
     handle = io.BytesIO(content)
     for _ in range(_OLD_PICKLES):

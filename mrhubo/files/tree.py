@@ -21,8 +21,8 @@ from mrhubo.files.joblib_stream import Later
 from mrhubo.files.npz import open_npz, read_member
 from mrhubo.files.packed import is_packed, open_unpacked
 from mrhubo.files.regular import MAX_BYTES as MAX_FILE
-from mrhubo.files.regular import check_regular, open_regular
-from mrhubo.files.safe_pickle import MAX_BYTES, is_old_torch, read_torch, to_array, to_number, to_tensor
+from mrhubo.files.regular import check_regular, naming, open_regular
+from mrhubo.files.safe_pickle import MAX_BYTES, SAVE_ANEW, is_old_torch, read_torch, to_array, to_number, to_tensor
 from mrhubo.files.unpickler import RecordedObject, UnreadablePickle
 
 _MAX_MADE = 2**26
@@ -148,6 +148,11 @@ class Tree:
         except UserError:
             return None
 
+    def find_array(self, *names: str) -> np.ndarray | None:
+        """The array under the first of some keys that there is; None where there is none, or it is no array."""
+        found = self.get(*names)
+        return None if found is None or found.shape() is None else found.array()
+
     def text(self) -> str | None:
         """The text that it is; None where it is none."""
         value = self._value
@@ -169,13 +174,11 @@ class Tree:
             return f"a dictionary with {shortened(listed(self.keys), 200)}"
         if self.is_list:
             return f"a list of {len(self):,}"
-        if isinstance(self._value, Later):
+        if isinstance(self._value, Later | np.ndarray):
             return f"an array of shape {self._value.shape}"
         if isinstance(self._value, RecordedObject):
             shape = self.shape()
             return f"an array of shape {shape}" if shape is not None else f"an object '{shortened(self._value.kind)}'"
-        if isinstance(self._value, np.ndarray):
-            return f"an array of shape {self._value.shape}"
         return f"a {type(self._value).__name__}"
 
     def _child(self, name: str, value: Any) -> Tree:
@@ -225,15 +228,13 @@ def read_tree(path: Path) -> Tree:
     Raises:
         UserError: it is none of these, damaged, hostile, or too large.
     """
-    try:
+    with naming(path):
         with open_regular(path) as handle:
             start = handle.read(64)
         if start.startswith(b"PK"):
             return _read_zip(path)
         if is_old_torch(start):
-            raise UserError(
-                "was saved by torch before 1.6; load it with a torch that you trust it with, and save it anew"
-            )
+            raise UserError(f"was saved by torch before 1.6; {SAVE_ANEW}")
         with open_unpacked(path, MAX_BYTES, MAX_FILE) as handle:
             if start.startswith(_NPY):
                 size = check_regular(path, MAX_BYTES)
@@ -244,9 +245,6 @@ def read_tree(path: Path) -> Tree:
                 if not is_packed(start):
                     raise
                 raise UserError("is packed, and what is in it is no pickle; unpack it first") from error
-    except UserError as error:
-        said = str(error)
-        raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
 
 
 def _read_zip(path: Path) -> Tree:

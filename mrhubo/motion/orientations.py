@@ -116,9 +116,17 @@ def turn_of(joint: str, points: Mapping[str, Tensor]) -> Tensor | None:
         points: points (T, 3) [m] by name, NaN where they are not known.
     """
     for triad in TRIADS[joint]:
-        if triad.names <= points.keys() and bool(torch.isfinite(_frame(triad, points)).any()):
-            return _frame(triad, points) @ _frame(triad, rest_points())[0].T
+        if not triad.names <= points.keys():
+            continue
+        frame_T33 = _frame(triad, points)
+        if bool(torch.isfinite(frame_T33).any()):
+            return frame_T33 @ _frame(triad, rest_points())[0].T
     return None
+
+
+def known_frames(value_TX: Tensor) -> Tensor:
+    """In which frames (T,) all numbers of a value (T, ...) are known, and not NaN."""
+    return torch.isfinite(value_TX).flatten(1).all(-1)
 
 
 def frame_of(first_T3: Tensor, second_T3: Tensor) -> Tensor:

@@ -172,8 +172,13 @@ class _Form:
 
 def _read_matrices(matrix: Tensor, _: Turns) -> tuple[Tensor, Tensor]:
     """Those that are not orthonormal, or mirror, are wrong."""
+    return are_crooked(matrix), matrix
+
+
+def are_crooked(matrix: Tensor) -> Tensor:
+    """Which (...) of some matrices (..., 3, 3) are no rotations: not orthonormal, mirrors, or not finite."""
     skew = (matrix.mT @ matrix - torch.eye(3).to(matrix)).abs().amax((-2, -1))
-    return (skew > _SKEW) | (torch.linalg.det(matrix) < 0), matrix
+    return ~((skew < _SKEW) & (torch.linalg.det(matrix) > 0))
 
 
 def _read_sixd(sixd: Tensor, _: Turns) -> tuple[Tensor, Tensor]:

@@ -24,11 +24,11 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from mrhubo.body.anatomy import hinge_axis
-from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton, local_rotations
 from mrhubo.errors import UserError
 from mrhubo.motion.gaps import Neighbours, fill_directions, fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.orientations import frame_of, turn_of
+from mrhubo.motion.orientations import frame_of, known_frames, turn_of
 from mrhubo.robot.bending import bend_axis
 from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, orthonormal, shortest_turn
 
@@ -92,7 +92,7 @@ class _Build:
         missing = [name for name in names if name not in self.points]
         if missing:
             return torch.zeros(self.frames, dtype=torch.bool)
-        return torch.stack([torch.isfinite(self.points[name]).all(-1) for name in names]).all(0)
+        return torch.stack([known_frames(self.points[name]) for name in names]).all(0)
 
     def surety(self, known_T: Tensor, *names: str) -> Tensor:
         """How sure (T,) something is that hangs on these points: as the least sure of them; 0 where it is not known."""
@@ -129,19 +129,16 @@ def motion_from_points(
             _limb(build, limb, side)
     _head(build)
     world = build.world
-    order = [world[joint] for joint in JOINT_NAMES]
-    local_TJ33 = torch.stack([order[PARENTS[i]].mT @ order[i] for i in range(1, len(order))], dim=1)
-    local_TJ33 = orthonormal(local_TJ33).float()
+    local_TJ33 = local_rotations(torch.stack([world[joint] for joint in JOINT_NAMES], dim=1))
     sure_TJ = torch.stack([build.sure.get(joint, build.sure["spine3"]) for joint in POSED_JOINT_NAMES], dim=1)
     pelvis_T33 = world["pelvis"]
-    middle_T3 = (build.points["left_hip"] + build.points["right_hip"]) / 2 if body_has(body, "left_hip") else None
     position_T3 = None
-    if middle_T3 is not None:
-        offset_3 = (build.rest["left_hip"] + build.rest["right_hip"]) / 2
-        position_T3 = fill_numbers(middle_T3, torch.isfinite(middle_T3).all(-1)) - pelvis_T33 @ offset_3
+    if {"left_hip", "right_hip"} <= build.points.keys():
+        middle_T3, offset_3 = ((at["left_hip"] + at["right_hip"]) / 2 for at in (build.points, build.rest))
+        position_T3 = fill_numbers(middle_T3, known_frames(middle_T3)) - pelvis_T33 @ offset_3
     return Motion(
         name=name,
-        local_TJ33=local_TJ33,
+        local_TJ33=orthonormal(local_TJ33).float(),
         frame_rate=float(frame_rate),
         description=name,
         root_rotation_T33=orthonormal(pelvis_T33).float(),
@@ -152,29 +149,20 @@ def motion_from_points(
     )
 
 
-def body_has(body: BodyPoints, joint: str) -> bool:
-    """Whether the points of a joint on both sides are there."""
-    name = joint.partition("_")[2]
-    return all(f"{side}_{name}" in body.points for side in SIDES)
-
-
 def _trunk(build: _Build, what: str) -> None:
     """Pelvis, spine and collars; a pelvis that nothing tells is turned as the chest."""
     chest_T33, pelvis_T33 = build.turn("spine3"), build.turn("pelvis")
-    if chest_T33 is None or not bool(torch.isfinite(chest_T33).flatten(1).all(-1).any()):
+    if chest_T33 is None or not bool(known_frames(chest_T33).any()):
         raise UserError(
             f"{what}: nothing tells how the chest is turned; both shoulders and both hips must be known in some frame"
         )
     sides = [f"{side}_{joint}" for joint in ("shoulder", "hip") for side in SIDES]
-    known_T = torch.isfinite(chest_T33).flatten(1).all(-1)
+    known_T = known_frames(chest_T33)
     chest_T33 = fill_rotations(chest_T33, known_T)
     build.sure["spine3"] = build.surety(known_T, *(() if "spine3" in build.body.turns else sides))
     if not bool(known_T.all()):
         build.notes.append(f"how the chest is turned is not known in {_count(~known_T)}: filled in, confidence 0")
-    pelvis_T33 = chest_T33 if pelvis_T33 is None else pelvis_T33
-    pelvis_known_T = torch.isfinite(pelvis_T33).flatten(1).all(-1)
-    relative_T33 = fill_rotations(torch.nan_to_num(chest_T33.mT @ pelvis_T33), pelvis_known_T)
-    pelvis_T33 = chest_T33 @ relative_T33
+    pelvis_T33, _ = _filled(chest_T33, chest_T33 if pelvis_T33 is None else pelvis_T33)
     back_T3 = matrix_to_axis_angle(pelvis_T33.mT @ chest_T33)
     build.world["pelvis"], build.world["spine3"] = pelvis_T33, chest_T33
     for place, joint in enumerate(("spine1", "spine2"), start=1):
@@ -227,10 +215,8 @@ def _tip(build: _Build, tip: str, carrier: str) -> None:
     if turn_T33 is None:
         build.world[tip], build.sure[tip] = lower_T33, build.sure[carrier]
         return
-    known_T = torch.isfinite(turn_T33).flatten(1).all(-1)
-    local_T33 = fill_rotations(torch.nan_to_num(lower_T33.mT @ turn_T33), known_T)
-    build.world[tip] = lower_T33 @ local_T33
-    build.sure[tip] = torch.where(known_T, build.surety(known_T, tip), 0.0)
+    build.world[tip], known_T = _filled(lower_T33, turn_T33)
+    build.sure[tip] = build.surety(known_T, tip)
 
 
 def _head(build: _Build) -> None:
@@ -241,14 +227,21 @@ def _head(build: _Build) -> None:
         build.sure["neck"] = build.sure["head"] = torch.zeros(build.frames, dtype=torch.float64)
         build.notes.append("nothing tells how the head is turned: it stays as the chest, confidence 0")
     else:
-        known_T = torch.isfinite(head_T33).flatten(1).all(-1)
-        head_T33 = chest_T33 @ fill_rotations(torch.nan_to_num(chest_T33.mT @ head_T33), known_T)
+        head_T33, known_T = _filled(chest_T33, head_T33)
         sure_T = build.surety(known_T, "nose", "left_ear", "right_ear")
         build.sure["neck"] = build.sure["head"] = sure_T
         if not bool(known_T.all()):
             build.notes.append(f"how the head is turned is not known in {_count(~known_T)}: filled in, confidence 0")
     half_T3 = matrix_to_axis_angle(chest_T33.mT @ head_T33) / 2
     build.world["neck"], build.world["head"] = chest_T33 @ axis_angle_to_matrix(half_T3), head_T33
+
+
+def _filled(carrier_T33: Tensor, part_T33: Tensor) -> tuple[Tensor, Tensor]:
+    """How a part is turned (T, 3, 3), and in which frames (T,) that is known; where it is NaN, it is filled in as its
+    carrier sees it.
+    """
+    known_T = known_frames(part_T33)
+    return carrier_T33 @ fill_rotations(torch.nan_to_num(carrier_T33.mT @ part_T33), known_T), known_T
 
 
 def _hinge(

@@ -22,7 +22,7 @@ import math
 import torch
 from torch import Tensor
 
-from mrhubo.body.skeleton import KEYPOINT_NAMES, PARENTS, SIDES, Skeleton, joint_index
+from mrhubo.body.skeleton import KEYPOINT_NAMES, PARENTS, SIDES, Skeleton, joint_index, local_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, orthonormal, random_axes
 
@@ -77,8 +77,8 @@ def reshare(
         collar = joint_index(f"{side}_collar")
         turn_T3 = math.radians(collar_deg) * _drift(seconds_T, generator)[:, None] * _axis(generator)
         after[:, collar] = before[:, collar] @ axis_angle_to_matrix(turn_T3)
-    local_TJ33 = after[:, PARENTS[1:]].mT @ after[:, 1:]
-    return dataclasses.replace(motion, local_TJ33=local_TJ33.float(), source=f"{motion.source}, re-shared".lstrip(", "))
+    source = f"{motion.source}, re-shared".lstrip(", ")
+    return dataclasses.replace(motion, local_TJ33=local_rotations(after).float(), source=source)
 
 
 def _split(

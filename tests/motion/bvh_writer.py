@@ -6,6 +6,7 @@ of children, and what else makers do differently are drawn or given.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,6 +32,9 @@ NAMES = {
 }  # fmt: skip
 _PAIRED = ("collar", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 _MIDDLE = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
+_INDEX = {name: i for i, name in enumerate(JOINT_NAMES)}
+_Node = tuple[str | None, int, np.ndarray]
+"""The parent's key, the joint of ours that turns a node, and its place in that joint's frame at rest."""
 
 
 @dataclass
@@ -87,24 +91,9 @@ def names_of(style: Style) -> dict[str, str]:
     return found
 
 
-def write_bvh(motion: Motion, style: Style) -> str:
-    """The file's text."""
-    rng = np.random.default_rng(style.seed)
-    names, offsets = names_of(style), [np.zeros(3), *Skeleton().offsets_J3.double().numpy()]
-    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
-    local = [motion.root_rotation_T33, *motion.local_TJ33.unbind(1)]
-    turns = [Rotation.from_matrix(x.double().numpy()) for x in local]
-    world: list[Rotation] = []
-    for joint, parent in enumerate(PARENTS):
-        world.append(turns[joint] if parent < 0 else world[parent] * turns[joint])
-    place_T3 = motion.root_position_T3.double().numpy()
-    if style.t_pose_first:
-        world = [Rotation.concatenate([Rotation.identity(), turn]) for turn in world]
-        place_T3 = np.concatenate([[[1.0, 0.9, 2.0]], place_T3])
-    to_file = Rotation.from_matrix(style.world)
-    # nodes: key -> (parent key, the joint of ours that turns it, place in that joint's frame at rest)
-    nodes: dict[str, tuple[str | None, int, np.ndarray]] = {}
-    index = {name: i for i, name in enumerate(JOINT_NAMES)}
+def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
+    """Joints and ends of bones, parents first; ends have a star at the end of their keys."""
+    nodes: dict[str, _Node] = {}
     if style.extra_root:
         nodes["extra"] = (None, -1, np.zeros(3))
     for joint, name in enumerate(JOINT_NAMES):
@@ -121,11 +110,11 @@ def write_bvh(motion: Motion, style: Style) -> str:
         if kind in ("knee", "elbow") and style.rolls:
             assert parent is not None
             roll = f"{parent}_roll"
-            nodes[roll] = (parent, index[parent], offsets[joint] / 2)
+            nodes[roll] = (parent, _INDEX[parent], offsets[joint] / 2)
             parent = roll
         if kind in ("hip", "shoulder") and style.doubled:
             assert parent is not None
-            nodes[f"{name}_base"] = (parent, index[parent], offsets[joint])
+            nodes[f"{name}_base"] = (parent, _INDEX[parent], offsets[joint])
             parent = f"{name}_base"
         nodes[name] = (parent, joint, offsets[joint])
     for side, sign in (("left", 1), ("right", -1)):
@@ -135,19 +124,59 @@ def write_bvh(motion: Motion, style: Style) -> str:
                 ("Index", (0.09, 0, 0.03)),
                 ("Ring", (0.085, 0, -0.02)),
             ):
-                nodes[f"{side}{finger}"] = (f"{side}_wrist", index[f"{side}_wrist"], np.array(way) * [sign, 1, 1])
-                nodes[f"{side}{finger}*"] = (f"{side}{finger}", index[f"{side}_wrist"], np.array([0.04 * sign, 0, 0]))
+                nodes[f"{side}{finger}"] = (f"{side}_wrist", _INDEX[f"{side}_wrist"], np.array(way) * [sign, 1, 1])
+                nodes[f"{side}{finger}*"] = (f"{side}{finger}", _INDEX[f"{side}_wrist"], np.array([0.04 * sign, 0, 0]))
         else:
-            nodes[f"{side}hand*"] = (f"{side}_wrist", index[f"{side}_wrist"], np.array([0.1 * sign, 0, 0]))
+            nodes[f"{side}hand*"] = (f"{side}_wrist", _INDEX[f"{side}_wrist"], np.array([0.1 * sign, 0, 0]))
         end = f"{side}_foot" if style.toes else f"{side}_ankle"
-        nodes[f"{side}toe*"] = (end, index[end], np.array([0.0, -0.015, 0.07]))
+        nodes[f"{side}toe*"] = (end, _INDEX[end], np.array([0.0, -0.015, 0.07]))
         for joint, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee")):
             if style.twists:
-                row = index[f"{side}_{joint}"]
-                nodes[f"{side}{joint}Twist*"] = (f"{side}_{joint}", row, 0.5 * offsets[index[f"{side}_{end}"]])
+                row = _INDEX[f"{side}_{joint}"]
+                nodes[f"{side}{joint}Twist*"] = (f"{side}_{joint}", row, 0.5 * offsets[_INDEX[f"{side}_{end}"]])
     if style.prop:
-        nodes["stick*"] = ("right_wrist", index["right_wrist"], np.array([0.0, 0.0, 1.2]))
-    nodes["head*"] = ("head", index["head"], np.array([0.0, 0.18, 0.0]))
+        nodes["stick*"] = ("right_wrist", _INDEX["right_wrist"], np.array([0.0, 0.0, 1.2]))
+    nodes["head*"] = ("head", _INDEX["head"], np.array([0.0, 0.18, 0.0]))
+    return nodes
+
+
+def _axes(
+    style: Style, nodes: dict[str, _Node], children: dict[str | None, list[str]], rng: np.random.Generator
+) -> dict[str, Rotation]:
+    """How each node's axes lie at rest in our world when all angles are 0."""
+    frame: dict[str, Rotation] = {}
+    to_our_world = Rotation.from_matrix(style.world).inv()
+    for key in nodes:
+        if style.axes in ("world", "hanging") or key == "extra":
+            arm = any(part in key for part in ("shoulder", "elbow", "wrist", "Thumb", "Index", "Ring", "hand"))
+            hangs = style.axes == "hanging" and arm and not key.endswith("_base")
+            turn = Rotation.from_euler("z", (90.0 if key.startswith("left") else -90.0) * hangs, degrees=True)
+            frame[key] = turn * to_our_world
+        elif style.axes == "random":
+            frame[key] = Rotation.from_quat(rng.normal(size=4))
+        else:  # x along the bone to the first child
+            inner = next((child for child in children.get(key, []) if np.linalg.norm(nodes[child][2]) > 1e-6), None)
+            way = np.array([0.0, 1.0, 0.0]) if inner is None else nodes[inner][2] / np.linalg.norm(nodes[inner][2])
+            frame[key] = Rotation.align_vectors([way], [[1.0, 0, 0]])[0]
+    return frame
+
+
+def write_bvh(motion: Motion, style: Style) -> str:
+    """The file's text."""
+    rng = np.random.default_rng(style.seed)
+    names, offsets = names_of(style), [np.zeros(3), *Skeleton().offsets_J3.double().numpy()]
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    local = [motion.root_rotation_T33, *motion.local_TJ33.unbind(1)]
+    turns = [Rotation.from_matrix(x.double().numpy()) for x in local]
+    world: list[Rotation] = []
+    for joint, parent in enumerate(PARENTS):
+        world.append(turns[joint] if parent < 0 else world[parent] * turns[joint])
+    place_T3 = motion.root_position_T3.double().numpy()
+    if style.t_pose_first:
+        world = [Rotation.concatenate([Rotation.identity(), turn]) for turn in world]
+        place_T3 = np.concatenate([[[1.0, 0.9, 2.0]], place_T3])
+    to_file = Rotation.from_matrix(style.world)
+    nodes = _nodes(style, offsets)
 
     def points(key: str) -> np.ndarray:
         """Where a node is in our world."""
@@ -158,32 +187,20 @@ def write_bvh(motion: Motion, style: Style) -> str:
         # all nodes between two joints of ours hang on the upper one
         if style.biped and parent in ("neck", "spine1") and key not in ("head", "spine2"):
             parent = "spine3" if parent == "neck" else "pelvis"
-        carrier = nodes[parent][1] if key in index or key.endswith(("_roll", "_base")) else joint
+        carrier = nodes[parent][1] if key in _INDEX or key.endswith(("_roll", "_base")) else joint
         base = points(parent)
-        if key in index and (parent.endswith("_base")):
+        if key in _INDEX and (parent.endswith("_base")):
             return base
-        if key in index and parent.endswith("_roll"):
+        if key in _INDEX and parent.endswith("_roll"):
             offset = offset / 2
         if parent == "spine3" and not style.collars and "_shoulder" in key:
-            offset = offset + offsets[index[key.removesuffix("_base").replace("shoulder", "collar")]]
+            offset = offset + offsets[_INDEX[key.removesuffix("_base").replace("shoulder", "collar")]]
         return base + world[carrier].apply(offset) if carrier >= 0 else base + offset
 
     children: dict[str | None, list[str]] = {}
     for key in nodes:
         children.setdefault(nodes[key][0], []).append(key)
-    frame: dict[str | None, Rotation] = {}
-    for key in nodes:
-        if style.axes in ("world", "hanging") or key == "extra":
-            arm = any(part in key for part in ("shoulder", "elbow", "wrist", "Thumb", "Index", "Ring", "hand"))
-            hangs = style.axes == "hanging" and arm and not key.endswith("_base")
-            turn = Rotation.from_euler("z", (90.0 if key.startswith("left") else -90.0) * hangs, degrees=True)
-            frame[key] = turn * to_file.inv()
-        elif style.axes == "random":
-            frame[key] = Rotation.from_quat(rng.normal(size=4))
-        else:  # x along the bone to the first child
-            inner = next((child for child in children.get(key, []) if np.linalg.norm(nodes[child][2]) > 1e-6), None)
-            way = np.array([0.0, 1.0, 0.0]) if inner is None else nodes[inner][2] / np.linalg.norm(nodes[inner][2])
-            frame[key] = Rotation.align_vectors([way], [[1.0, 0, 0]])[0]
+    frame = _axes(style, nodes, children, rng)
     frames = len(place_T3)
     lines, columns = ["HIERARCHY"], []
     turned = {key: to_file * (Rotation.identity(frames) if joint < 0 else world[joint]) * frame[key]
@@ -213,8 +230,6 @@ def write_bvh(motion: Motion, style: Style) -> str:
         for child in rng.permutation(children.get(key, [])).tolist():
             write(child, depth + 1)
         lines.append(f"{pad}}}")
-
-    import warnings
 
     with warnings.catch_warnings(action="ignore"):  # gimbal lock
         write("extra" if style.extra_root else "pelvis", 0)

@@ -12,7 +12,6 @@ Legend: T frames, X numbers of a row.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -23,7 +22,15 @@ from torch import Tensor
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.assemble import BLOCK, to_our_rest, upright
+from mrhubo.motion.readers.assemble import (
+    BLOCK,
+    FARTHEST_M,
+    LARGEST_BETA,
+    MAX_FRAMES,
+    MAX_ROOT_TURN,
+    to_our_rest,
+    upright,
+)
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.family import find_family
 from mrhubo.motion.readers.names import motion_name
@@ -32,21 +39,14 @@ from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.world import WORLDS
 
-MAX_FRAMES = 2_000_000
-"""Longest motion that is read (four and a half hours at 120 frames a second, 1.5 GB as matrices)."""
 _MAX_SMALL = 1_000_000
 """Bytes of an array that holds a number, some, or a text."""
-_MAX_ROOT_TURN = 8 * np.pi
-"""No root's axis-angle number is that large [rad]: a person may turn round some times; degrees are larger."""
 _POSE_KEYS = ("pose_body", "poses")
 _JOINTS = {
     "pose_body": {21: "body without root"},
     "poses": {22: "body", 24: "SMPL", 52: "SMPL-H", 55: "SMPL-X"},
 }
 """How many joints each has, and what has so many."""
-_LARGEST_BETA = 1e6
-_FARTHEST_M = 1e5
-"""No root is that far from the origin [m]."""
 
 
 def is_amass(content: Content) -> bool:
@@ -100,11 +100,11 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         root_rotation_T33=root_rotation_T33,
         root_position_T3=root_position_T3,
         betas=betas,
+        source=f"SMPL-family .npz with '{key}'",
         family=family,
         notes=tuple(notes),
     )
-    motion, up = upright(motion, WORLDS)
-    return to_our_rest(replace(motion, source=f"SMPL-family .npz with '{key}'{up}; {rest}"))
+    return to_our_rest(upright(motion, WORLDS, rest))
 
 
 def _read_pose(file: NpzFile) -> tuple[str, Form, Tensor]:
@@ -147,8 +147,8 @@ def _read_root(
             notes.append("'trans' is left out: without the root's rotation its up axis is not known")
             return None, None
         position_T3 = _read_rows(file, "trans", frames, (3,), notes)
-        if position_T3 is not None and not (np.abs(position_T3) <= _FARTHEST_M).all():
-            notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {_FARTHEST_M:g}")
+        if position_T3 is not None and not (np.abs(position_T3) <= FARTHEST_M).all():
+            notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
             position_T3 = None
     return rotation_T33, None if position_T3 is None else torch.from_numpy(position_T3).float()
 
@@ -157,7 +157,7 @@ def _root_matrices(key: str, rows_TX: np.ndarray | None, notes: list[str]) -> Te
     """Rotations (T, 3, 3) of rows (T, 3 or 9); None, and a note, where they are none."""
     if rows_TX is None:
         return None
-    rotation_T133 = to_matrices(rows_TX, Form(1, rows_TX.shape[1] == 9), _MAX_ROOT_TURN)
+    rotation_T133 = to_matrices(rows_TX, Form(1, rows_TX.shape[1] == 9), MAX_ROOT_TURN)
     if rotation_T133 is None:
         notes.append(f"'{key}' is left out: it holds NaN, infinite numbers, or what is no rotation in radians")
         return None
@@ -199,7 +199,7 @@ def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
     except UserError as error:
         notes.append(f"'betas' is left out: {error}")
         return None
-    if array.ndim != 1 or len(array) > 400 or not (np.abs(array) < _LARGEST_BETA).all():
+    if array.ndim != 1 or len(array) > 400 or not (np.abs(array) < LARGEST_BETA).all():
         notes.append(f"'betas' is left out: expected up to 400 finite numbers, found the shape {array.shape}")
         return None
     return tuple(float(number) for number in array.astype(np.float64))

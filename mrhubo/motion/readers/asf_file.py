@@ -23,7 +23,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
 
-_MAX_ASF, MAX_AMC = 4_000_000, 2**28
+_MAX_ASF, _MAX_AMC = 4_000_000, 2**28
 _MAX_BONES = 500
 _MAX_FRAMES = 500_000
 _MAX_NUMBERS = 100_000_000
@@ -94,7 +94,7 @@ def read_amc(path: Path, skeleton: Skeleton) -> tuple[JointTree, list[str]]:
     rows: list[np.ndarray] = []
     seen: set[str] = set()
     degrees = skeleton.degrees
-    for number, line in enumerate(read_regular(path, MAX_AMC).decode("latin1").splitlines(), start=1):
+    for number, line in enumerate(read_regular(path, _MAX_AMC).decode("latin1").splitlines(), start=1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue

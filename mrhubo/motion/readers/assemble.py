@@ -15,6 +15,14 @@ from mrhubo.motion.readers.world import find_up
 
 BLOCK = 65_536
 """Frames that are read and converted at a time."""
+MAX_FRAMES = 2_000_000
+"""Longest motion that is read (four and a half hours at 120 frames a second, 1.5 GB as matrices)."""
+MAX_ROOT_TURN = 8 * math.pi
+"""No root's axis-angle number is that large [rad]: a person may turn round some times; degrees are larger."""
+FARTHEST_M = 1e5
+"""No root is that far from the origin [m]."""
+LARGEST_BETA = 1e6
+"""No number of a body's shape is that large."""
 _LEVEL = math.radians(1.0)
 """Tilts of elbows' axes up to this stay: an angle that says nothing."""
 
@@ -36,20 +44,21 @@ def to_our_rest(motion: Motion) -> Motion:
     return replace(motion, local_TJ33=untilt_arms(motion.local_TJ33, tilt), notes=(*motion.notes, note))
 
 
-def upright(motion: Motion, worlds: tuple[str, ...]) -> tuple[Motion, str]:
-    """The motion, whose root is as the file has it, in a world whose y axis is up, and which way was up, in words.
+def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
+    """The motion, whose root is as the file has it, in a world whose y axis is up; its source says which way was up.
 
     Args:
         motion: its root's place is left out where its rotation is not known, as nothing tells the up axis.
         worlds: those of `mrhubo.motion.readers.world` that the file's may be.
+        rest: what its rotations refer to, for the end of its source.
     """
     rotation_T33, position_T3 = motion.root_rotation_T33, motion.root_position_T3
     if rotation_T33 is None:
-        return replace(motion, root_position_T3=None), ""
+        return replace(motion, root_position_T3=None, source=f"{motion.source}; {rest}")
     up, turn_33 = find_up(rotation_T33[:, :, 1], worlds)
-    turned = replace(
+    return replace(
         motion,
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,
+        source=f"{motion.source}, {up}; {rest}",
     )
-    return turned, f", {up}"

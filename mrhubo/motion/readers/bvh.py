@@ -12,7 +12,8 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.bvh_file import read_bvh_file
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import check_rate
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
 
@@ -32,12 +33,7 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
     tree, seconds, notes = read_bvh_file(path)
     rate = options.rate
     if seconds is not None:
-        low, high = RATES
-        if not low <= 1 / seconds <= high:
-            raise UserError(
-                f"{path}: 'Frame Time' is {seconds:g} s, {1 / seconds:g} frames per second; expected {low:g} to"
-                f" {high:g}"
-            )
+        check_rate(path, f"'Frame Time' is {seconds:g} s,", 1 / seconds)
         if rate is not None and abs(rate * seconds - 1) > 1e-3:
             notes.append(f"the file says {1 / seconds:.6g} frames per second, which is believed, and not {rate:g}")
         rate = 1 / seconds

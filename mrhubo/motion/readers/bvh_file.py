@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -73,7 +74,6 @@ def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
     columns = 0
     for number, line in enumerate(lines[1:], start=2):
         words = _TOKEN.findall(line)
-        keyword = words[0].upper()
         while words:
             keyword = words[0].upper()
             if keyword == "{":
@@ -103,10 +103,7 @@ def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
                 place, offset = open_joints[-1], [_number(path, line, word) for word in words[1:4]]
                 if len(offset) != 3:
                     raise _broken(path, line, "an offset of three numbers is expected")
-                old = joints[place]
-                joints[place] = Joint(
-                    old.name, old.parent, (offset[0], offset[1], offset[2]), old.rotation, old.position
-                )
+                joints[place] = replace(joints[place], offset_3=(offset[0], offset[1], offset[2]))
                 words = words[4:]
             elif keyword == "CHANNELS" and open_joints:
                 place = open_joints[-1]
@@ -137,7 +134,7 @@ def _read_channels(path: Path, line: str, words: list[str], joint: Joint, first:
         if axis not in "xyz" or kind not in ("rotation", "position"):
             raise _broken(path, line, f"channel '{shortened(word, 30)}' is not known; expected for instance Xrotation")
         (rotation if kind == "rotation" else position).append((axis, column))
-    return Joint(joint.name, joint.parent, joint.offset_3, tuple(rotation), tuple(position)), count
+    return replace(joint, rotation=tuple(rotation), position=tuple(position)), count
 
 
 def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, int]:

@@ -21,8 +21,6 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"GIF8", "a picture (GIF)"),
     (b"\x89HDF", "an HDF5 file"),
     (b"%PDF", "a PDF"),
-    (b"Kaydara FBX", "an FBX file"),
-    (b"glTF", "a GLB file"),
     (b"MATLAB", "a MATLAB file"),
     (b"PAR1", "a Parquet file"),
     (b"\x89MCAP", "an MCAP recording"),

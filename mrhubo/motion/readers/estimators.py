@@ -13,7 +13,7 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.layouts import find_layout
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
+from mrhubo.motion.readers.rate import RATE_KEYS, asked_rate, find_rate
 from mrhubo.motion.readers.rows import read_rows
 from mrhubo.motion.readers.sam3d import read_sam3d
 from mrhubo.motion.readers.soma import read_soma
@@ -77,4 +77,4 @@ def _rate(path: Path, tree: Tree, options: ReadOptions, notes: list[str]) -> flo
     for node in (tree, *(child for _, child in list(tree.items())[:1] if child.is_mapping)):
         if set(RATE_KEYS) & set(node.keys):
             return find_rate(path, node.keys, lambda key, node=node: node[key].array(), options, notes)
-    return find_rate(path, (), lambda key: tree[key].array(), options, notes)
+    return asked_rate(path, options)

@@ -60,17 +60,11 @@ class Keypoints:
 
 
 def holds_points(content: Content) -> bool:
-    """Whether a file has points and no rotations, by the names of its arrays, or by the shape of its only one; or is
-    JSON with something that may be points. Does not raise.
+    """Whether a file has points and no rotations, by the names of its arrays; or is JSON with something that may be
+    points. Does not raise.
     """
     if content.arrays:
         return bool(content.arrays & set(POINT_KEYS)) and not content.arrays & _POSE_KEYS
-    if content.is_npy:
-        try:
-            shape = read_tree(content.path).shape()
-        except UserError:
-            return False
-        return shape is not None and len(shape) == 3 and shape[2] in (3, 4)
     return content.text is not None and bool(_JSON.match(content.text))
 
 

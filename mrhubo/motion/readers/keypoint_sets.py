@@ -63,9 +63,8 @@ _CENTRAL = {
 }  # fmt: skip
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _LEFT, _RIGHT = ("left", "l", "lft"), ("right", "r", "rgt")
-_PROPORTIONS = (("knee", "ankle", "hip", "knee", 1.0), ("elbow", "wrist", "shoulder", "elbow", 0.83),
-                ("shoulder", "elbow", "hip", "knee", 0.75))  # fmt: skip
-"""Bones, other bones, and their ratio (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
+_PROPORTIONS = (("knee", "hip", 1.0), ("elbow", "shoulder", 0.83), ("shoulder", "hip", 0.75))
+"""Bones, by where they start, other bones, and their ratio (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
 
 
 def our_name(name: str) -> str | None:
@@ -129,7 +128,7 @@ def misfit(points: Mapping[str, np.ndarray]) -> float:
             if ("left", start) in mean and ("right", start) in mean:
                 found.append(abs(float(np.log(mean["left", start] / mean["right", start]))))
         for side in SIDES:
-            for start, _, other, _, ratio in _PROPORTIONS:
+            for start, other, ratio in _PROPORTIONS:
                 if (side, start) in mean and (side, other) in mean:
                     found.append(abs(float(np.log(mean[side, start] / mean[side, other] / ratio))))
     return float(np.mean(np.minimum(found, 2.0))) if found else np.inf

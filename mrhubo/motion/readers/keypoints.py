@@ -19,9 +19,9 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.keypoint_files import Keypoints, holds_points, read_keypoints_file
 from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import RATES, ReadOptions
-from mrhubo.motion.readers.rate import asked_rate
-from mrhubo.motion.readers.tree.world import nearest_unit, to_y_up
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import asked_rate, told_rate
+from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
 
 _UNSURE = 0.3
 """Points that their source is less sure of are taken as missing; detectors draw no point below it."""
@@ -45,10 +45,8 @@ def is_keypoints(content: Content) -> bool:
     """Whether a file has points of a body and no rotations; a single array of triples has, if the distances between
     what would be the ends of bones hardly change.
     """
-    if not holds_points(content):
-        return False
     if not content.is_npy:
-        return True
+        return holds_points(content)
     try:
         points = read_keypoints_file(content.path, ReadOptions())
     except UserError:
@@ -124,12 +122,7 @@ def _refuse_flat(path: Path, found: Keypoints) -> None:
 def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
     if found.rate is None:
         return asked_rate(path, options)
-    low, high = RATES
-    if not low <= found.rate <= high:
-        raise UserError(f"{path}: says {found.rate:g} frames per second; expected {low:g} to {high:g}")
-    if options.rate is not None and options.rate != found.rate:
-        found.notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {found.rate:g}")
-    return found.rate
+    return told_rate(path, "says", found.rate, options, found.notes)
 
 
 def _without_missing(found: Keypoints) -> np.ndarray:
@@ -155,9 +148,7 @@ def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str
     up_T3 = up_T3[np.isfinite(up_T3).all(-1)]
     if not len(up_T3):
         return points, "y up (a guess)"
-    mean_3 = (up_T3 / np.maximum(np.linalg.norm(up_T3, axis=-1, keepdims=True), 1e-12)).mean(0)
-    largest = int(np.abs(mean_3).argmax())
-    axis = ("" if mean_3[largest] > 0 else "-") + "xyz"[largest]
+    axis = named_axis(mean_direction(up_T3))
     trunk_T = np.linalg.norm(sum(points[f"{s}_shoulder"] - points[f"{s}_hip"] for s in SIDES), axis=-1) / 2
     leg = _LEG_OVER_TRUNK * _typical(trunk_T)
     if _seen(points, "ankle") and _seen(points, "knee"):

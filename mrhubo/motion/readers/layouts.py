@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.files.regular import naming
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.linking import LINKED, link
@@ -123,7 +124,7 @@ def _romp(tree: Tree) -> Layout | None:
 def _romp_reader(found: list[tuple[int, Tree, int]]) -> Callable[[], SmplArrays]:
     def read() -> SmplArrays:
         pose, betas, position = (
-            _stack_rows([(frame.get(key), row) for _, frame, row in found])
+            _stack_rows([(frame, row) for _, frame, row in found], key)
             for key in ("smpl_thetas", "smpl_betas", "cam_trans")
         )
         if pose is None:
@@ -267,10 +268,8 @@ def _places(node: Tree, key: str, people: int) -> np.ndarray:
 
 
 def _linked(tree: Tree, places: list[np.ndarray], reach: float) -> list[list[int]]:
-    try:
+    with naming(tree.path):
         return link(places, reach)
-    except UserError as error:
-        raise UserError(f"{tree.path}: {error}") from error
 
 
 def _stack(nodes: list[Tree]) -> np.ndarray:
@@ -282,11 +281,11 @@ def _stack(nodes: list[Tree]) -> np.ndarray:
     return np.stack(arrays)
 
 
-def _stack_rows(places: list[tuple[Tree | None, int]]) -> np.ndarray | None:
-    """A row of each of some arrays; None where some have none, or others."""
+def _stack_rows(places: list[tuple[Tree, int]], key: str) -> np.ndarray | None:
+    """A row of an array of each of some frames; None where some have none, or others."""
     rows = []
-    for node, row in places:
-        array = None if node is None or node.shape() is None else node.array()
+    for frame, row in places:
+        array = frame.find_array(key)
         if array is None or array.ndim != 2 or len(array) <= row or array.shape[1] > _SMALL:
             return None
         rows.append(array[row])

@@ -35,13 +35,33 @@ def find_rate(
     array = read(key)
     if array.size != 1:
         raise UserError(f"{path}: '{key}' has shape {array.shape}; expected one number")
-    rate = float(array.reshape(()))
-    low, high = RATES
-    if not low <= rate <= high:
-        raise UserError(f"{path}: '{key}' is {rate:g} frames per second; expected {low:g} to {high:g}")
+    return told_rate(path, f"'{key}' is", float(array.reshape(())), options, notes)
+
+
+def told_rate(path: Path, said: str, rate: float, options: ReadOptions, notes: list[str]) -> float:
+    """The rate that a file tells, which goes before that of the options.
+
+    Args:
+        path: the file, for sentences.
+        said: how the file tells it, for the beginning of a sentence.
+        rate: what it tells.
+        options: may tell another.
+        notes: is told if they do.
+
+    Raises:
+        UserError: it is no rate.
+    """
+    check_rate(path, said, rate)
     if options.rate is not None and options.rate != rate:
         notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {rate:g}")
     return rate
+
+
+def check_rate(path: Path, said: str, rate: float) -> None:
+    """Refuses what is no rate; arguments as for `told_rate`."""
+    low, high = RATES
+    if not low <= rate <= high:
+        raise UserError(f"{path}: {said} {rate:g} frames per second; expected {low:g} to {high:g}")
 
 
 def asked_rate(path: Path, options: ReadOptions) -> float:

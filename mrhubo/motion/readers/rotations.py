@@ -15,13 +15,11 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.motion.poses import MAX_TURN, Turns
+from mrhubo.motion.poses import MAX_TURN, Turns, are_crooked
 from mrhubo.rotation import axis_angle_to_matrix, orthonormal
 
 JOINTS = 21
 """SMPL's joints 1..21."""
-_SKEW = 1e-2
-"""How far R^T R may be from the identity: half precision and rounded text still pass."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +103,8 @@ def to_matrices(rows_TX: np.ndarray, form: Form, largest: float) -> Tensor | Non
     """
     values_TKX = rows_TX.reshape(len(rows_TX), form.joints, form.numbers).astype(np.float64)
     if form.matrices:
-        if _crooked(values_TKX).any():
-            return None
-        return orthonormal(torch.from_numpy(values_TKX).unflatten(-1, (3, 3))).float()
+        matrix_TK33 = torch.from_numpy(values_TKX).unflatten(-1, (3, 3))
+        return None if bool(are_crooked(matrix_TK33).any()) else orthonormal(matrix_TK33).float()
     if not (np.abs(values_TKX) <= largest).all():
         return None
     return axis_angle_to_matrix(torch.from_numpy(values_TKX)).float()
@@ -130,19 +127,11 @@ def _from_axis_angle(path: Path, key: str, values_NJ3: np.ndarray, start: int, c
 
 
 def _from_matrices(path: Path, key: str, values_NJ9: np.ndarray, start: int, column: int) -> Tensor:
-    bad_M2 = np.argwhere(_crooked(values_NJ9))
+    matrix_NJ33 = torch.from_numpy(values_NJ9).unflatten(-1, (3, 3))
+    bad_M2 = are_crooked(matrix_NJ33).nonzero()
     if len(bad_M2):
         frame, joint = bad_M2[0].tolist()
         finite = np.isfinite(values_NJ9[frame, joint]).all()
         why = "is no rotation matrix" if finite else "is not finite"
         raise UserError(f"{path}: '{key}' {why} in frame {start + frame}, joint {column // 9 + joint}")
-    return orthonormal(torch.from_numpy(values_NJ9).unflatten(-1, (3, 3))).float()
-
-
-def _crooked(values_XX9: np.ndarray) -> np.ndarray:
-    """Which of some matrices (..., 9) are no rotations."""
-    matrix = values_XX9.reshape(*values_XX9.shape[:-1], 3, 3)
-    with np.errstate(all="ignore"):
-        skew = np.abs(matrix.swapaxes(-1, -2) @ matrix - np.eye(3)).max(axis=(-1, -2))
-        straight = (skew < _SKEW) & (np.linalg.det(np.nan_to_num(matrix, posinf=0, neginf=0)) > 0)
-    return ~straight
+    return orthonormal(matrix_NJ33).float()

@@ -22,10 +22,11 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import SIDES
 from mrhubo.errors import UserError
+from mrhubo.files.regular import naming
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
-from mrhubo.motion.readers.amass import MAX_FRAMES
+from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES
 from mrhubo.motion.readers.linking import LINKED, link
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
@@ -35,7 +36,6 @@ from mrhubo.motion.readers.world import ANY_WORLD, find_up
 
 _KEY, _CAMERA = "pred_keypoints_3d", "pred_cam_t"
 _POINTS = 70
-_FARTHEST_M = 1e5
 _REACH = 1.0
 """How far anybody gets from one frame to the next [m], with the noise of a depth that is guessed."""
 _FACE = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
@@ -80,8 +80,8 @@ def read_sam3d(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]]
     chosen = choose(tree.path, tracks, options, notes)
     seen = people[chosen.person][1]()
     points_TK3 = torch.from_numpy(seen.points.astype(np.float64))
-    if not bool((points_TK3.nan_to_num().abs() < _FARTHEST_M).all()):
-        raise UserError(f"{tree.path}: '{_KEY}' holds infinite numbers, or some beyond {_FARTHEST_M:g} m")
+    if not bool((points_TK3.nan_to_num().abs() < FARTHEST_M).all()):
+        raise UserError(f"{tree.path}: '{_KEY}' holds infinite numbers, or some beyond {FARTHEST_M:g} m")
     if seen.camera is not None:
         points_TK3 = points_TK3 + torch.from_numpy(seen.camera.astype(np.float64))[:, None]
     up_T3 = points_TK3[:, [5, 6]].mean(dim=1) - points_TK3[:, [9, 10]].mean(dim=1)
@@ -113,12 +113,9 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
     people = [[person for person in (frame if frame.is_list else (frame,)) if _KEY in person.keys] for frame in frames]
     if not any(people):
         return {}
-    try:
-        numbers = link(
-            [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for here in people], _REACH
-        )
-    except UserError as error:
-        raise UserError(f"{tree.path}: {error}") from error
+    places = [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for here in people]
+    with naming(tree.path):
+        numbers = link(places, _REACH)
     if max(map(len, people)) > 1:
         notes.append(LINKED)
     seen: dict[int, dict[int, Tree]] = {}
@@ -130,9 +127,8 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
 
 def _place(person: Tree) -> np.ndarray:
     """Where somebody is, (3,); the origin where it is not told."""
-    place = person.get(_CAMERA)
-    array = place.array() if place is not None and place.shape() is not None else np.zeros(0)
-    return array.reshape(3).astype(np.float64) if array.size == 3 else np.zeros(3)
+    place = person.find_array(_CAMERA)
+    return place.reshape(3).astype(np.float64) if place is not None and place.size == 3 else np.zeros(3)
 
 
 def _stacked(node: Tree) -> _Seen | None:
@@ -141,8 +137,7 @@ def _stacked(node: Tree) -> _Seen | None:
     if shape is None or shape[-2:] != (_POINTS, 3) or len(shape) not in (3, 4) or (len(shape) == 4 and shape[1] != 1):
         return None
     points = node[_KEY].array().reshape(-1, _POINTS, 3)
-    camera = node.get(_CAMERA)
-    place = camera.array() if camera is not None and camera.shape() is not None else None
+    place = node.find_array(_CAMERA)
     if not 0 < len(points) <= MAX_FRAMES:
         raise UserError(f"{node.path}: '{_KEY}' has {len(points):,} frames; expected 1 to {MAX_FRAMES:,}")
     return _Seen(points, place.reshape(-1, 3) if place is not None and place.size == 3 * len(points) else None)

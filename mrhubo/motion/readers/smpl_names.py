@@ -68,16 +68,12 @@ class Found:
     """The dictionary that has them."""
     names: _Names
     form: Form
+    frames: int
+    """How many frames there are."""
     people: int | None
     """How many people there are, where the arrays have an axis for them before that of the frames."""
     outer: Tree | None = None
     """The dictionary around it, if that is the person's."""
-
-    @property
-    def frames(self) -> int:
-        """How many frames there are."""
-        shape = self.node[self.names.pose].array().shape
-        return shape[0] if self.people is None else shape[1]
 
     def read(self, person: int | None = None) -> SmplArrays:
         """The arrays, of one of the people where there are several."""
@@ -102,11 +98,10 @@ class Found:
         return [Track(str(n), self.frames, lambda n=n: self.read(n)) for n in range(self.people)]
 
     def _array(self, keys: tuple[str, ...], person: int | None) -> np.ndarray | None:
-        found = self.node.get(*keys)
-        if found is None or found.shape() is None:
-            return None
-        array = found.array()
-        return array[person] if person is not None and len(array.shape) > 1 and len(array) == self.people else array
+        array = self.node.find_array(*keys)
+        if array is None or person is None or array.ndim < 2 or len(array) != self.people:
+            return array
+        return array[person]
 
 
 def find_here(node: Tree) -> Found | None:
@@ -121,10 +116,10 @@ def find_here(node: Tree) -> Found | None:
         counts = _WITH_ROOT + _WITHOUT
         form = find_form(shape, counts)
         if form is not None:
-            return Found(node, names, form, None)
+            return Found(node, names, form, shape[0], None)
         form = find_form(shape[1:], counts) if len(shape) > 2 else None
         if form is not None:
-            return Found(node, names, form, shape[0])
+            return Found(node, names, form, shape[1], shape[0])
     return None
 
 

@@ -10,26 +10,24 @@ Legend: T frames, K joints of SOMA's, J = 21: SMPL's joints 1..21.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from mrhubo.body.skeleton import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton, local_rotations
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.amass import MAX_FRAMES
-from mrhubo.motion.readers.assemble import upright
+from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES, MAX_ROOT_TURN, upright
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.rotations import find_form, to_matrices
 from mrhubo.motion.readers.smpl_names import search
 from mrhubo.motion.readers.world import WORLDS
 from mrhubo.rotation import orthonormal, shortest_turn
 
-_MAX_TURN = 8 * np.pi
 _FINGERS = tuple(
     f"Hand{finger}{part}"
     for finger, parts in (("Thumb", "123"), ("Index", "1234"), ("Middle", "1234"), ("Ring", "1234"), ("Pinky", "1234"))
@@ -121,10 +119,7 @@ def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | N
     world = _world(tree, arrays)
     if arrays.places is not None:
         _point(world, arrays, notes)
-    stacked_TK33 = torch.stack([world[_OURS[joint]] for joint in JOINT_NAMES], dim=1)
-    local_TJ33 = torch.stack(
-        [stacked_TK33[:, PARENTS[j]].mT @ stacked_TK33[:, j] for j in range(1, len(JOINT_NAMES))], dim=1
-    )
+    local_TJ33 = local_rotations(torch.stack([world[_OURS[joint]] for joint in JOINT_NAMES], dim=1))
     name = motion_name(tree.path)
     motion = Motion(
         name=name,
@@ -133,12 +128,11 @@ def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | N
         description=name,
         root_rotation_T33=world["Hips"].float(),
         root_position_T3=_root(arrays, len(local_TJ33), notes),
+        source=f"{arrays.source}, '{arrays.key}'",
         notes=tuple(notes),
     )
-    motion, up = upright(motion, WORLDS)
     limbs = "limbs point as the joints' places say" if arrays.places is not None else "rotations refer to a T-pose"
-    source = f"{arrays.source}, '{arrays.key}'{up}; {limbs}"
-    return replace(motion, source=source)
+    return upright(motion, WORLDS, limbs)
 
 
 def _find(node: Tree) -> _Arrays | None:
@@ -158,23 +152,23 @@ def _find(node: Tree) -> _Arrays | None:
         if len(shape) == 4 and shape[1] in _ORDERS:
             names, places = _ORDERS[shape[1]], node.get("posed_joints")
             joints = places.array() if places is not None and places.shape() == (*shape[:2], 3) else None
-            local, root = node["local_rot_mats"].array(), _array(node, "root_positions")
+            local, root = node["local_rot_mats"].array(), node.find_array("root_positions")
             return _Arrays("Kimodo", "local_rot_mats", local, names, joints, root)
     if {"body_pose", "global_orient"} <= keys:
-        body, root = _array(node, "body_pose"), _array(node, "global_orient")
+        body, root = node.find_array("body_pose"), node.find_array("global_orient")
         if body is not None and root is not None and body.size == 76 * 3 * len(body) and root.size == 3 * len(body):
             local = np.concatenate((root.reshape(-1, 1, 3), body.reshape(-1, 76, 3)), axis=1)
-            return _Arrays("GEM-X", f"{node.where}[body_pose]", local, _ALL, None, _array(node, "transl"))
+            return _Arrays("GEM-X", f"{node.where}[body_pose]", local, _ALL, None, node.find_array("transl"))
     if {"poses", "joint_names"} <= keys:
         names = tuple(node["joint_names"].texts())
-        poses = _array(node, "poses")
+        poses = node.find_array("poses")
         if poses is not None and poses.ndim in (3, 4) and len(names) == poses.shape[1] and "Hips" in names:
             return _soma_x(node, poses, names)
     return None
 
 
 def _soma_x(node: Tree, poses: np.ndarray, names: tuple[str, ...]) -> _Arrays:
-    absolute = _array(node, "absolute_pose")
+    absolute = node.find_array("absolute_pose")
     if absolute is not None and absolute.size == 1 and bool(absolute.reshape(-1)[0]):
         raise UserError(
             f"{node.path}: its rotations are absolute ('absolute_pose'), which only SOMA's own rig can read; save them"
@@ -182,13 +176,8 @@ def _soma_x(node: Tree, poses: np.ndarray, names: tuple[str, ...]) -> _Arrays:
         )
     unit = node.get("unit")
     metres = {"centimeters": 0.01, "millimeters": 0.001}.get((unit.text() or "") if unit is not None else "", 1.0)
-    root = _array(node, "transl")
+    root = node.find_array("transl")
     return _Arrays("SOMA-X", "poses", poses, names, None, None if root is None else root * metres)
-
-
-def _array(node: Tree, key: str) -> np.ndarray | None:
-    found = node.get(key)
-    return None if found is None or found.shape() is None else found.array()
 
 
 def _world(tree: Tree, arrays: _Arrays) -> dict[str, Tensor]:
@@ -199,7 +188,7 @@ def _world(tree: Tree, arrays: _Arrays) -> dict[str, Tensor]:
         raise UserError(
             f"{tree.path}: '{arrays.key}' has shape {arrays.local.shape}; expected (frames, {joints}, 3, 3)"
         )
-    local_TK33 = to_matrices(arrays.local.reshape(frames, -1), form, _MAX_TURN)
+    local_TK33 = to_matrices(arrays.local.reshape(frames, -1), form, MAX_ROOT_TURN)
     if local_TK33 is None:
         raise UserError(f"{tree.path}: '{arrays.key}' holds NaN, infinite numbers, or what is no rotation")
     identity_T33 = torch.eye(3, dtype=torch.float64).expand(frames, 3, 3)
@@ -232,7 +221,7 @@ def _root(arrays: _Arrays, frames: int, notes: list[str]) -> Tensor | None:
     if root is None:
         return None
     rows_TX = root.reshape(len(root), -1) if root.ndim else root.reshape(1, 1)
-    if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < 1e5).all():
+    if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < FARTHEST_M).all():
         notes.append(f"where the root goes is left out: its shape is {root.shape}, or it holds no finite numbers")
         return None
     return torch.from_numpy(rows_TX.astype(np.float32))

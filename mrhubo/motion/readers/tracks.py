@@ -6,7 +6,7 @@ Legend: T frames, S frames in which somebody is seen, X numbers of a row, J = 21
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,16 +17,20 @@ from torch import Tensor
 from mrhubo.errors import UserError, nearest, shortened
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.amass import MAX_FRAMES
-from mrhubo.motion.readers.assemble import BLOCK, to_our_rest, upright
+from mrhubo.motion.readers.assemble import (
+    BLOCK,
+    FARTHEST_M,
+    LARGEST_BETA,
+    MAX_FRAMES,
+    MAX_ROOT_TURN,
+    to_our_rest,
+    upright,
+)
 from mrhubo.motion.readers.family import rest_in_words
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rotations import JOINTS, Form, read_local, to_matrices
 
-_MAX_ROOT_TURN = 8 * np.pi
-_FARTHEST_M = 1e5
-_LARGEST_BETA = 1e6
 _SCARCEST = 0.02
 """Who is seen in a smaller share of the frames from their first to their last makes no motion."""
 
@@ -118,9 +122,7 @@ def choose(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: li
     return chosen
 
 
-def motion_of(
-    path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, notes: list[str], description: str = ""
-) -> Motion:
+def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, notes: list[str]) -> Motion:
     """A person's motion, from the first frame in which they are seen to the last; between, where they are not, it goes
     from one frame to the next with a confidence of 0.
 
@@ -148,17 +150,16 @@ def motion_of(
         name=name,
         local_TJ33=local_TJ33,
         frame_rate=frame_rate,
-        description=description or name,
+        description=name,
         root_rotation_T33=root_T33,
         root_position_T3=position_T3,
         betas=_betas(arrays, notes),
+        source=f"{kind.source}, '{arrays.key}'",
         family=kind.family,
         notes=tuple(notes),
         confidence_TJ=confidence_TJ,
     )
-    motion, up = upright(motion, kind.worlds)
-    source = f"{kind.source}, '{arrays.key}'{up}; {rest_in_words(kind.family)}"
-    return to_our_rest(replace(motion, source=source))
+    return to_our_rest(upright(motion, kind.worlds, rest_in_words(kind.family)))
 
 
 def _root(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
@@ -174,7 +175,7 @@ def _root(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
         rows_SX, matrices = arrays.pose.reshape(seen, form.width)[:, : form.numbers], form.matrices
     else:
         return None
-    rotation_S133 = to_matrices(rows_SX, Form(1, matrices), _MAX_ROOT_TURN)
+    rotation_S133 = to_matrices(rows_SX, Form(1, matrices), MAX_ROOT_TURN)
     if rotation_S133 is None:
         notes.append(
             "the root's rotation is left out: it holds NaN, infinite numbers, or what is no rotation in radians"
@@ -191,8 +192,8 @@ def _position(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
     if len(rows_SX) != len(arrays.pose) or rows_SX.shape[1] != 3:
         notes.append(f"where the root goes is left out: its shape is {arrays.position.shape}")
         return None
-    if not (np.abs(rows_SX) <= _FARTHEST_M).all():
-        notes.append(f"where the root goes is left out: it holds NaN, infinite numbers, or some beyond {_FARTHEST_M:g}")
+    if not (np.abs(rows_SX) <= FARTHEST_M).all():
+        notes.append(f"where the root goes is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
         return None
     return torch.from_numpy(rows_SX.astype(np.float32))
 
@@ -204,7 +205,7 @@ def _betas(arrays: SmplArrays, notes: list[str]) -> tuple[float, ...] | None:
         return None
     if betas.ndim >= 2:
         betas = betas.reshape(len(betas), -1).astype(np.float64).mean(axis=0) if len(betas) else betas.reshape(0)
-    if betas.ndim != 1 or len(betas) > 400 or not (np.abs(betas) < _LARGEST_BETA).all():
+    if betas.ndim != 1 or len(betas) > 400 or not (np.abs(betas) < LARGEST_BETA).all():
         notes.append(f"the body's shape is left out: expected up to 400 finite numbers, found {betas.shape}")
         return None
     return tuple(float(number) for number in betas)

@@ -140,11 +140,11 @@ def _head_chain(shape: Shape, limbs: Limbs) -> Chain | None:
     arms = {chain.places[0] for chain in limbs.chains["arm"]} | {chain.places[0] for chain in limbs.chains["leg"]}
     below = set(spine) | set(shape.tree.above(limbs.leg_carrier))
     children = [child for place in spine for child in shape.tree.children[place] if child not in arms | below]
-    children = [child for child in children if shape.length[child] + shape.reach[child] > shape.nothing]
+    children = [child for child in children if shape.far(child) > shape.nothing]
     if not children:
         return None
     named = [child for child in children if any(is_head(shape.tree.names[p]) for p in shape.chain(child).places)]
-    return shape.chain(max(named or children, key=lambda child: shape.length[child] + shape.reach[child]))
+    return shape.chain(max(named or children, key=shape.far))
 
 
 def _head(shape: Shape, chain: Chain) -> int:

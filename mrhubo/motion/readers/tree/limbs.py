@@ -88,7 +88,7 @@ def _fit(shape: Shape, legs: Pair, arms: Pair) -> Limbs | None:
     others = [
         child
         for child in tree.children[arms.carrier]
-        if child not in inside and child not in way and shape.reach[child] + shape.length[child] > 0.05 * leg
+        if child not in inside and child not in way and shape.far(child) > 0.05 * leg
     ]
     cost -= _HEADED * bool(others) + _HEADED * (legs.carrier in tree.above(arms.carrier)[1:])
 

@@ -80,7 +80,7 @@ def _difference(name: str, other: str) -> tuple[str, str]:
 
 
 def _has(name: str, words: Sequence[str]) -> bool:
-    """Whether one of the words is in a name: as a word, or at the end or beginning of one in small letters."""
+    """Whether one of the words is in one of the words of a name, in small letters."""
     bare = name.rpartition(":")[2]
     found = [word.lower() for word in _WORD.findall(bare)]
-    return any(part == word or part == f"{word}s" or word in part for part in found for word in words)
+    return any(word in part for part in found for word in words)

@@ -20,7 +20,7 @@ from torch.nn.functional import normalize
 
 from mrhubo.body.anatomy import hinge_axis
 from mrhubo.body.skeleton import SIDES
-from mrhubo.motion.orientations import frame_of, rest_points, turn_of
+from mrhubo.motion.orientations import frame_of, known_frames, rest_points, turn_of
 from mrhubo.motion.positions import BENT
 from mrhubo.motion.readers.tree.hands import hand_axes
 from mrhubo.motion.readers.tree.hierarchy import JointTree
@@ -182,5 +182,5 @@ def _mean(rotation_F33: Tensor) -> Tensor | None:
     """The mean rotation (3, 3) of those that are finite (F. L. Markley et al., "Averaging Quaternions", Journal of
     Guidance, Control, and Dynamics 2007); None where there is none.
     """
-    good_F33 = rotation_F33[torch.isfinite(rotation_F33).flatten(1).all(-1)]
+    good_F33 = rotation_F33[known_frames(rotation_F33)]
     return torch.from_numpy(Rotation.from_matrix(good_F33.numpy()).mean().as_matrix()) if len(good_F33) else None

@@ -69,12 +69,13 @@ class Shape:
         """The longest way down from a joint; of ways that are equally long, that with more joints."""
         places, below = [place], [0.0]
         while self.tree.children[place]:
-            place = max(self.tree.children[place], key=lambda child: (self._far(child), len(self.tree.children[child])))
+            place = max(self.tree.children[place], key=lambda child: (self.far(child), len(self.tree.children[child])))
             places.append(place)
             below.append(below[-1] + float(self.length[place]))
         return Chain(tuple(places), tuple(below))
 
-    def _far(self, place: int) -> float:
+    def far(self, place: int) -> float:
+        """How far it is from a joint's parent, over the joint, to the end of the longest way down."""
         return float(self.length[place] + self.reach[place])
 
     def pairs(self) -> list[Pair]:

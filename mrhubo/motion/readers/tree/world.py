@@ -31,7 +31,6 @@ _CLEAR = 0.7
 """Share of a mean upward vector along one axis, from which on the axis is up."""
 _STEADY = 0.5
 """Length of the mean of upward unit vectors from which on people stand more than they lie."""
-_AXES = {"x": 0, "y": 1, "z": 2}
 
 
 def up_axis(pose: Pose, place: Mapping[str, int], reference: Reference | None, given: str | None) -> tuple[str, str]:
@@ -41,20 +40,30 @@ def up_axis(pose: Pose, place: Mapping[str, int], reference: Reference | None, g
     up_F3 = sum(
         pose.point[place[f"{side}_shoulder"]] - pose.point[place[f"{side}_ankle"]] for side in ("left", "right")
     )
-    mean_3 = np.mean(up_F3 / np.maximum(np.linalg.norm(up_F3, axis=-1, keepdims=True), 1e-12), axis=0)
+    mean_3 = mean_direction(np.asarray(up_F3))
     length = float(np.linalg.norm(mean_3))
     if length < _STEADY or np.abs(mean_3).max() < _CLEAR * length:
         if reference is None:
             return "y", "a guess, as the body lies"
         mean_3 = reference.axes_33[:, 1]
-    axis = int(np.argmax(np.abs(mean_3)))
-    return ("" if mean_3[axis] > 0 else "-") + "xyz"[axis], "by how the body stands"
+    return named_axis(mean_3), "by how the body stands"
+
+
+def mean_direction(vector_F3: np.ndarray) -> np.ndarray:
+    """The mean (3,) of the directions of some vectors (F, 3)."""
+    return np.mean(vector_F3 / np.maximum(np.linalg.norm(vector_F3, axis=-1, keepdims=True), 1e-12), axis=0)
+
+
+def named_axis(vector_3: np.ndarray) -> str:
+    """The axis that is nearest to a vector, for instance `z` or `-y`."""
+    axis = int(np.argmax(np.abs(vector_3)))
+    return ("" if vector_3[axis] > 0 else "-") + "xyz"[axis]
 
 
 def to_y_up(axis: str) -> np.ndarray:
     """The turn (3, 3) that makes an axis, for instance `z` or `-y`, the y axis; by a quarter or half turn."""
     unit = np.zeros(3)
-    unit[_AXES[axis[-1]]] = -1.0 if axis.startswith("-") else 1.0
+    unit["xyz".index(axis[-1])] = -1.0 if axis.startswith("-") else 1.0
     if axis == "y":
         return np.eye(3)
     across = np.array([1.0, 0.0, 0.0]) if axis == "-y" else np.cross(unit, [0.0, 1.0, 0.0])
