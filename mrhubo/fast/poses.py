@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.fast.plain.human import cross, norm
+from mrhubo.fast.plain.human import cross, norm, rodrigues
 
 _JOINTS = 21
 _MOST_TURN = 6 * math.pi
@@ -104,11 +104,4 @@ def _of_axis_angle(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         finite = np.isfinite(array[wrong_T.argmax()]).all()
         what = "no axis-angle in radians (degrees?)" if finite else "NaN or infinite numbers"
         refuse((int(wrong_T.argmax()), what), shape)
-    x, y, z = np.moveaxis(vector / np.maximum(angle, _SMALL)[..., None], -1, 0)
-    sine, rest = np.sin(angle), 1 - np.cos(angle)
-    rows = (
-        1 - rest * (y * y + z * z), rest * x * y - sine * z, rest * x * z + sine * y,
-        rest * x * y + sine * z, 1 - rest * (x * x + z * z), rest * y * z - sine * x,
-        rest * x * z - sine * y, rest * y * z + sine * x, 1 - rest * (x * x + y * y),
-    )  # fmt: skip
-    return np.stack(rows, axis=-1).reshape(*angle.shape, 3, 3)
+    return rodrigues(vector / np.maximum(angle, _SMALL)[..., None], np.sin(angle), np.cos(angle))

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.description import Description, Layers, Part
+from mrhubo.fast.plain.human import skew
 from mrhubo.fast.plain.steps import blocks_of
 
 _KEYS = (
@@ -103,9 +104,7 @@ def pack(description: Description) -> Packed:
 def _derived(d: Description) -> dict[str, np.ndarray]:
     """What is worked out of a description's arrays."""
     constants, capsules, k = d.settings.constants, d.capsules, d.kinematics
-    x, y, z = k.axis_A3.T
-    across_A33 = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]).transpose(2, 0, 1)
-    origin_A33 = k.origin_A34[..., :3]
+    origin_A33, across_A33 = k.origin_A34[..., :3], skew(k.axis_A3)
     orders, firsts = [], []
     for own_XC in blocks_of(d.cost):
         orders.append(np.concatenate([np.flatnonzero(column) for column in own_XC.T]))
