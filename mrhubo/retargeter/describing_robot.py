@@ -18,6 +18,7 @@ from mrhubo.reference import DirectionProblem, polish
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.robot.joint import drive
 from mrhubo.robot.keypoints import Limb
+from mrhubo.robot.urdf import moved
 
 
 def whole(values: Any) -> np.ndarray:
@@ -75,18 +76,7 @@ class _Bodies:
         parent = self.number(own.parent)
         body = self._child(self.joints[parent - 1]) if parent else self.description.root
         home_44 = np.linalg.inv(self._pose[body]) @ self._pose[own.child]
-        return parent, (home_44 @ np.linalg.inv(_moved(own.axis_3, angle, own.rotary)))[:3]
-
-
-def _moved(axis_3: np.ndarray, angle: float, rotary: bool) -> np.ndarray:
-    pose_44 = np.eye(4)
-    if not rotary:
-        pose_44[:3, 3] = angle * axis_3
-        return pose_44
-    x, y, z = axis_3
-    cross_33 = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    pose_44[:3, :3] += np.sin(angle) * cross_33 + (1 - np.cos(angle)) * cross_33 @ cross_33
-    return pose_44
+        return parent, (home_44 @ np.linalg.inv(moved(own.axis_3, angle, not own.rotary)))[:3]
 
 
 def describe_kinematics(problem: DirectionProblem) -> Kinematics:
