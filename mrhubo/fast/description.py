@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -163,6 +164,20 @@ class Cost:
     """what they cost beside,"""
     cell_CU: np.ndarray
     """and in which cell of its joints' space each is."""
+
+    @cached_property
+    def joints_NC(self) -> np.ndarray:
+        """1 where a joint belongs to a block."""
+        return (self.block_N[:, None] == np.arange(self._blocks)) * 1.0
+
+    @cached_property
+    def directions_DC(self) -> np.ndarray:
+        """1 where a direction does."""
+        return (self.block_D[:, None] == np.arange(self._blocks)) * 1.0
+
+    @property
+    def _blocks(self) -> int:
+        return int(self.block_N.max()) + 1
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.description import Description, Layers, Part
 from mrhubo.fast.plain.human import skew
-from mrhubo.fast.plain.steps import blocks_of
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -106,7 +105,7 @@ def _derived(d: Description) -> dict[str, np.ndarray]:
     constants, capsules, k = d.settings.constants, d.capsules, d.kinematics
     origin_A33, across_A33 = k.origin_A34[..., :3], skew(k.axis_A3)
     orders, firsts = [], []
-    for own_XC in blocks_of(d.cost):
+    for own_XC in (d.cost.joints_NC, d.cost.directions_DC):
         orders.append(np.concatenate([np.flatnonzero(column) for column in own_XC.T]))
         firsts.append(np.concatenate(([0], own_XC.sum(axis=0).cumsum())).astype(np.int64))
     half_S = np.linalg.norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0], axis=-1) / 2
