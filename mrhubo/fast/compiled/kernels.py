@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -47,8 +48,11 @@ def _checksum() -> str:
     return digest.hexdigest()
 
 
+@cache
 def make_kernels() -> Kernels:
-    """The functions; each is compiled when it is first called, which takes some seconds, or read from the cache."""
+    """The functions, the same for all retargeters; each is compiled when it is first called, which takes some seconds,
+    or read from the cache.
+    """
     version = _checksum()
 
     @njit(cache=True, **tables.EXACT)
