@@ -261,15 +261,21 @@ def _chunks(frames: int) -> list[slice]:
     return [slice(start, start + _CHUNK) for start in range(0, frames, _CHUNK)]
 
 
+def forms_here() -> tuple[str, ...]:
+    """The forms that this machine can run, the quicker one first."""
+    return FORMS if importlib.util.find_spec("numba") else FORMS[1:]
+
+
 def make_engine(description: Description, form: str | None) -> Engine:
     """The form of a name; None: compiled where numba is installed.
 
     Raises:
         UserError: there is no such form, or it needs numba, which is not installed.
     """
-    there = importlib.util.find_spec("numba") is not None
     if form not in (None, *FORMS):
         raise UserError(f"form must be one of {', '.join(FORMS)}, found {form!r}")
-    if form == "compiled" and not there:
+    here = forms_here()
+    form = form or here[0]
+    if form not in here:
         raise UserError("form='compiled' needs numba: pip install 'mrhubo[fast]'")
-    return CompiledEngine(description) if there and form != "numpy" else NumpyEngine(description)
+    return CompiledEngine(description) if form == "compiled" else NumpyEngine(description)
