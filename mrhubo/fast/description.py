@@ -290,7 +290,7 @@ class Description:
     def arrays(self) -> dict[str, np.ndarray]:
         """Every array, by a name that `Description.of` reads."""
         found: dict[str, np.ndarray] = {}
-        for name in _SECTIONS:
+        for name in SECTIONS:
             section = getattr(self, name)
             found |= {f"{name}.{field.name}": getattr(section, field.name) for field in fields(section)}
         for stage in ("pre", "post"):
@@ -315,7 +315,7 @@ class Description:
         """
         told = json.loads(metadata["settings"])
         names = {name: tuple(told[name]) for name in ("joint_names", "direction_names", "branch_names")}
-        sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in _SECTIONS.items()}
+        sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in SECTIONS.items()}
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
         return cls(prior=prior, settings=Settings(**{**told, **names}), **sections, **stages)
@@ -342,7 +342,7 @@ class Description:
         return found
 
 
-_SECTIONS: dict[str, type] = {
+SECTIONS: dict[str, type] = {
     "human": Human,
     "features": Features,
     "kinematics": Kinematics,
@@ -351,6 +351,7 @@ _SECTIONS: dict[str, type] = {
     "trust": Trust,
     "capsules": Capsules,
 }
+"""Parts of a description that hold arrays alone."""
 Kind = TypeVar("Kind")
 
 

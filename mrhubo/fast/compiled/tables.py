@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.description import Description, Layers, Part
+from mrhubo.fast.description import SECTIONS, Description, Layers, Part
 from mrhubo.fast.plain.human import skew
 
 _KEYS = (
@@ -81,7 +81,7 @@ class Packed(NamedTuple):
 def pack(description: Description) -> Packed:
     """The arrays of a description."""
     found = {}
-    for name in ("human", "features", "kinematics", "cost", "reading", "trust", "capsules"):
+    for name in SECTIONS:
         section = getattr(description, name)
         found |= {field.name: getattr(section, field.name) for field in fields(section)}
     shorts = [np.zeros(0, np.int16)]
