@@ -17,9 +17,10 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain import human, judging, networks, robot, steps
+from mrhubo.fast.poses import NOT_FINITE
 
 FORMS = ("compiled", "numpy")
-NOT_FINITE, NO_ROTATION = "NaN or infinite numbers", "a matrix that is no rotation"
+_NO_ROTATION = "a matrix that is no rotation"
 SKEW = 1e-2
 """How far R^T R may be from the identity, as for `mrhubo.motion.read_poses`."""
 _CHUNK = 2_048
@@ -30,7 +31,7 @@ _FEW = 32
 
 @dataclass(frozen=True)
 class Answers:
-    """What `mrhubo.fast.result.FastResult` says of each frame (B)."""
+    """What `mrhubo.robot_motion.RobotMotion` says of each frame (B)."""
 
     q_BN: np.ndarray
     error_BM: np.ndarray
@@ -96,7 +97,7 @@ class NumpyEngine:
         third_BJ3 = human.cross(local_BJ33[..., 0], local_BJ33[..., 1])
         mirrored_B = ((third_BJ3 * local_BJ33[..., 2]).sum(-1) < 0).any(axis=1)
         wrong_B = mirrored_B | (off_BJ33 > SKEW).any(axis=(1, 2, 3))
-        return (int(wrong_B.argmax()), NO_ROTATION) if wrong_B.any() else None
+        return (int(wrong_B.argmax()), _NO_ROTATION) if wrong_B.any() else None
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
@@ -170,7 +171,7 @@ class CompiledEngine:
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """As `Engine.wrong`."""
         found = self._kernels.wrong(local_BJ33, SKEW)
-        return None if found < 0 else (found // 2, NO_ROTATION if found % 2 else NOT_FINITE)
+        return None if found < 0 else (found // 2, _NO_ROTATION if found % 2 else NOT_FINITE)
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
