@@ -134,8 +134,8 @@ class NumpyEngine:
                 continue
             local_BT33 = judging.read_pose(d.reading, d.settings.constants, target)
             error_BT, excess_BT = judging.reconstruction_error(d, local_BT33), judging.excess(d.reading, local_BT33)
-            miss_BX = angle_BD @ (trust.column_XD / trust.column_XD.sum(axis=1, keepdims=True)).T
-            phi_BX = error_BT @ (trust.slot_XT / trust.slot_XT.sum(axis=1, keepdims=True)).T
+            miss_BX = judging.of_branches(angle_BD, trust.column_XD)
+            phi_BX = judging.of_branches(error_BT, trust.slot_XT)
             excess_BX = np.degrees((excess_BT[:, None] * trust.slot_XT).max(axis=-1))
             shaken = None if shake_BX is None else shake_BX[rows]
             found.trust_BX[rows] = judging.confidence(d, miss_BX, phi_BX, excess_BX, shaken)

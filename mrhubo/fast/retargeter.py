@@ -148,11 +148,10 @@ class FastRetargeter:
         """How much each branch shakes (T, X) [degrees]; None where no frame rate is known."""
         if frame_rate is None:
             return None
-        column_XD, constants = self.description.trust.column_XD, self.description.settings.constants
-        length = shape[-1] if shape else 1
+        length, constants = shape[-1] if shape else 1, self.description.settings.constants
         clips = target_TD3.reshape(-1, length, *target_TD3.shape[1:]) if len(target_TD3) else target_TD3[None]
         shake_TD = np.concatenate([judging.shake(clip, frame_rate, constants) for clip in clips])
-        return np.degrees(shake_TD @ (column_XD / np.maximum(column_XD.sum(axis=1, keepdims=True), 1)).T)
+        return np.degrees(judging.of_branches(shake_TD, self.description.trust.column_XD))
 
     def told(self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str) -> RobotMotion:
         """A form's answers, with the leading axes of the poses and what is known of the retargeter."""

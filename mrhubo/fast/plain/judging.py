@@ -129,6 +129,11 @@ def reconstruct(description: Description, off_BF: np.ndarray, act: Activation) -
     return mlp(prior.decoder, mlp(prior.encoder, off_BF, act), act)
 
 
+def of_branches(number_BY: np.ndarray, own_XY: np.ndarray) -> np.ndarray:
+    """Means (B, X) of numbers of directions or joints over those that are a branch's own."""
+    return number_BY @ (own_XY / own_XY.sum(axis=1, keepdims=True)).T
+
+
 def angle_between(a_X3: np.ndarray, b_X3: np.ndarray) -> np.ndarray:
     """Angles (...) [rad] between vectors."""
     return np.arctan2(norm(cross(a_X3, b_X3)), (a_X3 * b_X3).sum(-1))
