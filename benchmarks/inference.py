@@ -30,11 +30,12 @@ import mrhubo
 from mrhubo.fast.engines import FORMS
 from mrhubo.motion import Motion, read_motion, resample
 from mrhubo.pairing.random_poses import random_poses
-from mrhubo.reference import OptimizationRetargeter
+from mrhubo.reference import OptimizationRetargeter, direction_error
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap
 from mrhubo.robot.keypoints import Limb
 from mrhubo.runtime.locations import project_root
+from mrhubo.runtime.threads import use_threads
 
 _RATE = 60.0
 _WARM_UP = 5
@@ -179,8 +180,6 @@ def wide(body_map: BodyMap, frames: int) -> torch.Tensor:
 
 def limb_errors(body_map: BodyMap, q_TN: torch.Tensor, local_TJ33: torch.Tensor) -> torch.Tensor:
     """Mean angle of each frame's measured directions (T,) [degrees]."""
-    from mrhubo.reference import direction_error
-
     return direction_error(body_map, q_TN, local_TJ33).mean(dim=1)
 
 
@@ -200,17 +199,14 @@ def nearness(retargeter: Retargeter, forms: Mapping[str, Mapping[str, Answer]], 
                 found = np.stack([loop.of_directions(target) for target in targets])
                 answers[f"mink, iterations: {iterations}"] = torch.from_numpy(found).float()
         for name, q_TN in answers.items():
-            over_T = limb_errors(body_map, q_TN, poses) - optimum_T
-            figures = (over_T.mean(), over_T.quantile(0.99), over_T.max())
-            rows.append([kind, name, *(f"{float(figure):.2f}" for figure in figures)])
-        rows.append(
-            [
-                kind,
-                "optimum itself",
-                *(f"{float(x):.2f}" for x in (optimum_T.mean(), optimum_T.quantile(0.99), optimum_T.max())),
-            ]
-        )
+            rows.append([kind, name, *figures(limb_errors(body_map, q_TN, poses) - optimum_T)])
+        rows.append([kind, "optimum itself", *figures(optimum_T)])
     return rows
+
+
+def figures(error_T: torch.Tensor) -> list[str]:
+    """Mean, 99th percentile and largest."""
+    return [f"{float(figure):.2f}" for figure in (error_T.mean(), error_T.quantile(0.99), error_T.max())]
 
 
 def start(package: Path, form: str) -> list[str]:
@@ -247,21 +243,19 @@ def main(argv: list[str]) -> None:
     retargeter = mrhubo.load(package)
     forms, poses = columns(package, retargeter), easy(300).numpy()
     names = ["network", "1 step", "10 steps", "all"]
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    rows = [
-        [form, *(microseconds(ways[name], poses, rounds) if name in ways else "" for name in names)]
-        for form, ways in forms.items()
-    ]
-    if there("mink", "mujoco") and MinkLoop.can(retargeter.body_map):
-        targets = retargeter.body_map.human_directions(torch.from_numpy(poses)).numpy()
-        times = {n: microseconds(MinkLoop(retargeter.body_map, n).of_directions, targets, rounds) for n in (1, 10)}
-        rows.append(["mink, as many iterations", "", times[1], times[10], ""])
+    with use_threads(1):
+        rows = [
+            [form, *(microseconds(ways[name], poses, rounds) if name in ways else "" for name in names)]
+            for form, ways in forms.items()
+        ]
+        if there("mink", "mujoco") and MinkLoop.can(retargeter.body_map):
+            targets = retargeter.body_map.human_directions(torch.from_numpy(poses)).numpy()
+            times = {n: microseconds(MinkLoop(retargeter.body_map, n).of_directions, targets, rounds) for n in (1, 10)}
+            rows.append(["mink, as many iterations", "", times[1], times[10], ""])
     print("one frame, one thread [us]; `all`: at most 10 steps, confidence and collision\n")
     print_table(["form", *names], rows)
-    torch.set_num_threads(threads)
     many = np.ascontiguousarray(np.resize(poses, (batch, 21, 3, 3)))
-    print(f"\nbatches of {batch:,}, {threads} threads [frames a second]\n")
+    print(f"\nbatches of {batch:,}, {torch.get_num_threads()} threads [frames a second]\n")
     rows = [
         [form, *(per_second(ways[name], many) if name in ways else "" for name in ("network", "all"))]
         for form, ways in forms.items()

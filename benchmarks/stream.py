@@ -13,7 +13,6 @@ human's, and by how many frames the robot lags (where the correlation of both sp
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import itertools
 import math
 import time
@@ -28,7 +27,7 @@ import mrhubo
 from mrhubo import rotation
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.fast import FastStream
-from mrhubo.fast.engines import FORMS
+from mrhubo.fast.engines import forms_here
 from mrhubo.motion import Motion, read_folder, resample
 from mrhubo.reference import OptimizationRetargeter, direction_jerk
 from mrhubo.reference.metrics import angle_between
@@ -115,7 +114,7 @@ def main(argv: list[str] | None = None) -> None:
         "stream, all of the answer": stream,
         "stream, joint angles alone": stream.joints,
     }
-    for form in FORMS if importlib.util.find_spec("numba") else FORMS[1:]:
+    for form in forms_here():
         fast = FastStream(mrhubo.load_fast(given.package, form), given.rate)
         ways[f"`FastStream`, {form}, all of the answer"] = lambda pose, fast=fast: fast(pose.numpy())
         ways[f"`FastStream`, {form}, joint angles alone"] = lambda pose, fast=fast: fast.joints(pose.numpy())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,23 +51,22 @@ def meaning(description: Description, inputs: str) -> dict[str, str]:
     }
 
 
-def checked_poses(retargeter: Retargeter) -> Tensor:
-    """Poses (B, 21, 3, 3) of the body prior on which a file's answers are compared with PyTorch's."""
-    import torch
+def compared(answer: Callable[[Tensor], np.ndarray], retargeter: Retargeter) -> float:
+    """How far a file's answers are from PyTorch's at most [rad], on poses of the body prior.
 
-    latent_BZ = torch.randn(_CHECKED, retargeter.prior.latent, generator=torch.Generator().manual_seed(0))
-    with torch.no_grad():
-        return retargeter.prior.decode_matrices(latent_BZ.to(retargeter.device)).cpu()
-
-
-def compared(found_BN: np.ndarray, retargeter: Retargeter) -> float:
-    """How far a file's answers to `checked_poses` are from PyTorch's at most [rad].
+    Args:
+        answer: gives joint angles (B, N) [rad] of poses (B, 21, 3, 3) by the file.
+        retargeter: whose file it is.
 
     Raises:
         UserError: more than they may be.
     """
-    wanted_BN = retargeter.predict(checked_poses(retargeter)).cpu().numpy()
-    off_BN = np.abs(found_BN - wanted_BN)
+    import torch
+
+    latent_BZ = torch.randn(_CHECKED, retargeter.prior.latent, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        local_BJ33 = retargeter.prior.decode_matrices(latent_BZ.to(retargeter.device)).cpu()
+    off_BN = np.abs(answer(local_BJ33) - retargeter.predict(local_BJ33).cpu().numpy())
     usual, worst = float(np.quantile(off_BN, _MOST)), float(off_BN.max())
     if not (usual <= _SAME and worst <= _WORST):
         raise UserError(

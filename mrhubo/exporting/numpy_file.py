@@ -10,7 +10,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.exporting import standalone
-from mrhubo.exporting.meaning import checked_poses, compared, meaning
+from mrhubo.exporting.meaning import compared, meaning
 from mrhubo.files.atomic import atomic_path
 from mrhubo.retargeter import Retargeter
 
@@ -34,7 +34,8 @@ def write_numpy(retargeter: Retargeter, path: Path) -> float:
     arrays = {name: array for name, array in description.arrays().items() if name.startswith(_KEPT)}
     arrays["meaning"] = np.array(json.dumps(meaning(description, "poses")))
     arrays["settings"] = np.array(description.metadata()["settings"])
-    off = compared(standalone.Retargeter(arrays)(checked_poses(retargeter).numpy()), retargeter)
+    exported = standalone.Retargeter(arrays)
+    off = compared(lambda local_BJ33: exported(local_BJ33.numpy()), retargeter)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # pyright: ignore[reportArgumentType]
     for file, content in (

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.exporting.meaning import checked_poses, compared, meaning
+from mrhubo.exporting.meaning import compared, meaning
 from mrhubo.fast.description import Description, Part
 from mrhubo.files.atomic import atomic_path
 from mrhubo.retargeter import Retargeter
@@ -48,7 +49,7 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
     if inputs == "directions" and description.settings.features != "directions":
         raise UserError("these networks see rotations, not directions (model.input_frame: local); export --input poses")
     model = _model(onnx, description, inputs)
-    off = compared(_answers(onnx, model, retargeter, inputs), retargeter)
+    off = compared(lambda local_BJ33: _answers(onnx, model, retargeter, inputs, local_BJ33), retargeter)
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
     return off
@@ -255,9 +256,8 @@ def _limited(graph: _Graph, description: Description, raw: str, output: str) -> 
     graph.node("Min", angle, graph.constant(upper_N), output=output)
 
 
-def _answers(onnx: Any, model: Any, retargeter: Retargeter, inputs: str) -> np.ndarray:
+def _answers(onnx: Any, model: Any, retargeter: Retargeter, inputs: str, given: Tensor) -> np.ndarray:
     """Of the file to poses (B, N) [rad], as ONNX's own evaluator works them out."""
-    given = checked_poses(retargeter)
     if inputs == "directions":
         given = retargeter.body_map.human_directions(given.to(retargeter.device)).cpu()
     evaluator = onnx.reference.ReferenceEvaluator(model)

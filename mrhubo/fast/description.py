@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -164,6 +165,20 @@ class Cost:
     cell_CU: np.ndarray
     """and in which cell of its joints' space each is."""
 
+    @cached_property
+    def joints_NC(self) -> np.ndarray:
+        """1 where a joint belongs to a block."""
+        return (self.block_N[:, None] == np.arange(self._blocks)) * 1.0
+
+    @cached_property
+    def directions_DC(self) -> np.ndarray:
+        """1 where a direction does."""
+        return (self.block_D[:, None] == np.arange(self._blocks)) * 1.0
+
+    @property
+    def _blocks(self) -> int:
+        return int(self.block_N.max()) + 1
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -275,7 +290,7 @@ class Description:
     def arrays(self) -> dict[str, np.ndarray]:
         """Every array, by a name that `Description.of` reads."""
         found: dict[str, np.ndarray] = {}
-        for name in _SECTIONS:
+        for name in SECTIONS:
             section = getattr(self, name)
             found |= {f"{name}.{field.name}": getattr(section, field.name) for field in fields(section)}
         for stage in ("pre", "post"):
@@ -300,7 +315,7 @@ class Description:
         """
         told = json.loads(metadata["settings"])
         names = {name: tuple(told[name]) for name in ("joint_names", "direction_names", "branch_names")}
-        sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in _SECTIONS.items()}
+        sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in SECTIONS.items()}
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
         return cls(prior=prior, settings=Settings(**{**told, **names}), **sections, **stages)
@@ -327,7 +342,7 @@ class Description:
         return found
 
 
-_SECTIONS: dict[str, type] = {
+SECTIONS: dict[str, type] = {
     "human": Human,
     "features": Features,
     "kinematics": Kinematics,
@@ -336,6 +351,7 @@ _SECTIONS: dict[str, type] = {
     "trust": Trust,
     "capsules": Capsules,
 }
+"""Parts of a description that hold arrays alone."""
 Kind = TypeVar("Kind")
 
 

@@ -17,9 +17,10 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain import human, judging, networks, robot, steps
+from mrhubo.fast.poses import NOT_FINITE
 
 FORMS = ("compiled", "numpy")
-NOT_FINITE, NO_ROTATION = "NaN or infinite numbers", "a matrix that is no rotation"
+_NO_ROTATION = "a matrix that is no rotation"
 SKEW = 1e-2
 """How far R^T R may be from the identity, as for `mrhubo.motion.read_poses`."""
 _CHUNK = 2_048
@@ -30,7 +31,7 @@ _FEW = 32
 
 @dataclass(frozen=True)
 class Answers:
-    """What `mrhubo.fast.result.FastResult` says of each frame (B)."""
+    """What `mrhubo.robot_motion.RobotMotion` says of each frame (B)."""
 
     q_BN: np.ndarray
     error_BM: np.ndarray
@@ -96,7 +97,7 @@ class NumpyEngine:
         third_BJ3 = human.cross(local_BJ33[..., 0], local_BJ33[..., 1])
         mirrored_B = ((third_BJ3 * local_BJ33[..., 2]).sum(-1) < 0).any(axis=1)
         wrong_B = mirrored_B | (off_BJ33 > SKEW).any(axis=(1, 2, 3))
-        return (int(wrong_B.argmax()), NO_ROTATION) if wrong_B.any() else None
+        return (int(wrong_B.argmax()), _NO_ROTATION) if wrong_B.any() else None
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
@@ -133,8 +134,8 @@ class NumpyEngine:
                 continue
             local_BT33 = judging.read_pose(d.reading, d.settings.constants, target)
             error_BT, excess_BT = judging.reconstruction_error(d, local_BT33), judging.excess(d.reading, local_BT33)
-            miss_BX = angle_BD @ (trust.column_XD / trust.column_XD.sum(axis=1, keepdims=True)).T
-            phi_BX = error_BT @ (trust.slot_XT / trust.slot_XT.sum(axis=1, keepdims=True)).T
+            miss_BX = judging.of_branches(angle_BD, trust.column_XD)
+            phi_BX = judging.of_branches(error_BT, trust.slot_XT)
             excess_BX = np.degrees((excess_BT[:, None] * trust.slot_XT).max(axis=-1))
             shaken = None if shake_BX is None else shake_BX[rows]
             found.trust_BX[rows] = judging.confidence(d, miss_BX, phi_BX, excess_BX, shaken)
@@ -170,7 +171,7 @@ class CompiledEngine:
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """As `Engine.wrong`."""
         found = self._kernels.wrong(local_BJ33, SKEW)
-        return None if found < 0 else (found // 2, NO_ROTATION if found % 2 else NOT_FINITE)
+        return None if found < 0 else (found // 2, _NO_ROTATION if found % 2 else NOT_FINITE)
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
@@ -261,15 +262,21 @@ def _chunks(frames: int) -> list[slice]:
     return [slice(start, start + _CHUNK) for start in range(0, frames, _CHUNK)]
 
 
+def forms_here() -> tuple[str, ...]:
+    """The forms that this machine can run, the quicker one first."""
+    return FORMS if importlib.util.find_spec("numba") else FORMS[1:]
+
+
 def make_engine(description: Description, form: str | None) -> Engine:
     """The form of a name; None: compiled where numba is installed.
 
     Raises:
         UserError: there is no such form, or it needs numba, which is not installed.
     """
-    there = importlib.util.find_spec("numba") is not None
     if form not in (None, *FORMS):
         raise UserError(f"form must be one of {', '.join(FORMS)}, found {form!r}")
-    if form == "compiled" and not there:
+    here = forms_here()
+    form = form or here[0]
+    if form not in here:
         raise UserError("form='compiled' needs numba: pip install 'mrhubo[fast]'")
-    return CompiledEngine(description) if there and form != "numpy" else NumpyEngine(description)
+    return CompiledEngine(description) if form == "compiled" else NumpyEngine(description)

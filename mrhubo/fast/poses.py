@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.fast.plain.human import cross, norm
+from mrhubo.fast.plain.human import cross, norm, rodrigues
 
+NOT_FINITE = "NaN or infinite numbers"
 _JOINTS = 21
 _MOST_TURN = 6 * math.pi
 _FLAT = 1e-4
@@ -78,17 +79,19 @@ def refuse(wrong: tuple[int, str] | None, shape: tuple[int, ...]) -> None:
         raise UserError(f"human pose{frame} holds {wrong[1]}")
 
 
+def _refuse_first(wrong_TJ: np.ndarray, array: np.ndarray, what: str, shape: tuple[int, ...]) -> None:
+    """Refuses the first frame of which a joint is wrong, for what it holds."""
+    if wrong_TJ.any():
+        place = int(wrong_TJ.any(axis=1).argmax())
+        refuse((place, what if np.isfinite(array[place]).all() else NOT_FINITE), shape)
+
+
 def _of_sixd(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """6D: two columns, one after the other."""
     first, second = array[..., :3].astype(np.float64), array[..., 3:].astype(np.float64)
     third = cross(first, second)
-    parallel_T = ~(norm(third) > _FLAT * norm(first) * norm(second)).all(axis=1)
-    if parallel_T.any():
-        finite = np.isfinite(array[parallel_T.argmax()]).all()
-        refuse(
-            (int(parallel_T.argmax()), "six numbers that are no rotation" if finite else "NaN or infinite numbers"),
-            shape,
-        )
+    parallel_TJ = ~(norm(third) > _FLAT * norm(first) * norm(second))
+    _refuse_first(parallel_TJ, array, "six numbers that are no rotation", shape)
     x = first / norm(first)[..., None]
     second = second - (x * second).sum(-1, keepdims=True) * x
     y = second / norm(second)[..., None]
@@ -99,16 +102,5 @@ def _of_axis_angle(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Axis times angle [rad], by Rodrigues' formula."""
     vector = array.reshape(len(array), _JOINTS, 3).astype(np.float64)
     angle = norm(vector)
-    wrong_T = ~(angle <= _MOST_TURN).all(axis=1)
-    if wrong_T.any():
-        finite = np.isfinite(array[wrong_T.argmax()]).all()
-        what = "no axis-angle in radians (degrees?)" if finite else "NaN or infinite numbers"
-        refuse((int(wrong_T.argmax()), what), shape)
-    x, y, z = np.moveaxis(vector / np.maximum(angle, _SMALL)[..., None], -1, 0)
-    sine, rest = np.sin(angle), 1 - np.cos(angle)
-    rows = (
-        1 - rest * (y * y + z * z), rest * x * y - sine * z, rest * x * z + sine * y,
-        rest * x * y + sine * z, 1 - rest * (x * x + z * z), rest * y * z - sine * x,
-        rest * x * z - sine * y, rest * y * z + sine * x, 1 - rest * (x * x + y * y),
-    )  # fmt: skip
-    return np.stack(rows, axis=-1).reshape(*angle.shape, 3, 3)
+    _refuse_first(~(angle <= _MOST_TURN), array, "no axis-angle in radians (degrees?)", shape)
+    return rodrigues(vector / np.maximum(angle, _SMALL)[..., None], np.sin(angle), np.cos(angle))

@@ -21,7 +21,7 @@ from mrhubo.errors import UserError
 from mrhubo.fast.description import Description
 from mrhubo.fast.engines import FORMS, Answers, Engine, make_engine
 from mrhubo.fast.plain import judging
-from mrhubo.fast.poses import read_poses, refuse
+from mrhubo.fast.poses import Poses, read_poses, refuse
 from mrhubo.robot_motion import FollowingJoint, RobotFacts, RobotMotion
 
 POLISH = 10
@@ -94,9 +94,7 @@ class FastRetargeter:
                 negative, or the frame rate not positive.
         """
         _check(polish)
-        poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
-        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
-        target_TD3 = self.engine.directions(poses.local_TJ33)
+        poses, target_TD3 = self._read(motion, frame_rate)
         q_TN = self.engine.network(poses.local_TJ33, target_TD3)
         shake_TX = self._shake(target_TD3, poses.shape, poses.frame_rate)
         found = self.engine.answer(q_TN, target_TD3, polish, shake_TX)
@@ -105,11 +103,9 @@ class FastRetargeter:
     def predict(self, motion: Any, polish: int = 0) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
         _check(polish)
-        poses = read_poses(motion, None, self.description.settings.own_rest)
-        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
-        target_TD3 = self.engine.directions(poses.local_TJ33)
+        poses, target_TD3 = self._read(motion)
         q_TN = self.engine.polish(self.engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
-        return q_TN.reshape(*poses.shape, -1)
+        return q_TN.reshape(*poses.shape, q_TN.shape[1])
 
     def imitate(self, directions: Any, polish: int = POLISH) -> RobotMotion:
         """The answer to directions (..., D, 3) in place of poses: unit vectors in human axes (x left, y up, z forward)
@@ -139,27 +135,30 @@ class FastRetargeter:
 
     def directions(self, motion: Any) -> np.ndarray:
         """Directions (..., D, 3) of human poses, as `imitate` takes them."""
-        poses = read_poses(motion, None, self.description.settings.own_rest)
-        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
-        found_TD3 = self.engine.directions(poses.local_TJ33)
+        poses, found_TD3 = self._read(motion)
         return found_TD3.reshape(*poses.shape, *found_TD3.shape[1:])
+
+    def _read(self, motion: Any, frame_rate: float | None = None) -> tuple[Poses, np.ndarray]:
+        """Poses that are known to be good, and their directions (T, D, 3)."""
+        poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
+        refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
+        return poses, self.engine.directions(poses.local_TJ33)
 
     def _shake(self, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float | None) -> np.ndarray | None:
         """How much each branch shakes (T, X) [degrees]; None where no frame rate is known."""
         if frame_rate is None:
             return None
-        column_XD, constants = self.description.trust.column_XD, self.description.settings.constants
-        length = shape[-1] if shape else 1
+        length, constants = shape[-1] if shape else 1, self.description.settings.constants
         clips = target_TD3.reshape(-1, length, *target_TD3.shape[1:]) if len(target_TD3) else target_TD3[None]
         shake_TD = np.concatenate([judging.shake(clip, frame_rate, constants) for clip in clips])
-        return np.degrees(shake_TD @ (column_XD / np.maximum(column_XD.sum(axis=1, keepdims=True), 1)).T)
+        return np.degrees(judging.of_branches(shake_TD, self.description.trust.column_XD))
 
     def told(self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str) -> RobotMotion:
         """A form's answers, with the leading axes of the poses and what is known of the retargeter."""
         trust_TX = found.trust_BX
         confidence_T = trust_TX.min(axis=1) if trust_TX.shape[1] else np.zeros_like(found.phi_B)
         return RobotMotion.trusted(
-            q=found.q_BN.reshape(*shape, -1) if found.q_BN.size else found.q_BN.reshape(*shape, len(self.joint_names)),
+            q=found.q_BN.reshape(*shape, found.q_BN.shape[1]),
             confidence=confidence_T.reshape(shape),
             branch_confidence=trust_TX.reshape(*shape, trust_TX.shape[1]),
             direction_error_deg=found.error_BM.reshape(*shape, found.error_BM.shape[1]),

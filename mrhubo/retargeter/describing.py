@@ -36,6 +36,7 @@ from mrhubo.fast.description import (
 from mrhubo.reference import polish
 from mrhubo.retargeter import confidence
 from mrhubo.retargeter.describing_robot import (
+    Bodies,
     describe_capsules,
     describe_cost,
     describe_kinematics,
@@ -70,18 +71,18 @@ def describe(retargeter: Retargeter) -> Description:
         "shake_deg": confidence.SHAKE_DEG, "acceleration": confidence.ACCELERATION,
         "neighbours": confidence.NEIGHBOURS, "usual_phi": retargeter.confidence.usual_phi,
     }  # fmt: skip
-    reading, prior = _reading(body_map), retargeter.prior
+    reading, prior, bodies = _reading(body_map), retargeter.prior, Bodies(body_map.robot)
     return Description(
         _human(body_map),
         _features(features),
         _parts(first) if isinstance(first, Branched) else (),
         _parts(last) if isinstance(last, Branched) else (),
-        describe_kinematics(retargeter.directions),
+        describe_kinematics(retargeter.directions, bodies),
         describe_cost(retargeter.directions, retargeter.polisher),
         reading,
         _prior(prior, reading.joint_T),
         _trust(retargeter, reading.joint_T),
-        describe_capsules(body_map),
+        describe_capsules(body_map, bodies),
         Settings(
             body_map.robot.name,
             body_map.robot.joint_names,

@@ -18,6 +18,7 @@ from mrhubo.reference import DirectionProblem, polish
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.robot.joint import drive
 from mrhubo.robot.keypoints import Limb
+from mrhubo.robot.urdf import moved
 
 
 def whole(values: Any) -> np.ndarray:
@@ -37,7 +38,7 @@ def single(tensor: Tensor) -> np.ndarray:
     return np.array(tensor.detach().cpu().numpy(), np.float32)
 
 
-class _Bodies:
+class Bodies:
     """The links that driven joints carry, and where others are fixed to them."""
 
     def __init__(self, robot: Robot) -> None:
@@ -75,25 +76,13 @@ class _Bodies:
         parent = self.number(own.parent)
         body = self._child(self.joints[parent - 1]) if parent else self.description.root
         home_44 = np.linalg.inv(self._pose[body]) @ self._pose[own.child]
-        return parent, (home_44 @ np.linalg.inv(_moved(own.axis_3, angle, own.rotary)))[:3]
+        return parent, (home_44 @ np.linalg.inv(moved(own.axis_3, angle, not own.rotary)))[:3]
 
 
-def _moved(axis_3: np.ndarray, angle: float, rotary: bool) -> np.ndarray:
-    pose_44 = np.eye(4)
-    if not rotary:
-        pose_44[:3, 3] = angle * axis_3
-        return pose_44
-    x, y, z = axis_3
-    cross_33 = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    pose_44[:3, :3] += np.sin(angle) * cross_33 + (1 - np.cos(angle)) * cross_33 @ cross_33
-    return pose_44
-
-
-def describe_kinematics(problem: DirectionProblem) -> Kinematics:
+def describe_kinematics(problem: DirectionProblem, bodies: Bodies) -> Kinematics:
     """The robot's joints and directions."""
     body_map, jacobian = problem.body_map, problem.kinematics
     robot, shared = body_map.robot, body_map.shared
-    bodies = _Bodies(robot)
     drives = [drive(robot.description.joints, name) for name in bodies.joints]
     columns = [robot.joint_names.index(d.joint) for d in drives]
     angles = [d.multiplier * bodies.home_N[n] + d.offset for d, n in zip(drives, columns, strict=True)]
@@ -175,12 +164,11 @@ def describe_cost(problem: DirectionProblem, polisher: polish.Polish) -> Cost:
     )
 
 
-def describe_capsules(body_map: BodyMap) -> Capsules:
+def describe_capsules(body_map: BodyMap, bodies: Bodies) -> Capsules:
     """The collision shapes."""
     collision, joints = body_map.collision, body_map.robot.driven_joints
-    numbers = _Bodies(body_map.robot)
     children = [body_map.robot.description.joints[name].child for name in joints]
-    number = [0, *(numbers.number(child) for child in children)]
+    number = [0, *(bodies.number(child) for child in children)]
     return Capsules(
         body_S=whole([number[body] for body in collision._body_C.tolist()]),
         end_S23=real(collision._ends_C23),

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ import numpy as np
 import xxhash
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast import plain
+from mrhubo.fast import description, plain
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import judging, networks, steps, tables
 from mrhubo.fast.compiled import robot as robots
@@ -41,14 +42,18 @@ STEPS, ALL, WITHOUT_PRIOR = range(3)
 def _checksum() -> str:
     """Of all that is compiled."""
     digest = xxhash.xxh3_64()
-    for folder in (Path(__file__).parent, Path(str(plain.__file__)).parent):
-        for path in sorted(folder.glob("*.py")):
-            digest.update(path.read_bytes())
+    folders = (Path(__file__).parent, Path(str(plain.__file__)).parent)
+    sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
+    for path in (*sources, Path(description.__file__)):  # whose kinds of steps are constants of what is compiled
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
+@cache
 def make_kernels() -> Kernels:
-    """The functions; each is compiled when it is first called, which takes some seconds, or read from the cache."""
+    """The functions, the same for all retargeters; each is compiled when it is first called, which takes some seconds,
+    or read from the cache.
+    """
     version = _checksum()
 
     @njit(cache=True, **tables.EXACT)

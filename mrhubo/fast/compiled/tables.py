@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.description import Description, Layers, Part
-from mrhubo.fast.plain.steps import blocks_of
+from mrhubo.fast.description import SECTIONS, Description, Layers, Part
+from mrhubo.fast.plain.human import skew
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -81,7 +81,7 @@ class Packed(NamedTuple):
 def pack(description: Description) -> Packed:
     """The arrays of a description."""
     found = {}
-    for name in ("human", "features", "kinematics", "cost", "reading", "trust", "capsules"):
+    for name in SECTIONS:
         section = getattr(description, name)
         found |= {field.name: getattr(section, field.name) for field in fields(section)}
     shorts = [np.zeros(0, np.int16)]
@@ -103,11 +103,9 @@ def pack(description: Description) -> Packed:
 def _derived(d: Description) -> dict[str, np.ndarray]:
     """What is worked out of a description's arrays."""
     constants, capsules, k = d.settings.constants, d.capsules, d.kinematics
-    x, y, z = k.axis_A3.T
-    across_A33 = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]).transpose(2, 0, 1)
-    origin_A33 = k.origin_A34[..., :3]
+    origin_A33, across_A33 = k.origin_A34[..., :3], skew(k.axis_A3)
     orders, firsts = [], []
-    for own_XC in blocks_of(d.cost):
+    for own_XC in (d.cost.joints_NC, d.cost.directions_DC):
         orders.append(np.concatenate([np.flatnonzero(column) for column in own_XC.T]))
         firsts.append(np.concatenate(([0], own_XC.sum(axis=0).cumsum())).astype(np.int64))
     half_S = np.linalg.norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0], axis=-1) / 2

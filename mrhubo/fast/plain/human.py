@@ -43,6 +43,20 @@ def normalize(a_X3: np.ndarray) -> np.ndarray:
     return a_X3 / np.maximum(norm(a_X3), _SHORT)[..., None]
 
 
+def skew(axis_X3: np.ndarray) -> np.ndarray:
+    """Matrices (..., 3, 3) whose product with a vector is the cross product with it."""
+    x, y, z = axis_X3[..., 0], axis_X3[..., 1], axis_X3[..., 2]
+    nothing = np.zeros_like(x)
+    return np.stack((nothing, -z, y, z, nothing, -x, -y, x, nothing), axis=-1).reshape(*x.shape, 3, 3)
+
+
+def rodrigues(axis_X3: np.ndarray, sine_X: np.ndarray, cosine_X: np.ndarray) -> np.ndarray:
+    """Turns (..., 3, 3) about unit axes (..., 3), by Rodrigues' formula."""
+    across_X33 = skew(axis_X3)
+    turn_X33 = sine_X[..., None, None] * across_X33 + (1 - cosine_X)[..., None, None] * (across_X33 @ across_X33)
+    return np.eye(3) + turn_X33
+
+
 def directions_of(human: Human, constants: Mapping[str, float], local_BJ33: np.ndarray) -> np.ndarray:
     """Directions (B, D, 3) of local rotations (B, 21, 3, 3), as `BodyMap.human_directions`."""
     local_BP33 = orthonormal(local_BJ33[:, human.joint_P, :, :2].astype(np.float64))

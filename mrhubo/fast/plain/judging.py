@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrhubo.fast.description import BEND, LIMB, SHARE, Capsules, Description, Reading
-from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal
+from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal, rodrigues
 from mrhubo.fast.plain.networks import ACTIVATIONS, Activation, mlp
 
 SHORT, PARALLEL = 1e-9, 1e-7
@@ -51,15 +51,6 @@ def _columns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return np.stack((first, second, cross(first, second)), axis=-1)
 
 
-def _rodrigues(axis_B3: np.ndarray, sine_B: np.ndarray, cosine_B: np.ndarray) -> np.ndarray:
-    """Rotations (B, 3, 3) about unit axes."""
-    x, y, z = axis_B3[:, 0], axis_B3[:, 1], axis_B3[:, 2]
-    nothing = np.zeros_like(x)
-    across_B33 = np.stack((nothing, -z, y, z, nothing, -x, -y, x, nothing), axis=-1).reshape(-1, 3, 3)
-    turn_B33 = sine_B[:, None, None] * across_B33 + (1 - cosine_B)[:, None, None] * (across_B33 @ across_B33)
-    return np.eye(3) + turn_B33
-
-
 def _shortest(start_B3: np.ndarray, end_B3: np.ndarray) -> np.ndarray:
     """The smallest turns (B, 3, 3) between unit vectors; none where they are opposite."""
     axis_B3 = cross(start_B3, end_B3)
@@ -68,7 +59,7 @@ def _shortest(start_B3: np.ndarray, end_B3: np.ndarray) -> np.ndarray:
     told_B = sine_B > SHORT
     length_B = np.hypot(sine_B, cosine_B)
     sine_B, cosine_B = np.where(told_B, sine_B / length_B, 0.0), np.where(told_B, cosine_B / length_B, 1.0)
-    return _rodrigues(normalize(axis_B3), sine_B, cosine_B)
+    return rodrigues(normalize(axis_B3), sine_B, cosine_B)
 
 
 def _about(axis_B3: np.ndarray, start_B3: np.ndarray, end_B3: np.ndarray) -> np.ndarray:
@@ -76,7 +67,7 @@ def _about(axis_B3: np.ndarray, start_B3: np.ndarray, end_B3: np.ndarray) -> np.
     sine_B = (axis_B3 * cross(start_B3, end_B3)).sum(-1)
     cosine_B = (start_B3 * end_B3).sum(-1) - (start_B3 * axis_B3).sum(-1) * (end_B3 * axis_B3).sum(-1)
     angle_B = np.arctan2(sine_B, cosine_B)
-    return _rodrigues(axis_B3, np.sin(angle_B), np.cos(angle_B))
+    return rodrigues(axis_B3, np.sin(angle_B), np.cos(angle_B))
 
 
 def quaternions(matrix_X33: np.ndarray) -> np.ndarray:
@@ -99,7 +90,7 @@ def _share(matrix_B33: np.ndarray, share: float) -> np.ndarray:
     quaternion_B4 = quaternions(matrix_B33)
     sine_B = norm(quaternion_B4[:, :3])
     angle_B = 2 * share * np.arctan2(sine_B, quaternion_B4[:, 3])
-    return _rodrigues(normalize(quaternion_B4[:, :3]), np.sin(angle_B), np.cos(angle_B))
+    return rodrigues(normalize(quaternion_B4[:, :3]), np.sin(angle_B), np.cos(angle_B))
 
 
 def excess(reading: Reading, local_BT33: np.ndarray) -> np.ndarray:
@@ -136,6 +127,11 @@ def reconstruct(description: Description, off_BF: np.ndarray, act: Activation) -
     """The body prior's six numbers for each turned joint, not yet orthonormal, of those by which it is off its rest."""
     prior = description.prior
     return mlp(prior.decoder, mlp(prior.encoder, off_BF, act), act)
+
+
+def of_branches(number_BY: np.ndarray, own_XY: np.ndarray) -> np.ndarray:
+    """Means (B, X) of numbers of directions or joints over those that are a branch's own."""
+    return number_BY @ (own_XY / own_XY.sum(axis=1, keepdims=True)).T
 
 
 def angle_between(a_X3: np.ndarray, b_X3: np.ndarray) -> np.ndarray:

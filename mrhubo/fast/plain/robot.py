@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrhubo.fast.description import Kinematics
-from mrhubo.fast.plain.human import cross, norm
+from mrhubo.fast.plain.human import cross, norm, rodrigues
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,7 @@ def place(kinematics: Kinematics, q_BN: np.ndarray) -> Placed:
     """Bodies and directions at joint angles (B, N) [rad]."""
     batch, joints = len(q_BN), len(kinematics.parent_A)
     angle_BA = q_BN[:, kinematics.column_A] * kinematics.ratio_A + kinematics.offset_A
-    sine_BA, cosine_BA = np.sin(angle_BA), np.cos(angle_BA)
-    x, y, z = kinematics.axis_A3.T
-    across_A33 = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]).transpose(2, 0, 1)
-    turn_BA33 = np.eye(3) + sine_BA[..., None, None] * across_A33
-    turn_BA33 += (1 - cosine_BA)[..., None, None] * (across_A33 @ across_A33)
+    turn_BA33 = rodrigues(kinematics.axis_A3, np.sin(angle_BA), np.cos(angle_BA))
     turn_BA33[:, kinematics.rotary_A == 0] = np.eye(3)
     slide_BA = np.where(kinematics.rotary_A > 0, 0.0, angle_BA)
     rotation_A33, position_A3 = kinematics.origin_A34[..., :3], kinematics.origin_A34[..., 3]

@@ -45,16 +45,9 @@ class Model:
         )
 
 
-def blocks_of(cost: Cost) -> tuple[np.ndarray, np.ndarray]:
-    """1 where a joint (N, C), or a direction (D, C), belongs to a block."""
-    count = int(cost.block_N.max()) + 1
-    return (cost.block_N[:, None] == np.arange(count)) * 1.0, (cost.block_D[:, None] == np.arange(count)) * 1.0
-
-
 def quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
     """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
     kinematics, cost, human = description.kinematics, description.cost, description.human
-    joints_NC, directions_DC = blocks_of(cost)
     placed = place(kinematics, q_BN)
     jacobian_BDN3 = jacobian(kinematics, placed, len(cost.lower_N))
     length_BD = np.where(cost.partial_D > 0, norm(target_BD3), 1.0)
@@ -62,8 +55,8 @@ def quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray
     miss_BD3 = placed.direction_BD3 - unseen(human.seen_D, placed.view_BV33, unit_BD3)
     weight_BD = cost.weight_D * length_BD
     from_middle_BN = q_BN - cost.middle_N
-    cost_BC = ((miss_BD3 * miss_BD3).sum(-1) * weight_BD) @ directions_DC
-    cost_BC += (from_middle_BN * from_middle_BN * cost.ridge_N) @ joints_NC
+    cost_BC = ((miss_BD3 * miss_BD3).sum(-1) * weight_BD) @ cost.directions_DC
+    cost_BC += (from_middle_BN * from_middle_BN * cost.ridge_N) @ cost.joints_NC
     rows_BNR = jacobian_BDN3.swapaxes(1, 2).reshape(len(q_BN), len(cost.lower_N), -1)
     weighted_BNR = rows_BNR * np.repeat(weight_BD, 3, axis=1)[:, None]
     gradient_BN = (weighted_BNR @ miss_BD3.reshape(len(q_BN), -1, 1))[..., 0] + from_middle_BN * cost.ridge_N
@@ -94,7 +87,7 @@ def minimise(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles (B, N) [rad] after as many steps at most, and what each block costs there (B, C)."""
     cost = description.cost
-    block_N, joints_NC = cost.block_N, blocks_of(cost)[0]
+    block_N, joints_NC = cost.block_N, cost.joints_NC
     model = quadratic(description, q_BN, target_BD3)
     found_BN, found_cost_BC = q_BN.copy(), model.cost_BC.copy()
     damping_BC = np.full_like(model.cost_BC, DAMPING)
@@ -130,7 +123,7 @@ def follow(
     what each block costs there (B, C), without the pull. As `mrhubo.streaming.branches` makes them.
     """
     cost, centre_BN = description.cost, q_BN
-    block_N, joints_NC = cost.block_N, blocks_of(cost)[0]
+    block_N, joints_NC = cost.block_N, cost.joints_NC
     pull_B1 = pull_B[:, None]
     model = quadratic(description, q_BN, target_BD3)
     damping_BC = np.full_like(model.cost_BC, DAMPING)
@@ -169,7 +162,7 @@ def polish(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, s
 
 def weights(cost: Cost, target_BD3: np.ndarray) -> np.ndarray:
     """How much the directions of each block count together (B, C)."""
-    return (norm(target_BD3) * cost.weight_D) @ blocks_of(cost)[1]
+    return (norm(target_BD3) * cost.weight_D) @ cost.directions_DC
 
 
 def _again(
