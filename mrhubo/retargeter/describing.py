@@ -1,6 +1,6 @@
 """A retargeter as the plain arrays of `mrhubo.fast`: everything that can be worked out before the first pose comes.
 
-Legend: as in `mrhubo.fast.description`.
+Legend: as in `mrhubo.fast.sections`.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from mrhubo.body.rest_directions import is_ours
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
 from mrhubo.body.vposer import VPoser
 from mrhubo.errors import UserError
-from mrhubo.fast.description import (
+from mrhubo.fast.description import Description
+from mrhubo.fast.sections import (
     BEND,
     LIMB,
     ORIENT,
     SHARE,
-    Description,
     Features,
     Human,
     Layers,

@@ -59,8 +59,8 @@ from mrhubo.fast.compiled.tables import (
     vector,
     whole,
 )
-from mrhubo.fast.description import BEND, LIMB, ORIENT, SHARE
 from mrhubo.fast.plain.judging import PARALLEL, SHORT
+from mrhubo.fast.sections import BEND, LIMB, ORIENT, SHARE
 
 _TINY = 1e-12
 

@@ -18,7 +18,7 @@ import numpy as np
 import xxhash
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast import description, plain
+from mrhubo.fast import plain, sections
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import judging, networks, steps, tables
 from mrhubo.fast.compiled import robot as robots
@@ -44,7 +44,7 @@ def _checksum() -> str:
     digest = xxhash.xxh3_64()
     folders = (Path(__file__).parent, Path(str(plain.__file__)).parent)
     sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
-    for path in (*sources, Path(description.__file__)):  # whose kinds of steps are constants of what is compiled
+    for path in (*sources, Path(sections.__file__)):  # whose kinds of steps are constants of what is compiled
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

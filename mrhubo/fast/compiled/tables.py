@@ -1,6 +1,6 @@
 """A description in four flat arrays, which a compiled function takes at once: handing over sixty takes 14 us.
 
-Legend: as in `mrhubo.fast.description`; and G layers, H networks.
+Legend: as in `mrhubo.fast.sections`; and G layers, H networks.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.description import SECTIONS, Description, Layers, Part
+from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import skew
+from mrhubo.fast.sections import SECTIONS, Layers, Part
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -28,7 +29,7 @@ _KEYS = (
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
 )  # fmt: skip
-"""The tables, as in `mrhubo.fast.description` but for these:
+"""The tables, as in `mrhubo.fast.sections` but for these:
 
 bend_4: ends of the bend axes' ranges [rad]. A joint's turn by the angle t is origin + sin t * across + (1 - cos t) *
 twice, across = origin [axis]x and twice = origin [axis]x^2. The joints of block c are order_N[first_C[c] : first_C[c +

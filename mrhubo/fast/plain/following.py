@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Cost
 from mrhubo.fast.plain.human import norm, normalize
 from mrhubo.fast.plain.steps import weights
+from mrhubo.fast.sections import Cost
 from mrhubo.fast.stream_settings import StreamSettings
 
 _REFERENCE_RATE = 24.0

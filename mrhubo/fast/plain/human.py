@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mrhubo.fast.description import Human
+from mrhubo.fast.sections import Human
 
 _TINY = 1e-12
 _SHORT = 1e-12

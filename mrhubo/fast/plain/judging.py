@@ -12,9 +12,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mrhubo.fast.description import BEND, LIMB, SHARE, Capsules, Description, Reading
+from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal, rodrigues
 from mrhubo.fast.plain.networks import ACTIVATIONS, Activation, mlp
+from mrhubo.fast.sections import BEND, LIMB, SHARE, Capsules, Reading
 
 SHORT, PARALLEL = 1e-9, 1e-7
 _TINY = 1e-12

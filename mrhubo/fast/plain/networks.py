@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Description, Layers, Part
+from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import cross, norm, normalize
+from mrhubo.fast.sections import Layers, Part
 
 # erf(x) = x P(x^2) / Q(x^2) up to |x| = 4, beyond which it is 1 in float32: a rational fit with an error below 3e-8,
 # found by iteratively reweighted least squares on the values of scipy.special.erf.

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Kinematics
 from mrhubo.fast.plain.human import cross, norm, rodrigues
+from mrhubo.fast.sections import Kinematics
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Cost, Description
+from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.plain.robot import jacobian, place, unseen
+from mrhubo.fast.sections import Cost
 
 TOLERANCE = 1e-4
 """A block whose joints all move by less [rad] in a step has converged."""
