@@ -5,19 +5,23 @@ Legend: B frames, J = 21 posed joints, D directions, M measured ones, N joints, 
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.description import Description
+from mrhubo.fast.kept import note_kept, numba_is_there
 from mrhubo.fast.plain import human, judging, networks, robot, steps
+from mrhubo.fast.plain.steps import Model
 from mrhubo.fast.poses import NOT_FINITE
+from mrhubo.fast.together.banded import Banded, Solve, halve
+from mrhubo.fast.together.problem import Problem, make_problem
 
 FORMS = ("compiled", "numpy")
 _NO_ROTATION = "a matrix that is no rotation"
@@ -77,6 +81,11 @@ class Engine(Protocol):
         """As `mrhubo.fast.plain.steps.follow`: joint angles (B, N) [rad] and costs of blocks (B, C), float64."""
         ...
 
+    @property
+    def problem(self) -> Problem:
+        """What frames cost, for whole motions."""
+        ...
+
     def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """After steps of optimisation, with all that is told of them; shaking of branches in degrees, where known."""
         ...
@@ -119,17 +128,22 @@ class NumpyEngine:
         """As `Engine.follow`."""
         return steps.follow(self.description, q_BN, target_BD3, pull_B, lower_BN, upper_BN)
 
+    @cached_property
+    def problem(self) -> Problem:
+        """As `Engine.problem`."""
+        return make_problem(self.description, steps.quadratic, halve)
+
     def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """As `Engine.answer`."""
         d, found = self.description, Answers.empty(self.description, len(q_BN))
-        for rows in _chunks(len(q_BN)):
+        for rows in steps.chunks(len(q_BN), _CHUNK):
             target, trust = target_BD3[rows], d.trust
             found.q_BN[rows] = self.polish(q_BN[rows], target, polish)
             placed = robot.place(d.kinematics, found.q_BN[rows].astype(np.float64))
-            own_BD3 = robot.seen(d.human.seen_D, placed.view_BV33, placed.direction_BD3)
+            own_BD3 = np.moveaxis(robot.seen(d.human.seen_D, placed.view_V33B, placed.direction_D3B), -1, 0)
             angle_BD = np.degrees(judging.angle_between(own_BD3, target))
             found.error_BM[rows] = angle_BD[:, trust.measured]
-            found.collision_B[rows] = judging.collides(d.capsules, placed.rotation_BL33, placed.position_BL3)
+            found.collision_B[rows] = judging.collides(d.capsules, placed.rotation_L33B, placed.position_L3B)
             if not len(trust.column_XD):
                 continue
             local_BT33 = judging.read_pose(d.reading, d.settings.constants, target)
@@ -158,6 +172,8 @@ class CompiledEngine:
         self._layers = networks.Activations(self._activate(ACTIVATIONS["gelu"]), self._activate(self._activation))
         self._threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self._pool: ThreadPoolExecutor | None = None
+        self._compiles = True
+        """Whether something that a motion needs may have been compiled since all of it was noted."""
         self._nothing = np.zeros((0, 0), np.float32), np.zeros((0, len(description.trust.column_XD)))
 
     def _activate(self, kind: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -187,7 +203,7 @@ class CompiledEngine:
         if len(target_BD3) <= _FEW:
             self._kernels.networks(self._tables, local_BJ33, target_BD3, found_BN)
             return found_BN
-        for rows in _chunks(len(target_BD3)):
+        for rows in steps.chunks(len(target_BD3), _CHUNK):
             features_BF = networks.features_of(self.description, local_BJ33[rows], target_BD3[rows])
             found_BN[rows] = networks.joint_angles(self.description, features_BF, self._layers.gelu)
         return found_BN
@@ -210,6 +226,40 @@ class CompiledEngine:
         self._kernels.follow(self._tables, target_BD3, pull_B, lower_BN, upper_BN, q_BN, cost_BC)
         return q_BN, cost_BC
 
+    @cached_property
+    def problem(self) -> Problem:
+        """As `Engine.problem`."""
+        from mrhubo.fast.compiled.motion_kernels import make_motion_kernels
+
+        kernels, blocks = make_motion_kernels(), len(self.description.cost.cell_CU)
+
+        def quadratic(_: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
+            frames, joints = q_BN.shape
+            found = np.empty((frames, blocks)), np.empty((frames, joints)), np.empty((frames, joints, joints))
+
+            def work(rows: slice) -> None:
+                kernels.quadratic(self._tables, q_BN[rows], target_BD3[rows], *(part[rows] for part in found))
+
+            self._shared(frames, work)
+            return Model(*found)
+
+        def factor(system: Banded) -> Solve:
+            frames, joints = system.diagonal_TM.shape
+            coupling_KTM = np.zeros((len(system.couplings_TM), frames, joints))
+            for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
+                coupling_KTM[lag - 1, : frames - lag] = coupling_TM
+            lower_RW = np.empty((frames * joints, len(coupling_KTM) * joints + 1))
+            kernels.factor(system.within_TMM, system.diagonal_TM, coupling_KTM, lower_RW)
+
+            def solve(right_TM: np.ndarray) -> np.ndarray:
+                found_R = right_TM.flatten()
+                kernels.solve(lower_RW, found_R)
+                return found_R.reshape(right_TM.shape)
+
+            return solve
+
+        return make_problem(self.description, quadratic, factor)
+
     def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
         """As `Engine.answer`."""
         d, frames = self.description, len(q_BN)
@@ -218,7 +268,7 @@ class CompiledEngine:
         if frames <= _FEW:
             self._retarget(self._all, polish, slice(0, frames), found.q_BN, target_BD3, None, shake_BX, found)
             return found
-        for chunk in _chunks(frames):
+        for chunk in steps.chunks(frames, _CHUNK):
             part = Answers(*(getattr(found, name)[chunk] for name in Answers.__dataclass_fields__))
             target, shaken = target_BD3[chunk], None if shake_BX is None else shake_BX[chunk]
             six_BF = np.empty((len(target), 6 * len(d.reading.joint_T)), np.float32)
@@ -232,6 +282,9 @@ class CompiledEngine:
 
             run(self._steps, six_BF)
             run(self._without_prior, judging.reconstruct(d, six_BF, self._layers.prior))
+        if self._compiles and "problem" in self.__dict__:
+            self._compiles = False
+            note_kept(kernel.stats.cache_path for kernel in self._kernels)
         return found
 
     def _retarget(
@@ -258,13 +311,9 @@ class CompiledEngine:
         list(self._pool.map(work, [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]))
 
 
-def _chunks(frames: int) -> list[slice]:
-    return [slice(start, start + _CHUNK) for start in range(0, frames, _CHUNK)]
-
-
 def forms_here() -> tuple[str, ...]:
     """The forms that this machine can run, the quicker one first."""
-    return FORMS if importlib.util.find_spec("numba") else FORMS[1:]
+    return FORMS if numba_is_there() else FORMS[1:]
 
 
 def make_engine(description: Description, form: str | None) -> Engine:

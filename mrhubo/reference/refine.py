@@ -13,7 +13,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.reference.bounded import Banded, Bounds, bounded_minimum, solve_factored
+from mrhubo.fast.together.banded import Banded
+from mrhubo.fast.together.bounded import Bounds, bounded_minimum
+from mrhubo.reference.banded import factor
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
 
@@ -149,10 +151,10 @@ def _motion_step(
             )
             system = Banded(_array(within_TMM), diagonal_TM, couplings_TM)
             if bound is None:
-                step_TM = solve_factored(system.factor(), right_TM)
+                step_TM = factor(system)(right_TM)
             else:
                 bounds = _bounds(problem, q_TN, free_TN[:, 0], bound, joints_M)
-                step_TM = bounded_minimum(system, right_TM, bounds)
+                step_TM = bounded_minimum(system, right_TM, bounds, factor)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
 

@@ -2,8 +2,8 @@
 
     |q_t - q_(t-1)| <= step        for every joint, from each frame to the next
 
-First the nearest motion that keeps to it, then the best one near that (`bounded`), whose last millionths the nearest
-motion takes away again.
+First the nearest motion that keeps to it, then the best one near that (`mrhubo.fast.together.bounded`), whose last
+millionths the nearest motion takes away again.
 
 Legend: T frames, N joints, D directions.
 """
@@ -86,5 +86,5 @@ def keep_speed(
         free_T = free_T & ~fixed_T
     found_TN = refine_around(problem, nearest_TN, target_TD3, smoothness, free_T, _SWEEPS, _TOLERANCE, step_N)
     found_TN = nearest_slow(found_TN, step_N, fixed_T)
-    concerned_C = changed_TN.any(dim=0).float() @ problem.blocks.joints_NC > 0
+    concerned_C = changed_TN.any(dim=0).to(q_TN) @ problem.blocks.joints_NC > 0
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrhubo.fast.description import Description
-from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal, rodrigues
+from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal_columns, rodrigues
 from mrhubo.fast.plain.networks import ACTIVATIONS, Activation, mlp
 from mrhubo.fast.sections import BEND, LIMB, SHARE, Capsules, Reading
 
@@ -120,7 +120,7 @@ def reconstruction_error(description: Description, local_BT33: np.ndarray) -> np
     off_BF = (six_BT6 - [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]).reshape(len(six_BT6), -1).astype(np.float32)
     raw_BF = reconstruct(description, off_BF, ACTIVATIONS[description.settings.activation])
     columns_BT32 = raw_BF.astype(np.float64).reshape(*six_BT6.shape[:2], 2, 3).swapaxes(-1, -2)
-    again_BT32 = orthonormal(columns_BT32)[..., :2]
+    again_BT32 = orthonormal_columns(columns_BT32)[..., :2]
     return ((again_BT32 - local_BT33[..., :2]) ** 2).mean(axis=(-2, -1))
 
 
@@ -153,20 +153,22 @@ def shake(target_TD3: np.ndarray, frame_rate: float, constants: Mapping[str, flo
     return np.sqrt(windows_TDW.mean(axis=-1))
 
 
-def collides(capsules: Capsules, rotation_BL33: np.ndarray, position_BL3: np.ndarray) -> np.ndarray:
+def collides(capsules: Capsules, rotation_L33B: np.ndarray, position_L3B: np.ndarray) -> np.ndarray:
     """Whether any pair of capsules overlaps (B,)."""
-    touches_B = np.zeros(len(position_BL3), bool)
+    touches_B = np.zeros(position_L3B.shape[-1], bool)
     if not len(capsules.pair_Y2):
         return touches_B
-    turned_BS33 = rotation_BL33[:, capsules.body_S]
-    ends_BS23 = capsules.end_S23 @ turned_BS33.swapaxes(-1, -2) + position_BL3[:, capsules.body_S, None]
+    ends_S23B = np.einsum("sijb,sej->seib", rotation_L33B[capsules.body_S], capsules.end_S23)
+    ends_S23B += position_L3B[capsules.body_S, None]
     i_Y, j_Y = capsules.pair_Y2.T
     reach_S = norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0]) / 2 + capsules.radius_S
-    centre_BS3 = ends_BS23.mean(axis=2)
+    centre_S3B = ends_S23B.mean(axis=1)
     # The spheres around the capsules tell cheaply which pairs need a closer look.
-    row_X, pair_X = np.nonzero(norm(centre_BS3[:, i_Y] - centre_BS3[:, j_Y]) < reach_S[i_Y] + reach_S[j_Y])
+    apart_Y3B = centre_S3B[i_Y] - centre_S3B[j_Y]
+    near_YB = np.einsum("yib,yib->yb", apart_Y3B, apart_Y3B) < ((reach_S[i_Y] + reach_S[j_Y]) ** 2)[:, None]
+    pair_X, row_X = np.nonzero(near_YB)
     i_X, j_X = i_Y[pair_X], j_Y[pair_X]
-    apart_X = segment_distance(ends_BS23[row_X, i_X], ends_BS23[row_X, j_X])
+    apart_X = segment_distance(ends_S23B[i_X, :, :, row_X], ends_S23B[j_X, :, :, row_X])
     touches_B[row_X[apart_X < capsules.radius_S[i_X] + capsules.radius_S[j_X]]] = True
     return touches_B
 
