@@ -82,7 +82,7 @@ def _answerer(package: str | None, robot: str | None):  # noqa: ANN202 (importin
     from mrhubo.retargeting import of_package, of_reference
 
     if package is not None:
-        return of_package(mrhubo.load(package))
+        return of_package(package)
     return of_reference(mrhubo.Robot.from_config(str(robot)))
 
 
