@@ -79,7 +79,9 @@ class FastRetargeter:
             settings.robot, settings.facts["made_by"], settings.facts["checksum"], others=others, **limits
         )
 
-    def __call__(self, motion: Any, polish: int = POLISH, frame_rate: float | None = None) -> RobotMotion:
+    def __call__(
+        self, motion: Any, polish: int = POLISH, frame_rate: float | None = None, avoid_collisions: bool = True
+    ) -> RobotMotion:
         """Joint angles of human poses, each on its own, with their confidence.
 
         Args:
@@ -88,6 +90,7 @@ class FastRetargeter:
             polish: steps of optimisation after the networks at most; 0: none.
             frame_rate: frames per second of an array that is one motion (the last leading axis is the time): confidence
                 then knows how much it shakes. A `Motion` has its own.
+            avoid_collisions: frames in which the robot would touch itself give way, if there are steps at all.
 
         Raises:
             UserError: the array has another shape, or holds what is no rotation (says in which frame); `polish` is
@@ -97,17 +100,18 @@ class FastRetargeter:
         poses, target_TD3 = self._read(motion, frame_rate)
         q_TN = self.engine.network(poses.local_TJ33, target_TD3)
         shake_TX = self._shake(target_TD3, poses.shape, poses.frame_rate)
-        found = self.engine.answer(q_TN, target_TD3, polish, shake_TX)
+        found = self.engine.answer(q_TN, target_TD3, polish, avoid_collisions, shake_TX)
         return self.told(found, poses.shape, poses.frame_rate, poses.name)
 
-    def predict(self, motion: Any, polish: int = 0) -> np.ndarray:
+    def predict(self, motion: Any, polish: int = 0, avoid_collisions: bool = True) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
         _check(polish)
         poses, target_TD3 = self._read(motion)
-        q_TN = self.engine.polish(self.engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
+        network_TN = self.engine.network(poses.local_TJ33, target_TD3)
+        q_TN = self.engine.polish(network_TN, target_TD3, polish, avoid_collisions)
         return q_TN.reshape(*poses.shape, q_TN.shape[1])
 
-    def imitate(self, directions: Any, polish: int = POLISH) -> RobotMotion:
+    def imitate(self, directions: Any, polish: int = POLISH, avoid_collisions: bool = True) -> RobotMotion:
         """The answer to directions (..., D, 3) in place of poses: unit vectors in human axes (x left, y up, z forward)
         of the part that each is seen from, in the order of `description.settings.direction_names`; the length of a bend
         axis is how much it counts, 0 to 1.
@@ -131,7 +135,7 @@ class FastRetargeter:
         target_TD3 = np.ascontiguousarray(target_XD3.reshape(math.prod(shape), *target_XD3.shape[-2:]))
         nobody_TJ33 = np.zeros((len(target_TD3), 21, 3, 3), np.float32)
         q_TN = self.engine.network(nobody_TJ33, target_TD3)
-        return self.told(self.engine.answer(q_TN, target_TD3, polish, None), shape, None, "")
+        return self.told(self.engine.answer(q_TN, target_TD3, polish, avoid_collisions, None), shape, None, "")
 
     def directions(self, motion: Any) -> np.ndarray:
         """Directions (..., D, 3) of human poses, as `imitate` takes them."""

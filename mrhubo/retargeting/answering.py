@@ -35,21 +35,21 @@ class Answerer:
         return tuple(name for name in self.body_map.measured_names if name in limbs)
 
 
-def of_package(retargeter: Retargeter) -> Answerer:
+def of_package(retargeter: Retargeter, avoid_collisions: bool = True) -> Answerer:
     """A package's networks and their steps of optimisation, each motion as a whole."""
     return Answerer(
         f"{retargeter.origin}: robot '{retargeter.body_map.robot.name}', {len(retargeter.joint_names)} joints",
-        lambda motion: retargeter(motion).robot_motion,
+        lambda motion: retargeter(motion, avoid_collisions=avoid_collisions).robot_motion,
         retargeter.body_map,
     )
 
 
-def of_reference(robot: Robot) -> Answerer:
+def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     """The optimiser, which needs no training and takes longer."""
     reference = OptimizationRetargeter(robot)
     return Answerer(
         f"no package: the reference retargeter answers, by optimisation and without any training; robot '{robot.name}',"
         f" {len(robot.joint_names)} joints",
-        lambda motion: reference(motion).robot_motion,
+        lambda motion: reference(motion, avoid_collisions=avoid_collisions).robot_motion,
         reference.body_map,
     )
