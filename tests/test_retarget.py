@@ -100,6 +100,16 @@ def test_a_bad_file_among_several_is_told_at_the_end(
         main([*given, "--motion", str(bad)])
 
 
+def test_the_robot_gives_way_unless_told_otherwise(root: Path, tmp_path: Path) -> None:
+    motion = str(root / "data" / "motions" / "crossing_arms.npz")
+    given = ["--robot", "nao", "--motion", motion, "--from", "2", "--to", "3", "--out-rate", "12"]
+    assert main([*given, "--out", str(tmp_path / "free.npz")]) == 0
+    assert main([*given, "--no-avoid-collisions", "--out", str(tmp_path / "shown.npz")]) == 0
+    free, shown = (read_robot_motion(tmp_path / f"{name}.npz") for name in ("free", "shown"))
+    assert free.collision is not None and shown.collision is not None
+    assert shown.collision.sum() > free.collision.sum() == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

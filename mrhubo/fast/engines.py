@@ -17,9 +17,11 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.fast.description import Description
 from mrhubo.fast.kept import note_kept, numba_is_there
-from mrhubo.fast.plain import human, judging, networks, robot, steps
+from mrhubo.fast.plain import collision, human, judging, networks, robot, steps
+from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.plain.steps import Model
 from mrhubo.fast.poses import NOT_FINITE
+from mrhubo.fast.together.avoiding import GivingWay, make_giving_way
 from mrhubo.fast.together.banded import Banded, Solve, halve
 from mrhubo.fast.together.problem import Problem, make_problem
 
@@ -71,8 +73,14 @@ class Engine(Protocol):
         """Joint angles (B, N) [rad] of the networks, float32."""
         ...
 
-    def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int) -> np.ndarray:
-        """Joint angles (B, N) [rad] after steps of optimisation, float32."""
+    def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool) -> np.ndarray:
+        """Joint angles (B, N) [rad] after steps of optimisation, float32; `avoid`: if there are any, then after steps
+        away from self-collision.
+        """
+        ...
+
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+        """Joint angles (B, N) [rad] after steps away from self-collision, float64."""
         ...
 
     def follow(
@@ -86,8 +94,17 @@ class Engine(Protocol):
         """What frames cost, for whole motions."""
         ...
 
-    def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
-        """After steps of optimisation, with all that is told of them; shaking of branches in degrees, where known."""
+    @property
+    def giving_way(self) -> GivingWay:
+        """What makes frames of whole motions give way that touch."""
+        ...
+
+    def answer(
+        self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None
+    ) -> Answers:
+        """After steps as `polish` makes them, with all that is told of them; shaking of branches in degrees, where
+        known.
+        """
         ...
 
 
@@ -96,6 +113,7 @@ class NumpyEngine:
 
     def __init__(self, description: Description) -> None:
         self.description = description
+        self._avoidance = Avoidance(description)
 
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """As `Engine.wrong`."""
@@ -116,11 +134,16 @@ class NumpyEngine:
         """As `Engine.network`."""
         return networks.joint_angles(self.description, networks.features_of(self.description, local_BJ33, target_BD3))
 
-    def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int) -> np.ndarray:
+    def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool) -> np.ndarray:
         """As `Engine.polish`."""
         if not polish or not len(q_BN):
             return q_BN
-        return steps.polish(self.description, q_BN.astype(np.float64), target_BD3, polish).astype(np.float32)
+        found_BN = steps.polish(self.description, q_BN.astype(np.float64), target_BD3, polish)
+        return (self._avoidance(found_BN, target_BD3) if avoid else found_BN).astype(np.float32)
+
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+        """As `Engine.avoid`."""
+        return self._avoidance(q_BN, target_BD3)
 
     def follow(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
@@ -133,17 +156,24 @@ class NumpyEngine:
         """As `Engine.problem`."""
         return make_problem(self.description, steps.quadratic, halve)
 
-    def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
+    @cached_property
+    def giving_way(self) -> GivingWay:
+        """As `Engine.giving_way`."""
+        return make_giving_way(self._avoidance, halve, self.avoid)
+
+    def answer(
+        self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None
+    ) -> Answers:
         """As `Engine.answer`."""
         d, found = self.description, Answers.empty(self.description, len(q_BN))
         for rows in steps.chunks(len(q_BN), _CHUNK):
             target, trust = target_BD3[rows], d.trust
-            found.q_BN[rows] = self.polish(q_BN[rows], target, polish)
+            found.q_BN[rows] = self.polish(q_BN[rows], target, polish, avoid)
             placed = robot.place(d.kinematics, found.q_BN[rows].astype(np.float64))
             own_BD3 = np.moveaxis(robot.seen(d.human.seen_D, placed.view_V33B, placed.direction_D3B), -1, 0)
             angle_BD = np.degrees(judging.angle_between(own_BD3, target))
             found.error_BM[rows] = angle_BD[:, trust.measured]
-            found.collision_B[rows] = judging.collides(d.capsules, placed.rotation_L33B, placed.position_L3B)
+            found.collision_B[rows] = collision.collides(d.capsules, placed.rotation_BL33, placed.position_BL3)
             if not len(trust.column_XD):
                 continue
             local_BT33 = judging.read_pose(d.reading, d.settings.constants, target)
@@ -208,14 +238,21 @@ class CompiledEngine:
             found_BN[rows] = networks.joint_angles(self.description, features_BF, self._layers.gelu)
         return found_BN
 
-    def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int) -> np.ndarray:
+    def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool) -> np.ndarray:
         """As `Engine.polish`."""
         found = Answers.empty(self.description, 0)
         q_BN = q_BN.copy()
         if polish:
             self._shared(
-                len(q_BN), lambda rows: self._retarget(self._steps, polish, rows, q_BN, target_BD3, None, None, found)
+                len(q_BN),
+                lambda rows: self._retarget(self._steps, (polish, avoid), rows, q_BN, target_BD3, None, None, found),
             )
+        return q_BN
+
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+        """As `Engine.avoid`."""
+        q_BN = q_BN.copy()
+        self._shared(len(q_BN), lambda rows: self._kernels.avoid(self._tables, target_BD3[rows], q_BN[rows]))
         return q_BN
 
     def follow(
@@ -260,13 +297,20 @@ class CompiledEngine:
 
         return make_problem(self.description, quadratic, factor)
 
-    def answer(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, shake_BX: np.ndarray | None) -> Answers:
+    @cached_property
+    def giving_way(self) -> GivingWay:
+        """As `Engine.giving_way`."""
+        return make_giving_way(Avoidance(self.description), self.problem.factor, self.avoid)
+
+    def answer(
+        self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None
+    ) -> Answers:
         """As `Engine.answer`."""
         d, frames = self.description, len(q_BN)
         found = Answers.empty(d, frames)
         found.q_BN[:] = q_BN
         if frames <= _FEW:
-            self._retarget(self._all, polish, slice(0, frames), found.q_BN, target_BD3, None, shake_BX, found)
+            self._retarget(self._all, (polish, avoid), slice(0, frames), found.q_BN, target_BD3, None, shake_BX, found)
             return found
         for chunk in steps.chunks(frames, _CHUNK):
             part = Answers(*(getattr(found, name)[chunk] for name in Answers.__dataclass_fields__))
@@ -277,7 +321,7 @@ class CompiledEngine:
                     shaken: np.ndarray | None = shaken) -> None:  # fmt: skip
                 self._shared(
                     len(target),
-                    lambda rows: self._retarget(what, polish, rows, part.q_BN, target, six_BF, shaken, part),
+                    lambda rows: self._retarget(what, (polish, avoid), rows, part.q_BN, target, six_BF, shaken, part),
                 )
 
             run(self._steps, six_BF)
@@ -288,15 +332,15 @@ class CompiledEngine:
         return found
 
     def _retarget(
-        self, what: int, polish: int, rows: slice, q_BN: np.ndarray, target_BD3: np.ndarray, six_BF: np.ndarray | None,
-        shake_BX: np.ndarray | None, into: Answers,
+        self, what: int, steps: tuple[int, bool], rows: slice, q_BN: np.ndarray, target_BD3: np.ndarray,
+        six_BF: np.ndarray | None, shake_BX: np.ndarray | None, into: Answers,
     ) -> None:  # fmt: skip
         six, shaken = (
             none if given is None else given[rows]
             for none, given in zip(self._nothing, (six_BF, shake_BX), strict=True)
         )
         self._kernels.retarget(
-            self._tables, self._activation, polish, what, target_BD3[rows], q_BN[rows], six, shaken,
+            self._tables, self._activation, *steps, what, target_BD3[rows], q_BN[rows], six, shaken,
             into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],
         )  # fmt: skip
 

@@ -81,7 +81,12 @@ class FastRetargeter:
         )
 
     def __call__(
-        self, motion: Any, polish: int = POLISH, frame_rate: float | None = None, together: bool | None = None
+        self,
+        motion: Any,
+        polish: int = POLISH,
+        frame_rate: float | None = None,
+        together: bool | None = None,
+        avoid_collisions: bool = True,
     ) -> RobotMotion:
         """Joint angles of human poses, with their confidence.
 
@@ -93,6 +98,7 @@ class FastRetargeter:
                 knows how much they shake. A `Motion` has its own.
             together: all frames of a motion become one smooth motion, in which no joint turns faster than it can
                 (`mrhubo.retargeter.clip`), and not each frame on its own; None: where the frame rate is known.
+            avoid_collisions: frames in which the robot would touch itself give way, if there are steps at all.
 
         Raises:
             UserError: the array has another shape, or holds what is no rotation (says in which frame); `polish` is
@@ -104,19 +110,22 @@ class FastRetargeter:
         if together and rate is None:
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
         q_TN = self.engine.network(poses.local_TJ33, target_TD3)
+        avoid = bool(polish) and avoid_collisions
         if rate is not None and together is not False:
-            q_TN, polish = self._join(self.engine.polish(q_TN, target_TD3, polish), target_TD3, poses.shape, rate), 0
-        found = self.engine.answer(q_TN, target_TD3, polish, self._shake(target_TD3, poses.shape, rate))
+            q_TN = self.engine.polish(q_TN, target_TD3, polish, False)
+            q_TN, polish = self._join(q_TN, target_TD3, poses.shape, rate, avoid), 0
+        found = self.engine.answer(q_TN, target_TD3, polish, avoid, self._shake(target_TD3, poses.shape, rate))
         return self.told(found, poses.shape, rate, poses.name, poses.source)
 
-    def predict(self, motion: Any, polish: int = 0) -> np.ndarray:
+    def predict(self, motion: Any, polish: int = 0, avoid_collisions: bool = True) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
         _check(polish)
         poses, target_TD3 = self._read(motion)
-        q_TN = self.engine.polish(self.engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
+        network_TN = self.engine.network(poses.local_TJ33, target_TD3)
+        q_TN = self.engine.polish(network_TN, target_TD3, polish, avoid_collisions)
         return q_TN.reshape(*poses.shape, q_TN.shape[1])
 
-    def imitate(self, directions: Any, polish: int = POLISH) -> RobotMotion:
+    def imitate(self, directions: Any, polish: int = POLISH, avoid_collisions: bool = True) -> RobotMotion:
         """The answer to directions (..., D, 3) in place of poses: unit vectors in human axes (x left, y up, z forward)
         of the part that each is seen from, in the order of `description.settings.direction_names`; the length of a bend
         axis is how much it counts, 0 to 1.
@@ -140,7 +149,7 @@ class FastRetargeter:
         target_TD3 = np.ascontiguousarray(target_XD3.reshape(math.prod(shape), *target_XD3.shape[-2:]))
         nobody_TJ33 = np.zeros((len(target_TD3), 21, 3, 3), np.float32)
         q_TN = self.engine.network(nobody_TJ33, target_TD3)
-        return self.told(self.engine.answer(q_TN, target_TD3, polish, None), shape, None)
+        return self.told(self.engine.answer(q_TN, target_TD3, polish, avoid_collisions, None), shape, None)
 
     def directions(self, motion: Any) -> np.ndarray:
         """Directions (..., D, 3) of human poses, as `imitate` takes them."""

@@ -33,7 +33,7 @@ from mrhubo.reference import at_limit_share
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.robot import Robot
 from mrhubo.runtime.progress import Reporter
-from mrhubo.streaming import Stream
+from mrhubo.streaming import Stream, StreamSettings
 
 _STILL_RAD, _MOVING_RAD = 1e-5, 0.1
 """Range of the joints' angles over all test clips that counts as none, and as one that should be there."""
@@ -56,12 +56,18 @@ class Way:
 
 
 _FRAMES, _REFERENCE = "frame by frame", "reference"
+_ASKED = StreamSettings(avoid_collisions=False)
 _WAYS: Mapping[str, Way] = {
     "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
-    _FRAMES: Way("retarget", lambda r, motions: [r.predict(m.local_TJ33, POLISH) for m in motions]),
-    "whole clips": Way("clip", lambda r, motions: [r.predict(m.local_TJ33, POLISH, m.frame_rate) for m in motions]),
-    "stream": Way("stream", lambda r, motions: [result.q for result in Stream(r).retarget_all(motions)]),
+    _FRAMES: Way("retarget", lambda r, motions: [_polished(r, m, None) for m in motions]),
+    "whole clips": Way("clip", lambda r, motions: [_polished(r, m, m.frame_rate) for m in motions]),
+    "stream": Way("stream", lambda r, motions: [found.q for found in Stream(r, settings=_ASKED).retarget_all(motions)]),
 }
+"""None avoids self-collision, as the reference, which they are measured against, does not."""
+
+
+def _polished(retargeter: Retargeter, motion: Motion, frame_rate: float | None) -> Tensor:
+    return retargeter.predict(motion.local_TJ33, POLISH, frame_rate, avoid_collisions=False)
 
 
 @dataclass(frozen=True)
@@ -112,17 +118,20 @@ class Measured:
 
 def measure(prepared: Prepared, report: Reporter, retargeter: Retargeter, clips: Sequence[Clip]) -> Measured:
     """Answers and scores in every way, and how long a frame takes."""
-    predictions: list[Tensor] = []
-    ways: dict[str, Sequence[Evaluation]] = {}
     sets = {"": clips, _SUFFIX: reshare_clips(clips)}
-    with report.step("evaluation", 2 * len(_WAYS) * len(clips), "clips") as progress:
-        for suffix, asked in sets.items():
-            for name, way in _WAYS.items():
-                progress.update(len(ways) * len(clips), name + suffix)
-                found = way.answer(retargeter, [clip.motion for clip in asked])
-                predictions = predictions or found
-                ways[name + suffix] = _score(prepared, found, asked)
-        progress.update(2 * len(_WAYS) * len(clips))
+    asked = [clip for chosen in sets.values() for clip in chosen]
+    found: dict[str, list[Tensor]] = {}
+    with report.step("evaluation", len(_WAYS) * len(asked), "clips") as progress:
+        for name, way in _WAYS.items():
+            progress.update(len(found) * len(asked), name)
+            # All at once: a stream takes as long for many people as for one.
+            found[name] = way.answer(retargeter, [clip.motion for clip in asked])
+        progress.update(len(_WAYS) * len(asked))
+    ways: dict[str, Sequence[Evaluation]] = {}
+    for i, (suffix, chosen) in enumerate(sets.items()):
+        part = slice(i * len(clips), (i + 1) * len(clips))
+        ways |= {name + suffix: _score(prepared, answers[part], chosen) for name, answers in found.items()}
+    predictions = next(iter(found.values()))[: len(clips)]
     ways[_REFERENCE] = _score(prepared, [clip.reference_TN for clip in clips], clips)
     polished = functools.partial(retargeter.predict, polish=POLISH)
     return Measured(predictions, ways, latencies(retargeter.predict, clips), latencies(polished, clips))
@@ -191,7 +200,7 @@ def measure_package(
         )
     clips = make_references(prepared, report)[0 if validation else 1]
     if polish is not None:
-        predict = functools.partial(retargeter.predict, polish=polish)
+        predict = functools.partial(retargeter.predict, polish=polish, avoid_collisions=False)
         with report.step("evaluation", len(clips), "clips"):
             found = _score(prepared, [predict(clip.motion.local_TJ33) for clip in clips], clips)
         lines, latency = [table(found)], latencies(predict, clips)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.refine import refine
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed, nearest_slow
@@ -41,6 +42,8 @@ class MotionTask:
     sweeps: int = 100
     tolerance: float = 3e-4
     """How long a motion is refined, as for `refine`."""
+    avoidance: Avoidance | None = None
+    """What makes frames give way that touch; None: nothing does."""
 
     def at(self, part: slice) -> MotionTask:
         """The same for some frames alone."""
@@ -88,7 +91,10 @@ def _smooth_window(
         if bool(((other_TN - path_TN).abs() > _JUMP).any()):
             other_TN, other_cost_C = polish(other_TN)
             motion_TN = torch.where((other_cost_C < cost_C)[problem.blocks.block_N], other_TN, motion_TN)
-    return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    if task.avoidance is None:
+        return motion_TN
+    return task.avoidance.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
 
 def _settled(candidates_TSN: Tensor, cost_TSC: Tensor, before_LN: Tensor) -> tuple[Tensor, Tensor]:

@@ -19,7 +19,7 @@ import math
 import torch
 from torch import Tensor
 
-from mrhubo.reference import DirectionProblem
+from mrhubo.reference import Avoidance, DirectionProblem
 from mrhubo.reference.speed import speed_bound
 from mrhubo.reference.terms import Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, smooth_motion
@@ -37,7 +37,13 @@ _SWEEPS, _TOLERANCE = 20, 2e-3
 
 
 @torch.no_grad()
-def join_frames(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> Tensor:
+def join_frames(
+    problem: DirectionProblem,
+    q_TN: Tensor,
+    target_TD3: Tensor,
+    frame_rate: float,
+    avoidance: Avoidance | None = None,
+) -> Tensor:
     """One motion (T, N) [rad] near answers that were found frame by frame (T, N), inside the limits of joints and of
     their speeds.
 
@@ -46,12 +52,13 @@ def join_frames(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
         q_TN: the answers.
         target_TD3: the human's directions.
         frame_rate: frames per second.
+        avoidance: what makes frames give way in which the robot touches itself; None: nothing does.
     """
     if len(q_TN) < 2:
-        return q_TN
+        return q_TN if avoidance is None else avoidance(q_TN, target_TD3)
     smoothness = Smoothness(pull_at(_SMOOTHNESS, frame_rate), jerk_weights(problem, target_TD3, frame_rate))
     bound = speed_bound(problem.robot.velocity_N, frame_rate)
-    task = MotionTask(target_TD3, smoothness, *bound, _SWEEPS, _TOLERANCE)
+    task = MotionTask(target_TD3, smoothness, *bound, _SWEEPS, _TOLERANCE, avoidance)
     return smooth_motion(problem, q_TN[:, None], problem.cost(q_TN, target_TD3)[:, None], task)
 
 

@@ -41,11 +41,12 @@ class Answerer:
         return RobotMotion(home_N[None], self.joint_names, robot=self.facts)
 
 
-def of_package(source: str | os.PathLike[str]) -> Answerer:
+def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) -> Answerer:
     """A package's networks and their steps of optimisation, each motion as a whole.
 
     Args:
         source: as for `mrhubo.load`.
+        avoid_collisions: as for `Retargeter.predict`.
 
     Raises:
         UserError: there is no such package, or it is damaged.
@@ -55,22 +56,22 @@ def of_package(source: str | os.PathLike[str]) -> Answerer:
     folder = mrhubo.package_folder(source)
     described = Description.read(folder) if (folder / FILE).is_file() else None
     if described is not None and described.settings.own_rest:
-        return _of_description(folder, described)
+        return _of_description(folder, described, avoid_collisions)
     retargeter = mrhubo.load(folder)
     return Answerer(
         _describe(folder, retargeter.body_map.robot.name, retargeter.joint_names),
-        lambda motion: retargeter(motion).robot_motion,
+        lambda motion: retargeter(motion, avoid_collisions=avoid_collisions).robot_motion,
         retargeter.joint_names,
         retargeter.facts,
         _limb_names(retargeter.body_map),
     )
 
 
-def _of_description(folder: Path, description: Description) -> Answerer:
+def _of_description(folder: Path, description: Description, avoid_collisions: bool) -> Answerer:
     """A package without PyTorch."""
     from mrhubo.retargeting.forms import Forms
 
-    forms, names = Forms(description), description.settings.direction_names
+    forms, names = Forms(description, avoid_collisions), description.settings.direction_names
     measured = [d for d in description.trust.measured if description.kinematics.limb_D[d]]
     return Answerer(
         _describe(folder, description.settings.robot, forms.fast.joint_names),
@@ -81,7 +82,7 @@ def _of_description(folder: Path, description: Description) -> Answerer:
     )
 
 
-def of_reference(robot: Robot) -> Answerer:
+def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     """The optimiser, which needs no training and takes longer."""
     from mrhubo.reference import OptimizationRetargeter
     from mrhubo.robot import robot_facts
@@ -90,7 +91,7 @@ def of_reference(robot: Robot) -> Answerer:
     return Answerer(
         f"no package: the reference retargeter answers, by optimisation and without any training; robot '{robot.name}',"
         f" {len(robot.joint_names)} joints",
-        lambda motion: reference(motion).robot_motion,
+        lambda motion: reference(motion, avoid_collisions=avoid_collisions).robot_motion,
         robot.joint_names,
         robot_facts(robot, "", ""),
         _limb_names(reference.body_map),

@@ -22,8 +22,8 @@ class Forms:
     numba is there, compiled. So both together take at most twice as long as the quicker one alone would.
     """
 
-    def __init__(self, description: Description) -> None:
-        self.fast = FastRetargeter(description, "numpy")
+    def __init__(self, description: Description, avoid_collisions: bool = True) -> None:
+        self.fast, self._avoid = FastRetargeter(description, "numpy"), avoid_collisions
         self._left = float("inf")
         """Time [s] that NumPy may still take."""
         if numba_is_there():
@@ -34,4 +34,4 @@ class Forms:
         self._left -= _NUMPY_S * len(motion)
         if self._left < 0:
             self.fast, self._left = FastRetargeter(self.fast.description, "compiled"), float("inf")
-        return self.fast(motion)
+        return self.fast(motion, avoid_collisions=self._avoid)

@@ -19,7 +19,7 @@ class Stub:
     def __init__(self, description: object, form: str) -> None:
         self.description, self.form = description, form
 
-    def __call__(self, motion: Motion) -> str:
+    def __call__(self, motion: Motion, avoid_collisions: bool) -> str:
         return self.form
 
 

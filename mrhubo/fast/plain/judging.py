@@ -1,9 +1,8 @@
-"""What is told beside joint angles: what the robot reads of a pose, its plausibility, touching, and confidence.
+"""What is told beside joint angles: what the robot reads of a pose, its plausibility, and confidence.
 
-Sources: `mrhubo.robot.plausibility`, `mrhubo.robot.alignment`, `mrhubo.body.anatomy`, `mrhubo.robot.collision`,
-`mrhubo.retargeter.confidence`.
+Sources: `mrhubo.robot.plausibility`, `mrhubo.robot.alignment`, `mrhubo.body.anatomy`, `mrhubo.retargeter.confidence`.
 
-Legend: B frames, D directions, T turned human joints, X branches, S capsules, Y pairs of them, L bodies.
+Legend: B frames, D directions, T turned human joints, X branches.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ import numpy as np
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal_columns, rodrigues
 from mrhubo.fast.plain.networks import ACTIVATIONS, Activation, mlp
-from mrhubo.fast.sections import BEND, LIMB, SHARE, Capsules, Reading
+from mrhubo.fast.sections import BEND, LIMB, SHARE, Reading
 
-SHORT, PARALLEL = 1e-9, 1e-7
+SHORT = 1e-9
 _TINY = 1e-12
 
 
@@ -151,41 +150,6 @@ def shake(target_TD3: np.ndarray, frame_rate: float, constants: Mapping[str, flo
     padded_XD = np.pad(beyond_YD**2, ((near + 1, near + 1), (0, 0)), mode="edge")
     windows_TDW = np.lib.stride_tricks.sliding_window_view(padded_XD, 2 * near + 1, axis=0)
     return np.sqrt(windows_TDW.mean(axis=-1))
-
-
-def collides(capsules: Capsules, rotation_L33B: np.ndarray, position_L3B: np.ndarray) -> np.ndarray:
-    """Whether any pair of capsules overlaps (B,)."""
-    touches_B = np.zeros(position_L3B.shape[-1], bool)
-    if not len(capsules.pair_Y2):
-        return touches_B
-    ends_S23B = np.einsum("sijb,sej->seib", rotation_L33B[capsules.body_S], capsules.end_S23)
-    ends_S23B += position_L3B[capsules.body_S, None]
-    i_Y, j_Y = capsules.pair_Y2.T
-    reach_S = norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0]) / 2 + capsules.radius_S
-    centre_S3B = ends_S23B.mean(axis=1)
-    # The spheres around the capsules tell cheaply which pairs need a closer look.
-    apart_Y3B = centre_S3B[i_Y] - centre_S3B[j_Y]
-    near_YB = np.einsum("yib,yib->yb", apart_Y3B, apart_Y3B) < ((reach_S[i_Y] + reach_S[j_Y]) ** 2)[:, None]
-    pair_X, row_X = np.nonzero(near_YB)
-    i_X, j_X = i_Y[pair_X], j_Y[pair_X]
-    apart_X = segment_distance(ends_S23B[i_X, :, :, row_X], ends_S23B[j_X, :, :, row_X])
-    touches_B[row_X[apart_X < capsules.radius_S[i_X] + capsules.radius_S[j_X]]] = True
-    return touches_B
-
-
-def segment_distance(a_X23: np.ndarray, b_X23: np.ndarray) -> np.ndarray:
-    """Distances (X,) of segments [m]: C. Ericson, Real-Time Collision Detection (2005), section 5.1.9."""
-    start_a, start_b = a_X23[:, 0], b_X23[:, 0]
-    along_a, along_b, r = a_X23[:, 1] - start_a, b_X23[:, 1] - start_b, start_a - start_b
-    a, e, b = (along_a * along_a).sum(-1), (along_b * along_b).sum(-1), (along_a * along_b).sum(-1)
-    c, f = (along_a * r).sum(-1), (along_b * r).sum(-1)
-    safe_a, safe_e = np.maximum(a, SHORT), np.maximum(e, SHORT)
-    determinant = a * e - b * b
-    s = np.where(determinant > PARALLEL * a * e, (b * f - c * e) / np.maximum(determinant, SHORT * SHORT), 0.0)
-    t = np.clip((b * np.clip(s, 0, 1) + f) / safe_e, 0, 1)
-    s = np.clip((b * t - c) / safe_a, 0, 1)
-    t = np.clip((b * s + f) / safe_e, 0, 1)
-    return norm(r + s[:, None] * along_a - t[:, None] * along_b)
 
 
 def confidence(

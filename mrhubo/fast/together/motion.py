@@ -6,11 +6,12 @@ Legend: T frames, L that are settled, S candidates per frame, D directions, N jo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrhubo.fast.description import Description
+from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.problem import Problem
 from mrhubo.fast.together.refine import refine
 from mrhubo.fast.together.smoothness import SMOOTHNESS, Smoothness, jerk_weights, pull_at
@@ -27,15 +28,28 @@ BRIDGE_STEPS, BRIDGE_TOLERANCE = 12, 1e-2
 
 
 def join_frames(
-    description: Description, problem: Problem, q_TN: np.ndarray, target_TD3: np.ndarray, frame_rate: float
+    description: Description,
+    problem: Problem,
+    giving_way: GivingWay | None,
+    q_TN: np.ndarray,
+    target_TD3: np.ndarray,
+    frame_rate: float,
 ) -> np.ndarray:
     """One motion (T, N) [rad] near answers that were found frame by frame (T, N), inside the limits of joints and of
-    their speeds, for directions (T, D, 3) at so many frames per second.
+    their speeds.
+
+    Args:
+        description: the robot's.
+        problem: what frames cost.
+        giving_way: what makes frames give way in which the robot touches itself; None: nothing does.
+        q_TN: the answers.
+        target_TD3: the human's directions.
+        frame_rate: frames per second.
     """
     if len(q_TN) < 2:
-        return q_TN
+        return q_TN if giving_way is None else giving_way.alone(q_TN, target_TD3)
     smoothness = Smoothness(pull_at(SMOOTHNESS, frame_rate), jerk_weights(description, target_TD3, frame_rate))
-    task = Task(target_TD3, smoothness, *speed_bound(problem.cost.velocity_N, frame_rate))
+    task = Task(target_TD3, smoothness, *speed_bound(problem.cost.velocity_N, frame_rate), giving_way)
     return smooth_motion(problem, q_TN, task)
 
 
@@ -50,11 +64,12 @@ class Task:
     """The longest step of a joint from one frame to the next [rad]."""
     around: int
     """Frames this near to those that were too fast may change."""
+    giving_way: GivingWay | None = None
 
     def at(self, part: slice) -> Task:
         """The same for some frames alone."""
         frame_X = np.arange(len(self.target_TD3))[part]
-        return Task(self.target_TD3[part], self.smoothness.at(frame_X), self.step_N, self.around)
+        return replace(self, target_TD3=self.target_TD3[part], smoothness=self.smoothness.at(frame_X))
 
 
 def smooth_motion(problem: Problem, q_TN: np.ndarray, task: Task) -> np.ndarray:
@@ -84,7 +99,10 @@ def _smooth_window(problem: Problem, q_TN: np.ndarray, task: Task, before_LN: np
     if other_TN is not None:
         other_TN, other_cost_C = polish(other_TN)
         motion_TN = np.where((other_cost_C < cost_C)[problem.cost.block_N], other_TN, motion_TN)
-    return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    if task.giving_way is None:
+        return motion_TN
+    return task.giving_way.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
 
 def _without_jumps(

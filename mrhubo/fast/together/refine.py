@@ -79,14 +79,14 @@ def refine_around(
     free_T: np.ndarray,
     sweeps: int,
     tolerance: float,
-    step_N: np.ndarray,
-    blocks_C: np.ndarray,
+    step_N: np.ndarray | None = None,
+    blocks_C: np.ndarray | None = None,
 ) -> np.ndarray:
-    """`refine` of some blocks (C,) for the frames in `free_T` (T,), with a bound; the others stay."""
+    """`refine` of some blocks (C,), or all, for the frames in `free_T` (T,), with a bound or none; the others stay."""
     used_X = np.flatnonzero(widen(free_T, smoothness.reach))
     if not len(used_X):
         return q_TN
-    bound = StepBound(step_N, np.diff(used_X) == 1)
+    bound = None if step_N is None else StepBound(step_N, np.diff(used_X) == 1)
     found_TN = q_TN.copy()
     found_TN[used_X] = refine(
         problem,
