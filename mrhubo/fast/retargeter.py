@@ -162,12 +162,14 @@ class FastRetargeter:
         refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
         return poses, self.engine.directions(poses.local_TJ33)
 
-    def _join(self, q_TN: np.ndarray, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float) -> np.ndarray:
+    def _join(
+        self, q_TN: np.ndarray, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float, avoid: bool
+    ) -> np.ndarray:
         """Answers (T, N) [rad] of motions, each made smooth, float32."""
-        problem, joined_TN = self.engine.problem, q_TN.copy()
+        joined_TN, ways = q_TN.copy(), (self.engine.problem, self.engine.giving_way if avoid else None)
         for rows in _clips(len(q_TN), shape):
             own_TN = q_TN[rows].astype(np.float64)
-            joined_TN[rows] = join_frames(self.description, problem, own_TN, target_TD3[rows], frame_rate)
+            joined_TN[rows] = join_frames(self.description, *ways, own_TN, target_TD3[rows], frame_rate)
         return joined_TN
 
     def _shake(self, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float | None) -> np.ndarray | None:
