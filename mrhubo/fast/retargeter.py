@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.fast.answers import Answers, Engine
 from mrhubo.fast.description import Description
-from mrhubo.fast.engines import FORMS, Answers, Engine, make_engine
+from mrhubo.fast.engines import FORMS, make_engine
 from mrhubo.fast.plain import judging
 from mrhubo.fast.poses import Poses, read_poses, refuse
 from mrhubo.fast.together.motion import join_frames

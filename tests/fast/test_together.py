@@ -14,7 +14,8 @@ from torch import Tensor
 
 from mrhubo.errors import UserError
 from mrhubo.fast import FastRetargeter
-from mrhubo.fast.engines import FORMS, Engine
+from mrhubo.fast.answers import Engine
+from mrhubo.fast.engines import FORMS
 from mrhubo.fast.together import motion as together
 from mrhubo.fast.together.banded import Banded, halve
 from mrhubo.motion import Motion, resample

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled import avoidance, collision, steps, tables
 from mrhubo.fast.compiled import robot as robots
-from mrhubo.fast.compiled import steps, tables
 from mrhubo.fast.kept import checksum
 
 
@@ -22,6 +22,8 @@ class MotionKernels(NamedTuple):
     """Compiled functions."""
 
     quadratic: Callable[..., Any]
+    whole: Callable[..., Any]
+    close: Callable[..., Any]
     factor: Callable[..., Any]
     solve: Callable[..., Any]
 
@@ -46,6 +48,31 @@ def make_motion_kernels() -> MotionKernels:
                 gradient_BN[b, n] = work.next_gradient_N[n]
                 for m in range(n + 1):
                     hessian_BNN[b, n, m] = hessian_BNN[b, m, n] = work.next_hessian_NN[n, m]
+
+    @njit(cache=True, **tables.COMPILED)
+    def whole(t, q_BN, target_BD3, cost_BC, gradient_BN, hessian_BNN):
+        """The same with what contacts cost, all joints in one block."""
+        _ = version
+        work = robots.make_work(t)
+        joints = q_BN.shape[1]
+        for b in range(len(q_BN)):
+            steps.aim(t, work, target_BD3, b)
+            cost_BC[b, 0] = avoidance.whole_model(
+                t, work, q_BN[b], work.next_cost_C, work.next_gradient_N, work.next_hessian_NN
+            )
+            for n in range(joints):
+                gradient_BN[b, n] = work.next_gradient_N[n]
+                for m in range(n + 1):
+                    hessian_BNN[b, n, m] = hessian_BNN[b, m, n] = work.next_hessian_NN[n, m]
+
+    @njit(cache=True, **tables.COMPILED)
+    def close(t, q_BN, close_B):
+        """Which frames have a pair of capsules nearer than its clearance."""
+        _ = version
+        work = robots.make_work(t)
+        for b in range(len(q_BN)):
+            robots.place(t, work, q_BN[b])
+            close_B[b] = collision.touches(t, work, True)
 
     @njit(cache=True, **tables.COMPILED)
     def factor(within_TMM, diagonal_TM, coupling_KTM, lower_RW):
@@ -95,4 +122,4 @@ def make_motion_kernels() -> MotionKernels:
             for k in range(len(before_X)):
                 before_X[k] -= row_W[width - len(before_X) + k] * found
 
-    return MotionKernels(quadratic, factor, solve)
+    return MotionKernels(quadratic, whole, close, factor, solve)
