@@ -105,9 +105,9 @@ def test_short_motions(make: Callable[[str], Retargeter], motion: Motion, frames
 def test_windows(make: Callable[[str], Retargeter], motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
     nao = make("nao")
     fast, whole = FastRetargeter(nao.describe(), "numpy"), FastRetargeter(nao.describe(), "numpy")(motion).q
-    for module, names in ((trajectory, ("_WINDOW", "_AHEAD")), (together, ("WINDOW", "AHEAD"))):
-        for name, value in zip(names, (40, 15), strict=True):
-            monkeypatch.setattr(module, name, value)
+    for module in (trajectory, together):
+        monkeypatch.setattr(module, "WINDOW", 40)
+        monkeypatch.setattr(module, "AHEAD", 15)
     found = fast(motion).q
     assert np.abs(found - wanted(nao, fast, motion)).max() < SAME_RAD
     assert 0 < np.abs(found - whole).max() < 0.2

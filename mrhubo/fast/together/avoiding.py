@@ -19,6 +19,7 @@ from mrhubo.fast.together.smoothness import Smoothness
 from mrhubo.fast.together.speed import keep_speed
 
 SWEEPS, TOLERANCE = 20, 2e-3
+"""Of a motion's refinement: the tolerance of whole motions."""
 
 
 @dataclass(frozen=True)
