@@ -1,5 +1,6 @@
 """Optimisation-based human -> robot retargeting (the ground truth, and the peer to beat), and the metrics."""
 
+from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.metrics import (
     angle_between,
@@ -15,6 +16,7 @@ from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult, c
 from mrhubo.reference.solve import DirectionProblem
 
 __all__ = [
+    "Avoidance",
     "DirectionJacobian",
     "DirectionProblem",
     "OptimizationResult",

@@ -201,6 +201,14 @@ class SelfCollision(nn.Module):
         """The links (a, b) of each pair."""
         return tuple((self._links[i], self._links[j]) for i, j in self._pair_2P.T.tolist())
 
+    def clearance(self, most: float) -> Tensor:
+        """The distance [m] that each pair is to keep (P,): `most`, or what it has in the robot's home pose, if that is
+        less. So no pair is asked to be further apart than whoever made the robot has it at home, and shapes that
+        overlap there (a cover around the next link) are not fought.
+        """
+        home = self.near(self.robot.home()[None], most)
+        return self._reach_C.new_full((self._pair_2P.shape[1],), most).index_copy(0, home.pair_X, home.distance_X)
+
     def collides(self, q_BN: Tensor, poses: LinkPoses | None = None) -> Tensor:
         """Whether any pair overlaps (B,), at joint angles (B, N) [rad]; `poses` as for `near`."""
         found_B = torch.zeros(len(q_BN), dtype=torch.bool, device=q_BN.device)

@@ -113,6 +113,27 @@ def test_the_numbers_are_those_of_the_stream_in_pytorch(
     np.testing.assert_allclose(run("compiled", settings), wanted, atol=SAME_RAD, rtol=0)
 
 
+@pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
+def test_who_touches_gives_way_as_in_pytorch(
+    make: Callable[[str], Retargeter], make_fast: Callable[[str, str], FastRetargeter], root: Path, name: str
+) -> None:
+    """Arms that cross in front of the chest, and a hand that is led through the other."""
+    motion = read_motion(root / "data" / "motions" / "crossing_arms.npz").local_TJ33[100:340:6]
+    retargeter = copy.deepcopy(make(name)).double()
+    with double():
+        exact = Stream(retargeter, rate=10)
+        wanted = np.stack([exact.joints(pose.double()).numpy() for pose in motion])
+    for form in FORMS:
+        stream = FastStream(make_fast(name, form), rate=10)
+        found = np.stack([stream.joints(pose.numpy()) for pose in motion])
+        np.testing.assert_allclose(found, wanted, atol=SAME_RAD, rtol=0)
+    stream = FastStream(make_fast(name, "numpy"), rate=10, settings=StreamSettings(avoid_collisions=False))
+    shown = np.stack([stream.joints(pose.numpy()) for pose in motion])
+    touching = make(name).collision.collides
+    before, after = (float(touching(torch.from_numpy(q)).float().sum()) for q in (shown, wanted))
+    assert before > 4 * after and before >= 2
+
+
 @FORM
 def test_what_is_told_of_an_answer(
     make: Callable[[str], Retargeter], make_fast: Callable[[str, str], FastRetargeter], seen: Tensor, form: str
