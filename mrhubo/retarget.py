@@ -85,7 +85,7 @@ def _answerer(package: str | None, robot: str | None, avoid_collisions: bool):  
     from mrhubo.retargeting import of_package, of_reference
 
     if package is not None:
-        return of_package(mrhubo.load(package), avoid_collisions)
+        return of_package(package, avoid_collisions)
     return of_reference(mrhubo.Robot.from_config(str(robot)), avoid_collisions)
 
 

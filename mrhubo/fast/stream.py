@@ -17,7 +17,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, one_euro, room
-from mrhubo.fast.poses import check_frame_rate, read_poses, refuse
+from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.fast.stream_settings import StreamSettings
@@ -88,7 +88,7 @@ class FastStream:
         found = self._engine.answer(self._joints.q_N[None], target_1D3, 0, False, None)
         if not seen:
             found.trust_BX[:] = 0.0
-        return self.retargeter.told(found, (), None, "")
+        return self.retargeter.told(found, (), None)
 
     def joints(self, pose: Any, time: float | None = None) -> np.ndarray:
         """The joint angles (N,) [rad] of `__call__` alone, in less time."""
@@ -152,7 +152,7 @@ class FastStream:
         if pose is None:
             return self._seen_1J33, False
         own_rest = self.retargeter.description.settings.own_rest
-        if hasattr(pose, "local_TJ33"):
+        if is_motion(pose):
             poses = read_poses(pose, None, own_rest)
             raise UserError(
                 f"stream: expected a pose, found a motion of {poses.shape[0]} frames; give its frames one by one"

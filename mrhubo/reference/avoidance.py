@@ -18,14 +18,12 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.fast.plain.avoidance import CLEARANCE, STEPS, WEIGHT
+from mrhubo.fast.together.avoiding import SWEEPS, TOLERANCE
 from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed
 from mrhubo.reference.terms import SelfCollisionTerm, Smoothness
 from mrhubo.robot import BodyMap
-
-_SWEEPS, _TOLERANCE = 20, 2e-3
-"""Of a motion's refinement, as in `collision_free`, and to the tolerance of whole motions."""
 
 
 class Avoidance(nn.Module):
@@ -83,5 +81,5 @@ class Avoidance(nn.Module):
             return q_TN
         free_T = widen(close_T, around) & ~fixed_T
         found_TN = torch.where(close_T[:, None], self(q_TN, target_TD3), q_TN)
-        found_TN = refine_around(self.problem, found_TN, target_TD3, smoothness, free_T, _SWEEPS, _TOLERANCE)
+        found_TN = refine_around(self.problem, found_TN, target_TD3, smoothness, free_T, SWEEPS, TOLERANCE)
         return keep_speed(self.problem, found_TN, target_TD3, smoothness, step_N, around, fixed_T)

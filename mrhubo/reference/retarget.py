@@ -18,8 +18,9 @@ from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import MotionLike, check_frame_rate, read_poses, to_tensor
+from mrhubo.motion.poses import MotionLike, read_poses, to_tensor
 from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error

@@ -25,7 +25,7 @@ from mrhubo.errors import UserError
 from mrhubo.fast.description import FILE, Description
 from mrhubo.files.storage import write_tensors
 from mrhubo.motion import Motion, MotionLike, read_poses
-from mrhubo.motion.poses import check_frame_rate
+from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import Avoidance, DirectionProblem, Polish
 from mrhubo.retargeter.clip import join_frames
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, branches_of, shake

@@ -11,17 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import xxhash
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast import plain, sections
 from mrhubo.fast.compiled import avoidance, collision, judging, networks, steps, tables
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import robot as robots
+from mrhubo.fast.kept import checksum
 
 
 class Kernels(NamedTuple):
@@ -40,22 +38,12 @@ STEPS, ALL, WITHOUT_PRIOR = range(3)
 """What `retarget` does: steps alone; steps and judging; judging alone, with the prior's answer given."""
 
 
-def _checksum() -> str:
-    """Of all that is compiled."""
-    digest = xxhash.xxh3_64()
-    folders = (Path(__file__).parent, Path(str(plain.__file__)).parent)
-    sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
-    for path in (*sources, Path(sections.__file__)):  # whose kinds of steps are constants of what is compiled
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 @cache
 def make_kernels() -> Kernels:
     """The functions, the same for all retargeters; each is compiled when it is first called, which takes some seconds,
     or read from the cache.
     """
-    version = _checksum()
+    version = checksum()
 
     @njit(cache=True, **tables.EXACT)
     def wrong(local_BJ33, skew):

@@ -46,22 +46,28 @@ def near(
     capsules: Capsules, rotation_BL33: np.ndarray, position_BL3: np.ndarray, margin_Y: np.ndarray | float = 0.0
 ) -> Near:
     """The pairs that are closer than a margin [m], which each may have of its own."""
-    turned_BS33 = rotation_BL33[:, capsules.body_S]
-    ends_BS23 = capsules.end_S23 @ turned_BS33.swapaxes(-1, -2) + position_BL3[:, capsules.body_S, None]
+    rotation_S33B = np.moveaxis(rotation_BL33, 0, -1)[capsules.body_S]
+    ends_S23B = np.einsum("sijb,sej->seib", rotation_S33B, capsules.end_S23)
+    ends_S23B += np.moveaxis(position_BL3, 0, -1)[capsules.body_S, None]
     i_Y, j_Y = capsules.pair_Y2.T
-    reach_S, centre_BS3 = reaches(capsules), ends_BS23.mean(axis=2)
+    reach_S, centre_S3B = reaches(capsules), ends_S23B.mean(axis=1)
     # The spheres around the capsules tell cheaply which pairs need a closer look.
     reach_Y = reach_S[i_Y] + reach_S[j_Y] + np.maximum(margin_Y, 0.0)
     size = max(1, _AT_ONCE // max(1, len(i_Y)))
-    blocks = [centre_BS3[first : first + size] for first in range(0, max(1, len(centre_BS3)), size)]
-    found = [np.nonzero(norm(block[:, i_Y] - block[:, j_Y]) < reach_Y) for block in blocks]
-    row_X = np.concatenate([row + number * size for number, (row, _) in enumerate(found)])
-    pair_X = np.concatenate([pair for _, pair in found])
+    blocks = [centre_S3B[..., first : first + size] for first in range(0, max(1, centre_S3B.shape[-1]), size)]
+    found = [np.nonzero(_squared(block[i_Y] - block[j_Y]) < (reach_Y**2)[:, None]) for block in blocks]
+    row_X = np.concatenate([row + number * size for number, (_, row) in enumerate(found)])
+    pair_X = np.concatenate([pair for pair, _ in found])
     i_X, j_X = i_Y[pair_X], j_Y[pair_X]
-    point_X3, apart_X3 = closest(ends_BS23[row_X, i_X], ends_BS23[row_X, j_X])
+    point_X3, apart_X3 = closest(ends_S23B[i_X, :, :, row_X], ends_S23B[j_X, :, :, row_X])
     distance_X = norm(apart_X3) - capsules.radius_S[i_X] - capsules.radius_S[j_X]
     x = np.flatnonzero(distance_X < np.broadcast_to(margin_Y, len(i_Y))[pair_X])
     return Near(row_X[x], pair_X[x], distance_X[x], point_X3[x], apart_X3[x])
+
+
+def _squared(vector_Y3B: np.ndarray) -> np.ndarray:
+    """Squared lengths (Y, B)."""
+    return np.einsum("yib,yib->yb", vector_Y3B, vector_Y3B)
 
 
 def closest(a_X23: np.ndarray, b_X23: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrhubo.fast.description import Description
-from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal, rodrigues
+from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal_columns, rodrigues
 from mrhubo.fast.plain.networks import ACTIVATIONS, Activation, mlp
 from mrhubo.fast.sections import BEND, LIMB, SHARE, Reading
 
@@ -119,7 +119,7 @@ def reconstruction_error(description: Description, local_BT33: np.ndarray) -> np
     off_BF = (six_BT6 - [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]).reshape(len(six_BT6), -1).astype(np.float32)
     raw_BF = reconstruct(description, off_BF, ACTIVATIONS[description.settings.activation])
     columns_BT32 = raw_BF.astype(np.float64).reshape(*six_BT6.shape[:2], 2, 3).swapaxes(-1, -2)
-    again_BT32 = orthonormal(columns_BT32)[..., :2]
+    again_BT32 = orthonormal_columns(columns_BT32)[..., :2]
     return ((again_BT32 - local_BT33[..., :2]) ** 2).mean(axis=(-2, -1))
 
 

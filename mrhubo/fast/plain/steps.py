@@ -28,8 +28,8 @@ FOLLOWED = 2
 
 
 def chunks(frames: int, most: int) -> list[slice]:
-    """Frames in pieces of so many at most, one at least."""
-    return [slice(start, start + most) for start in range(0, max(frames, 1), most)]
+    """Frames in pieces of so many at most."""
+    return [slice(start, start + most) for start in range(0, frames, most)]
 
 
 @dataclass
@@ -56,8 +56,11 @@ class Model:
 
 def quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
     """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
+    if len(q_BN) <= _CHUNK:
+        return _quadratic(description, q_BN, target_BD3)
     parts = [_quadratic(description, q_BN[rows], target_BD3[rows]) for rows in chunks(len(q_BN), _CHUNK)]
-    return parts[0] if len(parts) == 1 else Model(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+    together = zip(*((part.cost_BC, part.gradient_BN, part.hessian_BNN) for part in parts), strict=True)
+    return Model(*map(np.concatenate, together))
 
 
 def _quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
