@@ -72,7 +72,7 @@ class NumpyEngine:
     @cached_property
     def giving_way(self) -> GivingWay:
         """As `Engine.giving_way`."""
-        return make_giving_way(self._avoidance, halve, self.avoid)
+        return make_giving_way(self.avoid, halve, self.avoid)
 
     def answer(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None
