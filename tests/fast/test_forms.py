@@ -67,6 +67,7 @@ def test_steps_are_those_of_the_optimiser(
 def test_steps_away_from_self_collision_are_those_of_pytorch(
     fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
 ) -> None:
+    assert retargeter.avoidance.collision is retargeter.collision  # its shapes are read in float32
     exact = copy.deepcopy(retargeter).double()
     target = exact.body_map.human_directions(poses.double())
     start = exact.polisher(torch.from_numpy(fast.predict(array)).double(), target, 10)

@@ -80,6 +80,12 @@ def irregular(seen: Tensor) -> Frames:
     return frames
 
 
+def in_double(retargeter: Retargeter) -> Retargeter:
+    """The same in float64; collision shapes are read in float32 before."""
+    assert retargeter.avoidance.collision is retargeter.collision
+    return copy.deepcopy(retargeter).double()
+
+
 @contextmanager
 def double() -> Iterator[None]:
     """PyTorch works in float64."""
@@ -98,7 +104,7 @@ def test_the_numbers_are_those_of_the_stream_in_pytorch(
     name: str, frames: Callable[[Tensor], Frames],
 ) -> None:  # fmt: skip
     given, settings = frames(seen), StreamSettings(worse_time=0.05)
-    retargeter = copy.deepcopy(make(name)).double()
+    retargeter = in_double(make(name))
     with double():
         exact = Stream(retargeter, settings=settings)
         wanted = [exact.joints(None if pose is None else pose.double(), time).numpy() for pose, time in given]
@@ -119,7 +125,7 @@ def test_who_touches_gives_way_as_in_pytorch(
 ) -> None:
     """Arms that cross in front of the chest, and a hand that is led through the other."""
     motion = read_motion(root / "data" / "motions" / "crossing_arms.npz").local_TJ33[100:340:6]
-    retargeter = copy.deepcopy(make(name)).double()
+    retargeter = in_double(make(name))
     with double():
         exact = Stream(retargeter, rate=10)
         wanted = np.stack([exact.joints(pose.double()).numpy() for pose in motion])
