@@ -18,7 +18,7 @@ from mrhubo.config.help import field_docs
 from mrhubo.config.kinds import keys_of
 from mrhubo.config.loading import load_config
 from mrhubo.config.places import places_named, where, with_places
-from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
+from mrhubo.config.plain import changed_settings, fingerprint, flow_yaml, to_plain, to_yaml, without_paths
 from mrhubo.config.prior import SHIPPED_PRIOR, PriorConfig
 from mrhubo.config.schema import (
     BaselineConfig,
@@ -72,6 +72,7 @@ __all__ = [
     "field_docs",
     "find_config",
     "fingerprint",
+    "flow_yaml",
     "keys_of",
     "load_config",
     "number",
