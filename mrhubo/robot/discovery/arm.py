@@ -27,6 +27,8 @@ _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 its length."""
 _WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
+_SHORT = 4
+"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 _ON = 1e-4
@@ -126,15 +128,13 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
 def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
     """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
     whole = chain
-    # What is driven with others is a gripper wherever it is; it must not be taken for a part of the forearm.
-    while len(chain) > 2 and _driven(chain[-1]):
-        chain = chain[:-1]
+    chain = without_gripper(chain)
     end, why = len(chain), "others mimic it, or it slides: a gripper"
     elbow_at = find_elbow(bodies, chain)
     first = 2 if elbow_at is None else elbow_at + 1
     for i in range(first, len(chain)):
         step = chain[i]
-        if _driven(step):
+        if _driven(step) and (i >= _SHORT or not step.hinge.free):
             end = i
         elif i - first >= _WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
@@ -144,6 +144,15 @@ def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str,
             continue
         break
     return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def without_gripper(chain: Chain) -> Chain:
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie, and
+    no part of a forearm.
+    """
+    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
+        chain = chain[:-1]
+    return chain
 
 
 def _driven(step: Step) -> bool:
@@ -231,7 +240,8 @@ def _wrist(
     end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper)
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
-        if float(np.linalg.norm(origin_3 - elbow.point_3)) > _OUT * upper:
+        outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
+        if outward > _OUT * upper:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at

@@ -100,12 +100,12 @@ def _up(
         ankles_3 = np.mean([leg.ankle.point_3 for leg in legs], axis=0)
         cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", shoulders_3 - hips_3, 2.0)]
     else:
-        root_3 = np.zeros(3)
-        if np.linalg.norm(shoulders_3 - root_3) > 0.3 * arms[0].length:
-            cues.append(("the base", shoulders_3 - root_3, 1.5))
+        below_3 = _rest(bodies, roles) - shoulders_3
+        cues.append(("what carries the arms", -below_3, 1.5 * min(1.0, float(np.linalg.norm(below_3)) / (0.3 * arms[0].length))))
         cues.append(("the file's z", np.array([0.0, 0.0, 1.0]), 1.0))
         middle_3 = np.mean([reach_middle(arm.chain[arm.clavicles :], arm.wrist.point_3) for arm in arms], axis=0)
-        cues.append(("how the arms move", (shoulders_3 - middle_3) / arms[0].length, 0.7))
+        hangs_3 = (shoulders_3 - middle_3) / arms[0].length
+        cues.append(("how the arms move", hangs_3, 0.7 * min(1.0, 3 * float(np.linalg.norm(hangs_3)))))
     if roles.neck:
         top_3 = np.mean([bodies.position(link) for link in bodies.links_of[roles.neck[-1].end]], axis=0)
         cues.append(("the head", top_3 - shoulders_3, 0.7))
@@ -123,6 +123,16 @@ def _up(
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]
     return unit(best - normal_3 * (normal_3 @ best)), float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+
+
+def _rest(bodies: Bodies, roles: Roles) -> np.ndarray:
+    """The middle (3,) of what is neither arm nor neck: of what lies beyond the chest, else of the chest itself."""
+    limbs: set[int] = set()
+    for step in (*(chain[0] for chain in roles.arms.chains), *roles.neck[:1]):
+        limbs |= bodies.beyond(step)[0]
+    rest = [body for body in range(len(bodies.links_of)) if body not in limbs and body != roles.chest]
+    points = [bodies.corners(body).mean(0) for body in rest] or [bodies.corners(roles.chest).mean(0)]
+    return np.mean(points, axis=0)
 
 
 def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tuple[np.ndarray, float]]:
