@@ -27,6 +27,8 @@ _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 its length."""
 _WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
+_BESIDE = 0.025
+"""How far a jaw's axis passes the hand's line, as a share of the arm."""
 _SHORT = 4
 """Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
@@ -143,7 +145,26 @@ def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str,
         else:
             continue
         break
+    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
+        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
     return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def _is_jaw(chain: Chain, elbow_at: int) -> bool:
+    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line on which the wrist's axes lie, or
+    parallel to one that swings the wrist already.
+    """
+    lines = lines_of(chain)
+    found = measure(lines)
+    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
+    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
+    if sine(along_3, last.axis_3) < 0.7:
+        return False
+    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
+    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
+        return True
+    twists = [line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
+    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
 
 
 def without_gripper(chain: Chain) -> Chain:
