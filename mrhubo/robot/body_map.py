@@ -21,6 +21,7 @@ from mrhubo.robot.entries import check_names
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.told_joints import tell_of_waist, waist_joints
 from mrhubo.robot.urdf import describe
 
 
@@ -68,12 +69,17 @@ class BodyMap(nn.Module):
         skeleton: Skeleton | None = None,
         manual: ManualScale | None = None,
     ) -> BodyMap:
-        """A body map that has been checked; arguments as for the class.
+        """A body map that has been checked, without joints that carry all that is seen and so are told by nothing: they
+        are held. Arguments as for the class.
 
         Raises:
             UserError: the map cannot be right (`mrhubo.robot.checks`); names what is wrong.
         """
         body_map = cls(robot, keypoints, skeleton, manual)
+        waist = waist_joints(body_map)
+        if waist and len(waist) < len(robot.joint_names):
+            tell_of_waist(body_map, waist)
+            body_map = cls(robot.without(waist), body_map.keypoints, body_map.skeleton, manual)
         check_body_map(body_map)
         return body_map
 

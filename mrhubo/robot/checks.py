@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING
 import torch
 
 from mrhubo.errors import UserError
-from mrhubo.robot.entries import End
+from mrhubo.robot.ancestry import Ancestry
 from mrhubo.robot.keypoints import Limb
 from mrhubo.robot.model import Robot
 from mrhubo.robot.placement import check_placement, warn
+from mrhubo.robot.shoulders import check_starts
+from mrhubo.robot.suggestions import quoted
+from mrhubo.robot.told_joints import name_unlisted, refuse_untold
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
@@ -54,7 +57,9 @@ def check_body_map(body_map: BodyMap) -> None:
     _check_tree(body_map, limbs, lengths)
     _check_lengths(limbs, lengths)
     check_placement(body_map, q_BN)
-    _check_moved(body_map)
+    refuse_untold(body_map)
+    name_unlisted(body_map)
+    check_starts(body_map)
 
 
 def check_key_links(robot: Robot, key_links: Sequence[str]) -> None:
@@ -67,7 +72,7 @@ def check_key_links(robot: Robot, key_links: Sequence[str]) -> None:
     moved_BK3 = position_BL3[:, [robot.link_index(link) for link in key_links]]
     if float((moved_BK3 - moved_BK3[:1]).abs().max()) < _NO_LENGTH:
         raise UserError(
-            f"robot.key_links: none of robot.joints moves {_quoted(key_links)}, so their error would always be 0; name "
+            f"robot.key_links: none of robot.joints moves {quoted(key_links)}, so their error would always be 0; name "
             "links of the arms"
         )
 
@@ -92,35 +97,9 @@ def _check_shared(body_map: BodyMap) -> None:
         warn(f"robot.keypoints.{other}: is the link '{end.link}', as is '{name}', against which it never turns")
 
 
-class _Tree:
-    """Who is above whom in the robot's tree."""
-
-    def __init__(self, robot: Robot) -> None:
-        self._description, self._driven = robot.description, set(robot.driven_joints)
-
-    def turning(self, link: str) -> dict[str, None]:
-        """The joints that turn a link as q says, nearest first."""
-        above = self._description.joints_above(link)
-        return {joint.name: None for joint in above if joint.name in self._driven}
-
-    def turns_apart(self, inner: str, outer: str) -> str | None:
-        """A joint that turns the inner link and not the outer one."""
-        outside = self.turning(outer)
-        return next((joint for joint in self.turning(inner) if joint not in outside), None)
-
-    def is_above(self, link: str, other: str) -> bool:
-        """Whether a link is another one, or above it."""
-        return link == other or any(joint.parent == link for joint in self._description.joints_above(other))
-
-    def is_inward(self, limb: Limb, view: End) -> bool:
-        """Whether the tree runs through a limb towards the body: its root is a foot, or a hand."""
-        inner, outer = limb.start.link, limb.end.link
-        return inner != outer and self.is_above(outer, inner) and self.turns_apart(inner, view.link) is None
-
-
 def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]]) -> None:
     """Refuses a part that does not move with what carries it, and a limb that does not run outwards."""
-    tree, ends, by_part = _Tree(body_map.robot), body_map.keypoints.ends, {limb.part.name: limb for limb in limbs}
+    tree, ends, by_part = Ancestry(body_map.robot), body_map.keypoints.ends, {limb.part.name: limb for limb in limbs}
     inward = {x.part.name for x in limbs if x.part.seen_from and tree.is_inward(x, ends[x.part.seen_from])}
     for part in (part for part in body_map.keypoints.parts if part.name in by_part or part.name in ends):
         limb, carrier = by_part.get(part.name), part.hangs_on
@@ -145,7 +124,7 @@ def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tup
         _check_limb(tree, limb, lengths[limb.part.name])
 
 
-def _check_limb(tree: _Tree, limb: Limb, length: tuple[float, float]) -> None:
+def _check_limb(tree: Ancestry, limb: Limb, length: tuple[float, float]) -> None:
     inner, outer = limb.start.link, limb.end.link
     if tree.is_above(inner, outer):
         return
@@ -193,25 +172,6 @@ def _check_lengths(limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]
                 )
 
 
-def _check_moved(body_map: BodyMap) -> None:
-    """Refuses a joint that turns no direction: no human pose could tell its angle."""
-    robot, shared = body_map.robot, body_map.shared
-    q_BN = robot.sample(16, torch.Generator().manual_seed(0))
-    before = body_map.robot_directions(robot.forward(q_BN))
-    for column, joint in enumerate(robot.joint_names):
-        moved = q_BN.clone()
-        moved[:, column] = (robot.lower_N + robot.upper_N)[column] - q_BN[:, column]  # mirrored in its range
-        change = (body_map.robot_directions(robot.forward(moved)) - before).abs().max()
-        if float(change) < 1e-4:
-            seen_from = ", ".join(
-                f"the {name} '{link}'" for name, link in zip(shared.views, shared.view_links, strict=True)
-            )
-            raise UserError(
-                f"robot.joints: '{joint}' turns no limb, hand or head of robot.keypoints relative to {seen_from}, "
-                "so no human pose could tell its angle; leave it out or name what it moves"
-            )
-
-
 def _words(limb: Limb) -> str:
     return limb.part.name.replace("_", " ")
 
@@ -219,7 +179,3 @@ def _words(limb: Limb) -> str:
 def _centimetres(length: tuple[float, float]) -> str:
     shortest, longest = (f"{100 * metres:.3g}" for metres in length)
     return f"{shortest} cm" if shortest == longest else f"{shortest} .. {longest} cm"
-
-
-def _quoted(names: Sequence[str]) -> str:
-    return ", ".join(f"'{name}'" for name in names)

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from mrhubo.body.skeleton import KEYPOINT_NAMES
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.robot.keypoints import Axis, Limb
+from mrhubo.robot.side_names import named_side
+from mrhubo.robot.suggestions import exchanged, view_entry
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
@@ -59,6 +60,7 @@ class _Starts:
 
     def __init__(self, body_map: BodyMap, name: str, limbs: list[Limb], q_BN: Tensor) -> None:
         self.name, self.limbs, self.end = name, limbs, body_map.keypoints.ends[name]
+        self._body_map = body_map
         poses = body_map.robot.forward(q_BN)
         shared = body_map.shared
         view = shared.view_robot(poses)
@@ -71,7 +73,7 @@ class _Starts:
         self.local_E3 = ((view.start_BE3[:, rows] - origin_B3[:, None]) @ axes_B33).mean(0)
         """From the link's origin; both in human axes of the part."""
         part = next(part for part in body_map.keypoints.parts if part.name == name)
-        rest = dict(zip(KEYPOINT_NAMES, body_map.skeleton.rest_K3, strict=True))
+        rest = body_map.skeleton.rest_points
         self.human_E3 = torch.stack([rest[limb.part.start] - rest[part.joint] for limb in limbs])
         self.length = float((view.end_BE3 - view.start_BE3)[:, rows].norm(dim=-1).mean())
 
@@ -98,7 +100,7 @@ class _Starts:
         line = f"the line from '{other.part.start}' to '{one.part.start}'"
         sentence = (
             f"robot.keypoints.{self.name}: {line} points {off:.0f} degrees away from a human's, seen from "
-            f"'{self.end.link}'; are left and right exchanged? {self._advice()}"
+            f"'{self.end.link}'; {self._remedies(one, other)}"
         )
         if off > _WRONG_LINE:
             raise UserError(sentence)
@@ -114,11 +116,20 @@ class _Starts:
                 f"degrees from where they lie on a human, seen from '{self.end.link}'; {self._advice()}"
             )
 
+    def _remedies(self, one: Limb, other: Limb) -> str:
+        """What to write, the likelier first: names tell whether the sides or the frame are wrong."""
+        left, right = (one, other) if self.human_E3[self.limbs.index(one), 0] > 0 else (other, one)
+        written = end_entry(self.name, self.end, oriented_words)
+        entry, keypoints = view_entry(self._body_map, self.name), self._body_map.keypoints
+        remedies = [f"left and right are exchanged: write {exchanged(keypoints)}"]
+        named = [named_side((limb.start.link, limb.end.link)) for limb in (left, right)]
+        if entry is not None:
+            remedies.insert(int(named[0] < named[1]), f"the {self.name} does not look forward: write {entry}")
+        return "; or ".join(remedies)
+
     def _advice(self) -> str:
-        return (
-            f"A {self.name}'s frame has x forward and z up; where it has not, write {{link: {self.end.link}, forward: "
-            "[x, y, z], up: [x, y, z]}"
-        )
+        entry = view_entry(self._body_map, self.name)
+        return f"is the {self.name}'s frame right? " + (f"write {entry}" if entry else "its axes are forward and up")
 
 
 def _check_axes(body_map: BodyMap, q_BN: Tensor) -> None:
@@ -126,7 +137,7 @@ def _check_axes(body_map: BodyMap, q_BN: Tensor) -> None:
     robot = body_map.robot
     random_BD3, home_BD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_BN, robot.home()[None]))
     column = {name: i for i, name in enumerate(body_map.direction_names)}
-    rest = dict(zip(KEYPOINT_NAMES, body_map.skeleton.rest_K3, strict=True))
+    rest = body_map.skeleton.rest_points
     limbs = {direction.part.name: direction for direction in body_map.directions if isinstance(direction, Limb)}
     for axis in (direction for direction in body_map.directions if isinstance(direction, Axis)):
         rest_3, carrier = torch.tensor(axis.rest), limbs.get(axis.part.hangs_on or "")
