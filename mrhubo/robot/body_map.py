@@ -6,6 +6,7 @@ Legend: B batch, D directions, K keypoints, N robot joints.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 
 from torch import Tensor, nn
 
@@ -23,6 +24,7 @@ from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot
 from mrhubo.robot.told_joints import tell_of_waist, waist_joints
 from mrhubo.robot.urdf import describe
+from mrhubo.robot.yardstick import Yardstick
 
 
 class BodyMap(nn.Module):
@@ -119,6 +121,11 @@ class BodyMap(nn.Module):
         if self._collision is None:
             self._collision = SelfCollision(self.robot)
         return self._collision
+
+    @cached_property
+    def yardstick(self) -> Yardstick:
+        """What the robot's own axes tell of its body; looked for when first asked for."""
+        return Yardstick(self.robot)
 
     def robot_directions(self, poses: LinkPoses) -> Tensor:
         """Unit directions (B, D, 3) of the robot, in human axes of the parts from which they are seen."""

@@ -18,10 +18,10 @@ import torch
 
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.robot.ancestry import Ancestry
-from mrhubo.robot.axis_lines import StandingRobot
 from mrhubo.robot.joint import Joint
 from mrhubo.robot.keypoints import Keypoints, Limb
-from mrhubo.robot.suggestions import view_entry, quoted
+from mrhubo.robot.standing import StandingRobot
+from mrhubo.robot.suggestions import quoted
 from mrhubo.robot.urdf import Description
 
 if TYPE_CHECKING:
@@ -62,7 +62,9 @@ def waist_joints(body_map: BodyMap) -> list[str]:
 
 def tell_of_waist(body_map: BodyMap, joints: Sequence[str]) -> None:
     """Says that joints are held from now on."""
-    views = " and ".join(f"the {n} '{x}'" for n, x in zip(body_map.shared.views, body_map.shared.view_links, strict=True))
+    views = " and ".join(
+        f"the {n} '{x}'" for n, x in zip(body_map.shared.views, body_map.shared.view_links, strict=True)
+    )
     _warn(
         f"robot.joints: {quoted(joints)} carry {views} and all that is seen from there, so no human pose tells their "
         "angles: they are held at 0; leave them out, or choose where they stand: "
@@ -97,7 +99,7 @@ def refuse_untold(body_map: BodyMap) -> None:
             raise UserError(
                 f"robot.keypoints.{name}: '{ends[name].link}' does not carry {parts}: {quoted(between)} between them "
                 f"would turn them all alike, and spin; name the link that carries them, and leave the joints out: "
-                f"write {view_entry(body_map, name) or 'another link'}"
+                f"write {body_map.yardstick.entry(name) or f'{name}: {tree.carrier_of(links)}'}"
             )
 
 
@@ -115,8 +117,8 @@ def name_unlisted(body_map: BodyMap) -> None:
         names = [joint.name for joint in missing]
         angles = ", ".join(f"{name}: {robot.held[name]:g}" for name in names)
         _warn(
-            f"robot.joints: {quoted(names)} would turn body parts of robot.keypoints, and are not listed, so they never "
-            f"move; list them, or say that this is meant: hold: {{{angles}}}"
+            f"robot.joints: {quoted(names)} would turn body parts of robot.keypoints, and are not listed, so they "
+            f"never move; list them, or say that this is meant: hold: {{{angles}}}"
         )
 
 

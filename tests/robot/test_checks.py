@@ -38,6 +38,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({f"{side}_hand": {"link": "l_hand", "fingers": [0, 0, -1], "thumb": [1, 0, 0]} for side in SIDES},
      r"right_hand: is the link 'l_hand', as is 'left_hand'; one link cannot stand for both"),
     ({"left_elbow": "l_shoulder"}, r"lies below|lie on one point"),
+    ({"left_wrist": on("l_lower", 0, 0, -220)},
+     r"left_wrist: lies 219 m from every link of a robot of 0.98 m; .* millimetres\? Write left_wrist: {link: l_lower, offset: \[0, 0, -0.22\]}"),
 ]  # fmt: skip
 
 
@@ -54,7 +56,6 @@ ODD: list[tuple[dict[str, Any], str]] = [
     ({"left_shoulder": "chest"}, r"left upper arm .* is \d+(\.\d)? .. \d+(\.\d)? cm long, as the joints stand"),
     ({"left_shoulder": "base"}, r"left upper arm .* as the joints stand"),
     ({"right_elbow": "r_hand", "right_wrist": None}, r"right upper arm .* as the joints stand"),
-    ({"left_wrist": on("l_lower", 0, 0, -220)}, r"left forearm .* is 220 m long; .* in millimetres"),
     ({"head": "chest"}, r"robot.keypoints.head: is the link 'chest', as is 'chest', against which it never turns"),
 ]  # fmt: skip
 
@@ -71,8 +72,8 @@ RIGHT: list[dict[str, Any]] = [
     {"left_shoulder": "l_shoulder", "left_elbow": "l_fore"},
     {"left_elbow": on("l_upper", 0, 0, -0.25), "left_wrist": on("l_lower", 0, 0, -0.22)},
     {"left_elbow": on("l_hand", 0, 0, 0.22), "left_wrist": on("l_lower", 0, 0, -0.22)},  # below in the tree, not on the arm
-    {"right_wrist": on("r_lower", 0, 0, -0.4)},
-    {"left_shoulder": on("l_upper", 0.03, 0, -0.02), "left_elbow": on("l_lower", 0, 0.01, 0)},
+    {"left_wrist": on("l_lower", 0, 0, -0.4), "right_wrist": on("r_lower", 0, 0, -0.4)},
+    {"left_shoulder": on("l_upper", 0.01, 0, -0.01), "left_elbow": on("l_lower", 0, 0.01, 0)},
     {"chest": "base"},
     {"head": "head"},
     {f"right_{point}": None for point in ("shoulder", "elbow", "wrist")},
