@@ -17,6 +17,7 @@ import torch
 
 from mrhubo.errors import InputWarning
 from mrhubo.robot.ancestry import Ancestry
+from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.capsules import SHORT
 from mrhubo.robot.entries import Point
 from mrhubo.robot.joint import Joint
@@ -50,7 +51,7 @@ def check_centres(body_map: BodyMap) -> None:
     for limb in (direction for direction in body_map.keypoints.directions if isinstance(direction, Limb)):
         view = body_map.keypoints.ends[limb.part.seen_from or ""]
         start, end = (body_map.yardstick.centre(name, limb.end.link) for name in (limb.part.start, limb.part.end))
-        if start is None or tree.is_inward(limb, view):
+        if start is None or tree.is_inward(limb, view) or _other_joint(body_map, poses[0], limb):
             continue
         if limb.part.hangs_on == limb.part.seen_from:
             below = [name for name in reversed(tree.movable(limb.end.link)) if name not in tree.movable(view.link)]
@@ -65,6 +66,21 @@ def check_centres(body_map: BodyMap) -> None:
         ):
             told.add(limb.part.end)
             _warn(sentence)
+
+
+def _other_joint(body_map: BodyMap, standing: StandingRobot, limb: Limb) -> bool:
+    """Whether another joint bends the limb, or what hangs on it, than the one that was found to: then the map and what
+    was found speak of different joints, and the one need not be measured by the other.
+    """
+    for bend in (direction for direction in body_map.directions if isinstance(direction, BendAxis)):
+        if limb.part.name not in bend.part.limbs:
+            continue
+        outer = next(x for x in body_map.directions if isinstance(x, Limb) and x.part.name == bend.part.bent)
+        centre = body_map.yardstick.centre(outer.part.start, bend.link)
+        hinge = standing.line(body_map.robot.description.parent_joint[bend.link])
+        if centre is not None and hinge.distance(standing.position(centre)) > _ELSEWHERE * _length(standing, outer):
+            return True
+    return False
 
 
 def _warn(sentence: str) -> None:

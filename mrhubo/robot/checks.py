@@ -144,8 +144,8 @@ def _check_limb(tree: Ancestry, limb: Limb, length: tuple[float, float], advice:
     if tree.is_above(outer, inner):
         if joint is not None or not any(limb.end.offset_3):
             raise UserError(
-                f"{place} lies below '{limb.part.end}' ('{outer}') in the robot's tree, and a limb runs outwards; are "
-                f"the two exchanged?{advice.replace(';', '', 1)}"
+                f"{place} lies below '{limb.part.end}' ('{outer}') in the robot's tree, and a limb runs outwards (are "
+                f"the two exchanged?){advice}"
             )
     elif joint is not None and length[1] > _STEADY * length[0]:
         raise UserError(
@@ -181,8 +181,8 @@ def _check_lengths(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, 
             if not _RATIO[0] <= longest / inner[1] <= _RATIO[1]:
                 warn(
                     f"robot.keypoints: the {_words(limb)} {between} is {_centimetres((shortest, longest))} long, and "
-                    f"what it hangs on {_centimetres(inner)}; are these points at the limbs' joints?"
-                    f"{advice.replace(';', '', 1)}"
+                    f"what it hangs on {_centimetres(inner)} (are these points at the limbs' joints?)"
+                    f"{advice}"
                 )
 
 

@@ -44,4 +44,5 @@ def check_offsets(body_map: BodyMap) -> None:
         smaller = Point(point.link, (x, y, z))
         if apart > _NOWHERE * size:
             raise UserError(f"{sentence}Were these millimetres? Write {point_entry(name, smaller)}")
-        warnings.warn(f"{sentence}Is this one right?", InputWarning, stacklevel=2)
+        advice = body_map.yardstick.advice(name, after=" ")
+        warnings.warn(f"{sentence}Is this one right?{advice}", InputWarning, stacklevel=2)

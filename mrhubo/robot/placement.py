@@ -57,8 +57,8 @@ def _check_facing(body_map: BodyMap, name: str) -> None:
     if turned is not None and turned > _ODD_MIDDLE:
         sides = f"; left and right then: {exchanged(body_map.keypoints)}" if turned > 180 - _ODD_MIDDLE else ""
         warn(
-            f"robot.keypoints.{name}: its forward and up are turned by {turned:.0f} degrees from where the robot faces, "
-            f"which is told by {yardstick.facing_cue}; write {yardstick.entry(name)}{sides}"
+            f"robot.keypoints.{name}: its forward and up are turned by {turned:.0f} degrees from where the robot "
+            f"faces, as {yardstick.facing_cue} tell; write {yardstick.entry(name)}{sides}"
         )
 
 
@@ -142,8 +142,8 @@ class _Starts:
         frame = f"the {self.name} does not look forward and up: {self._entry()}"
         exchange = f"left and right are exchanged: write {exchanged(self._body_map.keypoints)}"
         if turned is not None and turned <= _ODD_LINE < 180 - off:
-            starts = self._body_map.yardstick.advice(one.part.start, other.part.start)
-            return f"are these points where the limbs start?{starts.replace(';', '', 1)}"
+            starts = self._body_map.yardstick.advice(one.part.start, other.part.start, after=" ")
+            return f"are these points where the limbs start?{starts}"
         if turned is not None:
             return frame if turned > _ODD_LINE else exchange
         return f"{exchange}; or {frame}" if sides(zip(*ends, strict=True)) < 0 else f"{frame}; or {exchange}"

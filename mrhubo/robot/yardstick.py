@@ -52,8 +52,8 @@ class Yardstick:
         return "nothing" if self.found is None else self.found.forward.cue
 
     def centre(self, name: str, link: str) -> Point | None:
-        """The joint centre of a keypoint, on the side of the robot on which a link is, whatever that side is called in a
-        map; None where the axes do not tell it.
+        """The joint centre of a keypoint, on the side of the robot on which a link is, whatever a map calls that side;
+        None where the axes do not tell it.
         """
         found = None if self.found is None else self._on_side(self.found.geometric, name, link)
         return None if found is None else Point(found.link, found.offset_3)
@@ -69,10 +69,10 @@ class Yardstick:
         found = self.found.points.get(name) if link is None else self._on_side(self.found.points, name, link)
         return None if found is None else point_entry(name, Point(found.link, found.offset_3))
 
-    def advice(self, *names: str) -> str:
+    def advice(self, *names: str, after: str = "; ") -> str:
         """``; the robot's axes tell: left_elbow: l_lower, left_wrist: l_hand``, to end a sentence; or nothing."""
         entries = [entry for name in names if (entry := self.entry(name)) is not None]
-        return f"; the robot's axes tell: {', '.join(entries)}" if entries else ""
+        return f"{after}the robot's axes tell: {', '.join(entries)}" if entries else ""
 
     def _on_side(self, points: Mapping[str, FoundPoint], name: str, link: str) -> FoundPoint | None:
         both = next((pair for pair in PAIRED_KEYPOINTS.values() if name in pair), (name,))
