@@ -18,7 +18,7 @@ PARALLEL = 0.09
 """Sine under which two axes count as parallel: 5 degrees."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Line:
     """A point (3,) and a unit direction (3,)."""
 
