@@ -281,7 +281,7 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
     if onward:
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
-            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.5
+            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
     named = [link for link in inside if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual]
     if named:
         nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
@@ -291,10 +291,10 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         out_3 = unit(corners.mean(0) - start_3)
         reach = float(((corners - start_3) @ out_3).max())
         if reach > _OUT * usual:
-            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.5
+            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.45
     far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
     if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
-        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.5
+        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.45
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
         return start_3 + 2 * (centre_3 - start_3), "twice as far as the centre of mass, as no joint tells the wrist", 0.4

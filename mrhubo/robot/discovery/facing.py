@@ -19,6 +19,10 @@ from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
 from mrhubo.robot.discovery.roles import Roles
 
+_BELOW = 0.2
+"""How far below the shoulders a head may be, as a share of the arm: some robots carry their arms high."""
+_UNSURE = 0.3
+"""Up less sure than that tells nothing of necks."""
 _SAME = 0.9986
 """Cosine of 3 degrees: directions that mean the same one."""
 
@@ -47,6 +51,19 @@ class Heading:
     """Whether the second chain of each pair is the left one."""
     contradicted: tuple[str, ...]
     """What speaks against it."""
+
+
+def choose_neck(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Roles:
+    """The roles with the likeliest neck that begins above the shoulders or ends there, or with none."""
+    if not roles.necks:
+        return roles
+    heading = find_heading(bodies, roles.with_neck(()), arms, legs)
+    shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms])) - _BELOW * arms[0].length
+    for neck in roles.necks:
+        top_3 = np.mean([bodies.position(link) for link in bodies.links_of[neck[-1].end]], axis=0)
+        if heading.up_sure < _UNSURE or float(top_3 @ heading.up_3) > shoulders:
+            return roles.with_neck(neck)
+    return roles.with_neck(())
 
 
 def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Heading:
