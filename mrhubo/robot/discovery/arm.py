@@ -7,6 +7,7 @@ comes after forearm and hand.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,8 @@ _SHORT = 4
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 _ON = 1e-4
+_LEAST = 1e-3
+"""How long upper arm and forearm are at least, as a share of the robot."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
     elbow = Spot(point_3, step.start, links, cue, sure)
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
+    if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
+        return None
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
@@ -262,7 +267,9 @@ def _wrist(
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
-        if outward > _OUT * upper:
+        # Where the twist passes the elbow at a distance, the forearm's direction depends on how far out its end is.
+        farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
+        if outward > _OUT * upper and farther:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at

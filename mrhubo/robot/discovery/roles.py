@@ -63,7 +63,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
     large = [pair for pair in pairs if pair.size > least]
-    armed = [pair for pair in large if read_arm(bodies, pair.chains[0]) is not None and pair.mirrored > 0.05]
+    armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
     # Casters have two joints too, but none of them has limits.
     armed = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])] or armed[:1]
     if not armed:
@@ -105,6 +105,9 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     used = {chain[0].hinge.name for pair in same for chain in pair.chains}
     used |= {step.hinge.name for step in waist}
     necks = _necks(bodies, arms, used)
+    arm = arms.chains[0]
+    if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
+        raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
     others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
