@@ -8,6 +8,7 @@ from mrhubo.reference.metrics import (
     direction_error,
     direction_jerk,
     joint_error,
+    limit_shares,
     link_error,
 )
 from mrhubo.reference.polish import Polish
@@ -29,5 +30,6 @@ __all__ = [
     "direction_error",
     "direction_jerk",
     "joint_error",
+    "limit_shares",
     "link_error",
 ]
