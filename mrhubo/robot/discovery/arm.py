@@ -7,6 +7,7 @@ comes after forearm and hand.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,9 +28,15 @@ _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 its length."""
 _WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
+_BESIDE = 0.025
+"""How far a jaw's axis passes the hand's line, as a share of the arm."""
+_SHORT = 4
+"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 _ON = 1e-4
+_LEAST = 1e-3
+"""How long upper arm and forearm are at least, as a share of the robot."""
 
 
 @dataclass(frozen=True)
@@ -120,21 +127,21 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
     elbow = Spot(point_3, step.start, links, cue, sure)
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
+    if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
+        return None
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
 def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
     """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
     whole = chain
-    # What is driven with others is a gripper wherever it is; it must not be taken for a part of the forearm.
-    while len(chain) > 2 and _driven(chain[-1]):
-        chain = chain[:-1]
+    chain = without_gripper(chain)
     end, why = len(chain), "others mimic it, or it slides: a gripper"
     elbow_at = find_elbow(bodies, chain)
     first = 2 if elbow_at is None else elbow_at + 1
     for i in range(first, len(chain)):
         step = chain[i]
-        if _driven(step):
+        if _driven(step) and (i >= _SHORT or not step.hinge.free):
             end = i
         elif i - first >= _WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
@@ -143,7 +150,35 @@ def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str,
         else:
             continue
         break
+    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
+        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
     return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def _is_jaw(chain: Chain, elbow_at: int) -> bool:
+    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line on which the wrist's axes lie, or
+    parallel to one that swings the wrist already.
+    """
+    lines = lines_of(chain)
+    found = measure(lines)
+    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
+    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
+    if sine(along_3, last.axis_3) < 0.7:
+        return False
+    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
+    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
+        return True
+    twists = [line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
+    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def without_gripper(chain: Chain) -> Chain:
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie, and
+    no part of a forearm.
+    """
+    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
+        chain = chain[:-1]
+    return chain
 
 
 def _driven(step: Step) -> bool:
@@ -231,7 +266,10 @@ def _wrist(
     end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper)
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
-        if float(np.linalg.norm(origin_3 - elbow.point_3)) > _OUT * upper:
+        outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
+        # Where the twist passes the elbow at a distance, the forearm's direction depends on how far out its end is.
+        farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
+        if outward > _OUT * upper and farther:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
@@ -250,7 +288,7 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
     if onward:
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
-            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.5
+            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
     named = [link for link in inside if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual]
     if named:
         nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
@@ -260,10 +298,10 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         out_3 = unit(corners.mean(0) - start_3)
         reach = float(((corners - start_3) @ out_3).max())
         if reach > _OUT * usual:
-            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.5
+            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.45
     far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
     if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
-        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.5
+        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.45
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
         return start_3 + 2 * (centre_3 - start_3), "twice as far as the centre of mass, as no joint tells the wrist", 0.4

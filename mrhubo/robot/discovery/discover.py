@@ -11,9 +11,10 @@ import numpy as np
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, read_bodies
-from mrhubo.robot.discovery.facing import Heading, find_heading
+from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
+from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
 from mrhubo.robot.discovery.result import (
     Candidate,
@@ -62,6 +63,7 @@ class _Finder:
         arms = [arm for chain in roles.arms.chains if (arm := read_arm(bodies, chain)) is not None]
         legs = [leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None]
         legs = legs if len(legs) == 2 else []
+        roles = choose_neck(bodies, roles, arms, legs)
         self.bodies, self.roles = bodies, roles
         self.heading: Heading = find_heading(bodies, roles, arms, legs)
         self.arms: dict[str, Arm] = dict(zip(SIDES, arms[::-1] if self.heading.swap else arms, strict=True))
@@ -231,7 +233,7 @@ class _Finder:
         above = share > 0
         question = None
         if abs(share) < 0.1:
-            moved_3 = np.cross(axis_3, upper_3)
+            moved_3 = cross(axis_3, upper_3)
             ahead = float(moved_3 @ self.heading.forward_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
             above = ahead > 0
             if abs(ahead) < 0.3:

@@ -13,12 +13,16 @@ import numpy as np
 
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import Bodies
+from mrhubo.robot.discovery.bodies import Bodies, Chain
 from mrhubo.robot.discovery.leg import Leg
-from mrhubo.robot.discovery.lines import unit
+from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
 from mrhubo.robot.discovery.roles import Roles
 
+_BELOW = 0.2
+"""How far below the shoulders a head may be, as a share of the arm: some robots carry their arms high."""
+_UNSURE = 0.3
+"""Up less sure than that tells nothing of necks."""
 _SAME = 0.9986
 """Cosine of 3 degrees: directions that mean the same one."""
 
@@ -49,6 +53,24 @@ class Heading:
     """What speaks against it."""
 
 
+def choose_neck(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Roles:
+    """The roles with the likeliest neck that begins above the shoulders or ends there, or with none."""
+    if not roles.necks:
+        return roles
+    heading = find_heading(bodies, roles.with_neck(()), arms, legs)
+    shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms])) - _BELOW * arms[0].length
+    for neck in roles.necks:
+        top_3 = bodies.middle(neck[-1].end)
+        if _is_named(neck) or heading.up_sure < _UNSURE or float(top_3 @ heading.up_3) > shoulders:
+            return roles.with_neck(neck)
+    return roles.with_neck(())
+
+
+def _is_named(neck: Chain) -> bool:
+    """Whether names say that a chain is a neck."""
+    return any(names.speaks_of(name, "head") for step in neck for name in (step.hinge.name, step.outer_link))
+
+
 def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Heading:
     """Up by legs, trunk and axes; forward by votes.
 
@@ -60,7 +82,7 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
     """
     normal_3 = _normal(bodies, roles)
     up_3, up_sure, up_cue = _up(bodies, roles, arms, legs, normal_3)
-    forward_3 = np.cross(normal_3, up_3)
+    forward_3 = cross(normal_3, up_3)
     votes = list(_forward_votes(bodies, roles, arms, legs, up_3, forward_3, normal_3))
     votes = [vote for vote in votes if abs(vote.value) > 0.1]
     total = sum(vote.weight for vote in votes)
@@ -100,15 +122,16 @@ def _up(
         ankles_3 = np.mean([leg.ankle.point_3 for leg in legs], axis=0)
         cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", shoulders_3 - hips_3, 2.0)]
     else:
-        root_3 = np.zeros(3)
-        if np.linalg.norm(shoulders_3 - root_3) > 0.3 * arms[0].length:
-            cues.append(("the base", shoulders_3 - root_3, 1.5))
+        for what, at_3, weight in _below(bodies, roles):
+            near = float(np.linalg.norm(at_3 - shoulders_3)) / (0.3 * arms[0].length)
+            cues.append((what, shoulders_3 - at_3, weight * min(1.0, near)))
         cues.append(("the file's z", np.array([0.0, 0.0, 1.0]), 1.0))
         middle_3 = np.mean([reach_middle(arm.chain[arm.clavicles :], arm.wrist.point_3) for arm in arms], axis=0)
-        cues.append(("how the arms move", (shoulders_3 - middle_3) / arms[0].length, 0.7))
+        hangs_3 = (shoulders_3 - middle_3) / arms[0].length
+        cues.append(("how the arms move", hangs_3, 0.7 * min(1.0, 3 * float(np.linalg.norm(hangs_3)))))
     if roles.neck:
-        top_3 = np.mean([bodies.position(link) for link in bodies.links_of[roles.neck[-1].end]], axis=0)
-        cues.append(("the head", top_3 - shoulders_3, 0.7))
+        top_3 = bodies.middle(roles.neck[-1].end)
+        cues.append(("the head", top_3 - shoulders_3, 2.0 if _is_named(roles.neck) else 0.7))
     flat = [(what, vector_3 - normal_3 * (normal_3 @ vector_3), weight) for what, vector_3, weight in cues]
     flat = [(what, unit(vector_3), weight) for what, vector_3, weight in flat if np.linalg.norm(vector_3) > 1e-6]
     candidates = _directions(bodies, roles, normal_3)
@@ -125,6 +148,19 @@ def _up(
     return unit(best - normal_3 * (normal_3 @ best)), float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
 
 
+def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:
+    """What probably lies below the shoulders: what it is, where (3,), and how much that counts."""
+    limbs: set[int] = set()
+    for step in (chain[0] for chain in (*roles.arms.chains, *roles.necks)):
+        limbs |= bodies.beyond(step)[0]
+    rest = [body for body in range(len(bodies.links_of)) if body not in limbs and body != roles.chest]
+    if rest:
+        yield "what carries the chest", np.mean([bodies.middle(body) for body in rest], axis=0), 1.5
+    else:
+        yield "the base", np.zeros(3), 1.0
+        yield "the trunk", bodies.corners(roles.chest).mean(0), 0.5
+
+
 def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tuple[np.ndarray, float]]:
     """Directions in the mirror plane along or across which joints turn, and the root's axes; with their share of all."""
     limbs = [step for pair in (roles.arms, roles.legs) if pair for chain in pair.chains for step in chain[:4]]
@@ -133,11 +169,11 @@ def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tupl
     weighed += [(axis_3, 1.0) for axis_3 in np.eye(3)]
     weighed += [(axis_3, 1.0) for axis_3 in bodies.pose_44[bodies.links_of[roles.chest][0]][:3, :3].T]
     flat = [(unit(v - normal_3 * (normal_3 @ v)), w) for v, w in weighed if abs(float(v @ normal_3)) < 0.05]
-    found = [(v, w) for axis_3, w in flat for v in (axis_3, np.cross(normal_3, axis_3))]
+    found = [(v, w) for axis_3, w in flat for v in (axis_3, cross(normal_3, axis_3))]
     found = [(sign * v, w) for v, w in found for sign in (1.0, -1.0)]
     if not found:
-        across_3 = unit(np.cross(normal_3, np.eye(3)[int(np.argmin(np.abs(normal_3)))]))
-        found = [(sign * v, 1.0) for v in (across_3, np.cross(normal_3, across_3)) for sign in (1.0, -1.0)]
+        across_3 = unit(cross(normal_3, np.eye(3)[int(np.argmin(np.abs(normal_3)))]))
+        found = [(sign * v, 1.0) for v in (across_3, cross(normal_3, across_3)) for sign in (1.0, -1.0)]
     total = sum(w for _, w in flat) or 1.0
     return [(v, sum(w for other, w in found if float(v @ other) > _SAME) / total) for v, _ in found]
 
@@ -194,10 +230,10 @@ def _bend(
     straight = straight_angle(axis_3, lower_3, upper_3)
     lower, upper = usual_range(step.hinge)
     side = bend_side(lower, upper, straight)
-    moved_3 = unit(np.cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
+    moved_3 = unit(cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
     # Where forward is once the upper part hangs down: turned back from where it points, the short way.
     down_3, upper_3 = -up_3, unit(upper_3)
-    about_3 = np.cross(down_3, upper_3)
+    about_3 = cross(down_3, upper_3)
     if np.linalg.norm(about_3) > 1e-6:
         angle = float(np.arctan2(np.linalg.norm(about_3), down_3 @ upper_3))
         forward_3 = turned(forward_3, unit(about_3), angle)

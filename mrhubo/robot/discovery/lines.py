@@ -9,6 +9,7 @@ Legend: N axes of a chain, from the body outwards.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,7 @@ PARALLEL = 0.09
 """Sine under which two axes count as parallel: 5 degrees."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Line:
     """A point (3,) and a unit direction (3,)."""
 
@@ -31,12 +32,17 @@ class Line:
 
     def distance(self, point_3: np.ndarray) -> float:
         """How far a point is from the line."""
-        return float(np.linalg.norm(point_3 - self.nearest(point_3)))
+        return math.dist(point_3, self.nearest(point_3))
+
+
+def cross(a_3: np.ndarray, b_3: np.ndarray) -> np.ndarray:
+    """Of two vectors (3,); NumPy's is made for many, and ten times slower for one."""
+    return np.array([a_3[1] * b_3[2] - a_3[2] * b_3[1], a_3[2] * b_3[0] - a_3[0] * b_3[2], a_3[0] * b_3[1] - a_3[1] * b_3[0]])
 
 
 def sine(a_3: np.ndarray, b_3: np.ndarray) -> float:
     """Between two unit directions, whichever way they point."""
-    return float(np.linalg.norm(np.cross(a_3, b_3)))
+    return math.sqrt(float((normal_3 := cross(a_3, b_3)) @ normal_3))
 
 
 def unit(vector_3: np.ndarray) -> np.ndarray:
@@ -47,12 +53,12 @@ def unit(vector_3: np.ndarray) -> np.ndarray:
 
 def feet(one: Line, other: Line) -> tuple[np.ndarray, np.ndarray]:
     """Where the common normal meets two lines; for parallel ones, at the first one's own point."""
-    normal_3 = np.cross(one.axis_3, other.axis_3)
+    normal_3 = cross(one.axis_3, other.axis_3)
     square = float(normal_3 @ normal_3)
     if square < PARALLEL**2:
         return one.point_3, other.nearest(one.point_3)
     between_3 = other.point_3 - one.point_3
-    s = float(np.cross(between_3, other.axis_3) @ normal_3) / square
+    s = float(cross(between_3, other.axis_3) @ normal_3) / square
     foot_3 = one.point_3 + s * one.axis_3
     return foot_3, other.nearest(foot_3)
 
@@ -75,28 +81,25 @@ class Measures:
 
 
 def measure(lines: Sequence[Line]) -> Measures:
-    """The lengths along a chain of axes. Axes that are parallel share the point at which the way comes in."""
+    """The lengths along a chain of axes. Axes that are parallel share the point at which the way comes in; those at the
+    chain's beginning, the one at which it leaves.
+    """
     count = len(lines)
     apart_N, along_N = np.zeros(max(count - 1, 0)), np.zeros(count)
     cosine_N, out_N, nodes_N3 = np.zeros(max(count - 1, 0)), np.zeros(count), np.zeros((count, 3))
     if not count:
         return Measures(apart_N, along_N, cosine_N, out_N, nodes_N3)
-    at_3: np.ndarray | None = None
+    pairs = [sine(lines[i].axis_3, lines[i + 1].axis_3) < PARALLEL for i in range(count - 1)]
+    first = pairs.index(False) if False in pairs else count - 1
+    at_3 = feet(lines[first], lines[first + 1])[0] if first + 1 < count else lines[first].point_3
+    for i in reversed(range(first + 1)):
+        nodes_N3[i] = at_3 = lines[i].nearest(at_3)
     for i in range(count - 1):
         one, other = lines[i], lines[i + 1]
         cosine_N[i] = abs(float(one.axis_3 @ other.axis_3))
-        if sine(one.axis_3, other.axis_3) < PARALLEL:
-            start_3 = one.point_3 if at_3 is None else at_3
-            leave_3, enter_3 = start_3, other.nearest(start_3)
-        else:
-            leave_3, enter_3 = feet(one, other)
-        if at_3 is None:
-            nodes_N3[0] = leave_3
-        else:
-            along_N[i] = float(np.linalg.norm(leave_3 - at_3))
-        apart_N[i] = float(np.linalg.norm(enter_3 - leave_3))
+        leave_3, enter_3 = (nodes_N3[i], other.nearest(nodes_N3[i])) if pairs[i] else feet(one, other)
+        along_N[i] = math.dist(leave_3, nodes_N3[i])
+        apart_N[i] = math.dist(enter_3, leave_3)
         out_N[i + 1] = out_N[i] + along_N[i] + apart_N[i]
-        nodes_N3[i + 1] = at_3 = enter_3
-    if count == 1:
-        nodes_N3[0] = lines[0].point_3
+        nodes_N3[i + 1] = enter_3
     return Measures(apart_N, along_N, cosine_N, out_N, nodes_N3)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.arm import find_elbow, read_arm
+from mrhubo.robot.discovery.arm import find_elbow, read_arm, without_gripper
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
+from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
 _PLANE = 0.03
@@ -31,15 +31,27 @@ class Roles:
     waist: Chain
     """From the pelvis to the chest; without legs, from the root to the chest."""
     neck: Chain
+    necks: tuple[Chain, ...]
+    """Other chains in the middle that may be the neck, likeliest first."""
     others: tuple[Pair, ...]
     """Pairs that are neither."""
     sure: float
     """How clear it is which pair is arms, 0..1."""
 
+    def with_neck(self, neck: Chain) -> Roles:
+        """With another neck, or none; what else begins in the middle of a root that is the chest is the waist."""
+        below = next((chain for chain in self.necks if chain is not neck), ())
+        return replace(self, neck=neck, waist=self.waist or (_reversed(below) if self.legs is None else ()))
+
     @property
     def chest(self) -> int:
         """The body that carries both arms."""
         return self.arms.body
+
+
+def _reversed(chain: Chain) -> Chain:
+    """A chain passed from its other end."""
+    return tuple(Step(step.hinge, step.end) for step in reversed(chain))
 
 
 def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
@@ -51,7 +63,9 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
     large = [pair for pair in pairs if pair.size > least]
-    armed = [pair for pair in large if read_arm(bodies, pair.chains[0]) is not None and pair.mirrored > 0.05]
+    armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
+    # Casters have two joints too, but none of them has limits.
+    armed = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])] or armed[:1]
     if not armed:
         count = len(bodies.hinges)
         raise UserError(
@@ -60,11 +74,10 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         )
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
-        legness[id(armed[0])] += 0.5 * _stands(bodies, armed[0])
-        if legness[id(armed[0])] > 0.5:
+        if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
             raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
-        arms, legs, sure = armed[0], None, 1.0 - max(0.0, 0.5 + legness[id(armed[0])])
+        arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     else:
         options = [
             (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high), i, j)
@@ -82,24 +95,28 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         arms, legs = armed[j], armed[i]
         reverse = next(option[0] for option in options if option[1:] == (j, i))
         sure = float(np.clip(0.5 + 0.25 * (score - reverse), 0.0, 1.0))
-        if legness[id(arms)] > 0.5:
+        if _named_legs(arms):
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
-    used = {step.hinge.name for pair in pairs for chain in pair.chains for step in chain[:1]}
+    same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
+    used = {chain[0].hinge.name for pair in same for chain in pair.chains}
     used |= {step.hinge.name for step in waist}
-    neck = _neck(bodies, arms, used)
+    necks = _necks(bodies, arms, used)
+    arm = arms.chains[0]
+    if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
+        raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
     others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
-    return Roles(arms, legs, waist, neck, others, sure)
+    return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:
     """About -2 (arms) to 2 (legs)."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     score = names.share(called, "leg") - names.share(called, "arm")
-    chain = pair.chains[0]
+    chain = without_gripper(pair.chains[0])
     end = chain[-1]
     beyond = [hinge for hinge in bodies.beyond(end)[1] if hinge is not end.hinge]
     if len(beyond) >= 2:
@@ -117,6 +134,12 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
         lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
         score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
     return score
+
+
+def _named_legs(pair: Pair) -> bool:
+    """Whether names speak of legs, and not of arms."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    return names.share(called, "leg") > 0.25 and names.share(called, "arm") == 0
 
 
 def _stands(bodies: Bodies, pair: Pair) -> bool:
@@ -154,10 +177,10 @@ def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float
     return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
 
 
-def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
-    """The longest other chain from the chest with axes in the mirror plane; () if there is none."""
-    middle_3, best = arms.mounts_23.mean(0), ()
-    rank = (0.0, 0.0, 0.0)
+def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
+    """The other chains from the chest with axes in the mirror plane, the likeliest neck first."""
+    middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
+    ranked: list[tuple[float, Chain]] = []
     for step in bodies.steps_from[arms.body]:
         if step.hinge.name in used or not step.hinge.rotary or _is_sensor(step):
             continue
@@ -165,7 +188,7 @@ def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
         todo: list[Step] = [step]
         while todo:
             fitting = [s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)]
-            fitting = [s for s in fitting if not _is_sensor(s)]
+            fitting = [s for s in fitting if not _is_sensor(s) and not _has_twin(s, todo, arms.normal_3, middle_3)]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
             if not fitting or len(chain) >= 4:
                 break
@@ -173,11 +196,30 @@ def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
             todo = bodies.onward(fitting[0])
         if not chain:
             continue
-        named = names.share([s.outer_link for s in chain] + [s.hinge.name for s in chain], "head")
-        found = (float(named > 0), float(len(chain)), bodies.extent(step))
-        if found > rank:
-            best, rank = tuple(chain), found
-    return best
+        called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
+        named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
+        # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
+        start_3 = measure(lines_of(tuple(chain))).nodes_N3[0]
+        away = min(chain[0].hinge.line.distance(middle_3), float(np.linalg.norm(start_3 - middle_3)))
+        ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
+    ranked.sort(key=lambda found: -found[0])
+    return tuple(chain for _, chain in ranked)
+
+
+def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray) -> bool:
+    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear."""
+    line = step.hinge.line
+    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
+
+    def miss(other: Line) -> float:
+        one_3, other_3 = feet(image, other)
+        return float(np.linalg.norm(one_3 - other_3)) + float(np.linalg.norm(image.point_3 - line.point_3)) * sine(
+            image.axis_3, other.axis_3
+        )
+
+    own = abs(float((line.point_3 - middle_3) @ normal_3))
+    return any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
 
 
 def _is_sensor(step: Step) -> bool:
