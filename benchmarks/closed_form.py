@@ -6,9 +6,9 @@ forearm; the first two joints bring the robot's upper arm there, the next two it
 formulas are the subproblems of Paden and Kahan (R. Murray, Z. Li, S. Sastry, "A Mathematical Introduction to Robotic
 Manipulation", 1994, section 3.3). No code of the authors' is in it, nor was it compared with theirs. What the papers
 leave open is ours: where no angle reaches a direction, those of the smallest angle to it are taken; angles outside the
-limits are clamped, and what follows is solved for the clamped ones. The upper arm is taken to lie along the third
-joint's axis; where it does not, as on COMAN, the answer is off by the angle between them (up to 7 degrees). Of the up to eight solutions, that is taken whose
-limbs and hand are nearest to the person's.
+limits are clamped, and what follows is solved for the clamped ones; of the up to eight solutions, that is taken whose
+limbs and hand are nearest to the person's. The upper arm is taken to lie along the third joint's axis; where it does
+not, as on COMAN, the answer is off by the angle between them (up to 7 degrees).
 
 Legend: B frames, D directions, N joints, 7 joints of an arm, X = 8 B: frames in all eight ways.
 """
