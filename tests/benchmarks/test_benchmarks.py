@@ -40,7 +40,7 @@ SCRIPTS = [
     "scaling",
 ]
 SCRIPTS += ["stream", "training"]
-LIBRARIES = ["common", "levenberg_marquardt"]
+LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
 
@@ -210,8 +210,9 @@ def test_inference(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> 
     text = run("inference", "--batch", 40, "--rounds", 2, "--frames", 4, package)
     assert {row[0] for row in rows(text, "form")} >= {"PyTorch", "numpy"}
     assert re.search(r"^\| numpy +\| \d+\.\d+ +\| \d+ +\| no +\|$", text, re.M), text
-    over = {(row[0], row[1]): float(row[2]) for row in rows(text, "motion")}
+    over = {(row[0], row[1].removesuffix(" (numpy)")): float(row[4]) for row in rows(text, "motion")}
     assert over["wide", "10 steps"] < over["wide", "1 step"] < over["wide", "network"]
+    assert "left out: mink: is not installed" in text and "left out: closed form of seven-joint arms: no arm" in text
 
 
 def test_polish(run: Run, package: Path, tmp_path: Path) -> None:
