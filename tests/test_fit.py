@@ -44,10 +44,10 @@ SMALL = [
 
 @pytest.fixture(scope="module")
 def motions(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two seconds of three of the shipped motions."""
+    """A second and a half of three of the shipped motions."""
     folder = tmp_path_factory.mktemp("motions")
     for name in ("drinking", "wave", "boxing"):
-        cut_motion(name, folder, (1, 3), every=2)
+        cut_motion(name, folder, (1, 2.5), every=3)
     return folder
 
 
@@ -200,10 +200,12 @@ def test_stopped_in_training_it_resumes_to_the_same_metrics(
     motions: Path,
     tmp_path: Path,
     server: ForkServerContext,
+    empty_tracking: Path,
     stop: signal.Signals,
     status: int | None,
 ) -> None:
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
+    shutil.copytree(empty_tracking, tmp_path / "mlruns")
     given = arguments(root, tmp_path, motions)
     process = server.Process(target=as_command, args=("fit", given, tmp_path / "output", {}))
     process.start()
@@ -294,15 +296,15 @@ def test_vposer_and_an_official_skeleton_take_the_place_of_ours(root: Path, moti
     assert isinstance(Retargeter.load(package).prior, VPoser)
 
 
-@pytest.mark.parametrize("variant", ["model.stages=1", "pairs.filter=none", "trainer.precision=bf16"])
+@pytest.mark.parametrize("variants", [["model.stages=1", "pairs.filter=none"], ["trainer.precision=bf16"]])
 def test_variants_are_settings(
-    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, variant: str
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, variants: list[str]
 ) -> None:
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
-    main(arguments(root, tmp_path, motions, variant))
+    main(arguments(root, tmp_path, motions, *variants))
     (found,) = runs_of(tmp_path)
-    assert variant.split(".")[1] in found.info.run_name
-    assert ("train/loss_pre" in found.data.metrics) is (variant != "model.stages=1")
+    assert all(variant.split(".")[1] in found.info.run_name for variant in variants)
+    assert ("train/loss_pre" in found.data.metrics) is ("model.stages=1" not in variants)
 
 
 def free_port() -> int:
@@ -312,10 +314,11 @@ def free_port() -> int:
 
 
 def test_two_ranks_fit_together_to_nearly_the_same_result(
-    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, server: ForkServerContext
+    root: Path, fitted: tuple[Path, str], motions: Path, tmp_path: Path, server: ForkServerContext, empty_tracking: Path
 ) -> None:
     """With what `torch.distributed.run` sets; that it starts ranks is seen where they make pairs."""
     shutil.copytree(fitted[0] / "pairs", tmp_path / "pairs")
+    shutil.copytree(empty_tracking, tmp_path / "mlruns")
     given = arguments(root, tmp_path, motions)
     shared = {"TORCHELASTIC_RUN_ID": "1", "WORLD_SIZE": "2", "LOCAL_WORLD_SIZE": "2", "GROUP_RANK": "0"}
     shared |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(free_port())}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from mrhubo.robot import BodyMap, build_body_map
 from tests.chain import cut_motion
 
 
+@functools.cache
 def body_map_of(root: Path, robot: str) -> tuple[BodyMap, list[str]]:
     config = load_config(root / "conf" / f"{robot}.yaml")
     return build_body_map(config.robot), config.robot.key_links

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ from mrhubo.robot.capsules import closest_points
 ROBOTS = ["nao", "coman", "reachy"]
 
 
+@functools.cache
 def robot_of(root: Path, name: str) -> Robot:
     return build_body_map(load_config(root / "conf" / f"{name}.yaml").robot).robot
 

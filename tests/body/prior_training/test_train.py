@@ -34,8 +34,8 @@ def data(tmp_path: Path) -> Path:
 
 def test_training_writes_a_prior_that_reconstructs(data: Path, tmp_path: Path) -> None:
     config = PriorConfig(
-        data=data, output=tmp_path / "prior.safetensors", steps=300, batch_size=64, hidden=64, latent=16, lr=1e-2,
-        tracking_dir=tmp_path / "mlruns",
+        data=data, output=tmp_path / "prior.safetensors", steps=300, batch_size=64, hidden=64, encoder_hidden=64,
+        latent=16, lr=1e-2, tracking_dir=tmp_path / "mlruns",
     )  # fmt: skip
     trained = train(config)
     opened = BodyPrior.open(config.output)
