@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 # Tests share the cores with each other and with the processes that they start. Threads that spin while they wait make
 # all of them many times slower; read when torch is imported, after this.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+if "PYTEST_XDIST_WORKER" in os.environ:  # there is one for each core
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -31,7 +33,7 @@ _TOGETHER = (
     ("tests/fast/",),  # what numba compiles is compiled once
 )
 _LONGEST = (
-    "tests/test_fit.py", "tests/golden/test_golden.py", "tests/fast/", "tests/fitting/test_steps.py",
+    "tests/test_fit.py", "tests/fast/", "tests/golden/test_golden.py", "tests/fitting/test_steps.py",
     "tests/baselines/s3le/test_s3le.py", "tests/benchmarks/test_benchmarks.py", "tests/invariance/test_invariance.py",
     "tests/callbacks/test_scale_search.py", "tests/paper/test_tables.py", "tests/body/prior_training/test_train.py",
 )  # fmt: skip

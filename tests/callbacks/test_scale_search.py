@@ -143,7 +143,7 @@ def test_it_goes_on_where_it_stopped(
     runs: tuple[Any, str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search(*runs)
+    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search()
     stopped = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "stopped")
     measured = []
 

@@ -15,7 +15,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import ManualScaleConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.frames import base_to_human
-from mrhubo.pairing import PairGenerator
+from mrhubo.pairing import PairGenerator, lbfgs
 from mrhubo.robot import BodyMap, LinkPoses, build_body_map
 from mrhubo.robot.manual_scale import check_ranges, varied
 
@@ -115,8 +115,9 @@ def test_means_offsets_and_constants_are_in_the_base_frame(root: Path) -> None:
     torch.testing.assert_close(found[:, 2], torch.tensor([2.0, 3.0, 1.0]).expand(60, 3))
 
 
-def test_pairs_come_from_it(root: Path) -> None:
-    config = load_config(root / "conf" / "paper" / "nao.yaml", ["pairs.shard_size=20"])
+def test_pairs_come_from_it(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lbfgs, "_ITERATIONS", 60)
+    config = load_config(root / "conf" / "paper" / "nao.yaml", ["pairs.shard_size=100"])
     body_map, prior = build_body_map(config.robot), BodyPrior.open()
     maker = PairGenerator(body_map, prior, config)
     pairs = maker.shard("forward", 0)
