@@ -30,7 +30,7 @@ from tests.light import lighten
 
 ROOT = Path(__file__).resolve().parent.parent
 __all__ = [
-    "ROOT", "Motion", "answer", "as_command", "cut_motion", "fit", "killed_at", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
+    "ROOT", "Motion", "answer", "as_command", "as_torchrun", "cut_motion", "fit", "killed_at", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
     "read_tensors", "write_tensors",
 ]  # fmt: skip
 
@@ -51,14 +51,25 @@ def as_command(
     lighten(pytest.MonkeyPatch())
     if largest is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+    _go_apart(output, environment)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored below a shell's background job
+    sys.argv = [f"mrhubo.{name}", *arguments]
+    run_command(importlib.import_module(f"mrhubo.{name}").main)
+
+
+def as_torchrun(arguments: Sequence[str], output: Path, environment: Mapping[str, str]) -> None:
+    """In a process of its own: what `torchrun` does."""
+    _go_apart(output, environment)
+    importlib.import_module("torch.distributed.run").main(list(arguments))
+
+
+def _go_apart(output: Path, environment: Mapping[str, str]) -> None:
+    """Into a session of its own; what is printed goes to a file."""
     os.setsid()
     os.environ.update(environment)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored below a shell's background job
     stream = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     for standard in (1, 2):
         os.dup2(stream, standard)
-    sys.argv = [f"mrhubo.{name}", *arguments]
-    run_command(importlib.import_module(f"mrhubo.{name}").main)
 
 
 def killed_at(event: int, folder: Path, command: Callable[[list[str]], object], arguments: list[str]) -> None:
