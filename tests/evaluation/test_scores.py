@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from tests.chain import cut_motion
 from tests.robot.more_robots import more_robot
 
 
+@functools.cache
 def body_map_of(root: Path, robot: str) -> tuple[BodyMap, list[str]]:
     config = load_config(root / "conf" / f"{robot}.yaml")
     return build_body_map(config.robot), config.robot.key_links

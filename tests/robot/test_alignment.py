@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,7 @@ def humans() -> torch.Tensor:
     return poses
 
 
+@functools.cache
 def of(root: Path, name: str) -> tuple[BodyMap, torch.Tensor]:
     body_map = build_body_map(load_config(root / "conf" / f"{name}.yaml").robot)
     q_BN = body_map.robot.sample(64, torch.Generator().manual_seed(1))

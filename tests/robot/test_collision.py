@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +24,7 @@ from tests.robot import exact_shapes
 ROBOTS = ["nao", "coman", "reachy"]
 
 
+@functools.cache
 def robot_of(root: Path, name: str) -> Robot:
     return build_body_map(load_config(root / "conf" / f"{name}.yaml").robot).robot
 
