@@ -1,0 +1,132 @@
+"""Hip, knee, ankle and sole from the axes of a leg.
+
+A knee is the middle one of three parallel lateral axes. The thigh starts on the pitch axis above it, which may lie far
+from where the hip's axes cross.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.robot.discovery.arm import Spot, find_elbow, limb_end
+from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
+from mrhubo.robot.discovery.lines import Line, feet, sine
+from mrhubo.robot.discovery.names import speaks_of
+
+_PARALLEL = 0.2
+"""Sine under which hip, knee and ankle pitch count as parallel, as the joints stand: 11 degrees."""
+_APART = 0.15
+"""How far hip, knee and ankle are at least from each other, as a share of the leg."""
+_ON = 1e-4
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg whose joints have their roles."""
+
+    chain: Chain
+    hip_at: int | None
+    """Position of the hip's pitch in the chain."""
+    knee_at: int
+    ankle_at: int | None
+    hip: Spot
+    knee: Spot
+    ankle: Spot
+    straight: bool
+    """Whether three parallel axes told the knee."""
+
+
+def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
+    """Roles and points of a leg's joints; None if it has no knee."""
+    rotary = tuple(step for step in chain if step.hinge.rotary)
+    lines = lines_of(rotary)
+    places = _three(lines)
+    if places is None:
+        knee_at = find_elbow(rotary)
+        if knee_at is None:
+            return None
+        hip_at = next((i for i in reversed(range(knee_at)) if _parallel(lines[i], lines[knee_at])), None)
+        ankle_at = knee_at + 1 if knee_at + 1 < len(rotary) else None
+    else:
+        hip_at, knee_at, ankle_at = places
+    ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at)
+    if hip_at is not None:
+        between = lines[hip_at + 1 : knee_at] or ([lines[hip_at - 1]] if hip_at else [])
+        crossing_3 = feet(between[-1], lines[knee_at])[0] if between else ankle.point_3
+        knee_3 = lines[knee_at].nearest(crossing_3 if len(lines[hip_at + 1 : knee_at]) else ankle.point_3)
+        hip_3 = lines[hip_at].nearest(knee_3)
+        cue, sure = f"the axis of '{rotary[hip_at].hinge.name}' above the knee", 0.9
+    else:
+        knee_3 = lines[knee_at].nearest(ankle.point_3)
+        hip_3 = lines[max(knee_at - 1, 0)].nearest(knee_3)
+        cue, sure = "the last axis before the knee", 0.5
+    step = rotary[knee_at]
+    links = [step.inner_link]
+    for i in reversed(range(hip_at if hip_at is not None else max(knee_at - 1, 0), knee_at)):
+        if lines[i].distance(hip_3) > _ON * bodies.size:
+            break
+        links.append(rotary[i].outer_link)
+    hip = Spot(hip_3, step.start, tuple(dict.fromkeys(links)), cue, sure)
+    how = "the middle one of three parallel axes" if places else "the first axis a third of the leg out"
+    knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
+    return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
+
+
+def _parallel(one: Line, other: Line) -> bool:
+    return sine(one.axis_3, other.axis_3) < _PARALLEL
+
+
+def _three(lines: list[Line]) -> tuple[int, int, int] | None:
+    """Hip pitch, knee and ankle pitch: three parallel axes far from each other."""
+    best, found = 0.0, None
+    for i, j, k in itertools.combinations(range(len(lines)), 3):
+        if not (_parallel(lines[i], lines[j]) and _parallel(lines[j], lines[k])):
+            continue
+        thigh, shank = lines[i].distance(lines[j].point_3), lines[j].distance(lines[k].point_3)
+        if min(thigh, shank) > best + 1e-6 and min(thigh, shank) > _APART * (thigh + shank):
+            best, found = min(thigh, shank), (i, j, k)
+    return found
+
+
+def _ankle(bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None) -> Spot:
+    knee_3 = lines[knee_at].nearest(bodies.position(chain[knee_at].outer_link))
+    if ankle_at is None:
+        thigh = lines[knee_at].distance(lines[max(knee_at - 1, 0)].point_3)
+        end_3, how, sure = limb_end(bodies, chain[-1], knee_3, max(thigh, 1e-3 * bodies.size))
+        return Spot(end_3, chain[-1].end, (chain[-1].outer_link,), how.replace("wrist", "ankle"), sure)
+    others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not _parallel(lines[i], lines[ankle_at])]
+    step = chain[knee_at + 1]
+    if others:
+        point_3, cue, sure = feet(lines[ankle_at], lines[others[0]])[0], "where the ankle's axes are nearest to each other", 0.95
+    else:
+        point_3, cue, sure = lines[ankle_at].nearest(knee_3), "the ankle axis's point nearest to the knee", 0.8
+    links = [step.inner_link]
+    for i in range(knee_at + 1, len(lines)):
+        if lines[i].distance(point_3) > _ON * bodies.size:
+            break
+        links.append(chain[i].outer_link)
+    return Spot(point_3, step.start, tuple(links), cue, sure)
+
+
+def read_sole(bodies: Bodies, leg: Leg, up_3: np.ndarray) -> Spot | None:
+    """The lowest point below the ankle, on the foot; None if nothing tells it."""
+    foot = leg.chain[-1].end
+    link = leg.chain[-1].outer_link
+    named = [name for name in bodies.links_of[foot] if speaks_of(name, "sole") and name != link]
+    if bodies.shapes_of[foot]:
+        height = float((bodies.corners(foot) @ up_3).min())
+        cue, sure = "the lowest of the foot's shapes", 0.9
+    elif named:
+        height = min(float(bodies.position(name) @ up_3) for name in named)
+        cue, sure = f"the link '{named[0]}', after its name", 0.8
+    else:
+        lowest = min(bodies.links_of[foot], key=lambda name: float(bodies.position(name) @ up_3))
+        height = float(bodies.position(lowest) @ up_3)
+        cue, sure = f"the lowest link '{lowest}' fixed to the foot", 0.5
+    below = float(leg.ankle.point_3 @ up_3) - height
+    if below < 0.02 * float(np.linalg.norm(leg.ankle.point_3 - leg.hip.point_3)):
+        return None
+    return Spot(leg.ankle.point_3 - below * up_3, foot, (link,), cue, sure)

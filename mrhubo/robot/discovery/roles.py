@@ -1,0 +1,157 @@
+"""Which pair of limbs is arms and which legs, and what lies between: chest, pelvis, waist, neck."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.robot.discovery import names
+from mrhubo.robot.discovery.arm import find_elbow, read_arm
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
+from mrhubo.robot.discovery.symmetry import Pair
+
+_PLANE = 0.03
+"""How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
+_SMALL = 0.25
+"""Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+
+
+@dataclass(frozen=True)
+class Roles:
+    """The limbs and the trunk of a robot."""
+
+    arms: Pair
+    legs: Pair | None
+    waist: Chain
+    """From the pelvis to the chest; without legs, from the root to the chest."""
+    neck: Chain
+    others: tuple[Pair, ...]
+    """Pairs that are neither."""
+    sure: float
+    """How clear it is which pair is arms, 0..1."""
+
+    @property
+    def chest(self) -> int:
+        """The body that carries both arms."""
+        return self.arms.body
+
+
+def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
+    """Arms, legs and trunk.
+
+    Raises:
+        UserError: no pair of arms can be told; says what the robot has.
+    """
+    path = bodies.description.path
+    large = [pair for pair in pairs if pair.size > _SMALL * pairs[0].size and max(map(len, pair.chains)) >= 2]
+    armed = [pair for pair in large if read_arm(bodies, pair.chains[0]) is not None and pair.mirrored > 0.05]
+    if not armed:
+        count = len(bodies.hinges)
+        raise UserError(
+            f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints that "
+            f"are mirror images ({count} movable joint{'s' * (count != 1)} in all); a humanoid with two arms is needed"
+        )
+    legness = {id(pair): _legness(bodies, pair) for pair in armed}
+    if len(armed) == 1:
+        if legness[id(armed[0])] > 0.5:
+            joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
+            raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
+        arms, legs, sure = armed[0], None, 1.0 - max(0.0, 0.5 + legness[id(armed[0])])
+    else:
+        options = [
+            (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high), i, j)
+            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
+        ]  # fmt: skip
+        options.sort(key=lambda option: -option[0])
+        score, i, j = options[0]
+        arms, legs = armed[j], armed[i]
+        reverse = next(option[0] for option in options if option[1:] == (j, i))
+        sure = float(np.clip(0.5 + 0.25 * (score - reverse), 0.0, 1.0))
+        if legness[id(arms)] > 0.5:
+            raise UserError(
+                f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
+            )
+    start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
+    waist = bodies.path(start, arms.body)
+    used = {step.hinge.name for pair in pairs for chain in pair.chains for step in chain[:1]}
+    used |= {step.hinge.name for step in waist}
+    neck = _neck(bodies, arms, used)
+    others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
+    return Roles(arms, legs, waist, neck, others, sure)
+
+
+def _legness(bodies: Bodies, pair: Pair) -> float:
+    """About -2 (arms) to 2 (legs)."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    score = names.share(called, "leg") - names.share(called, "arm")
+    chain = pair.chains[0]
+    end = chain[-1]
+    beyond = [hinge for hinge in bodies.beyond(end)[1] if hinge is not end.hinge]
+    if len(beyond) >= 2:
+        score -= 0.5
+    lines = lines_of(chain)
+    found, knee_at = measure(lines), find_elbow(chain)
+    if knee_at is not None and knee_at + 1 < len(chain):
+        way = max(found.out_N[-1], 1e-9)
+        shank = sum(
+            found.apart_N[i] for i in range(knee_at, len(chain) - 1)
+            if sine(lines[i].axis_3, lines[i + 1].axis_3) < PARALLEL or found.apart_N[i] > 0.2 * way
+        )  # fmt: skip
+        twisted = sum(found.along_N[knee_at + 1 :])
+        score += 0.7 * (shank / way > 0.2) - 0.7 * (twisted / way > 0.2)
+        lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
+        score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
+    return score
+
+
+def _hangs_below(low: Pair, high: Pair) -> float:
+    """-1..1: whether the lower pair's limbs hang away from where the upper pair begins."""
+    ends = np.mean([measure(lines_of(chain)).nodes_N3[-1] for chain in low.chains], axis=0)
+    mount_3, other_3 = low.mounts_23.mean(0), high.mounts_23.mean(0)
+    if np.linalg.norm(other_3 - mount_3) < 1e-3 * low.size:
+        return 0.0
+    return float(unit(mount_3 - ends) @ unit(other_3 - mount_3))
+
+
+def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float) -> bool:
+    """Whether a joint's axis is its own mirror image: across the mirror plane, or in it."""
+    line = step.hinge.line
+    across = abs(float(line.axis_3 @ normal_3))
+    if across > 0.97:
+        return True
+    return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
+
+
+def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
+    """The longest other chain from the chest with axes in the mirror plane; () if there is none."""
+    middle_3, best = arms.mounts_23.mean(0), ()
+    rank = (0.0, 0.0, 0.0)
+    for step in bodies.steps_from[arms.body]:
+        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(step):
+            continue
+        chain: list[Step] = []
+        todo: list[Step] = [step]
+        while todo:
+            fitting = [s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)]
+            fitting = [s for s in fitting if not _is_sensor(s)]
+            fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
+            if not fitting or len(chain) >= 4:
+                break
+            chain.append(fitting[0])
+            todo = bodies.onward(fitting[0])
+        if not chain:
+            continue
+        named = names.share([s.outer_link for s in chain] + [s.hinge.name for s in chain], "head")
+        found = (float(named > 0), float(len(chain)), bodies.extent(step))
+        if found > rank:
+            best, rank = tuple(chain), found
+    return best
+
+
+def _is_sensor(step: Step) -> bool:
+    """A joint without limits above a chest turns a lidar, not a head."""
+    return not step.hinge.limited and step.hinge.lower is None
