@@ -1,8 +1,8 @@
 """Shoulder, elbow and wrist from the axes of an arm.
 
 The way from the first axis to the last along common normals (`lines.measure`) does not depend on the zero pose. An elbow
-is the first axis on it that lies further than a third of the way out; what comes before turns the upper arm, what comes
-after forearm and hand.
+is the axis on it with long stretches on both sides, upper arm and forearm; what comes before turns the upper arm, what
+comes after forearm and hand.
 """
 
 from __future__ import annotations
@@ -16,7 +16,12 @@ from mrhubo.robot.discovery.lines import Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
-"""How far out an elbow is at least, as a share of the way to the last joint."""
+"""How long a forearm is at least, as a share of the upper arm."""
+_HAND = 0.5
+"""How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
+_BEFORE, _FEW = 3, 0.8
+"""Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
+below a clavicle."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share of
 its length."""
@@ -67,19 +72,36 @@ class Arm:
         return upper + float(np.linalg.norm(self.wrist.point_3 - self.elbow.point_3))
 
 
-def find_elbow(chain: Chain) -> int | None:
-    """Position of the elbow's hinge; None if the chain is too short to have one."""
-    lines = lines_of(chain)
-    found = measure(lines)
-    if len(chain) < 2 or found.out_N[-1] < 1e-6:
+def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
+    """Position of the elbow's hinge: the axis with the longest stretches of the arm on either side of it. None if the
+    chain is too short to have one.
+    """
+    found = measure(lines_of(chain))
+    if len(chain) < 2:
         return None
-    return next((i for i in range(1, len(chain)) if found.out_N[i] > _OUT * found.out_N[-1]), None)
+    gap_N = np.diff(found.out_N, append=found.out_N[-1])
+    end_3 = found.nodes_N3[-1]
+    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(chain[-1])[0]])
+    beyond = float(np.linalg.norm(corners - end_3, axis=-1).max())
+    centre_3 = bodies.centre(chain[-1].end)
+    if centre_3 is not None:
+        beyond = max(beyond, 2 * float(np.linalg.norm(centre_3 - end_3)))
+    gap_N[-1] = _HAND * beyond
+    scores = np.zeros(len(chain))
+    for i in range(1, len(chain)):
+        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
+        after = max(gap_N[i : i + 2])
+        scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
+    best = int(np.argmax(scores))
+    if gap_N[best - 1] < 1e-3 * bodies.size:
+        return None
+    return best if scores[best] > 0 else int(np.argmax(gap_N[:-1])) + 1
 
 
 def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     """Roles and points of an arm's joints; None if it has no elbow."""
-    chain, left_out = _without_hand(chain)
-    elbow_at = find_elbow(chain)
+    chain, left_out = _without_hand(bodies, chain)
+    elbow_at = find_elbow(bodies, chain)
     if elbow_at is None:
         return None
     lines = lines_of(chain)
@@ -101,25 +123,31 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
-def _without_hand(chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
+def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
     """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
-    end, why = len(chain), "beyond the wrist"
-    elbow_at = find_elbow(chain)
+    whole = chain
+    # What is driven with others is a gripper wherever it is; it must not be taken for a part of the forearm.
+    while len(chain) > 2 and _driven(chain[-1]):
+        chain = chain[:-1]
+    end, why = len(chain), "others mimic it, or it slides: a gripper"
+    elbow_at = find_elbow(bodies, chain)
     first = 2 if elbow_at is None else elbow_at + 1
     for i in range(first, len(chain)):
         step = chain[i]
-        if not step.hinge.rotary:
-            end, why = i, "it slides: a jaw of a gripper"
-        elif step.hinge.drives or not step.hinge.free:
-            end, why = i, "others mimic it, or it mimics another: a gripper"
+        if _driven(step):
+            end = i
         elif i - first >= _WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
-        elif speaks_of(step.hinge.name, "hand") and i >= first + 1:
+        elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
             end, why = i, "its name says that it belongs to the hand"
         else:
             continue
         break
-    return chain[:end], tuple((step.hinge.name, why) for step in chain[end:])
+    return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def _driven(step: Step) -> bool:
+    return not step.hinge.rotary or step.hinge.drives or not step.hinge.free
 
 
 def _twist(lines: list[Line], elbow_at: int) -> int | None:

@@ -150,8 +150,10 @@ class _Finder:
 
     def _main_link(self, body: int, steps: list[Step]) -> str:
         """The link of a body from which joints go out."""
-        carrying = [step.inner_link for step in steps]
-        return max(dict.fromkeys(carrying), key=carrying.count) if carrying else self.bodies.links_of[body][0]
+        inside = set(self.bodies.links_of[body])
+        above = [[step.inner_link, *(j.parent for j in self.bodies.description.joints_above(step.inner_link))] for step in steps]
+        shared = [link for link in above[0] if link in inside and all(link in other for other in above)]
+        return shared[0] if shared else steps[0].inner_link
 
     def _chains(self) -> dict[str, tuple[str, ...]]:
         chains: dict[str, Chain] = {f"{side}_arm": arm.chain for side, arm in self.arms.items()}

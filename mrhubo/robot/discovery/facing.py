@@ -58,7 +58,7 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
         arms: both arms, in the order of the pair.
         legs: both legs in the same order, or none.
     """
-    normal_3 = roles.arms.normal_3
+    normal_3 = _normal(bodies, roles)
     up_3, up_sure, up_cue = _up(bodies, roles, arms, legs, normal_3)
     forward_3 = np.cross(normal_3, up_3)
     votes = list(_forward_votes(bodies, roles, arms, legs, up_3, forward_3, normal_3))
@@ -74,6 +74,20 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
     # Three points of weight all one way are certain; a tie, or nothing, is a guess.
     sure = float(np.clip(abs(score) / 3.0, 0.0, 1.0) * (abs(score) / max(total, 1e-9)) ** 0.5) if votes else 0.0
     return Heading(up_3, sign * normal_3, sign * forward_3, up_sure, sure, up_cue, cue, swap, against)
+
+
+def _normal(bodies: Bodies, roles: Roles) -> np.ndarray:
+    """Across the mirror plane: an axis that many joints or frames share and that lies within 3 degrees of what the limbs'
+    points tell, which a few millimetres turn.
+    """
+    normal_3 = roles.arms.normal_3
+    steps = [step for pair in (roles.arms, roles.legs) if pair for chain in pair.chains for step in chain]
+    axes = [step.hinge.line.axis_3 for step in (*steps, *roles.waist, *roles.neck)]
+    axes += [*np.eye(3), *bodies.pose_44[bodies.links_of[roles.chest][0]][:3, :3].T]
+    near = [np.sign(axis_3 @ normal_3) * axis_3 for axis_3 in axes if abs(float(axis_3 @ normal_3)) > _SAME]
+    if not near:
+        return normal_3
+    return unit(max(near, key=lambda axis_3: (round(sum(float(axis_3 @ other) > 1 - 1e-6 for other in near)), float(axis_3 @ normal_3))))
 
 
 def _up(
@@ -102,6 +116,9 @@ def _up(
         (((up_3, sum(w * float(up_3 @ v) for _, v, w in flat) + 0.5 * share) for up_3, share in candidates)),
         key=lambda found: found[1],
     )
+    near = [(v, share) for v, share in candidates if float(v @ best) > _SAME]
+    # Of those that mean the same direction, the one that most agree on exactly.
+    best = max(near, key=lambda found: sum(float(found[0] @ other) > 1 - 1e-9 for other, _ in candidates))[0]
     total = sum(w for _, _, w in flat) or 1.0
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]

@@ -61,19 +61,24 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
         return None
     last = arm.chain[-1]
     forearm_3 = unit(arm.wrist.point_3 - arm.elbow.point_3)
+    if not forearm_3.any():
+        return None
     if arm.forearm_twist_at is not None:
         axis_3 = arm.chain[arm.forearm_twist_at].hinge.line.axis_3
         if abs(float(axis_3 @ forearm_3)) > 0.95:
             forearm_3 = axis_3 * np.sign(axis_3 @ forearm_3)
     fingers = _fingers(bodies, last, arm.wrist.point_3)
     fingers_3, how = forearm_3, "the forearm's direction at the zero pose"
+    rest_3 = _rest_thumb(arm, left * left_3, forward_3)
+    span = 0.1 * arm.length
+    fingers = [finger for finger in fingers if np.linalg.norm(finger.tip_3 - arm.wrist.point_3) > span / 2]
     if fingers:
         bases_3 = np.mean([finger.base_3 for finger in fingers], axis=0)
         tips_3 = np.mean([finger.tip_3 for finger in fingers], axis=0)
         out_3 = unit(tips_3 - arm.wrist.point_3) + unit(bases_3 - arm.wrist.point_3)
-        if np.linalg.norm(out_3) > 0.5 and float(unit(out_3) @ forearm_3) < _STRAIGHT:
+        far = float(np.linalg.norm(bases_3 - arm.wrist.point_3)) > span
+        if far and np.linalg.norm(out_3) > 0.5 and -0.2 < float(unit(out_3) @ forearm_3) < _STRAIGHT:
             fingers_3, how = unit(bases_3 - arm.wrist.point_3), "from the wrist to the fingers' bases"
-    rest_3 = _rest_thumb(fingers_3, left * left_3, forward_3)
     thumb_3, told, sure, doubt = rest_3, "the thumb as a human's in the zero pose", 0.4, None
     if len(fingers) >= 3:
         thumb_3, told, sure, doubt = _dexterous(fingers, fingers_3, left, rest_3)
@@ -81,19 +86,28 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
         thumb_3, told, sure, doubt = _jaws(fingers, fingers_3, left * left_3, rest_3, arm.wrist.point_3)
     else:
         doubt = "nothing tells on which side the thumb would be"
-    thumb_3 = unit(thumb_3 - fingers_3 * (fingers_3 @ thumb_3))
+    thumb_3 = thumb_3 - fingers_3 * (fingers_3 @ thumb_3)
+    if np.linalg.norm(thumb_3) < 0.1:
+        other_3 = np.cross(fingers_3, left_3) if abs(fingers_3 @ left_3) < 0.9 else forward_3
+        thumb_3 = other_3 - fingers_3 * (fingers_3 @ other_3)
+    thumb_3 = unit(thumb_3)
     return Hand(last.outer_link, fingers_3, thumb_3, sure, f"{how}; {told}", doubt)
 
 
-def _rest_thumb(fingers_3: np.ndarray, outward_3: np.ndarray, forward_3: np.ndarray) -> np.ndarray:
-    """Where the thumb of a human is whose hand, at rest outwards with the thumb forward, is turned the short way until
-    its fingers point so.
+def _rest_thumb(arm: Arm, outward_3: np.ndarray, forward_3: np.ndarray) -> np.ndarray:
+    """Where a human's thumb is whose arm, at rest outwards with the thumb forward, is turned the short way until its
+    upper arm points as the robot's, and then its forearm.
     """
-    about_3 = np.cross(outward_3, fingers_3)
+    upper_3 = unit(arm.elbow.point_3 - arm.shoulder.point_3)
+    forearm_3 = unit(arm.wrist.point_3 - arm.elbow.point_3)
+    return _swung(_swung(forward_3, outward_3, upper_3), upper_3, forearm_3)
+
+
+def _swung(vector_3: np.ndarray, start_3: np.ndarray, end_3: np.ndarray) -> np.ndarray:
+    """A vector turned the short way that takes one direction to another."""
+    about_3 = np.cross(start_3, end_3)
     sine = float(np.linalg.norm(about_3))
-    if sine < 1e-6:
-        return forward_3
-    return turned(forward_3, about_3 / sine, float(np.arctan2(sine, outward_3 @ fingers_3)))
+    return turned(vector_3, about_3 / sine, float(np.arctan2(sine, start_3 @ end_3))) if sine > 1e-6 else vector_3
 
 
 def _fingers(bodies: Bodies, last: Step, wrist_3: np.ndarray) -> list[_Finger]:

@@ -18,6 +18,8 @@ from mrhubo.robot.discovery.names import speaks_of
 
 _PARALLEL = 0.2
 """Sine under which hip, knee and ankle pitch count as parallel, as the joints stand: 11 degrees."""
+_TILTED = 0.6
+"""The same of a hip's pitch, which some robots tilt by up to 30 degrees."""
 _APART = 0.15
 """How far hip, knee and ankle are at least from each other, as a share of the leg."""
 _ON = 1e-4
@@ -45,7 +47,7 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     lines = lines_of(rotary)
     places = _three(lines)
     if places is None:
-        knee_at = find_elbow(rotary)
+        knee_at = find_elbow(bodies, rotary)
         if knee_at is None:
             return None
         hip_at = next((i for i in reversed(range(knee_at)) if _parallel(lines[i], lines[knee_at])), None)
@@ -54,10 +56,10 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         hip_at, knee_at, ankle_at = places
     ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at)
     if hip_at is not None:
-        between = lines[hip_at + 1 : knee_at] or ([lines[hip_at - 1]] if hip_at else [])
-        crossing_3 = feet(between[-1], lines[knee_at])[0] if between else ankle.point_3
-        knee_3 = lines[knee_at].nearest(crossing_3 if len(lines[hip_at + 1 : knee_at]) else ankle.point_3)
-        hip_3 = lines[hip_at].nearest(knee_3)
+        between = lines[hip_at + 1 : knee_at]
+        knee_3 = lines[knee_at].nearest(feet(between[-1], lines[knee_at])[0] if between else ankle.point_3)
+        crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > _TILTED
+        hip_3 = feet(lines[hip_at], between[-1])[0] if crossing else lines[hip_at].nearest(knee_3)
         cue, sure = f"the axis of '{rotary[hip_at].hinge.name}' above the knee", 0.9
     else:
         knee_3 = lines[knee_at].nearest(ankle.point_3)
@@ -70,7 +72,7 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
             break
         links.append(rotary[i].outer_link)
     hip = Spot(hip_3, step.start, tuple(dict.fromkeys(links)), cue, sure)
-    how = "the middle one of three parallel axes" if places else "the first axis a third of the leg out"
+    how = "the middle one of three parallel axes" if places else "the axis with the longest stretches on either side"
     knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
     return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
 
@@ -82,13 +84,22 @@ def _parallel(one: Line, other: Line) -> bool:
 def _three(lines: list[Line]) -> tuple[int, int, int] | None:
     """Hip pitch, knee and ankle pitch: three parallel axes far from each other."""
     best, found = 0.0, None
-    for i, j, k in itertools.combinations(range(len(lines)), 3):
-        if not (_parallel(lines[i], lines[j]) and _parallel(lines[j], lines[k])):
+    for j, k in itertools.combinations(range(len(lines)), 2):
+        if not _parallel(lines[j], lines[k]):
             continue
-        thigh, shank = lines[i].distance(lines[j].point_3), lines[j].distance(lines[k].point_3)
-        if min(thigh, shank) > best + 1e-6 and min(thigh, shank) > _APART * (thigh + shank):
-            best, found = min(thigh, shank), (i, j, k)
+        shank = lines[j].distance(lines[k].point_3)
+        thighs = [lines[i].distance(lines[j].point_3) for i in range(j)]
+        above = [i for i in range(j) if thighs[i] > _APART * (thighs[i] + shank) and _tilt(lines[i], lines[j]) < _TILTED]
+        if not above:
+            continue
+        i = min(above, key=lambda i: (round(_tilt(lines[i], lines[j]), 2), -i))
+        if min(thighs[i], shank) > best and shank > _APART * (thighs[i] + shank):
+            best, found = min(thighs[i], shank), (i, j, k)
     return found
+
+
+def _tilt(one: Line, other: Line) -> float:
+    return sine(one.axis_3, other.axis_3)
 
 
 def _ankle(bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None) -> Spot:

@@ -9,6 +9,7 @@ _WORDS = {
     "leg": r"leg|hip|knee|ankle|ankel|thigh|shin|calf|foot|feet|toe|crotch|crus|tibia|femur|sole|shank",
     "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar",
     "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|hand_(open|close)|tip",
+    "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
     "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
@@ -18,7 +19,7 @@ _PATTERNS = {kind: re.compile(text, re.IGNORECASE) for kind, text in _WORDS.item
 
 
 def speaks_of(name: str, kind: str) -> bool:
-    """Whether a name has a word of a kind: leg, arm, hand (its moving parts), camera, head, sole, tool."""
+    """Whether a name has a word of a kind: leg, arm, hand (its moving parts), turn (of a whole limb), camera, head, sole, tool."""
     return _PATTERNS[kind].search(name) is not None
 
 

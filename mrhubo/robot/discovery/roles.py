@@ -12,10 +12,12 @@ from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import find_elbow, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
-from mrhubo.robot.discovery.symmetry import Pair
+from mrhubo.robot.discovery.symmetry import Pair, alike
 
 _PLANE = 0.03
 """How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
+_TINY = 0.1
+"""The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
 
@@ -47,7 +49,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         UserError: no pair of arms can be told; says what the robot has.
     """
     path = bodies.description.path
-    large = [pair for pair in pairs if pair.size > _SMALL * pairs[0].size and max(map(len, pair.chains)) >= 2]
+    least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
+    large = [pair for pair in pairs if pair.size > least]
     armed = [pair for pair in large if read_arm(bodies, pair.chains[0]) is not None and pair.mirrored > 0.05]
     if not armed:
         count = len(bodies.hinges)
@@ -57,6 +60,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         )
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
+        legness[id(armed[0])] += 0.5 * _stands(bodies, armed[0])
         if legness[id(armed[0])] > 0.5:
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
             raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
@@ -68,6 +72,13 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         ]  # fmt: skip
         options.sort(key=lambda option: -option[0])
         score, i, j = options[0]
+        if _same(armed[i], armed[j]):
+            different = [option for option in options if not _same(armed[option[1]], armed[option[2]])]
+            if not different:
+                raise UserError(
+                    f"{path}: has two pairs of limbs that are alike, as a four-legged robot has; a humanoid is needed"
+                )
+            score, i, j = different[0]
         arms, legs = armed[j], armed[i]
         reverse = next(option[0] for option in options if option[1:] == (j, i))
         sure = float(np.clip(0.5 + 0.25 * (score - reverse), 0.0, 1.0))
@@ -94,7 +105,7 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
     if len(beyond) >= 2:
         score -= 0.5
     lines = lines_of(chain)
-    found, knee_at = measure(lines), find_elbow(chain)
+    found, knee_at = measure(lines), find_elbow(bodies, chain)
     if knee_at is not None and knee_at + 1 < len(chain):
         way = max(found.out_N[-1], 1e-9)
         shank = sum(
@@ -106,6 +117,23 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
         lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
         score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
     return score
+
+
+def _stands(bodies: Bodies, pair: Pair) -> bool:
+    """Whether a pair of limbs ends beyond all else, in the direction in which it hangs, which is down in the file."""
+    ends_3 = np.mean([measure(lines_of(chain)).nodes_N3[-1] for chain in pair.chains], axis=0)
+    out_3 = unit(ends_3 - pair.mounts_23.mean(0))
+    limbs = set().union(*(bodies.beyond(chain[0])[0] for chain in pair.chains))
+    rest = [body for body in range(len(bodies.links_of)) if body not in limbs]
+    lowest = max(float((bodies.corners(body) @ out_3).max()) for body in rest)
+    return out_3[2] < -0.7 and lowest < float(ends_3 @ out_3)
+
+
+def _same(one: Pair, other: Pair) -> bool:
+    """Whether two pairs have the same limbs: the legs of a four-legged robot."""
+    measures = [measure(lines_of(pair.chains[0])) for pair in (one, other)]
+    count = len(one.chains[0])
+    return one.body == other.body and count == len(other.chains[0]) == alike(*measures)
 
 
 def _hangs_below(low: Pair, high: Pair) -> float:

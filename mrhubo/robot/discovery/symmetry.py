@@ -69,7 +69,7 @@ def find_pairs(bodies: Bodies) -> list[Pair]:
             if count < max(_FEWEST, 0.6 * max(len(chains[i]), len(chains[j]))):
                 continue
             pair = _pair(bodies, body, (chains[i], chains[j]))
-            if pair is not None:
+            if pair is not None and pair.mirrored > 0:
                 found.append(pair)
     found.sort(key=lambda pair: (-pair.size, -pair.mirrored))
     kept: list[Pair] = []
