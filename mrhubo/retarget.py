@@ -21,7 +21,7 @@ def build_parser() -> CommandParser[None]:
     who = parser.add_mutually_exclusive_group(required=True)
     package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
-    robot = "a robot without a package: its YAML file, or the name of one that ships with mrhubo"
+    robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
     parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help="motion files, and folders of them")
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
@@ -83,7 +83,9 @@ def _answerer(package: str | None, robot: str | None):  # noqa: ANN202 (importin
 
     if package is not None:
         return of_package(mrhubo.load(package))
-    return of_reference(mrhubo.Robot.from_config(str(robot)))
+    from mrhubo.describing.run import open_robot
+
+    return of_reference(open_robot(str(robot)))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from mrhubo.errors import UserError
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = {
     name: f"mrhubo.{name}"
-    for name in ("fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
+    for name in ("describe", "fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
 }
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
 """Of the config; elsewhere `Config`."""
@@ -208,6 +208,7 @@ GIVEN = {
     "--to": "numpy",
 }
 NEEDED = {
+    "describe": 1,
     "fit": 1,
     "pair": 1,
     "retarget": 3,

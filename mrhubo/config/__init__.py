@@ -34,7 +34,7 @@ from mrhubo.config.schema import (
     TrackingConfig,
     TrainerConfig,
 )
-from mrhubo.config.shipped import find_config, shipped_root
+from mrhubo.config.shipped import find_config, is_config, shipped_root
 from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
 from mrhubo.config.typed import typed_value
 
@@ -71,6 +71,7 @@ __all__ = [
     "choice",
     "field_docs",
     "find_config",
+    "is_config",
     "fingerprint",
     "flow_yaml",
     "keys_of",

@@ -59,7 +59,9 @@ def to_yaml(config: Any) -> str:
 
 def flow_yaml(value: Any) -> str:
     """One value as YAML on one line, as `to_yaml` writes it: ``{link: torso, offset: [0.0, 0.1, 0.0]}``."""
-    text = yaml.dump(_escaped(to_plain(value)), Dumper=_Dumper, default_flow_style=True, sort_keys=False, width=math.inf)
+    text = yaml.dump(
+        _escaped(to_plain(value)), Dumper=_Dumper, default_flow_style=True, sort_keys=False, width=math.inf
+    )
     return text.removesuffix("\n").removesuffix("\n...")
 
 

@@ -24,7 +24,7 @@ from mrhubo.view.solids import Color
 
 _PALE: Color = (0.84, 0.86, 0.89)
 """Of both bodies, under their marks."""
-_ARROW, _SHORT_ARROW, _FRONT_ARROW = 0.17, 0.11, 0.30
+_ARROW, _SHORT_ARROW, _FRONT_ARROW = 0.17, 0.11, 0.34
 """Lengths [m] of the arrows: a part's first direction, its second one, and where the chest looks."""
 _ROD = 0.09
 """Half of a joint axis's rod [m]."""
@@ -38,6 +38,8 @@ class Figure:
 
     body: Solids
     marks: Solids
+    middle_3: np.ndarray
+    """The middle (3,) of where the arms start, or of the body, where nothing starts at the chest."""
 
 
 class FigureMaker:
@@ -58,11 +60,15 @@ class FigureMaker:
         """The human in a pose, local rotations (21, 3, 3)."""
         points = self._human_points(local_J33)
         start_E3, end_E3 = self._human_limbs(points)
+        body = human_figure(local_J33, self.body_map.skeleton, _PALE, None)
+        middle_3 = self._middle(start_E3, body)
         marks = self._marks(start_E3, end_E3, self.body_map.human_directions(local_J33[None])[0], points)
-        return Figure(human_figure(local_J33, self.body_map.skeleton, _PALE, None), marks)
+        return Figure(body, Solids.concatenate([marks, _front(middle_3)]), middle_3)
 
-    def robot_figure(self, q_N: Tensor) -> Figure:
-        """The robot at joint angles (N,) [rad]."""
+    def robot_figure(self, q_N: Tensor, size: float = 1.0, rod: float = _ROD, front: bool = True) -> Figure:
+        """The robot at joint angles (N,) [rad]; `size` of its marks, half the length [m] of a joint axis's `rod`, and
+        whether an arrow shows where its chest looks.
+        """
         poses = self.robot.forward(q_N[None])
         view = self.body_map.shared.view_robot(poses)
         place_44 = np.eye(4)
@@ -71,10 +77,22 @@ class FigureMaker:
         start_E3, end_E3 = view.start_BE3[0].numpy() @ turn_33, view.end_BE3[0].numpy() @ turn_33
         links_L3 = poses.position_BL3[0].numpy() @ turn_33
         origins = {axis.part.joint: links_L3[self.robot.link_index(axis.link)] for axis in self._axes}
-        marks = self._marks(start_E3, end_E3, view.direction_BD3[0], origins)
+        marks = self._marks(start_E3, end_E3, view.direction_BD3[0], origins, size)
         shown = link_poses(self.robot.description.parsed, self.robot.configuration(q_N.numpy()))
-        rods = axis_rods(self._joint_axes(shown, place_44), _ROD)
-        return Figure(self._body(shown).transformed(place_44), Solids.concatenate([marks, rods]))
+        rods = axis_rods(self._joint_axes(shown, place_44), rod, size)
+        body = self._body(shown).transformed(place_44)
+        middle_3 = self._middle(start_E3, body)
+        return Figure(body, Solids.concatenate([marks, rods, *([_front(middle_3)] if front else [])]), middle_3)
+
+    def places(self, q_N: Tensor) -> dict[str, np.ndarray]:
+        """Where the config's points (3,) are in `robot_figure`, by their names."""
+        view = self.body_map.shared.view_robot(self.robot.forward(q_N[None]))
+        turn_33 = self.scale * human_to_world(view.views[0][0].numpy())
+        found: dict[str, np.ndarray] = {}
+        for row, limb in enumerate(self._limbs):
+            found.setdefault(limb.part.start, view.start_BE3[0, row].numpy() @ turn_33)
+            found.setdefault(limb.part.end, view.end_BE3[0, row].numpy() @ turn_33)
+        return found
 
     def _human_points(self, local_J33: Tensor) -> dict[str, np.ndarray]:
         """Keypoints (3,) by name, world frame, m."""
@@ -101,22 +119,27 @@ class FigureMaker:
         return float(np.clip(by_limbs, by_height / _MOST_STRETCH, by_height * _MOST_STRETCH))
 
     def _marks(
-        self, start_E3: np.ndarray, end_E3: np.ndarray, direction_D3: Tensor, origins: Mapping[str, np.ndarray]
+        self,
+        start_E3: np.ndarray,
+        end_E3: np.ndarray,
+        direction_D3: Tensor,
+        origins: Mapping[str, np.ndarray],
+        size: float = 1.0,
     ) -> Solids:
-        """Limbs, where hands and head point, and where the chest looks; `origins` by the human joint of a part."""
+        """Limbs, and where hands and head point; `origins` by the human joint of a part."""
         limbs = zip(self._limbs, start_E3, end_E3, strict=True)
-        marks = [bone(start_3, end_3, _color(limb.part.joint)) for limb, start_3, end_3 in limbs]
+        marks = [bone(start_3, end_3, _color(limb.part.joint), size) for limb, start_3, end_3 in limbs]
         ends = {limb.part.name: end_3 for limb, end_3 in zip(self._limbs, end_E3, strict=True)}
         columns = {d.name: row for row, d in enumerate(self.body_map.directions)}
         for axis in self._axes:
             origin_3 = ends.get(axis.part.hangs_on or "", origins[axis.part.joint])
             length = _ARROW if axis.name == axis.part.direction_names[0] else _SHORT_ARROW
             direction_3 = human_to_world(direction_D3[columns[axis.name]].numpy())
-            marks.append(arrow(origin_3, direction_3, length, _color(axis.part.joint)))
-        if any(self._inner):
-            forward_3 = np.array([1.0, 0.0, 0.0])
-            marks.append(arrow(start_E3[self._inner].mean(axis=0), forward_3, _FRONT_ARROW, SIDE_COLORS[None], 1.3))
+            marks.append(arrow(origin_3, direction_3, length, _color(axis.part.joint), size))
         return Solids.concatenate(marks)
+
+    def _middle(self, start_E3: np.ndarray, body: Solids) -> np.ndarray:
+        return start_E3[self._inner].mean(axis=0) if any(self._inner) else body.bounds().mean(axis=0)
 
     def _body(self, poses: Mapping[str, np.ndarray]) -> Solids:
         return robot_solids(self._geometry, poses, self._parents).recolored(_PALE).scaled(self.scale)
@@ -132,3 +155,8 @@ class FigureMaker:
 
 def _color(joint: str) -> Color:
     return SIDE_COLORS[SIDE_OF.get(joint)]
+
+
+def _front(origin_3: np.ndarray) -> Solids:
+    """Where the chest looks: x of the world frame."""
+    return arrow(origin_3, np.array([1.0, 0.0, 0.0]), _FRONT_ARROW, SIDE_COLORS[None], 1.8)

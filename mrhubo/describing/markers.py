@@ -12,7 +12,11 @@ import numpy as np
 from mrhubo.view import Solids
 from mrhubo.view.solids import Color
 
-SIDE_COLORS: dict[str | None, Color] = {"left": (0.93, 0.49, 0.13), "right": (0.16, 0.44, 0.80), None: (0.16, 0.60, 0.32)}
+SIDE_COLORS: dict[str | None, Color] = {
+    "left": (0.93, 0.49, 0.13),
+    "right": (0.16, 0.44, 0.80),
+    None: (0.16, 0.60, 0.32),
+}
 """Of what belongs to the left, to the right, and to neither."""
 AXIS_COLOR: Color = (0.55, 0.15, 0.62)
 """Of the robot's joint axes."""

@@ -20,13 +20,16 @@ _DEEPEST = 30
 _COLUMNS = ("joint", "kind", "axis", "position [m]", "limits", "parent -> child")
 
 
-def tree_text(description: Description) -> str:
-    """The tree, a joint a line: kind, axis, position, limits, and the links above and below it."""
+def tree_text(description: Description, source: str | None = None) -> str:
+    """The tree, a joint a line: kind, axis, position, limits, and the links above and below it.
+
+    `source` is what the user calls the file, where it is another than that of the description.
+    """
     rows = [_COLUMNS, *(_row(description, joint, depth, poses) for joint, depth, poses in _walk(description))]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_COLUMNS) - 1)]
     turning = sum(joint.rotary for joint in description.joints.values())
     lines = [
-        f"{description.path}: {len(description.links)} links, {len(description.joints)} joints, {turning} of which turn",
+        f"{source or description.path}: {len(description.links)} links, {len(description.joints)} joints, {turning} of which turn",
         f"root link '{printable(description.root)}'; axes and positions are in its frame, with every joint at 0",
         "",
     ]
@@ -77,4 +80,5 @@ def _limits(joint: Joint) -> str:
 def _mimic(joint: Joint) -> str:
     if joint.mimic is None:
         return ""
-    return f"  (follows {shortened(joint.mimic.joint, 60)}: times {joint.mimic.multiplier:.4g}, plus {joint.mimic.offset:.4g})"
+    mimic = joint.mimic
+    return f"  (follows {shortened(mimic.joint, 60)}: times {mimic.multiplier:.4g}, plus {mimic.offset:.4g})"

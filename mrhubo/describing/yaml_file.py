@@ -13,7 +13,7 @@ from typing import Any
 
 from mrhubo.config import flow_yaml
 from mrhubo.errors import listed, printable
-from mrhubo.robot.discovery import Discovery, FoundEnd, FoundPoint
+from mrhubo.robot.discovery import Discovery, FoundEnd
 from mrhubo.robot.parts import PARTS, LimbPart, OrientedPart
 
 _WIDTH = 120
@@ -52,22 +52,31 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
     if found.ranges:
         lines.append("  ranges:  # [rad]")
         for joint, limits in found.ranges.items():
-            lines += _entry(f"    {flow_yaml(joint)}: {flow_yaml([_number(limits.lower), _number(limits.upper)])}", limits.why)
+            lines += _entry(
+                f"    {flow_yaml(joint)}: {flow_yaml([_number(limits.lower), _number(limits.upper)])}", limits.why
+            )
     if doubts := unsure(found):
-        lines += _comments(2, "Guesses: look at these entries, then take their names out. Nothing is trained before.")
+        lines += _comments(2, "Guesses: look at these entries, and take their names out when they are right.")
         lines.append(f"  unsure: {flow_yaml(list(doubts))}")
     return "\n".join([*lines, *_others(found)]) + "\n"
 
 
 def unsure(found: Discovery) -> dict[str, str]:
     """The entries of the config that are guesses, and what was asked about each."""
-    ours, theirs = set(_rows()), {*found.points, *found.ends, *found.chains}
+    ours, theirs = set(entry_names()), {*found.points, *found.ends, *found.chains}
     chains = {chain for chain, joints in found.chains.items() if set(joints) & set(found.joints)}
     doubts: dict[str, list[str]] = {}
     for question in found.questions:
         if question.about in ours | chains or question.about not in theirs:  # of legs, nothing is read yet
             doubts.setdefault(question.about, []).append(question.text)
     return {about: " ".join(texts) for about, texts in doubts.items()}
+
+
+def keypoint_entries(found: Discovery) -> dict[str, Any]:
+    """What was found, as `robot.keypoints` of a config."""
+    ends = {name: end_entry(end) for name, end in found.ends.items()}
+    entries = {name: point_entry(point.link, point.offset_3) for name, point in found.points.items()} | ends
+    return {name: entries[name] for name in entry_names() if name in entries}
 
 
 def relative(path: Path, file: Path) -> str:
@@ -77,7 +86,7 @@ def relative(path: Path, file: Path) -> str:
     return str(path) if shared == Path(shared.anchor) else os.path.relpath(path, folder)
 
 
-def _rows() -> list[str]:
+def entry_names() -> list[str]:
     """The entries that `robot.keypoints` can have, in the order of the table."""
     names: list[str] = []
     for part in PARTS:
@@ -112,19 +121,21 @@ def _joints(found: Discovery) -> Iterator[str]:
 
 def _joint_lines(joints: Sequence[str], chain: str) -> Iterator[str]:
     for place, joint in enumerate(joints):
-        yield f"    - {flow_yaml(joint)}" + (f"  # {printable(chain)}, from the body outwards" if chain and not place else "")
+        yield f"    - {flow_yaml(joint)}" + (
+            f"  # {printable(chain)}, from the body outwards" if chain and not place else ""
+        )
 
 
 def _keypoints(found: Discovery) -> Iterator[str]:
-    for name in _rows():
-        if name in found.ends:
-            end = found.ends[name]
-            yield from _entry(f"    {name}: {flow_yaml(end_entry(end))}", _told(end))
-            yield from _candidates(name, end, lambda link, _, end=end: {"link": link, **_axes(end)})
-        elif name in found.points:
-            point = found.points[name]
-            yield from _entry(f"    {name}: {flow_yaml(point_entry(point.link, point.offset_3))}", _told(point))
-            yield from _candidates(name, point, point_entry)
+    for name, entry in keypoint_entries(found).items():
+        part = found.ends.get(name) or found.points[name]
+        yield from _entry(f"    {name}: {flow_yaml(entry)}", f"{part.confidence:.2f}: {part.cue}")
+        for other in part.candidates:
+            if isinstance(part, FoundEnd):
+                choice: Any = {"link": other.link, **_axes(part)}
+            else:
+                choice = point_entry(other.link, other.offset_3)
+            yield from _comments(4, f"or {name}: {flow_yaml(choice)} ({other.why})")
 
 
 def point_entry(link: str, offset_3: Sequence[float]) -> str | dict[str, Any]:
@@ -148,15 +159,6 @@ def _axes(end: FoundEnd) -> dict[str, list[float]]:
 def _number(value: float) -> float:
     """Tenths of a millimetre, or of a milliradian."""
     return round(float(value), 4) + 0.0  # no -0.0
-
-
-def _told(found: FoundPoint | FoundEnd) -> str:
-    return f"{found.confidence:.2f}: {found.cue}"
-
-
-def _candidates(name: str, found: FoundPoint | FoundEnd, entry: Any) -> Iterator[str]:
-    for other in found.candidates:
-        yield from _comments(4, f"or {name}: {flow_yaml(entry(other.link, other.offset_3))} ({other.why})")
 
 
 def _others(found: Discovery) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """MuJoCo's models (MJCF) as URDF: links, joints, limits, and the shapes of links; MuJoCo itself reads them.
 
-What has no meaning for a robot's kinematics is left out: actuators, sensors, tendons, contacts, lights, the floor. Meshes
-are named by their files and not loaded. Reference for elements and attributes:
+What has no meaning for a robot's kinematics is left out: actuators, sensors, tendons, contacts, lights, the floor.
+Meshes are named by their files and not loaded. Reference for elements and attributes:
 https://mujoco.readthedocs.io/en/stable/XMLreference.html
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +37,8 @@ _GROWING = ("replicate", "composite", "flexcomp", "flex", "plugin")
 class Converted:
     """A robot that was a MuJoCo model."""
 
+    name: str
+    """The model's name, or its file's."""
     urdf: str
     """The text of the URDF."""
     notes: tuple[str, ...]
@@ -69,6 +72,7 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
             f"{path}: is a MuJoCo model, and MuJoCo is not installed: pip install 'mrhubo[mjcf]', or name a URDF"
         ) from error
     _refuse_growing(path)
+    mujoco.set_mju_user_warning(lambda _: None)  # else it writes a log file where the user happens to be
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         meshes = _without_meshes(spec, path, beside, mujoco)
@@ -77,6 +81,8 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
         raise
     except Exception as error:  # ValueError and mujoco.FatalError, whose types differ between versions
         raise UserError(f"{path}: MuJoCo refuses the model: {shortened(first_line(error), 300)}") from error
+    finally:
+        mujoco.set_mju_user_warning(None)
     return _Writer(path, model, meshes).converted()
 
 
@@ -135,7 +141,8 @@ class _Writer:
 
     def __init__(self, path: Path, model: Any, meshes: dict[str, tuple[str, str]]) -> None:
         self.path, self.model, self.meshes = path, model, meshes
-        self.robot = etree.Element("robot", name=model.names[: model.names.index(b"\0")].decode(errors="replace") or path.stem)
+        name = model.names[: model.names.index(b"\0")].decode(errors="replace")
+        self.robot = etree.Element("robot", name=path.stem if name in ("", "MuJoCo Model") else name)
         self.notes: list[str] = []
         self.links: dict[str, etree._Element] = {}
         self.joints: dict[str, etree._Element] = {}
@@ -159,7 +166,8 @@ class _Writer:
         self._mimics()
         text = etree.tostring(self.robot, pretty_print=True, encoding="unicode")
         head = f"<!-- Made by `mrhubo describe` of the MuJoCo model {self.path.name.replace('--', '- -')}. -->\n"
-        return Converted('<?xml version="1.0" encoding="utf-8"?>\n' + head + text, tuple(self.notes))
+        text = f'<?xml version="1.0" encoding="utf-8"?>\n{head}{text}'
+        return Converted(str(self.robot.get("name")), text, tuple(self.notes))
 
     def _root_body(self) -> int:
         """The body on the world that carries most joints: floors, tables and balls carry fewer."""
@@ -274,7 +282,8 @@ class _Writer:
                 self._shape(link, tag, place_44, "mesh", filename=mesh[0], scale=mesh[1])
             elif (write := _SHAPES.get(int(model.geom_type[geom]))) is not None:
                 for shape, offset_44, sizes in write(np.array(model.geom_size[geom])):
-                    self._shape(link, tag, place_44 @ offset_44, shape, **{word: _numbers(size) for word, size in sizes.items()})
+                    words = {word: _numbers(size) for word, size in sizes.items()}
+                    self._shape(link, tag, place_44 @ offset_44, shape, **words)
 
     @staticmethod
     def _shape(link: etree._Element, tag: str, place_44: np.ndarray, shape: str, **sizes: str) -> None:
@@ -338,7 +347,8 @@ def _pose(position_3: np.ndarray, quaternion_4: np.ndarray | None = None) -> np.
 
 
 def _origin(element: etree._Element, pose_44: np.ndarray) -> None:
-    rpy = Rotation.from_matrix(pose_44[:3, :3]).as_euler("xyz")
+    with warnings.catch_warnings(action="ignore"):  # pitched by 90 degrees: roll and yaw are one, which is no matter
+        rpy = Rotation.from_matrix(pose_44[:3, :3]).as_euler("xyz")
     etree.SubElement(element, "origin", xyz=_numbers(pose_44[:3, 3]), rpy=_numbers(rpy))
 
 
@@ -348,4 +358,3 @@ def _numbers(values: np.ndarray) -> str:
 
 def _number(value: float) -> str:
     return f"{round(float(value), 9) + 0.0:.9g}"
-
