@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from mrhubo.describing.run import Described
 
 DESCRIPTION = (
-    "Finds out from a robot's model which of its links and joints stand for which part of a human body, by geometry first"
-    " and by names last, and writes a config that says how sure every entry is, with a picture beside it: the robot and"
-    " the human in five poses. Of a config, hand-written or not, it draws the picture alone."
+    "Finds out from a robot's model which of its links and joints stand for which part of a human body, by geometry"
+    " first and by names last, and writes a config that says how sure every entry is, with a picture beside it: the"
+    " robot and the human in five poses. Of a config, hand-written or not, it draws the picture alone."
 )
 
 

@@ -17,8 +17,8 @@ def build_parser() -> CommandParser[Config]:
     """The command's arguments."""
     parser = CommandParser("mrhubo fit", DESCRIPTION, Config, instead="--urdf FILE")
     urdf = (
-        "a robot without a config: its URDF, or what else mrhubo describe takes; its config is written to conf/NAME.yaml"
-        " first, or taken from there"
+        "a robot without a config: its URDF, or what else mrhubo describe takes; its config is written to"
+        " conf/NAME.yaml first, or taken from there"
     )
     parser.add_argument("--urdf", metavar="FILE", help=urdf)
     parser.add_argument("--quiet", action="store_true", help="no progress lines")

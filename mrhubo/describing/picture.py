@@ -33,8 +33,9 @@ _WIDE_M, _BELOW_M = (1.62, 2.2), 0.14
 """Least and greatest width [m] of the picture of a figure, and how far below the shoulders its middle is."""
 _DETAIL_POSE = list(POSES).index("elbows at right angles")
 _CAPTION = (
-    "orange: what the config calls left; blue: right; green: where the chest looks, and the head; purple: the joints' axes."
-    " Balls are the config's points: a shoulder's lies where the axes that turn the upper arm meet, an elbow's on its hinge."
+    "orange: what the config calls left; blue: right; green: where the chest looks, and the head; purple: joint axes."
+    " Balls are the config's points: a shoulder's lies where the axes that turn the upper arm meet, an elbow's on its"
+    " hinge."
 )
 
 

@@ -1,4 +1,4 @@
-"""What a description says in the terminal: every choice, how sure it is, and what told it; then what is to be answered."""
+"""What a description says in the terminal: every choice, how sure it is, what told it; then what is to be answered."""
 
 from __future__ import annotations
 
@@ -66,6 +66,6 @@ def _questions(found: Discovery, file: Path) -> Iterator[str]:
     if not doubts:
         return
     yield ""
-    yield f"What could not be decided. Correct or confirm these entries in {file}, and take their names out of `unsure`:"
+    yield f"Not decided. Correct or confirm these entries in {file}, and take their names out of `unsure` there:"
     for about, text in doubts.items():
         yield from textwrap.wrap(f"{about}: {printable(text)}", _WIDTH, initial_indent="  ", subsequent_indent="    ")

@@ -12,7 +12,7 @@ from pathlib import Path
 from mrhubo.config import is_config, load_config
 from mrhubo.describing.model_file import find_model, model_named
 from mrhubo.describing.picture import draw, save_picture
-from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, relative, unsure
+from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, unsure
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.files.atomic import atomic_path
 from mrhubo.robot import BodyMap, Robot, build_body_map
@@ -73,13 +73,13 @@ def describe_model(word: str, out: Path | None = None, force: bool = False) -> D
     """
     path = find_model(word)
     with model_named(), _as_urdf(path, out, force) as (urdf, notes):
-        found = discover(read_urdf(urdf))
+        found = _discover(read_urdf(urdf))
         file = out or default_config(path)
         check_name("the config's file name", file.stem)
         picture = file.with_suffix(".png")
         if not force:
             refuse_existing(file)
-        text = described_yaml(found, urdf, file, picture, relative(path, file))
+        text = described_yaml(found, urdf, file, picture, path.name)
         with atomic_path(file) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return Described(found, file, picture, urdf, notes)
@@ -116,10 +116,8 @@ def open_robot(word: str) -> Robot:
         return Robot.from_config(word)
     description = read_model(word)
     with model_named():
-        found = discover(description)
-        ranges = {joint: [limits.lower, limits.upper] for joint, limits in found.ranges.items()}
-        name, entries = _file_name(find_model(word)), keypoint_entries(found)
-        robot = Robot.from_urdf(description, found.joints, entries, found.key_links, ranges, name=name)
+        found = _discover(description)
+        robot = _robot(description, found, _file_name(find_model(word)))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
     return robot
@@ -152,6 +150,32 @@ def refuse_existing(file: Path) -> None:
     """Refuses to replace what somebody may have worked on."""
     if file.exists():
         raise UserError(f"{file} is there already, and may hold work of yours; name another by --out, or give --force")
+
+
+def _discover(description: Description) -> Discovery:
+    """What the links of a robot stand for; where joints cannot be used, and no whole robot is left, they are to blame.
+
+    Raises:
+        UserError: no two arms are found.
+    """
+    try:
+        found = discover(description)
+        if description.faults:
+            with warnings.catch_warnings(action="ignore"):
+                BodyMap.of(_robot(description, found, "robot"))
+    except UserError as error:
+        if not description.faults:
+            raise
+        fault = next(iter(description.faults.values()))
+        raise UserError(f"{description.path}, {fault}; without this joint no two whole arms are found") from error
+    return found
+
+
+def _robot(description: Description, found: Discovery, name: str) -> Robot:
+    ranges = {joint: [limits.lower, limits.upper] for joint, limits in found.ranges.items()}
+    return Robot.from_urdf(
+        description, found.joints, keypoint_entries(found), found.key_links, ranges, name=name
+    )  # fmt: skip
 
 
 @contextlib.contextmanager

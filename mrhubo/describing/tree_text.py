@@ -28,8 +28,9 @@ def tree_text(description: Description, source: str | None = None) -> str:
     rows = [_COLUMNS, *(_row(description, joint, depth, poses) for joint, depth, poses in _walk(description))]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_COLUMNS) - 1)]
     turning = sum(joint.rotary for joint in description.joints.values())
+    counts = f"{len(description.links)} links, {len(description.joints)} joints, {turning} of which turn"
     lines = [
-        f"{source or description.path}: {len(description.links)} links, {len(description.joints)} joints, {turning} of which turn",
+        f"{source or description.path}: {counts}",
         f"root link '{printable(description.root)}'; axes and positions are in its frame, with every joint at 0",
         "",
     ]

@@ -20,13 +20,13 @@ _WIDTH = 120
 _DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
 """What an entry may leave out."""
 _HEAD = """\
-# {name}, as `mrhubo describe` found it in {source}. Look at {picture} first; then:
+# What `mrhubo describe` found in {source}. Look at {picture}, beside this file, first. Every entry may be changed:
+#   mrhubo describe {file}  # draws the picture anew
 #   mrhubo fit {file}
-# Every entry may be changed: {again} draws the picture anew.
 #
-# A shoulder, elbow or wrist is a joint's centre, where its axes meet: {{link: NAME, offset: [x, y, z]}} is a point [m] in
+# Shoulders, elbows and wrists are joint centres, where axes meet: {{link: NAME, offset: [x, y, z]}} is a point [m] in
 # the frame of that link, and a link's name alone is the origin of its frame. Directions are in the frame of their link.
-# In front of an entry: how sure it is, from 0 to 1, and what told it.
+# With every entry: how sure it is, from 0 to 1, and what told it.
 """
 
 
@@ -40,15 +40,12 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
         picture: where its picture is going to be.
         source: what the user named, for the comment at the top.
     """
-    again = f"mrhubo describe {file}"
-    head = _HEAD.format(
-        name=printable(found.name), source=printable(source), picture=printable(str(picture)), file=printable(str(file)),
-        again=f"`{printable(again)}`",
-    )  # fmt: skip
+    words = {"source": source, "picture": picture.name, "file": str(file)}
+    head = _HEAD.format(**{word: printable(text) for word, text in words.items()})
     lines = [*head.splitlines(), *_questions(found), "robot:"]
     lines += [f"  name: {flow_yaml(file.stem)}", f"  urdf: {flow_yaml(relative(urdf, file))}"]
     lines += [*_joints(found), "  keypoints:", *_keypoints(found)]
-    lines += _wrapped("  key_links: [", list(map(flow_yaml, found.key_links)), "]")
+    lines += _wrapped("  key_links: [", map(flow_yaml, found.key_links), "]")
     if found.ranges:
         lines.append("  ranges:  # [rad]")
         for joint, limits in found.ranges.items():
@@ -110,20 +107,16 @@ def _questions(found: Discovery) -> Iterator[str]:
 
 def _joints(found: Discovery) -> Iterator[str]:
     """The joints, a line or more a chain."""
-    yield "  joints:"
+    yield "  joints: ["
     rest = list(found.joints)
     for chain, members in found.chains.items():
         moved = [joint for joint in members if joint in rest]
         rest = [joint for joint in rest if joint not in moved]
-        yield from _joint_lines(moved, chain.replace("_", " "))
-    yield from _joint_lines(rest, "")
-
-
-def _joint_lines(joints: Sequence[str], chain: str) -> Iterator[str]:
-    for place, joint in enumerate(joints):
-        yield f"    - {flow_yaml(joint)}" + (
-            f"  # {printable(chain)}, from the body outwards" if chain and not place else ""
-        )
+        if moved:
+            yield f"    # {printable(chain.replace('_', ' '))}, from the body outwards"
+            yield from _wrapped("    ", map(flow_yaml, moved), ",")
+    yield from _wrapped("    ", map(flow_yaml, rest), ",") if rest else ()
+    yield "  ]"
 
 
 def _keypoints(found: Discovery) -> Iterator[str]:
@@ -135,7 +128,7 @@ def _keypoints(found: Discovery) -> Iterator[str]:
                 choice: Any = {"link": other.link, **_axes(part)}
             else:
                 choice = point_entry(other.link, other.offset_3)
-            yield from _comments(4, f"or {name}: {flow_yaml(choice)} ({other.why})")
+            yield f"    # {name}: {flow_yaml(choice)}  # or: {printable(other.why)}"
 
 
 def point_entry(link: str, offset_3: Sequence[float]) -> str | dict[str, Any]:
@@ -157,8 +150,8 @@ def _axes(end: FoundEnd) -> dict[str, list[float]]:
 
 
 def _number(value: float) -> float:
-    """Tenths of a millimetre, or of a milliradian."""
-    return round(float(value), 4) + 0.0  # no -0.0
+    """Hundredths of a millimetre, or of a milliradian."""
+    return round(float(value), 5) + 0.0  # no -0.0
 
 
 def _others(found: Discovery) -> Iterator[str]:
