@@ -54,15 +54,16 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         ankle_at = knee_at + 1 if knee_at + 1 < len(rotary) else None
     else:
         hip_at, knee_at, ankle_at = places
-    ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at)
+    across = _across(lines, knee_at, hip_at, ankle_at)
+    aside_3 = across if across is not None else bodies.position(rotary[knee_at].outer_link)
+    knee_3 = lines[knee_at].nearest(aside_3)
+    ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at, knee_3)
     if hip_at is not None:
         between = lines[hip_at + 1 : knee_at]
-        knee_3 = lines[knee_at].nearest(feet(between[-1], lines[knee_at])[0] if between else ankle.point_3)
         crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > _TILTED
         hip_3 = feet(lines[hip_at], between[-1])[0] if crossing else lines[hip_at].nearest(knee_3)
         cue, sure = f"the axis of '{rotary[hip_at].hinge.name}' above the knee", 0.9
     else:
-        knee_3 = lines[knee_at].nearest(ankle.point_3)
         hip_3 = lines[max(knee_at - 1, 0)].nearest(knee_3)
         cue, sure = "the last axis before the knee", 0.5
     step = rotary[knee_at]
@@ -84,16 +85,20 @@ def _parallel(one: Line, other: Line) -> bool:
 def _three(lines: list[Line]) -> tuple[int, int, int] | None:
     """Hip pitch, knee and ankle pitch: three parallel axes far from each other."""
     best, found = 0.0, None
-    for j, k in itertools.combinations(range(len(lines)), 2):
-        if not _parallel(lines[j], lines[k]):
+    length = max(one.distance(other.point_3) for one, other in itertools.combinations(lines, 2)) if len(lines) > 2 else 0.0
+    for j in range(1, len(lines)):
+        # The next parallel axis some way off is the ankle's; toes have one more.
+        shanks = {k: lines[j].distance(lines[k].point_3) for k in range(j + 1, len(lines)) if _parallel(lines[j], lines[k])}
+        k = next((k for k, shank in shanks.items() if shank > _APART * length), None)
+        if k is None:
             continue
-        shank = lines[j].distance(lines[k].point_3)
+        shank = shanks[k]
         thighs = [lines[i].distance(lines[j].point_3) for i in range(j)]
         above = [i for i in range(j) if thighs[i] > _APART * (thighs[i] + shank) and _tilt(lines[i], lines[j]) < _TILTED]
         if not above:
             continue
         i = min(above, key=lambda i: (round(_tilt(lines[i], lines[j]), 2), -i))
-        if min(thighs[i], shank) > best and shank > _APART * (thighs[i] + shank):
+        if min(thighs[i], shank) > best:
             best, found = min(thighs[i], shank), (i, j, k)
     return found
 
@@ -102,8 +107,25 @@ def _tilt(one: Line, other: Line) -> float:
     return sine(one.axis_3, other.axis_3)
 
 
-def _ankle(bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None) -> Spot:
-    knee_3 = lines[knee_at].nearest(bodies.position(chain[knee_at].outer_link))
+def _across(lines: list[Line], knee_at: int, hip_at: int | None, ankle_at: int | None) -> np.ndarray | None:
+    """A point (3,) that tells how far from the middle a leg runs: where an axis that is not lateral meets one that is.
+    None if there is no such axis.
+    """
+    if hip_at is not None:
+        between = [line for line in lines[hip_at + 1 : knee_at] if not _parallel(line, lines[knee_at])]
+        if between:
+            return feet(between[-1], lines[knee_at])[0]
+    if ankle_at is not None:
+        others = [line for line in lines[knee_at + 1 :] if not _parallel(line, lines[ankle_at])]
+        if others:
+            return feet(lines[ankle_at], others[0])[0]
+    before = [line for line in lines[: hip_at or 0] if _tilt(line, lines[knee_at]) > 0.9]
+    return feet(lines[hip_at], before[-1])[0] if before and hip_at is not None else None
+
+
+def _ankle(
+    bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None, knee_3: np.ndarray
+) -> Spot:
     if ankle_at is None:
         thigh = lines[knee_at].distance(lines[max(knee_at - 1, 0)].point_3)
         end_3, how, sure = limb_end(bodies, chain[-1], knee_3, max(thigh, 1e-3 * bodies.size))

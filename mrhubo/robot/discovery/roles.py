@@ -11,7 +11,7 @@ from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import find_elbow, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
+from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
 _PLANE = 0.03
@@ -165,7 +165,7 @@ def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
         todo: list[Step] = [step]
         while todo:
             fitting = [s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)]
-            fitting = [s for s in fitting if not _is_sensor(s)]
+            fitting = [s for s in fitting if not _is_sensor(s) and not _has_twin(s, todo, arms.normal_3, middle_3)]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
             if not fitting or len(chain) >= 4:
                 break
@@ -178,6 +178,22 @@ def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
         if found > rank:
             best, rank = tuple(chain), found
     return best
+
+
+def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray) -> bool:
+    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear."""
+    line = step.hinge.line
+    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
+
+    def miss(other: Line) -> float:
+        one_3, other_3 = feet(image, other)
+        return float(np.linalg.norm(one_3 - other_3)) + float(np.linalg.norm(image.point_3 - line.point_3)) * sine(
+            image.axis_3, other.axis_3
+        )
+
+    own = abs(float((line.point_3 - middle_3) @ normal_3))
+    return any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
 
 
 def _is_sensor(step: Step) -> bool:
