@@ -124,6 +124,8 @@ def test_what_pages_show_is_accepted(path: Path, name: str, arguments: list[str]
     if not arguments:
         return  # only named
     parse(name, arguments)
+    if name == "describe":
+        return  # its word is a model, of the reader's own
     settings = [text for text in arguments if re.match(r"[a-z][\w.]*=", text)]
     rest = [text for text in arguments if text not in settings]
     file = rest[rest.index("--config") + 1] if "--config" in rest else "" if not rest else rest[0]
@@ -206,6 +208,7 @@ GIVEN = {
     "--out": "wave.csv",
     "--robot": "nao",
     "--to": "numpy",
+    "FILE": "my.urdf",
 }
 NEEDED = {
     "describe": 1,
