@@ -27,6 +27,10 @@ _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 its length."""
 _WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
+_BESIDE = 0.025
+"""How far a jaw's axis passes the hand's line, as a share of the arm."""
+_SHORT = 4
+"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 _ON = 1e-4
@@ -126,15 +130,13 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
 def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
     """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
     whole = chain
-    # What is driven with others is a gripper wherever it is; it must not be taken for a part of the forearm.
-    while len(chain) > 2 and _driven(chain[-1]):
-        chain = chain[:-1]
+    chain = without_gripper(chain)
     end, why = len(chain), "others mimic it, or it slides: a gripper"
     elbow_at = find_elbow(bodies, chain)
     first = 2 if elbow_at is None else elbow_at + 1
     for i in range(first, len(chain)):
         step = chain[i]
-        if _driven(step):
+        if _driven(step) and (i >= _SHORT or not step.hinge.free):
             end = i
         elif i - first >= _WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
@@ -143,7 +145,35 @@ def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str,
         else:
             continue
         break
+    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
+        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
     return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def _is_jaw(chain: Chain, elbow_at: int) -> bool:
+    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line on which the wrist's axes lie, or
+    parallel to one that swings the wrist already.
+    """
+    lines = lines_of(chain)
+    found = measure(lines)
+    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
+    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
+    if sine(along_3, last.axis_3) < 0.7:
+        return False
+    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
+    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
+        return True
+    twists = [line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
+    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def without_gripper(chain: Chain) -> Chain:
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie, and
+    no part of a forearm.
+    """
+    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
+        chain = chain[:-1]
+    return chain
 
 
 def _driven(step: Step) -> bool:
@@ -231,7 +261,8 @@ def _wrist(
     end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper)
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
-        if float(np.linalg.norm(origin_3 - elbow.point_3)) > _OUT * upper:
+        outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
+        if outward > _OUT * upper:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at

@@ -100,12 +100,13 @@ def _up(
         ankles_3 = np.mean([leg.ankle.point_3 for leg in legs], axis=0)
         cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", shoulders_3 - hips_3, 2.0)]
     else:
-        root_3 = np.zeros(3)
-        if np.linalg.norm(shoulders_3 - root_3) > 0.3 * arms[0].length:
-            cues.append(("the base", shoulders_3 - root_3, 1.5))
+        for what, at_3, weight in _below(bodies, roles):
+            near = float(np.linalg.norm(at_3 - shoulders_3)) / (0.3 * arms[0].length)
+            cues.append((what, shoulders_3 - at_3, weight * min(1.0, near)))
         cues.append(("the file's z", np.array([0.0, 0.0, 1.0]), 1.0))
         middle_3 = np.mean([reach_middle(arm.chain[arm.clavicles :], arm.wrist.point_3) for arm in arms], axis=0)
-        cues.append(("how the arms move", (shoulders_3 - middle_3) / arms[0].length, 0.7))
+        hangs_3 = (shoulders_3 - middle_3) / arms[0].length
+        cues.append(("how the arms move", hangs_3, 0.7 * min(1.0, 3 * float(np.linalg.norm(hangs_3)))))
     if roles.neck:
         top_3 = np.mean([bodies.position(link) for link in bodies.links_of[roles.neck[-1].end]], axis=0)
         cues.append(("the head", top_3 - shoulders_3, 0.7))
@@ -123,6 +124,19 @@ def _up(
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]
     return unit(best - normal_3 * (normal_3 @ best)), float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+
+
+def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:
+    """What probably lies below the shoulders: what it is, where (3,), and how much that counts."""
+    limbs: set[int] = set()
+    for step in (*(chain[0] for chain in roles.arms.chains), *roles.neck[:1]):
+        limbs |= bodies.beyond(step)[0]
+    rest = [body for body in range(len(bodies.links_of)) if body not in limbs and body != roles.chest]
+    if rest:
+        yield "what carries the chest", np.mean([bodies.corners(body).mean(0) for body in rest], axis=0), 1.5
+    else:
+        yield "the base", np.zeros(3), 1.0
+        yield "the trunk", bodies.corners(roles.chest).mean(0), 0.5
 
 
 def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tuple[np.ndarray, float]]:

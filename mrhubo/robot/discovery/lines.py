@@ -75,28 +75,25 @@ class Measures:
 
 
 def measure(lines: Sequence[Line]) -> Measures:
-    """The lengths along a chain of axes. Axes that are parallel share the point at which the way comes in."""
+    """The lengths along a chain of axes. Axes that are parallel share the point at which the way comes in; those at the
+    chain's beginning, the one at which it leaves.
+    """
     count = len(lines)
     apart_N, along_N = np.zeros(max(count - 1, 0)), np.zeros(count)
     cosine_N, out_N, nodes_N3 = np.zeros(max(count - 1, 0)), np.zeros(count), np.zeros((count, 3))
     if not count:
         return Measures(apart_N, along_N, cosine_N, out_N, nodes_N3)
-    at_3: np.ndarray | None = None
+    pairs = [sine(lines[i].axis_3, lines[i + 1].axis_3) < PARALLEL for i in range(count - 1)]
+    first = pairs.index(False) if False in pairs else count - 1
+    at_3 = feet(lines[first], lines[first + 1])[0] if first + 1 < count else lines[first].point_3
+    for i in reversed(range(first + 1)):
+        nodes_N3[i] = at_3 = lines[i].nearest(at_3)
     for i in range(count - 1):
         one, other = lines[i], lines[i + 1]
         cosine_N[i] = abs(float(one.axis_3 @ other.axis_3))
-        if sine(one.axis_3, other.axis_3) < PARALLEL:
-            start_3 = one.point_3 if at_3 is None else at_3
-            leave_3, enter_3 = start_3, other.nearest(start_3)
-        else:
-            leave_3, enter_3 = feet(one, other)
-        if at_3 is None:
-            nodes_N3[0] = leave_3
-        else:
-            along_N[i] = float(np.linalg.norm(leave_3 - at_3))
+        leave_3, enter_3 = (nodes_N3[i], other.nearest(nodes_N3[i])) if pairs[i] else feet(one, other)
+        along_N[i] = float(np.linalg.norm(leave_3 - nodes_N3[i]))
         apart_N[i] = float(np.linalg.norm(enter_3 - leave_3))
         out_N[i + 1] = out_N[i] + along_N[i] + apart_N[i]
-        nodes_N3[i + 1] = at_3 = enter_3
-    if count == 1:
-        nodes_N3[0] = lines[0].point_3
+        nodes_N3[i + 1] = enter_3
     return Measures(apart_N, along_N, cosine_N, out_N, nodes_N3)

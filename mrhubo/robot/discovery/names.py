@@ -12,6 +12,7 @@ _WORDS = {
     "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
+    "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",
     "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
     "tool": r"tool|tcp|ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
 }

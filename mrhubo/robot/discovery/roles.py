@@ -9,7 +9,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.arm import find_elbow, read_arm
+from mrhubo.robot.discovery.arm import find_elbow, read_arm, without_gripper
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.symmetry import Pair, alike
@@ -60,11 +60,10 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         )
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
-        legness[id(armed[0])] += 0.5 * _stands(bodies, armed[0])
-        if legness[id(armed[0])] > 0.5:
+        if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
             raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
-        arms, legs, sure = armed[0], None, 1.0 - max(0.0, 0.5 + legness[id(armed[0])])
+        arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     else:
         options = [
             (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high), i, j)
@@ -82,13 +81,14 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         arms, legs = armed[j], armed[i]
         reverse = next(option[0] for option in options if option[1:] == (j, i))
         sure = float(np.clip(0.5 + 0.25 * (score - reverse), 0.0, 1.0))
-        if legness[id(arms)] > 0.5:
+        if _named_legs(arms):
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
-    used = {step.hinge.name for pair in pairs for chain in pair.chains for step in chain[:1]}
+    same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
+    used = {chain[0].hinge.name for pair in same for chain in pair.chains}
     used |= {step.hinge.name for step in waist}
     neck = _neck(bodies, arms, used)
     others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
@@ -99,7 +99,7 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
     """About -2 (arms) to 2 (legs)."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     score = names.share(called, "leg") - names.share(called, "arm")
-    chain = pair.chains[0]
+    chain = without_gripper(pair.chains[0])
     end = chain[-1]
     beyond = [hinge for hinge in bodies.beyond(end)[1] if hinge is not end.hinge]
     if len(beyond) >= 2:
@@ -117,6 +117,12 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
         lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
         score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
     return score
+
+
+def _named_legs(pair: Pair) -> bool:
+    """Whether names speak of legs, and not of arms."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    return names.share(called, "leg") > 0.25 and names.share(called, "arm") == 0
 
 
 def _stands(bodies: Bodies, pair: Pair) -> bool:
@@ -157,7 +163,7 @@ def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float
 def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
     """The longest other chain from the chest with axes in the mirror plane; () if there is none."""
     middle_3, best = arms.mounts_23.mean(0), ()
-    rank = (0.0, 0.0, 0.0)
+    rank, reach = -np.inf, measure(lines_of(arms.chains[0])).out_N[-1]
     for step in bodies.steps_from[arms.body]:
         if step.hinge.name in used or not step.hinge.rotary or _is_sensor(step):
             continue
@@ -173,8 +179,12 @@ def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
             todo = bodies.onward(fitting[0])
         if not chain:
             continue
-        named = names.share([s.outer_link for s in chain] + [s.hinge.name for s in chain], "head")
-        found = (float(named > 0), float(len(chain)), bodies.extent(step))
+        called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
+        named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
+        # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
+        away = chain[0].hinge.line.distance(middle_3) if len(chain) == 1 else float(np.linalg.norm(chain[0].hinge.line.nearest(middle_3) - middle_3))
+        away = min(away, float(np.linalg.norm(measure(lines_of(tuple(chain))).nodes_N3[0] - middle_3)))
+        found = named + 0.5 * min(len(chain), 2) - away / reach
         if found > rank:
             best, rank = tuple(chain), found
     return best
