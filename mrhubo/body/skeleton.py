@@ -188,6 +188,11 @@ class Skeleton(nn.Module):
         """xxh3 of its lengths, 16 hex digits."""
         return checksum_tensors({"offsets": self.offsets_J3, "points": self.point_offsets_E3}, {})
 
+    @property
+    def rest_points(self) -> dict[str, Tensor]:
+        """`rest_K3`, the keypoints (3,) [m] of a human at rest, by name."""
+        return dict(zip(KEYPOINT_NAMES, self.rest_K3, strict=True))
+
     def global_rotations(self, local_BJ33: Tensor) -> Tensor:
         """Local rotations (B, 21, 3, 3) of joints 1..21 to rotations relative to the pelvis (B, 22, 3, 3)."""
         root = torch.eye(3, dtype=local_BJ33.dtype, device=local_BJ33.device).expand(len(local_BJ33), 1, 3, 3)

@@ -75,9 +75,10 @@ def prepare(config: Config, search: bool = False) -> Prepared:
         UserError: anything in the config, the URDF, the prior or the motions is wrong.
     """
     setup = prepare_pairs(config, search)
-    build_network(config, setup.body_map)
-    motions = load_motions(config, setup.body_map.skeleton)
-    return Prepared(config, setup.body_map, setup.prior, setup.store, motions, tracking_dir(config))
+    config, body_map = setup.config, setup.body_map
+    build_network(config, body_map)
+    motions = load_motions(config, body_map.skeleton)
+    return Prepared(config, body_map, setup.prior, setup.store, motions, tracking_dir(config))
 
 
 def make_places(setup: PairSetup, *more: Path) -> None:
