@@ -17,11 +17,10 @@ from PIL import Image, UnidentifiedImageError
 
 from mrhubo.describing.figures import Figure, FigureMaker
 from mrhubo.describing.poses import POSES, human_poses
-from mrhubo.errors import UserError
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.metrics import direction_error
 from mrhubo.robot import BodyMap, Limb, link_poses
-from mrhubo.robot.discovery import discover
+from mrhubo.robot.entries import Point
 from mrhubo.view import Camera, contact_sheet, render, save_png
 
 _MAKER = "mrhubo describe"
@@ -113,18 +112,14 @@ def _details(body_map: BodyMap, maker: FigureMaker, q_N: torch.Tensor) -> Image.
 
 def _distances(body_map: BodyMap) -> Mapping[str, float]:
     """How far [m] the points of a config lie from where the axes alone put them, where these tell it."""
-    description = body_map.robot.description
-    try:
-        geometric = discover(description).geometric
-    except UserError:  # no robot that is known by its axes
-        return {}
-    poses = link_poses(description.parsed, {})
-    return {
-        name: float(np.linalg.norm(_at(poses, point.link, point.offset_3) - geometric[name].root_3))
-        for name, point in body_map.keypoints.points.items()
-        if name in geometric and point.link in poses
-    }
+    poses = link_poses(body_map.robot.description.parsed, {})
+    found: dict[str, float] = {}
+    for name, point in body_map.keypoints.points.items():
+        centre = body_map.yardstick.centre(name, point.link)
+        if centre is not None and {centre.link, point.link} <= poses.keys():
+            found[name] = float(np.linalg.norm(_at(poses, point) - _at(poses, centre)))
+    return found
 
 
-def _at(poses: Mapping[str, np.ndarray], link: str, offset_3: tuple[float, ...]) -> np.ndarray:
-    return poses[link][:3, :3] @ np.array(offset_3) + poses[link][:3, 3]
+def _at(poses: Mapping[str, np.ndarray], point: Point) -> np.ndarray:
+    return poses[point.link][:3, :3] @ np.array(point.offset_3) + poses[point.link][:3, 3]
