@@ -23,7 +23,7 @@ _DOMINANT = 2.5
 """How many times longer than any other branch the one must be in which a limb goes on; else it ends there, as a hand."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hinge:
     """A joint that moves, between two bodies."""
 
@@ -92,7 +92,7 @@ def lines_of(chain: Chain) -> list[Line]:
     return [step.hinge.line for step in chain]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bodies:
     """The bodies of a robot."""
 
@@ -103,6 +103,7 @@ class Bodies:
     """By link."""
     hinges: tuple[Hinge, ...]
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
+    _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def links_of(self) -> list[list[str]]:
@@ -167,6 +168,12 @@ class Bodies:
 
     def beyond(self, step: Step) -> tuple[set[int], list[Hinge]]:
         """The bodies and joints of a branch, its first joint among them."""
+        key = (step.start, step.hinge.name)
+        if key not in self._branches:
+            self._branches[key] = self._branch(step)
+        return self._branches[key]
+
+    def _branch(self, step: Step) -> tuple[set[int], list[Hinge]]:
         bodies, hinges, todo = {step.end}, [step.hinge], [step.end]
         while todo:
             body = todo.pop()

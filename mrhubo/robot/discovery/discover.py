@@ -15,6 +15,7 @@ from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, read_bodies
 from mrhubo.robot.discovery.facing import Heading, find_heading
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
+from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
 from mrhubo.robot.discovery.result import (
     Candidate,
@@ -238,7 +239,7 @@ class _Finder:
         above = share > 0
         question = None
         if abs(share) < 0.1:
-            moved_3 = np.cross(axis_3, upper_3)
+            moved_3 = cross(axis_3, upper_3)
             ahead = float(moved_3 @ self.heading.forward_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
             above = ahead > 0
             if abs(ahead) < 0.3:

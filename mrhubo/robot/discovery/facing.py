@@ -15,7 +15,7 @@ from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies
 from mrhubo.robot.discovery.leg import Leg
-from mrhubo.robot.discovery.lines import unit
+from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
 from mrhubo.robot.discovery.roles import Roles
 
@@ -60,7 +60,7 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
     """
     normal_3 = _normal(bodies, roles)
     up_3, up_sure, up_cue = _up(bodies, roles, arms, legs, normal_3)
-    forward_3 = np.cross(normal_3, up_3)
+    forward_3 = cross(normal_3, up_3)
     votes = list(_forward_votes(bodies, roles, arms, legs, up_3, forward_3, normal_3))
     votes = [vote for vote in votes if abs(vote.value) > 0.1]
     total = sum(vote.weight for vote in votes)
@@ -147,11 +147,11 @@ def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tupl
     weighed += [(axis_3, 1.0) for axis_3 in np.eye(3)]
     weighed += [(axis_3, 1.0) for axis_3 in bodies.pose_44[bodies.links_of[roles.chest][0]][:3, :3].T]
     flat = [(unit(v - normal_3 * (normal_3 @ v)), w) for v, w in weighed if abs(float(v @ normal_3)) < 0.05]
-    found = [(v, w) for axis_3, w in flat for v in (axis_3, np.cross(normal_3, axis_3))]
+    found = [(v, w) for axis_3, w in flat for v in (axis_3, cross(normal_3, axis_3))]
     found = [(sign * v, w) for v, w in found for sign in (1.0, -1.0)]
     if not found:
-        across_3 = unit(np.cross(normal_3, np.eye(3)[int(np.argmin(np.abs(normal_3)))]))
-        found = [(sign * v, 1.0) for v in (across_3, np.cross(normal_3, across_3)) for sign in (1.0, -1.0)]
+        across_3 = unit(cross(normal_3, np.eye(3)[int(np.argmin(np.abs(normal_3)))]))
+        found = [(sign * v, 1.0) for v in (across_3, cross(normal_3, across_3)) for sign in (1.0, -1.0)]
     total = sum(w for _, w in flat) or 1.0
     return [(v, sum(w for other, w in found if float(v @ other) > _SAME) / total) for v, _ in found]
 
@@ -208,10 +208,10 @@ def _bend(
     straight = straight_angle(axis_3, lower_3, upper_3)
     lower, upper = usual_range(step.hinge)
     side = bend_side(lower, upper, straight)
-    moved_3 = unit(np.cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
+    moved_3 = unit(cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
     # Where forward is once the upper part hangs down: turned back from where it points, the short way.
     down_3, upper_3 = -up_3, unit(upper_3)
-    about_3 = np.cross(down_3, upper_3)
+    about_3 = cross(down_3, upper_3)
     if np.linalg.norm(about_3) > 1e-6:
         angle = float(np.arctan2(np.linalg.norm(about_3), down_3 @ upper_3))
         forward_3 = turned(forward_3, unit(about_3), angle)

@@ -13,7 +13,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies, Step
-from mrhubo.robot.discovery.lines import unit
+from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import turned, usual_range
 from mrhubo.robot.joint import drive
 
@@ -88,7 +88,7 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
         doubt = "nothing tells on which side the thumb would be"
     thumb_3 = thumb_3 - fingers_3 * (fingers_3 @ thumb_3)
     if np.linalg.norm(thumb_3) < 0.1:
-        other_3 = np.cross(fingers_3, left_3) if abs(fingers_3 @ left_3) < 0.9 else forward_3
+        other_3 = cross(fingers_3, left_3) if abs(fingers_3 @ left_3) < 0.9 else forward_3
         thumb_3 = other_3 - fingers_3 * (fingers_3 @ other_3)
     thumb_3 = unit(thumb_3)
     return Hand(last.outer_link, fingers_3, thumb_3, sure, f"{how}; {told}", doubt)
@@ -105,7 +105,7 @@ def _rest_thumb(arm: Arm, outward_3: np.ndarray, forward_3: np.ndarray) -> np.nd
 
 def _swung(vector_3: np.ndarray, start_3: np.ndarray, end_3: np.ndarray) -> np.ndarray:
     """A vector turned the short way that takes one direction to another."""
-    about_3 = np.cross(start_3, end_3)
+    about_3 = cross(start_3, end_3)
     sine = float(np.linalg.norm(about_3))
     return turned(vector_3, about_3 / sine, float(np.arctan2(sine, start_3 @ end_3))) if sine > 1e-6 else vector_3
 
@@ -129,7 +129,7 @@ def _fingers(bodies: Bodies, last: Step, wrist_3: np.ndarray) -> list[_Finger]:
             if not hinge.rotary:
                 continue
             way = _closing(bodies, hinge.name)
-            curl_3 = curl_3 + way * np.cross(hinge.line.axis_3, tip_3 - hinge.line.point_3)
+            curl_3 = curl_3 + way * cross(hinge.line.axis_3, tip_3 - hinge.line.point_3)
         flexing = [hinge.line.axis_3 for hinge in hinges if hinge.rotary]
         axis_3 = flexing[-1] if flexing else on.hinge.line.axis_3
         slides = not on.hinge.rotary
@@ -173,13 +173,13 @@ def _dexterous(
     spread = spread - np.outer(spread @ fingers_3, fingers_3)
     lateral_3 = np.linalg.svd(spread)[2][0] if len(others) > 1 and np.abs(spread).max() > 1e-4 else others[0].axis_3
     lateral_3 = unit(lateral_3 - fingers_3 * (fingers_3 @ lateral_3))
-    palm_3 = np.cross(fingers_3, lateral_3)
+    palm_3 = cross(fingers_3, lateral_3)
     reach = float(np.mean([np.linalg.norm(finger.tip_3 - finger.base_3) for finger in others]))
     # The palm is where the thumb opposes the fingers, and where these go as they close.
     opposed = float((thumb.tip_3 - np.mean([finger.base_3 for finger in others], axis=0)) @ palm_3) / max(reach, 1e-6)
     curls = [float(finger.curl_3 @ palm_3) / max(float(np.linalg.norm(finger.curl_3)), 1e-9) for finger in others]
     palm = float(np.clip(2 * opposed, -1, 1)) + 0.8 * float(np.mean(curls))
-    by_curl = left * float(np.clip(palm, -1, 1)) * float(np.cross(palm_3, fingers_3) @ lateral_3)
+    by_curl = left * float(np.clip(palm, -1, 1)) * float(cross(palm_3, fingers_3) @ lateral_3)
     size = max(float(np.linalg.norm(finger.base_3 - thumb.base_3)) for finger in others)
     by_base = float((thumb.base_3 - middle_3) @ lateral_3) / max(size, 1e-9)
     vote = 0.8 * by_curl + 2.0 * float(np.clip(by_base, -1, 1))
@@ -212,10 +212,10 @@ def _jaws(
     elif fingers[0].slides:
         across_3 = fingers[0].axis_3
     else:
-        across_3 = np.cross(fingers[0].axis_3, fingers_3)
+        across_3 = cross(fingers[0].axis_3, fingers_3)
     across_3 = across_3 - fingers_3 * (fingers_3 @ across_3)
     if np.linalg.norm(across_3) < 1e-6:
-        across_3 = np.cross(fingers[0].axis_3, fingers_3)
+        across_3 = cross(fingers[0].axis_3, fingers_3)
     across_3 = unit(across_3)
     named = [finger for finger in fingers if finger.named_thumb]
     if len(named) == 1 and len(fingers) == 2:

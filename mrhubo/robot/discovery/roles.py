@@ -52,6 +52,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
     large = [pair for pair in pairs if pair.size > least]
     armed = [pair for pair in large if read_arm(bodies, pair.chains[0]) is not None and pair.mirrored > 0.05]
+    # Casters have two joints too, but none of them has limits.
+    armed = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])] or armed[:1]
     if not armed:
         count = len(bodies.hinges)
         raise UserError(

@@ -18,6 +18,8 @@ from mrhubo.robot.discovery.lines import Measures, measure, unit
 _LENGTH = 0.03
 """How far two lengths may differ, as a share of the chain's: left and right in files that were measured, not drawn."""
 _COSINE = 0.09
+_ALIKE = 0.6
+"""Share of the joints up to which two limbs must be alike: one hand may be another than the other."""
 _FEWEST = 2
 """Joints of a limb."""
 
@@ -62,13 +64,14 @@ def find_pairs(bodies: Bodies) -> list[Pair]:
     """All pairs of limbs, the largest first; those within a limb of a larger pair (fingers) are left out."""
     found: list[Pair] = []
     for body, steps in enumerate(bodies.steps_from):
-        chains = [bodies.chain(step) for step in steps]
-        measures = [measure(lines_of(chain)) for chain in chains]
-        for i, j in itertools.combinations(range(len(steps)), 2):
-            count = alike(measures[i], measures[j])
-            if count < max(_FEWEST, 0.6 * max(len(chains[i]), len(chains[j]))):
+        chains = [bodies.chain(step) for step in steps] if len(steps) > 1 else []
+        for chain, other in itertools.combinations(chains, 2):
+            least = max(_FEWEST, _ALIKE * max(len(chain), len(other)))
+            if min(len(chain), len(other)) < least:
                 continue
-            pair = _pair(bodies, body, (chains[i], chains[j]))
+            if alike(measure(lines_of(chain)), measure(lines_of(other))) < least:
+                continue
+            pair = _pair(bodies, body, (chain, other))
             if pair is not None and pair.mirrored > 0:
                 found.append(pair)
     found.sort(key=lambda pair: (-pair.size, -pair.mirrored))
