@@ -14,7 +14,7 @@ from typing import Any
 from mrhubo.config import flow_yaml
 from mrhubo.errors import listed, printable
 from mrhubo.robot.discovery import Discovery, FoundEnd
-from mrhubo.robot.parts import PARTS, LimbPart, OrientedPart
+from mrhubo.robot.parts import CHEST, PARTS, LimbPart, OrientedPart
 
 _WIDTH = 120
 _DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
@@ -65,7 +65,8 @@ def unsure(found: Discovery) -> dict[str, str]:
     doubts: dict[str, list[str]] = {}
     for question in found.questions:
         if question.about in ours | chains or question.about not in theirs:  # of legs, nothing is read yet
-            doubts.setdefault(question.about, []).append(question.text)
+            about = CHEST.name if question.about in CHEST.words else question.about
+            doubts.setdefault(about, []).append(question.text)
     return {about: " ".join(texts) for about, texts in doubts.items()}
 
 

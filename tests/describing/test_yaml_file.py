@@ -93,7 +93,7 @@ def test_ranges_and_questions_are_written(tmp_path: Path) -> None:
     file = written(tmp_path, discovery)
     config = load_config(file).robot
     assert config.ranges == {"l_elbow": [-2.0, -0.1]}
-    assert config.unsure == ["left_hand", "forward"]  # nothing reads a sole yet
+    assert config.unsure == ["left_hand", "chest"]  # nothing reads a sole yet
     assert all(question.text in file.read_text() for question in asked)
 
 
