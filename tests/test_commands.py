@@ -36,7 +36,7 @@ PAGES = [
 PLACEHOLDERS = {
     "<robot>": "nao", "<scale>": "manual", "$(CONFIG)": "conf/nao.yaml", "$(ARGS)": "", "--polish N": "--polish 1",
 }  # fmt: skip
-OWN_FILE = re.compile(r"(my\w*|mine|config|robot)\.yaml|[A-Z]+")
+OWN_FILE = re.compile(r"(conf/)?(my\w*|mine|config|robot)\.yaml|[A-Z]+")
 """What stands for a file of the reader's own."""
 STARTS = re.compile(
     r"(?:[\w.$()/-]*/)?(?:\S+ )*?(?:-m mrhubo\.(?P<module>[a-z][\w.]*)|(?<![\w./`-])mrhubo (?P<verb>[a-z]+))(?P<rest>.*)"

@@ -55,7 +55,7 @@ def test_a_config_that_a_fit_would_refuse_is_drawn_with_status_2(capsys: pytest.
     text = Path("conf/my.yaml").read_text().replace("left_", "x_").replace("right_", "left_").replace("x_", "right_")
     Path("conf/my.yaml").write_text(text)
     assert dispatch(["describe", "conf/my.yaml"]) == 2
-    assert "are left and right exchanged?" in capsys.readouterr().err
+    assert "error: conf/my.yaml, line 2" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,9 @@ def test_mistakes_are_sentences(arguments: list[str], sentence: str) -> None:
         dispatch(["describe", *arguments])
 
 
-def test_fit_takes_a_model_in_place_of_a_config(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_fit_takes_a_model_in_place_of_a_config(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     seen = []
     stand_in = SimpleNamespace(fit=lambda config, report: seen.append(config))
     monkeypatch.setitem(sys.modules, "mrhubo.fitting.fit", stand_in)  # the real one's import takes seconds

@@ -76,7 +76,7 @@ def _errors(body_map: BodyMap, q_PN: torch.Tensor, poses_PJ33: torch.Tensor) -> 
 
 
 def _render(figure: Figure, size: tuple[int, int], camera: Camera, ground: str | None = "auto") -> Image.Image:
-    picture = render(figure.body, size, camera, ground=ground)
+    picture = render(figure.body, size, camera, ground=ground, surface=figure.skin)
     marks = render(figure.marks, size, camera, background=None, ground=None)
     picture.paste(marks, (0, 0), marks)
     return picture
@@ -98,9 +98,8 @@ def _upper_body(figure: Figure, wide: float) -> Camera:
 def _details(body_map: BodyMap, maker: FigureMaker, q_N: torch.Tensor) -> Image.Image:
     """The whole robot, and every point of the config from near, with the axes around it."""
     figure, away = maker.robot_figure(q_N, 0.45, 0.6 * _NEAR_M, front=False), _distances(body_map)
-    whole = [
-        render(figure.body, _DETAIL, Camera.framing(figure.body, _DETAIL, azimuth, 8.0)) for azimuth in (0.0, 90.0)
-    ]
+    views = [Camera.framing(figure.body, _DETAIL, azimuth, 8.0) for azimuth in (0.0, 90.0)]
+    whole = [render(figure.body, _DETAIL, camera, surface=figure.skin) for camera in views]
     pictures, titles = whole, ["from the front", "from its left"]
     for name, place_3 in maker.places(q_N).items():
         camera = Camera(35.0, 25.0, (float(place_3[0]), float(place_3[1]), float(place_3[2])), _NEAR_M)

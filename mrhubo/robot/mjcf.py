@@ -66,7 +66,7 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
         UserError: MuJoCo is not installed or refuses the model, or there is no joint in it.
     """
     try:
-        import mujoco
+        import mujoco  # pyright: ignore[reportMissingImports] (an extra)
     except ImportError as error:
         raise UserError(
             f"{path}: is a MuJoCo model, and MuJoCo is not installed: pip install 'mrhubo[mjcf]', or name a URDF"

@@ -181,11 +181,12 @@ def save_png(image: Image.Image, path: str | Path, software: str | None = None) 
 
     ``software``: what the file names as its maker (`Software` in its text).
     """
-    path, text = Path(path), PngInfo()
+    path, more = Path(path), {}
     if software is not None:
-        text.add_text("Software", software)
+        more["pnginfo"] = PngInfo()
+        more["pnginfo"].add_text("Software", software)
     with atomic_path(path) as temporary:
-        image.save(temporary, format="PNG", pnginfo=text)
+        image.save(temporary, format="PNG", **more)
     return path
 
 

@@ -48,7 +48,9 @@ def test_the_shipped_robots_come_back(root: Path, tmp_path: Path, robot: str) ->
         assert end.link == discovery.ends[name].link and torch.allclose(end.axes_23, axes, atol=2e-5)
 
 
-@pytest.mark.parametrize("name", ["a: b", "x # y", "'quoted'", '"', "${l}", "true", "13_28", "{a}", "[b]", "ä ö", "- z", "*"])
+@pytest.mark.parametrize(
+    "name", ["a: b", "x # y", "'quoted'", '"', "${l}", "true", "13_28", "{a}", "[b]", "ä ö", "- z", "*"]
+)
 def test_any_name_of_a_link_and_a_joint_comes_back(tmp_path: Path, name: str) -> None:
     shown = name.replace('"', "&quot;")
     text = PAIR.replace('"l_lower"', f'"{shown}"').replace('"l_pitch"', f'"{shown}"')

@@ -78,8 +78,10 @@ def random_positions(mujoco: Any, model: Any, generator: np.random.Generator) ->
 def test_links_stand_where_mujoco_puts_them(tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
     description, notes = converted(tmp_path)
-    bare = re.sub("<asset>.*</asset>", "", MODEL, flags=re.S).replace('<geom class="looks" mesh="torso"', '<site')
-    model = mujoco.MjModel.from_xml_string(re.sub(r'material="m"/>|<keyframe>.*</keyframe>', lambda m: "/>" * ("m" in m[0][:10]), bare))
+    bare = re.sub("<asset>.*</asset>", "", MODEL, flags=re.S).replace('<geom class="looks" mesh="torso"', "<site")
+    model = mujoco.MjModel.from_xml_string(
+        re.sub(r'material="m"/>|<keyframe>.*</keyframe>', lambda m: "/>" * ("m" in m[0][:10]), bare)
+    )
     data, generator = mujoco.MjData(model), np.random.default_rng(0)
 
     def pose(body: str, anchor: str | None = None) -> np.ndarray:
@@ -118,7 +120,11 @@ def test_limits_and_shapes_are_kept(tmp_path: Path) -> None:
 
 def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
-    description, _ = converted(tmp_path, MODEL.replace('<freejoint name="root"/>', '<joint name="turn" axis="0 0 1"/>').split("<equality>")[0] + "</mujoco>")
+    description, _ = converted(
+        tmp_path,
+        MODEL.replace('<freejoint name="root"/>', '<joint name="turn" axis="0 0 1"/>').split("<equality>")[0]
+        + "</mujoco>",
+    )
     assert description.root == "base" and description.joints["turn"].child == "pelvis"
 
 
@@ -126,9 +132,15 @@ def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
     ("text", "sentence"),
     [
         ("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>", "has no joint"),
-        ("<mujoco><worldbody><body><joint axis='0 0 0'/><geom size='1'/></body></worldbody></mujoco>", "MuJoCo refuses"),
+        (
+            "<mujoco><worldbody><body><joint axis='0 0 0'/><geom size='1'/></body></worldbody></mujoco>",
+            "MuJoCo refuses",
+        ),
         ("<mujoco><worldbody><nonsense/></worldbody></mujoco>", "MuJoCo refuses"),
-        ("<mujoco><worldbody><replicate count='9999999'><geom size='1'/></replicate></worldbody></mujoco>", "<replicate>"),
+        (
+            "<mujoco><worldbody><replicate count='9999999'><geom size='1'/></replicate></worldbody></mujoco>",
+            "<replicate>",
+        ),
         ("<mujoco><worldbody>", "no well-formed XML"),
     ],
 )
