@@ -7,6 +7,7 @@ from mrhubo.reference.metrics import (
     direction_error,
     direction_jerk,
     joint_error,
+    limit_shares,
     link_error,
 )
 from mrhubo.reference.polish import Polish
@@ -27,5 +28,6 @@ __all__ = [
     "direction_error",
     "direction_jerk",
     "joint_error",
+    "limit_shares",
     "link_error",
 ]

@@ -5,6 +5,7 @@ Legend: B batch, D directions, K keypoints, N robot joints.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from functools import cached_property
 
@@ -126,6 +127,18 @@ class BodyMap(nn.Module):
     def yardstick(self) -> Yardstick:
         """What the robot's own axes tell of its body; looked for when first asked for."""
         return Yardstick(self.robot)
+
+    @cached_property
+    def geometric(self) -> BodyMap | None:
+        """The same with limbs from one joint's centre to the next, as the robot's axes tell them (`yardstick`): what a
+        limb is measured by, so that a point beside a joint shows. None where the axes tell no centre.
+        """
+        points = dict(self.keypoints.points)
+        points |= {n: c for n, p in points.items() if (c := self.yardstick.centre(n, p.link)) is not None}
+        if points == self.keypoints.points:
+            return None if self.yardstick.found is None else self
+        keypoints = dataclasses.replace(self.keypoints, points=points)
+        return BodyMap(self.robot.with_links(keypoints.links), keypoints, self.skeleton)
 
     def robot_directions(self, poses: LinkPoses) -> Tensor:
         """Unit directions (B, D, 3) of the robot, in human axes of the parts from which they are seen."""

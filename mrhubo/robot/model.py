@@ -219,7 +219,14 @@ class Robot(nn.Module):
         """The same robot with some of `joint_names` held at 0, or at the limit nearest to 0; at least one must stay."""
         kept = [name for name in self.joint_names if name not in joints]
         ranges = {name: ends for name, ends in self._made_with["ranges"].items() if name in kept}
-        robot = Robot(self.description, kept, name=self.name, **{**self._made_with, "ranges": ranges})
+        return self._again(kept, ranges=ranges)
+
+    def with_links(self, links: Iterable[str]) -> Robot:
+        """The same robot, which computes the poses of more links."""
+        return self._again(self.joint_names, links=(*self._made_with["links"], *links))
+
+    def _again(self, joints: Sequence[str], **changed: Any) -> Robot:
+        robot = Robot(self.description, joints, name=self.name, **{**self._made_with, **changed})
         robot.keypoints, robot.key_links = self.keypoints, self.key_links
         return robot.to(self.lower_N.device)
 

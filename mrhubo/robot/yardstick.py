@@ -58,6 +58,14 @@ class Yardstick:
         found = None if self.found is None else self._on_side(self.found.geometric, name, link)
         return None if found is None else Point(found.link, found.offset_3)
 
+    def distance(self, name: str, point: Point) -> float | None:
+        """Metres from a point to the joint centre of a keypoint, with every joint at 0; None where there is none."""
+        centre = self.centre(name, point.link)
+        standing = StandingRobot(self._description, {})
+        if centre is None:
+            return None
+        return float(np.linalg.norm(standing.position(centre) - standing.position(point)))
+
     def entry(self, name: str, link: str | None = None) -> str | None:
         """The entry of a point or oriented part as it was found; of a point on the side on which a link is, if one is
         given.
