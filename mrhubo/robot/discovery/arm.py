@@ -7,6 +7,7 @@ comes after forearm and hand.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,8 @@ _SHORT = 4
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 _ON = 1e-4
+_LEAST = 1e-3
+"""How long upper arm and forearm are at least, as a share of the robot."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
     elbow = Spot(point_3, step.start, links, cue, sure)
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
+    if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
+        return None
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
@@ -262,7 +267,9 @@ def _wrist(
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
-        if outward > _OUT * upper:
+        # Where the twist passes the elbow at a distance, the forearm's direction depends on how far out its end is.
+        farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
+        if outward > _OUT * upper and farther:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
@@ -281,7 +288,7 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
     if onward:
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
-            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.5
+            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
     named = [link for link in inside if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual]
     if named:
         nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
@@ -291,10 +298,10 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         out_3 = unit(corners.mean(0) - start_3)
         reach = float(((corners - start_3) @ out_3).max())
         if reach > _OUT * usual:
-            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.5
+            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.45
     far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
     if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
-        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.5
+        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.45
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
         return start_3 + 2 * (centre_3 - start_3), "twice as far as the centre of mass, as no joint tells the wrist", 0.4

@@ -150,6 +150,11 @@ class Bodies:
         centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
         return np.average(centres, axis=0, weights=[mass[0] for _, mass in found])
 
+    def middle(self, body: int) -> np.ndarray:
+        """About where a body is (3,): its centre of mass, else the mean of its corners."""
+        centre_3 = self.centre(body)
+        return self.corners(body).mean(0) if centre_3 is None else centre_3
+
     def corners(self, body: int) -> np.ndarray:
         """Points (P, 3) at the outside of a body's shapes, and the origins of its links; of meshes nothing is known."""
         found = [self.position(link)[None] for link in self.links_of[body]]

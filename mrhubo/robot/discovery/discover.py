@@ -12,7 +12,7 @@ from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, read_bodies
-from mrhubo.robot.discovery.facing import Heading, find_heading
+from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
 from mrhubo.robot.discovery.lines import cross
@@ -70,6 +70,7 @@ class _Finder:
             )
         legs = [leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None]
         legs = legs if len(legs) == 2 else []
+        roles = choose_neck(bodies, roles, arms, legs)
         self.bodies, self.roles = bodies, roles
         self.heading: Heading = find_heading(bodies, roles, arms, legs)
         self.arms: dict[str, Arm] = dict(zip(SIDES, arms[::-1] if self.heading.swap else arms, strict=True))

@@ -13,12 +13,16 @@ import numpy as np
 
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import Bodies
+from mrhubo.robot.discovery.bodies import Bodies, Chain
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
 from mrhubo.robot.discovery.roles import Roles
 
+_BELOW = 0.2
+"""How far below the shoulders a head may be, as a share of the arm: some robots carry their arms high."""
+_UNSURE = 0.3
+"""Up less sure than that tells nothing of necks."""
 _SAME = 0.9986
 """Cosine of 3 degrees: directions that mean the same one."""
 
@@ -47,6 +51,24 @@ class Heading:
     """Whether the second chain of each pair is the left one."""
     contradicted: tuple[str, ...]
     """What speaks against it."""
+
+
+def choose_neck(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Roles:
+    """The roles with the likeliest neck that begins above the shoulders or ends there, or with none."""
+    if not roles.necks:
+        return roles
+    heading = find_heading(bodies, roles.with_neck(()), arms, legs)
+    shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms])) - _BELOW * arms[0].length
+    for neck in roles.necks:
+        top_3 = bodies.middle(neck[-1].end)
+        if _is_named(neck) or heading.up_sure < _UNSURE or float(top_3 @ heading.up_3) > shoulders:
+            return roles.with_neck(neck)
+    return roles.with_neck(())
+
+
+def _is_named(neck: Chain) -> bool:
+    """Whether names say that a chain is a neck."""
+    return any(names.speaks_of(name, "head") for step in neck for name in (step.hinge.name, step.outer_link))
 
 
 def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Heading:
@@ -108,8 +130,8 @@ def _up(
         hangs_3 = (shoulders_3 - middle_3) / arms[0].length
         cues.append(("how the arms move", hangs_3, 0.7 * min(1.0, 3 * float(np.linalg.norm(hangs_3)))))
     if roles.neck:
-        top_3 = np.mean([bodies.position(link) for link in bodies.links_of[roles.neck[-1].end]], axis=0)
-        cues.append(("the head", top_3 - shoulders_3, 0.7))
+        top_3 = bodies.middle(roles.neck[-1].end)
+        cues.append(("the head", top_3 - shoulders_3, 2.0 if _is_named(roles.neck) else 0.7))
     flat = [(what, vector_3 - normal_3 * (normal_3 @ vector_3), weight) for what, vector_3, weight in cues]
     flat = [(what, unit(vector_3), weight) for what, vector_3, weight in flat if np.linalg.norm(vector_3) > 1e-6]
     candidates = _directions(bodies, roles, normal_3)
@@ -129,11 +151,11 @@ def _up(
 def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:
     """What probably lies below the shoulders: what it is, where (3,), and how much that counts."""
     limbs: set[int] = set()
-    for step in (*(chain[0] for chain in roles.arms.chains), *roles.neck[:1]):
+    for step in (chain[0] for chain in (*roles.arms.chains, *roles.necks)):
         limbs |= bodies.beyond(step)[0]
     rest = [body for body in range(len(bodies.links_of)) if body not in limbs and body != roles.chest]
     if rest:
-        yield "what carries the chest", np.mean([bodies.corners(body).mean(0) for body in rest], axis=0), 1.5
+        yield "what carries the chest", np.mean([bodies.middle(body) for body in rest], axis=0), 1.5
     else:
         yield "the base", np.zeros(3), 1.0
         yield "the trunk", bodies.corners(roles.chest).mean(0), 0.5

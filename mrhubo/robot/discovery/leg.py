@@ -7,6 +7,7 @@ from where the hip's axes cross.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ _TILTED = 0.6
 _APART = 0.15
 """How far hip, knee and ankle are at least from each other, as a share of the leg."""
 _ON = 1e-4
+_LEAST = 1e-3
+"""How long thigh and shank are at least, as a share of the robot."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     hip = Spot(hip_3, step.start, tuple(dict.fromkeys(links)), cue, sure)
     how = "the middle one of three parallel axes" if places else "the axis with the longest stretches on either side"
     knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
+    if min(math.dist(hip_3, knee_3), math.dist(knee_3, ankle.point_3)) < _LEAST * bodies.size:
+        return None
     return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,15 +31,27 @@ class Roles:
     waist: Chain
     """From the pelvis to the chest; without legs, from the root to the chest."""
     neck: Chain
+    necks: tuple[Chain, ...]
+    """Other chains in the middle that may be the neck, likeliest first."""
     others: tuple[Pair, ...]
     """Pairs that are neither."""
     sure: float
     """How clear it is which pair is arms, 0..1."""
 
+    def with_neck(self, neck: Chain) -> Roles:
+        """With another neck, or none; what else begins in the middle of a root that is the chest is the waist."""
+        below = next((chain for chain in self.necks if chain is not neck), ())
+        return replace(self, neck=neck, waist=self.waist or (_reversed(below) if self.legs is None else ()))
+
     @property
     def chest(self) -> int:
         """The body that carries both arms."""
         return self.arms.body
+
+
+def _reversed(chain: Chain) -> Chain:
+    """A chain passed from its other end."""
+    return tuple(Step(step.hinge, step.end) for step in reversed(chain))
 
 
 def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
@@ -51,7 +63,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
     large = [pair for pair in pairs if pair.size > least]
-    armed = [pair for pair in large if read_arm(bodies, pair.chains[0]) is not None and pair.mirrored > 0.05]
+    armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
     # Casters have two joints too, but none of them has limits.
     armed = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])] or armed[:1]
     if not armed:
@@ -92,9 +104,12 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
     used = {chain[0].hinge.name for pair in same for chain in pair.chains}
     used |= {step.hinge.name for step in waist}
-    neck = _neck(bodies, arms, used)
+    necks = _necks(bodies, arms, used)
+    arm = arms.chains[0]
+    if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
+        raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
     others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
-    return Roles(arms, legs, waist, neck, others, sure)
+    return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:
@@ -162,10 +177,10 @@ def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float
     return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
 
 
-def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
-    """The longest other chain from the chest with axes in the mirror plane; () if there is none."""
-    middle_3, best = arms.mounts_23.mean(0), ()
-    rank, reach = -np.inf, measure(lines_of(arms.chains[0])).out_N[-1]
+def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
+    """The other chains from the chest with axes in the mirror plane, the likeliest neck first."""
+    middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
+    ranked: list[tuple[float, Chain]] = []
     for step in bodies.steps_from[arms.body]:
         if step.hinge.name in used or not step.hinge.rotary or _is_sensor(step):
             continue
@@ -184,12 +199,11 @@ def _neck(bodies: Bodies, arms: Pair, used: set[str]) -> Chain:
         called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
         named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
         # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
-        away = chain[0].hinge.line.distance(middle_3) if len(chain) == 1 else float(np.linalg.norm(chain[0].hinge.line.nearest(middle_3) - middle_3))
-        away = min(away, float(np.linalg.norm(measure(lines_of(tuple(chain))).nodes_N3[0] - middle_3)))
-        found = named + 0.5 * min(len(chain), 2) - away / reach
-        if found > rank:
-            best, rank = tuple(chain), found
-    return best
+        start_3 = measure(lines_of(tuple(chain))).nodes_N3[0]
+        away = min(chain[0].hinge.line.distance(middle_3), float(np.linalg.norm(start_3 - middle_3)))
+        ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
+    ranked.sort(key=lambda found: -found[0])
+    return tuple(chain for _, chain in ranked)
 
 
 def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray) -> bool:

@@ -69,12 +69,14 @@ def find_pairs(bodies: Bodies) -> list[Pair]:
             least = max(_FEWEST, _ALIKE * max(len(chain), len(other)))
             if min(len(chain), len(other)) < least:
                 continue
-            if alike(measure(lines_of(chain)), measure(lines_of(other))) < least:
+            one, two = measure(lines_of(chain)), measure(lines_of(other))
+            # Ball joints, as of a neck and a waist, have no lengths by which to tell them apart.
+            if alike(one, two) < least or min(one.out_N[-1], two.out_N[-1]) < 1e-3 * bodies.size:
                 continue
             pair = _pair(bodies, body, (chain, other))
             if pair is not None and pair.mirrored > 0:
                 found.append(pair)
-    found.sort(key=lambda pair: (-pair.size, -pair.mirrored))
+    found.sort(key=lambda pair: -pair.size * pair.mirrored)
     kept: list[Pair] = []
     taken: set[int] = set()
     """Bodies of the limbs of larger pairs."""
