@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrhubo.config import CommandParser, find_config, is_config, load_config, print_error, run_command
+from mrhubo.errors import InputWarning, UserError
 
 if TYPE_CHECKING:
     from mrhubo.describing.run import Described
@@ -36,6 +38,10 @@ def main(argv: list[str]) -> int:
     """The command; 2 where a config was written, or drawn, that a fit would refuse as it stands."""
     options = build_parser().parse_args(argv)
     word, out = options.word, None if options.out is None else Path(options.out)
+    kinds = (".png",) if is_config(word) else (".yaml", ".yml")
+    if out is not None and out.suffix not in kinds:
+        what = "the picture of a config" if is_config(word) else "a config"
+        raise UserError(f"command line: --out: {what} is a {kinds[0]} file, '{out}' is none")
     if options.tree:
         return _show_tree(word)
     if is_config(word):
@@ -82,11 +88,27 @@ def _draw_config(word: str, out: Path | None, force: bool) -> int:
 
 
 def _draw(file: Path, picture: Path) -> int:
-    """Draws a config, and says what a fit would refuse about it."""
+    """Draws a config, and says what a fit would refuse or doubt about it."""
     from mrhubo.describing.run import draw_config
 
     fault = draw_config(file, picture)
-    return 0 if fault is None else print_error(fault)
+    if fault is not None:
+        return print_error(fault)
+    _try(file)
+    return 0
+
+
+def _try(file: Path) -> None:
+    """Tries a config on a motion, as a fit does first."""
+    from mrhubo.fitting.first_look import look_at
+    from mrhubo.robot import build_body_map
+
+    with warnings.catch_warnings(action="ignore"):  # told when it was drawn
+        body_map = build_body_map(load_config(file).robot)
+    look = look_at(body_map)
+    print(look)
+    for doubt in look.doubts:
+        warnings.warn(doubt, InputWarning, stacklevel=2)
 
 
 if __name__ == "__main__":

@@ -14,14 +14,18 @@ from PIL import Image
 
 from mrhubo.cli import dispatch
 from mrhubo.config import load_config
+from mrhubo.describe import _try as try_config
 from mrhubo.errors import UserError
 from tests.robot.two_arms import PAIR
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a robot; pictures are blank."""
+    """A folder with a robot; pictures are blank, and no motion is tried."""
+    from mrhubo import describe
     from mrhubo.describing import run
+
+    monkeypatch.setattr(describe, "_try", lambda file: None)
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(run, "draw", lambda body_map: Image.new("RGB", (3, 3)))
@@ -41,6 +45,12 @@ def test_a_model_becomes_a_config_and_a_picture(capsys: pytest.CaptureFixture[st
     assert dispatch(["describe", "conf/my.yaml", "--force"]) == 0
     assert dispatch(["describe", "my.urdf", "--out", "other/a.yaml"]) == 0
     assert load_config("other/a.yaml").robot.urdf.samefile("my.urdf") and Path("other/a.png").is_file()
+
+
+def test_a_config_is_tried_on_a_motion(capsys: pytest.CaptureFixture[str]) -> None:
+    dispatch(["describe", "my.urdf"])
+    try_config(Path("conf/my.yaml"))
+    assert "tried on 'pointing'" in capsys.readouterr().out
 
 
 def test_the_tree_is_printed_and_nothing_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,6 +76,11 @@ def test_a_config_that_a_fit_would_refuse_is_drawn_with_status_2(capsys: pytest.
         (["my.urdf", "--quiet"], "flag '--quiet' does not exist"),
         (["your.urdf"], "your.urdf does not exist"),
         (["your.yaml"], "does not exist"),
+        (["x" * 300], "is no file"),
+        (["x" * 300 + ".urdf"], "does not exist"),
+        (["."], "is a folder"),
+        (["my.urdf", "--out", "my.png"], "a config is a .yaml file"),
+        (["nao", "--out", "nao.yaml"], "the picture of a config is a .png file"),
     ],
 )
 def test_mistakes_are_sentences(arguments: list[str], sentence: str) -> None:

@@ -23,10 +23,10 @@ def find_model(word: str) -> Path:
         UserError: there is no such file, and no such robot, or the package cannot fetch it.
     """
     path = Path(word)
-    if os.path.lexists(path) or not re.fullmatch(r"\w+", word) or word.isdigit():
-        if path.is_dir():
+    if os.path.exists(path) or not re.fullmatch(r"\w+", word):
+        if os.path.isdir(path):
             raise UserError(f"{path} is a folder; name the robot's file in it")
-        if not path.exists():
+        if not os.path.exists(path):
             raise UserError(f"{path} does not exist; name a URDF or a MuJoCo model")
         return path
     if importlib.util.find_spec(_DESCRIPTIONS) is None:

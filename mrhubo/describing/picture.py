@@ -19,8 +19,7 @@ from mrhubo.describing.figures import Figure, FigureMaker
 from mrhubo.describing.poses import POSES, human_poses
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.metrics import direction_error
-from mrhubo.robot import BodyMap, Limb, link_poses
-from mrhubo.robot.entries import Point
+from mrhubo.robot import BodyMap, Limb
 from mrhubo.view import Camera, contact_sheet, render, save_png
 
 _MAKER = "mrhubo describe"
@@ -111,14 +110,5 @@ def _details(body_map: BodyMap, maker: FigureMaker, q_N: torch.Tensor) -> Image.
 
 def _distances(body_map: BodyMap) -> Mapping[str, float]:
     """How far [m] the points of a config lie from where the axes alone put them, where these tell it."""
-    poses = link_poses(body_map.robot.description.parsed, {})
-    found: dict[str, float] = {}
-    for name, point in body_map.keypoints.points.items():
-        centre = body_map.yardstick.centre(name, point.link)
-        if centre is not None and {centre.link, point.link} <= poses.keys():
-            found[name] = float(np.linalg.norm(_at(poses, point) - _at(poses, centre)))
-    return found
-
-
-def _at(poses: Mapping[str, np.ndarray], point: Point) -> np.ndarray:
-    return poses[point.link][:3, :3] @ np.array(point.offset_3) + poses[point.link][:3, 3]
+    found = {name: body_map.yardstick.distance(name, point) for name, point in body_map.keypoints.points.items()}
+    return {name: distance for name, distance in found.items() if distance is not None}

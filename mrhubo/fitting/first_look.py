@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import torch
 from torch import Tensor
@@ -17,8 +18,8 @@ from mrhubo.config.shipped import shipped_root
 from mrhubo.errors import InputWarning
 from mrhubo.evaluation import Clip, Motions, solve_references
 from mrhubo.fitting.preparation import Prepared
-from mrhubo.motion import read_motion, resample
-from mrhubo.reference import DirectionProblem, count_jumps, direction_error, limit_shares
+from mrhubo.motion import Motion, read_motion, resample
+from mrhubo.reference import DirectionProblem, OptimizationRetargeter, count_jumps, direction_error, limit_shares
 from mrhubo.robot import Axis, BodyMap, Limb
 from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.parts import LimbPart
@@ -79,14 +80,30 @@ def _most(shown: Mapping[str, str], values: Mapping[str, float]) -> str:
 @torch.no_grad()
 def look_first(prepared: Prepared, report: Reporter) -> FirstLook:
     """Solves the motion, or reads the answer of an earlier time, says what it shows, and warns of what may be wrong."""
-    body_map, folder = prepared.body_map, shipped_root() / "data" / "motions"
-    motion = resample(read_motion(folder / f"{_MOTION}.npz").for_skeleton(body_map.skeleton), _RATE)
-    clip = solve_references(prepared.config, body_map, Motions(folder, [], [motion]), prepared.references_dir)[1][0]
+    body_map, motion = prepared.body_map, _motion(prepared.body_map)
+    motions = Motions(_folder(), [], [motion])
+    clip = solve_references(prepared.config, body_map, motions, prepared.references_dir)[1][0]
     found = judge(body_map, clip)
     report.say(str(found))
     for doubt in found.doubts:
         warnings.warn(doubt, InputWarning, stacklevel=2)
     return found
+
+
+@torch.no_grad()
+def look_at(body_map: BodyMap) -> FirstLook:
+    """The same of a body map alone, without a place to keep the answer."""
+    motion = _motion(body_map)
+    reference = OptimizationRetargeter(body_map).retarget(motion.local_TJ33, motion.frame_rate)
+    return judge(body_map, Clip(motion, reference.q_TN))
+
+
+def _folder() -> Path:
+    return shipped_root() / "data" / "motions"
+
+
+def _motion(body_map: BodyMap) -> Motion:
+    return resample(read_motion(_folder() / f"{_MOTION}.npz").for_skeleton(body_map.skeleton), _RATE)
 
 
 def judge(body_map: BodyMap, clip: Clip) -> FirstLook:

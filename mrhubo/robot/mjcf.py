@@ -47,6 +47,8 @@ class Converted:
 
 def is_mjcf(path: Path) -> bool:
     """Whether a file is a MuJoCo model: its root element is <mujoco>."""
+    if not path.is_file():
+        return False
     try:
         with path.open("rb") as file:
             _, root = next(etree.iterparse(file, events=("start",), resolve_entities=False, no_network=True))
