@@ -5,6 +5,7 @@ It is a file for people: they look at the picture, change what is wrong, and nev
 
 from __future__ import annotations
 
+import math
 import os
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,6 +18,8 @@ from mrhubo.robot.discovery import Discovery, FoundEnd
 from mrhubo.robot.parts import CHEST, PARTS, LimbPart, OrientedPart
 
 _WIDTH = 120
+_FINE = 1e5
+"""Parts of a metre or a radian that are written."""
 _DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
 """What an entry may leave out."""
 _HEAD = """\
@@ -49,9 +52,7 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
     if found.ranges:
         lines.append("  ranges:  # [rad]")
         for joint, limits in found.ranges.items():
-            lines += _entry(
-                f"    {flow_yaml(joint)}: {flow_yaml([_number(limits.lower), _number(limits.upper)])}", limits.why
-            )
+            lines += _entry(f"    {flow_yaml(joint)}: {flow_yaml(_inward(limits.lower, limits.upper))}", limits.why)
     if doubts := unsure(found):
         lines += _comments(2, "Guesses: look at these entries, and take their names out when they are right.")
         lines.append(f"  unsure: {flow_yaml(list(doubts))}")
@@ -150,9 +151,14 @@ def _axes(end: FoundEnd) -> dict[str, list[float]]:
     return {word: [_number(number) for number in axis] for word, axis in end.axes.items()}
 
 
+def _inward(lower: float, upper: float) -> list[float]:
+    """A range as short numbers, none of which leaves it: a limit of the URDF may be one of its ends."""
+    return [math.ceil(lower * _FINE) / _FINE, math.floor(upper * _FINE) / _FINE]
+
+
 def _number(value: float) -> float:
     """Hundredths of a millimetre, or of a milliradian."""
-    return round(float(value), 5) + 0.0  # no -0.0
+    return round(float(value) * _FINE) / _FINE + 0.0  # no -0.0
 
 
 def _others(found: Discovery) -> Iterator[str]:

@@ -99,6 +99,15 @@ def test_ranges_and_questions_are_written(tmp_path: Path) -> None:
     assert all(question.text in file.read_text() for question in asked)
 
 
+@pytest.mark.parametrize(
+    ("lower", "upper"), [(-1.37568583, 0.9), (-2.2999999, -0.1234567), (0.0, 1.0000049), (-0.00001, 1.0)]
+)
+def test_a_range_never_leaves_the_limits_by_its_rounding(tmp_path: Path, lower: float, upper: float) -> None:
+    found_ = dataclasses.replace(found(tmp_path), ranges={"l_elbow": FoundRange(lower, upper, "why")})
+    low, high = load_config(written(tmp_path, found_)).robot.ranges["l_elbow"]
+    assert lower <= low < lower + 2e-5 and upper - 2e-5 < high <= upper
+
+
 def test_a_text_from_a_file_stays_in_its_comment(tmp_path: Path) -> None:
     """Names of a stranger's file are shown in comments too, and must not end them."""
     discovery = dataclasses.replace(found(tmp_path), notes=("two\nlines\r\nrobot: {}\u2028x: 1\x85y: 2",))

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, read_bodies
@@ -62,12 +61,6 @@ class _Finder:
 
     def __init__(self, bodies: Bodies, roles: Roles) -> None:
         arms = [arm for chain in roles.arms.chains if (arm := read_arm(bodies, chain)) is not None]
-        if len(arms) != 2 or min(arm.length for arm in arms) < _ZERO:
-            shown = ", ".join(f"'{chain[0].hinge.name}'" for chain in roles.arms.chains)
-            raise UserError(
-                f"{bodies.description.path}: the limbs that begin at {shown} mirror each other, but have no upper arm and "
-                "no elbow; a humanoid with two arms is needed"
-            )
         legs = [leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None]
         legs = legs if len(legs) == 2 else []
         roles = choose_neck(bodies, roles, arms, legs)
