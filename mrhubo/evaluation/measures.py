@@ -37,7 +37,7 @@ class Evaluation(ClipScore):
     at_limit: float
     """Share of joint angles at a limit."""
     collision: float
-    """Share of frames in which the robot's collision shapes overlap."""
+    """Share of frames in which the robot's collision shapes overlap. NaN: shapes of what moves are missing."""
     reference_collision: float
     """The same for the reference, which is not told to avoid it."""
     geometric_limb_deg: float = nan
@@ -76,7 +76,8 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         return float(angles_TD[:, _columns(body_map, region)].mean())  # NaN where there are none
 
     def collision_share(q_TN: Tensor, poses: LinkPoses) -> float:
-        return float(shapes.collides(q_TN, poses).float().mean()) if shapes.pairs else float("nan")
+        known = shapes.pairs and not shapes.unknown
+        return float(shapes.collides(q_TN, poses).float().mean()) if known else nan
 
     jerk, human_jerk = (
         float(direction_jerk(d[:, body_map.measured], clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3)

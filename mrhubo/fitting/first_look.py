@@ -35,6 +35,7 @@ _NARROW = 0.5
 """Radians of range below which a joint is at a limit often, whatever is meant."""
 _BENT, _BACKWARDS = 25.0, 0.05
 """Degrees from which on an elbow is bent, and share of frames in which one may be so the wrong way."""
+_MOST_LINKS = 5
 _NEAR, _TURNED_DEG = 0.2, 30.0
 """How far an entry may be from what the robot's axes tell, and agree with it: a share of the shortest limb, degrees."""
 
@@ -119,6 +120,7 @@ def judge(body_map: BodyMap, clip: Clip) -> FirstLook:
         *_missed_limbs(body_map, error_deg),
         *_stuck_joints(body_map, at_limit),
         *_turned_elbows(body_map, backwards),
+        *unknown_collisions(body_map),
     ]
     if jumps:
         doubts.append(f"robot.keypoints: the joints jump {jumps} times on '{motion.name}', where the human does not")
@@ -163,6 +165,18 @@ def _turned_elbows(body_map: BodyMap, backwards: Mapping[str, float]) -> list[st
                 f"the side on which a human's bends{advice}"
             )
     return found
+
+
+def unknown_collisions(body_map: BodyMap) -> list[str]:
+    """A sentence where nobody knows whether the robot touches itself, for want of shapes; else none."""
+    shapes, path = body_map.collision, body_map.robot.urdf
+    start = f"robot.urdf: {path}: whether the robot touches itself is unknown"
+    if shapes.unknown:
+        links = ", ".join(shapes.unknown[:_MOST_LINKS]) + (", ..." if len(shapes.unknown) > _MOST_LINKS else "")
+        return [
+            f"{start}: {len(shapes.unknown)} links that move have meshes for collision, which are not read: {links}"
+        ]
+    return [] if shapes.pairs else [f"{start}: it has no collision shapes that could meet"]
 
 
 def _entries_of(body_map: BodyMap) -> dict[str, list[str]]:

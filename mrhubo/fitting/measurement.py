@@ -26,6 +26,7 @@ from mrhubo.evaluation import (
     run_metrics,
     table,
 )
+from mrhubo.fitting.first_look import unknown_collisions
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.references import make_references
 from mrhubo.motion import Motion
@@ -201,8 +202,7 @@ def measure_package(
     else:
         measured = measure(prepared, report, retargeter, clips)
         lines, latency = [measured.table], measured.networks_latency
-    if links := body_map.collision.uncovered:
-        lines.append(f"collision: {len(links)} links have meshes for collision, which are not read: {', '.join(links)}")
+    lines += unknown_collisions(body_map)
     one, many = latency.values()
     lines.append(f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once")
     return "\n".join([lines[0], "", *lines[1:]])
