@@ -4,8 +4,8 @@ random humanoids, and on other URDF files.
     python benchmarks/discovery.py [--seeds 0-1000] [--urdfs FOLDER]
 
 The shipped robots' hand-written configs are the measure of theirs. A random humanoid counts as right when its joints,
-points (2 cm on an arm of half a metre), up, forward and hands are; where something is wrong, it counts whether a question
-asks about it. Of other files only what was found is printed, as nobody wrote down what is true of them.
+points (2 cm on an arm of half a metre), up, forward and hands are; where something is wrong, it counts whether a
+question asks about it. Of other files only what was found is printed, as nobody wrote down what is true of them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ FORMS = {
     "reordered": {"reorder": True},
     "axes negated": {"negate": True},
     "y up": {"turn": (math.pi / 2, 0.0, 0.0)},
-    "turned, scaled by 3, and all else": {"turn": (0.4, 2.0, -1.0), "scale": 3.0, "rename": True, "reorder": True, "negate": True},
+    "turned, scaled by 3, and all else": {
+        "turn": (0.4, 2.0, -1.0), "scale": 3.0, "rename": True, "reorder": True, "negate": True,
+    },
 }  # fmt: skip
 
 
@@ -79,7 +81,16 @@ def shipped() -> None:
                     for name, point in points.items()
                 ]
             extra = len(found.joints) - len(config.joints)
-            rows.append([robot, form, str(len(missing)), str(extra), f"{1000 * max(apart):.0f}", f"{found.forward.confidence:.2f}"])
+            rows.append(
+                [
+                    robot,
+                    form,
+                    str(len(missing)),
+                    str(extra),
+                    f"{1000 * max(apart):.0f}",
+                    f"{found.forward.confidence:.2f}",
+                ]
+            )
     print_table(["robot", "form", "joints missing", "joints more", "farthest point [mm]", "sure of facing"], rows)
     print()
 
@@ -119,7 +130,11 @@ def made(seeds: range) -> None:
             if outcome == "wrong":
                 silent.append(f"{seed}: {'; '.join(wrong)[:160]}")
     rows = [
-        [group, str(sum(counts.values())), *(f"{100 * counts[kind] / sum(counts.values()):.1f}" for kind in ("right", "asks", "wrong"))]
+        [
+            group,
+            str(sum(counts.values())),
+            *(f"{100 * counts[kind] / sum(counts.values()):.1f}" for kind in ("right", "asks", "wrong")),
+        ]
         for group, counts in sorted(groups.items())
     ]
     print_table(["random humanoids", "count", "right [%]", "wrong, asks [%]", "wrong, silent [%]"], rows)
@@ -142,7 +157,12 @@ def _summary(path: Path) -> list[str]:
         return ["", "", "", "", "", "", str(refusal).rpartition(": ")[2][:80]]
     counts = [str(len(found.chains.get(name, ()))) for name in ("left_arm", "neck", "waist", "left_leg")]
     facing = " ".join(f"{number:.2f}" for number in found.forward.root_3)
-    return [*counts, facing, f"{found.forward.confidence:.2f}", ", ".join(question.about for question in found.questions)]
+    return [
+        *counts,
+        facing,
+        f"{found.forward.confidence:.2f}",
+        ", ".join(question.about for question in found.questions),
+    ]
 
 
 if __name__ == "__main__":

@@ -124,7 +124,8 @@ class _Starts:
         middle_3 = (self.human_E3[i] + self.human_E3[j]) / 2
         seen = [(offset_E3[i] + offset_E3[j]) / 2 for offset_E3 in (self.start_E3, self.local_E3)]
         angles = [_degrees(robot_3, middle_3) for robot_3 in seen if robot_3.norm() >= line_3.norm() / 2]
-        if angles and min(angles) > _ODD_MIDDLE:
+        turned = self._body_map.yardstick.turned(self.end, self.name)
+        if angles and min(angles) > _ODD_MIDDLE and (turned is None or turned > _ODD_LINE):
             warn(
                 f"robot.keypoints.{self.name}: '{one.part.start}' and '{other.part.start}' lie {min(angles):.0f} "
                 f"degrees from where they lie on a human, seen from '{self.end.link}'; {self._advice()}"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
 
 _POSES = 16
-_STANDING = 4
+_STANDING = 2
 """Random poses in which a joint that is not listed is turned: in one alone, a straight arm hides its own twist."""
 _TURN, _TURNED = 0.5, 0.1
 """Radians by which it is turned, and how much of that a direction must turn along: a wrist's point is a little off the
@@ -40,24 +40,22 @@ _NOTHING = 1e-4
 @torch.no_grad()
 def untold_joints(body_map: BodyMap) -> list[str]:
     """The joints of q that turn no direction: no human pose could tell their angles."""
-    robot = body_map.robot
+    robot, count = body_map.robot, len(body_map.robot.joint_names)
     q_BN = robot.sample(_POSES, torch.Generator().manual_seed(0))
-    before = body_map.robot_directions(robot.forward(q_BN))
-    found = []
-    for column, joint in enumerate(robot.joint_names):
-        moved = q_BN.clone()
-        moved[:, column] = (robot.lower_N + robot.upper_N)[column] - q_BN[:, column]  # mirrored in its range
-        change = (body_map.robot_directions(robot.forward(moved)) - before).abs().max()
-        if float(change) < _NOTHING:
-            found.append(joint)
-    return found
+    mirrored_BN = robot.lower_N + robot.upper_N - q_BN  # in each joint's range
+    moved_NBN = torch.where(torch.eye(count, dtype=torch.bool, device=q_BN.device)[:, None], mirrored_BN, q_BN)
+    poses = robot.forward(torch.cat((q_BN, moved_NBN.flatten(0, 1))))
+    direction_XBD3 = body_map.robot_directions(poses).unflatten(0, (count + 1, _POSES))
+    change_N = (direction_XBD3[1:] - direction_XBD3[0]).abs().flatten(1).amax(dim=1)
+    return [joint for joint, change in zip(robot.joint_names, change_N.tolist(), strict=True) if change < _NOTHING]
 
 
 def waist_joints(body_map: BodyMap) -> list[str]:
     """The joints of q that turn no direction because they carry the parts from which all others are seen."""
     tree = Ancestry(body_map.robot)
     carrying = [set(tree.turning(link)) for link in body_map.shared.view_links]
-    return [joint for joint in untold_joints(body_map) if all(joint in above for above in carrying)]
+    carried = [joint for joint in body_map.robot.joint_names if all(joint in above for above in carrying)]
+    return [joint for joint in untold_joints(body_map) if joint in carried] if carried else []
 
 
 def tell_of_waist(body_map: BodyMap, joints: Sequence[str]) -> None:

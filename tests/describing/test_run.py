@@ -11,7 +11,8 @@ from mrhubo.config import load_config
 from mrhubo.describing import model_file
 from mrhubo.describing.run import config_of, describe_model, draw_config, open_robot, read_model
 from mrhubo.errors import InputWarning, UserError
-from mrhubo.robot import Robot
+from mrhubo.robot import Robot, build_body_map
+from mrhubo.robot.generator import humanoid
 from tests.robot.two_arms import PAIR
 
 
@@ -138,3 +139,15 @@ def test_robots_of_the_package_are_found_where_it_is(tmp_path: Path, monkeypatch
         read_model("far")
     with pytest.raises(UserError, match="'h1' is no file, and no robot of the package"):
         read_model("h1")
+
+
+@pytest.mark.parametrize("seed", [47, 49])
+def test_what_the_axes_tell_of_a_chest_is_not_doubted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int, recwarn: pytest.WarningsRecorder
+) -> None:
+    """Made-up robots whose chest has its origin above the shoulders, or in no place that a human's has."""
+    monkeypatch.chdir(tmp_path)
+    Path("my.urdf").write_text(humanoid(seed).urdf)
+    described = describe_model("my.urdf")
+    build_body_map(load_config(described.file).robot)
+    assert not [warning for warning in recwarn.list if "from where they lie on a human" in str(warning.message)]

@@ -1,8 +1,8 @@
 """Shoulder, elbow and wrist from the axes of an arm.
 
-The way from the first axis to the last along common normals (`lines.measure`) does not depend on the zero pose. An elbow
-is the axis on it with long stretches on both sides, upper arm and forearm; what comes before turns the upper arm, what
-comes after forearm and hand.
+The way from the first axis to the last along common normals (`lines.measure`) does not depend on the zero pose. An
+elbow is the axis on it with long stretches on both sides, upper arm and forearm; what comes before turns the
+upper arm, what comes after forearm and hand.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _BEFORE, _FEW = 3, 0.8
 """Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
 below a clavicle."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
-"""Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share of
-its length."""
+"""Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
+of its length."""
 _WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
 _BESIDE = 0.025
@@ -156,7 +156,7 @@ def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str,
 
 
 def _is_jaw(chain: Chain, elbow_at: int) -> bool:
-    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line on which the wrist's axes lie, or
+    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line of the wrist's axes, or
     parallel to one that swings the wrist already.
     """
     lines = lines_of(chain)
@@ -168,13 +168,15 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
     before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
     if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
         return True
-    twists = [line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
+    twists = [
+        line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
+    ]
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
 
 
 def without_gripper(chain: Chain) -> Chain:
-    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie, and
-    no part of a forearm.
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
+    and no part of a forearm.
     """
     while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
         chain = chain[:-1]
@@ -289,7 +291,11 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
             return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
-    named = [link for link in inside if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual]
+    named = [
+        link
+        for link in inside
+        if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual
+    ]
     if named:
         nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
         return bodies.position(nearest), f"the fixed link '{nearest}', after its name", 0.6
@@ -298,11 +304,23 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         out_3 = unit(corners.mean(0) - start_3)
         reach = float(((corners - start_3) @ out_3).max())
         if reach > _OUT * usual:
-            return start_3 + reach * out_3, "the end of the forearm's collision shape, as no joint tells the wrist", 0.45
+            return (
+                start_3 + reach * out_3,
+                "the end of the forearm's collision shape, as no joint tells the wrist",
+                0.45,
+            )
     far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
     if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
         return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.45
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
-        return start_3 + 2 * (centre_3 - start_3), "twice as far as the centre of mass, as no joint tells the wrist", 0.4
-    return start_3 + usual * unit(bodies.position(last.outer_link) - start_3), "a guess, as nothing tells the wrist", 0.1
+        return (
+            start_3 + 2 * (centre_3 - start_3),
+            "twice as far as the centre of mass, as no joint tells the wrist",
+            0.4,
+        )
+    return (
+        start_3 + usual * unit(bodies.position(last.outer_link) - start_3),
+        "a guess, as nothing tells the wrist",
+        0.1,
+    )

@@ -1,4 +1,4 @@
-"""A robot as rigid bodies and the joints between them, without a root: what hangs together hangs together from any side.
+"""A robot as rigid bodies and the joints between them, without a root: what hangs together does so from any side.
 
 Links that fixed joints connect are one body. Which link of a URDF is the root is an accident of its file: a pelvis, a
 chest, a foot, a wheelbase. So a body's branches are looked at alike, those towards the root too.
@@ -20,7 +20,7 @@ from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geom
 from mrhubo.robot.urdf import Description
 
 _DOMINANT = 2.5
-"""How many times longer than any other branch the one must be in which a limb goes on; else it ends there, as a hand."""
+"""How many times longer than any other branch the one must be in which a limb goes on; else it ends, as a hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,9 @@ class Bodies:
     """By link."""
     hinges: tuple[Hinge, ...]
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
-    _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(default_factory=dict, repr=False, compare=False)
+    _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     @cached_property
     def links_of(self) -> list[list[str]]:
@@ -144,7 +146,9 @@ class Bodies:
 
     def centre(self, body: int) -> np.ndarray | None:
         """Centre of mass (3,) of a body; None if it has no mass."""
-        found = [(link, self.description.masses[link]) for link in self.links_of[body] if link in self.description.masses]
+        found = [
+            (link, self.description.masses[link]) for link in self.links_of[body] if link in self.description.masses
+        ]
         if not found:
             return None
         centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
@@ -225,7 +229,7 @@ class Bodies:
         return self.extent(on) + float(np.linalg.norm(self.position(on.outer_link) - self.position(last.outer_link)))
 
     def _idle(self, step: Step) -> bool:
-        """Whether a branch has no rotary joint that is driven by itself: a linkage, fingers that mimic, a sliding jaw."""
+        """Whether a branch has no rotary joint driven by itself: a linkage, mimicking fingers, a sliding jaw."""
         return not any(hinge.free and hinge.rotary for hinge in self.beyond(step)[1])
 
     def path(self, start: int, end: int) -> Chain:
@@ -267,7 +271,11 @@ def read_bodies(description: Description) -> Bodies:
             child_44 = pose_44[link] @ joint.origin_44
             pose_44[joint.child] = child_44
             order.append(joint.child)
-            if joint.kind not in (*ROTARY, "prismatic") or name in description.faults or _stuck(joint.lower, joint.upper):
+            if (
+                joint.kind not in (*ROTARY, "prismatic")
+                or name in description.faults
+                or _stuck(joint.lower, joint.upper)
+            ):
                 body_of[joint.child] = body_of[link]
                 continue
             body_of[joint.child] = max(body_of.values()) + 1
@@ -293,5 +301,3 @@ def _sources(description: Description) -> set[str]:
             except UserError:  # told where it matters
                 continue
     return found
-
-

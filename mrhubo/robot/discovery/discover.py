@@ -61,7 +61,9 @@ class _Finder:
 
     def __init__(self, bodies: Bodies, roles: Roles) -> None:
         arms = [arm for chain in roles.arms.chains if (arm := read_arm(bodies, chain)) is not None]
-        legs = [leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None]
+        legs = [
+            leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None
+        ]
         legs = legs if len(legs) == 2 else []
         roles = choose_neck(bodies, roles, arms, legs)
         self.bodies, self.roles = bodies, roles
@@ -133,14 +135,24 @@ class _Finder:
         forward_3, up_3, roles = self.heading.forward_3, self.heading.up_3, self.roles
         sure = min(self.heading.forward_sure, self.heading.up_sure)
         chest = self._main_link(roles.chest, [chain[0] for chain in roles.arms.chains])
-        yield "chest", self._end(chest, {"forward": forward_3, "up": up_3}, min(sure, roles.sure), "the body that carries both arms")
+        yield (
+            "chest",
+            self._end(
+                chest, {"forward": forward_3, "up": up_3}, min(sure, roles.sure), "the body that carries both arms"
+            ),
+        )
         if roles.legs is not None and self.legs:
             pelvis = self._main_link(roles.legs.body, [chain[0] for chain in roles.legs.chains])
-            yield "pelvis", self._end(pelvis, {"forward": forward_3, "up": up_3}, sure, "the body that carries both legs")
+            yield (
+                "pelvis",
+                self._end(pelvis, {"forward": forward_3, "up": up_3}, sure, "the body that carries both legs"),
+            )
         if roles.neck:
             link = roles.neck[-1].outer_link
             cue = "the end of the longest chain in the middle above the chest; it faces ahead at the zero pose"
-            named = any(names.speaks_of(name, "head") for step in roles.neck for name in (step.hinge.name, step.outer_link))
+            named = any(
+                names.speaks_of(name, "head") for step in roles.neck for name in (step.hinge.name, step.outer_link)
+            )
             yield "head", self._end(link, {"forward": forward_3, "up": up_3}, min(sure, 0.9 if named else 0.7), cue)
         for side, hand in self.hands.items():
             axes = {"fingers": hand.fingers_3, "thumb": hand.thumb_3}
@@ -153,7 +165,10 @@ class _Finder:
     def _main_link(self, body: int, steps: list[Step]) -> str:
         """The link of a body from which joints go out."""
         inside = set(self.bodies.links_of[body])
-        above = [[step.inner_link, *(j.parent for j in self.bodies.description.joints_above(step.inner_link))] for step in steps]
+        above = [
+            [step.inner_link, *(j.parent for j in self.bodies.description.joints_above(step.inner_link))]
+            for step in steps
+        ]
         shared = [link for link in above[0] if link in inside and all(link in other for other in above)]
         return shared[0] if shared else steps[0].inner_link
 
@@ -177,15 +192,25 @@ class _Finder:
         for arm in self.arms.values():
             for step in arm.chain:
                 if step.hinge.name not in joints:
-                    yield step.hinge.name, "it belongs to an arm, but " + (
-                        "slides" if not step.hinge.rotary else "mimics another joint" if not step.hinge.free else "turns nothing that can be told"
+                    yield (
+                        step.hinge.name,
+                        "it belongs to an arm, but "
+                        + (
+                            "slides"
+                            if not step.hinge.rotary
+                            else "mimics another joint"
+                            if not step.hinge.free
+                            else "turns nothing that can be told"
+                        ),
                     )
 
     def _left_out(self, used: set[str]) -> Iterator[tuple[str, str]]:
         cut = {name: why for arm in self.arms.values() for name, why in arm.left_out}
         where = {}
         for side, arm in self.arms.items():
-            where |= {h.name: f"beyond the {side} wrist: a finger or gripper" for h in self.bodies.beyond(arm.chain[-1])[1]}
+            where |= {
+                h.name: f"beyond the {side} wrist: a finger or gripper" for h in self.bodies.beyond(arm.chain[-1])[1]
+            }
         for side, leg in self.legs.items():
             where |= {h.name: f"beyond the {side} ankle" for h in self.bodies.beyond(leg.chain[-1])[1]}
         if self.roles.neck:
@@ -226,7 +251,9 @@ class _Finder:
         axis_3 = step.sign * step.hinge.line.axis_3
         upper_3, fore_3 = arm.elbow.point_3 - arm.shoulder.point_3, arm.wrist.point_3 - arm.elbow.point_3
         straight = straight_angle(axis_3, fore_3, upper_3)
-        straight = min((straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper))
+        straight = min(
+            (straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper)
+        )
         if min(straight - lower, upper - straight) < _BENDS:
             return None, None
         share = bend_side(lower, upper, straight)
@@ -237,8 +264,10 @@ class _Finder:
             ahead = float(moved_3 @ self.heading.forward_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
             above = ahead > 0
             if abs(ahead) < 0.3:
-                question = Question(f"{side}_elbow", f"'{name}' bends as far one way as the other, and nothing tells which is a "
-                                    "human's; narrow it in robot.ranges if the arm bends backwards", (name,))  # fmt: skip
+                text = (
+                    f"'{name}' bends as far one way as the other, and nothing tells which is a human's; narrow it in "
+                )
+                question = Question(f"{side}_elbow", f"{text}robot.ranges if the arm bends backwards", (name,))
         ends = (straight, upper) if above else (lower, straight)
         why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human elbow one way; straight is at {straight:.2f}"
         return FoundRange(*map(float, ends), why), question
@@ -246,16 +275,18 @@ class _Finder:
     def _questions(self) -> Iterator[Question]:
         heading, roles = self.heading, self.roles
         if heading.forward_sure < _SURE:
-            yield Question("forward", "it is not clear where the robot faces, nor therefore which side is left; taken by: "
-                           f"{heading.forward_cue}")  # fmt: skip
+            yield Question("forward", "it is not clear where the robot faces, nor therefore which side is left; "
+                           f"taken by: {heading.forward_cue}")  # fmt: skip
         if heading.up_sure < _SURE:
             yield Question("up", f"it is not clear where the robot's up is; taken by: {heading.up_cue}")
         if roles.sure < _SURE:
-            yield Question("chest", "it is not clear which pair of limbs is arms and which legs",
-                           tuple(chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains))  # fmt: skip
+            first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
+            yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
         for name, spot, _ in self._spots():
             if spot.confidence < _SURE:
-                yield Question(name, f"the {name.replace('_', ' ')} was taken as {spot.cue}; give its point", spot.links)
+                yield Question(
+                    name, f"the {name.replace('_', ' ')} was taken as {spot.cue}; give its point", spot.links
+                )
         for side, hand in self.hands.items():
             if hand.doubt is not None:
                 yield Question(f"{side}_hand", f"{hand.doubt}; taken: {hand.cue}", (hand.link,))

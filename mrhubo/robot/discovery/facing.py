@@ -99,7 +99,7 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
 
 
 def _normal(bodies: Bodies, roles: Roles) -> np.ndarray:
-    """Across the mirror plane: an axis that many joints or frames share and that lies within 3 degrees of what the limbs'
+    """Across the mirror plane: an axis that many joints or frames share, within 3 degrees of what the limbs'
     points tell, which a few millimetres turn.
     """
     normal_3 = roles.arms.normal_3
@@ -109,7 +109,15 @@ def _normal(bodies: Bodies, roles: Roles) -> np.ndarray:
     near = [np.sign(axis_3 @ normal_3) * axis_3 for axis_3 in axes if abs(float(axis_3 @ normal_3)) > _SAME]
     if not near:
         return normal_3
-    return unit(max(near, key=lambda axis_3: (round(sum(float(axis_3 @ other) > 1 - 1e-6 for other in near)), float(axis_3 @ normal_3))))
+    return unit(
+        max(
+            near,
+            key=lambda axis_3: (
+                round(sum(float(axis_3 @ other) > 1 - 1e-6 for other in near)),
+                float(axis_3 @ normal_3),
+            ),
+        )
+    )
 
 
 def _up(
@@ -162,7 +170,7 @@ def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, floa
 
 
 def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Directions in the mirror plane along or across which joints turn, and the root's axes; with their share of all."""
+    """Directions in the mirror plane along or across which joints turn, and the root's axes; with their share."""
     limbs = [step for pair in (roles.arms, roles.legs) if pair for chain in pair.chains for step in chain[:4]]
     weighed = [(step.hinge.line.axis_3, 1.0) for step in (*limbs, *roles.waist)]
     weighed += [(step.hinge.line.axis_3, 0.3) for step in roles.neck]
@@ -184,7 +192,10 @@ def _forward_votes(
 ) -> Iterator[Vote]:  # fmt: skip
     yield Vote("the names of the sides", names.sides(_paired_names(roles)), 3.0)
     if legs:
-        knees = [_bend(leg.chain, leg.knee_at, leg.hip.point_3, leg.knee.point_3, leg.ankle.point_3, up_3, forward_3) for leg in legs]
+        knees = [
+            _bend(leg.chain, leg.knee_at, leg.hip.point_3, leg.knee.point_3, leg.ankle.point_3, up_3, forward_3)
+            for leg in legs
+        ]
         yield Vote("the knees bend backwards", -mean_sign(knees), 2.0)
         hips = []
         for leg in legs:
@@ -199,7 +210,8 @@ def _forward_votes(
     ]
     yield Vote("the elbows bend forward", mean_sign(elbows), 1.0)
     hands = [
-        float((reach_middle(arm.chain, arm.wrist.point_3) - arm.shoulder.point_3) @ forward_3) / arm.length * 4 for arm in arms
+        float((reach_middle(arm.chain, arm.wrist.point_3) - arm.shoulder.point_3) @ forward_3) / arm.length * 4
+        for arm in arms
     ]
     yield Vote("the hands reach further forward", mean_sign(hands), 1.5)
     cameras = list(_cameras(bodies, roles, arms, forward_3))
@@ -219,9 +231,10 @@ def _paired_names(roles: Roles) -> list[tuple[str, str]]:
 
 
 def _bend(
-    chain, at: int, start_3: np.ndarray, middle_3: np.ndarray, end_3: np.ndarray, up_3: np.ndarray, forward_3: np.ndarray
+    chain: Chain, at: int, start_3: np.ndarray, middle_3: np.ndarray, end_3: np.ndarray, up_3: np.ndarray,
+    forward_3: np.ndarray,
 ) -> float:  # fmt: skip
-    """-1..1: how far forward a limb's end goes when its hinge bends from the straight limb, with the upper part hanging."""
+    """-1..1: how far forward a limb's end goes when its hinge bends, with the upper part hanging."""
     step = chain[at]
     if not step.hinge.limited:
         return 0.0

@@ -90,16 +90,22 @@ def _parallel(one: Line, other: Line) -> bool:
 def _three(lines: list[Line]) -> tuple[int, int, int] | None:
     """Hip pitch, knee and ankle pitch: three parallel axes far from each other."""
     best, found = 0.0, None
-    length = max(one.distance(other.point_3) for one, other in itertools.combinations(lines, 2)) if len(lines) > 2 else 0.0
+    length = (
+        max(one.distance(other.point_3) for one, other in itertools.combinations(lines, 2)) if len(lines) > 2 else 0.0
+    )
     for j in range(1, len(lines)):
         # The next parallel axis some way off is the ankle's; toes have one more.
-        shanks = {k: lines[j].distance(lines[k].point_3) for k in range(j + 1, len(lines)) if _parallel(lines[j], lines[k])}
+        shanks = {
+            k: lines[j].distance(lines[k].point_3) for k in range(j + 1, len(lines)) if _parallel(lines[j], lines[k])
+        }
         k = next((k for k, shank in shanks.items() if shank > _APART * length), None)
         if k is None:
             continue
         shank = shanks[k]
         thighs = [lines[i].distance(lines[j].point_3) for i in range(j)]
-        above = [i for i in range(j) if thighs[i] > _APART * (thighs[i] + shank) and _tilt(lines[i], lines[j]) < _TILTED]
+        above = [
+            i for i in range(j) if thighs[i] > _APART * (thighs[i] + shank) and _tilt(lines[i], lines[j]) < _TILTED
+        ]
         if not above:
             continue
         i = min(above, key=lambda i: (round(_tilt(lines[i], lines[j]), 2), -i))
@@ -138,7 +144,11 @@ def _ankle(
     others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not _parallel(lines[i], lines[ankle_at])]
     step = chain[knee_at + 1]
     if others:
-        point_3, cue, sure = feet(lines[ankle_at], lines[others[0]])[0], "where the ankle's axes are nearest to each other", 0.95
+        point_3, cue, sure = (
+            feet(lines[ankle_at], lines[others[0]])[0],
+            "where the ankle's axes are nearest to each other",
+            0.95,
+        )
     else:
         point_3, cue, sure = lines[ankle_at].nearest(knee_3), "the ankle axis's point nearest to the knee", 0.8
     links = [step.inner_link]

@@ -1,7 +1,7 @@
 """Joint axes as lines in space: what lies between them does not depend on the pose of the joints that they carry.
 
-Two neighbouring axes of a chain keep their distance, their angle, and where their common normal meets them, whatever the
-joints do (J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on matrices", 1955).
+Two neighbouring axes of a chain keep their distance, their angle, and where their common normal meets them, whatever
+the joints do (J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on matrices", 1955).
 So limbs are measured along a chain of such normals, and no pose need be assumed.
 
 Legend: N axes of a chain, from the body outwards.
@@ -37,7 +37,9 @@ class Line:
 
 def cross(a_3: np.ndarray, b_3: np.ndarray) -> np.ndarray:
     """Of two vectors (3,); NumPy's is made for many, and ten times slower for one."""
-    return np.array([a_3[1] * b_3[2] - a_3[2] * b_3[1], a_3[2] * b_3[0] - a_3[0] * b_3[2], a_3[0] * b_3[1] - a_3[1] * b_3[0]])
+    return np.array(
+        [a_3[1] * b_3[2] - a_3[2] * b_3[1], a_3[2] * b_3[0] - a_3[0] * b_3[2], a_3[0] * b_3[1] - a_3[1] * b_3[0]]
+    )
 
 
 def sine(a_3: np.ndarray, b_3: np.ndarray) -> float:
@@ -70,8 +72,8 @@ class Measures:
     apart_N: np.ndarray
     """From each axis to the next, along their common normal (N - 1,)."""
     along_N: np.ndarray
-    """On each axis, from the normal that comes in to the one that goes out (N,); 0 at the first and last axis, and where
-    a parallel neighbour leaves it open."""
+    """On each axis, from the normal that comes in to the one that goes out (N,); 0 at the first and last axis, and
+    where a parallel neighbour leaves it open."""
     cosine_N: np.ndarray
     """Of the angle between each axis and the next, without its sign (N - 1,)."""
     out_N: np.ndarray

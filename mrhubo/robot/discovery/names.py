@@ -1,4 +1,4 @@
-"""What names say of links and joints. Names only confirm: files call links as they like, in any language, or not at all."""
+"""What names say of links and joints. Names only confirm: files call links as they like, in any language."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable
 _WORDS = {
     "leg": r"leg|hip|knee|ankle|ankel|thigh|shin|calf|foot|feet|toe|crotch|crus|tibia|femur|sole|shank",
     "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar",
-    "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|hand_(open|close)|tip",
+    "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|tip",
     "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
@@ -20,7 +20,7 @@ _PATTERNS = {kind: re.compile(text, re.IGNORECASE) for kind, text in _WORDS.item
 
 
 def speaks_of(name: str, kind: str) -> bool:
-    """Whether a name has a word of a kind: leg, arm, hand (its moving parts), turn (of a whole limb), camera, head, sole, tool."""
+    """Whether a name has a word of a kind: leg, arm, hand (what moves in it), turn (of a whole limb), ..."""
     return _PATTERNS[kind].search(name) is not None
 
 
@@ -31,8 +31,8 @@ def share(names: Iterable[str], kind: str) -> float:
 
 
 def side(name: str, other: str) -> int:
-    """1 if the first of two names that differ in one place is the left one's, -1 if the right one's, 0 if neither can be
-    told.
+    """1 if the first of two names that differ in one place is the left one's, -1 if the right one's, 0 if that cannot
+    be told.
     """
     name, other = name.lower(), other.lower()
     start = 0

@@ -1,7 +1,7 @@
 """What was found out about a robot: which link and point stands for which part of a human body, and why.
 
-Legend: vectors (3,) are tuples of metres, or unit directions; `_3` of a link is in the link's frame, `root_3` in the root
-link's frame with every joint at 0.
+Legend: vectors (3,) are tuples of metres, or unit directions; `_3` of a link is in the link's frame, `root_3` in the
+root link's frame with every joint at 0.
 """
 
 from __future__ import annotations

@@ -69,8 +69,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if not armed:
         count = len(bodies.hinges)
         raise UserError(
-            f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints that "
-            f"are mirror images ({count} movable joint{'s' * (count != 1)} in all); a humanoid with two arms is needed"
+            f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
+            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
         )
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
@@ -187,7 +187,9 @@ def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
         chain: list[Step] = []
         todo: list[Step] = [step]
         while todo:
-            fitting = [s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)]
+            fitting = [
+                s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
+            ]
             fitting = [s for s in fitting if not _is_sensor(s) and not _has_twin(s, todo, arms.normal_3, middle_3)]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
             if not fitting or len(chain) >= 4:

@@ -119,5 +119,3 @@ def _mirror_share(chains: tuple[Chain, Chain], normal_3: np.ndarray, nodes: Sequ
 def middle_of(pairs: Sequence[Pair]) -> np.ndarray:
     """A point (3,) in the mirror plane: the mean of where the limbs begin."""
     return np.mean([pair.mounts_23.mean(0) for pair in pairs], axis=0)
-
-

@@ -66,7 +66,11 @@ def hand(chance: Chance, plan: Plan, wrist: int, wrist_3: np.ndarray, shape: Han
     for finger in range(shape.fingers):
         aside_3 = (finger - (shape.fingers - 1) / 2) * spread * thumb_3
         _finger(chance, plan, wrist, end_3 + aside_3, -Z, flex_3, shape, f"{name}_finger{finger}", mimics, side)
-    base_3 = wrist_3 - 0.35 * shape.length * Z + (0.03 * scale * palm_3 if shape.thumb_opposes else 0.035 * scale * thumb_3 + 0.01 * scale * palm_3)
+    base_3 = (
+        wrist_3
+        - 0.35 * shape.length * Z
+        + (0.03 * scale * palm_3 if shape.thumb_opposes else 0.035 * scale * thumb_3 + 0.01 * scale * palm_3)
+    )
     out_3 = -Z if shape.thumb_opposes else (thumb_3 - Z) / np.sqrt(2)
     thumb_flex_3 = np.cross(out_3, -palm_3) if shape.thumb_opposes else np.cross(out_3, palm_3)
     _finger(chance, plan, wrist, base_3, out_3, thumb_flex_3, shape, f"{name}_thumb", mimics, side)
@@ -89,13 +93,19 @@ def _jaws(plan: Plan, wrist: int, end_3: np.ndarray, thumb_3: np.ndarray, shape:
     open_3 = 0.02 * shape.scale
     axis_3 = np.cross(Z, thumb_3)
     if shape.kind == "sliding jaws":
-        first = plan.join(f"{name}_jaw_a", wrist, end_3 + open_3 * thumb_3, thumb_3, (0.0, 0.04 * shape.scale), "prismatic")
-        second = plan.join(f"{name}_jaw_b", wrist, end_3 - open_3 * thumb_3, -thumb_3, (0.0, 0.04 * shape.scale), "prismatic",
-                           mimics=(f"{name}_jaw_a", 1.0))  # fmt: skip
+        first = plan.join(
+            f"{name}_jaw_a", wrist, end_3 + open_3 * thumb_3, thumb_3, (0.0, 0.04 * shape.scale), "prismatic"
+        )
+        second = plan.join(
+            f"{name}_jaw_b", wrist, end_3 - open_3 * thumb_3, -thumb_3, (0.0, 0.04 * shape.scale), "prismatic",
+            mimics=(f"{name}_jaw_a", 1.0),
+        )  # fmt: skip
         jaws = [(first, 1.0), (second, -1.0)]
     elif shape.kind == "turning jaws":
         first = plan.join(f"{name}_jaw_a", wrist, end_3 + open_3 * thumb_3, axis_3, (-0.2, 0.8))
-        second = plan.join(f"{name}_jaw_b", wrist, end_3 - open_3 * thumb_3, -axis_3, (-0.2, 0.8), mimics=(f"{name}_jaw_a", 1.0))
+        second = plan.join(
+            f"{name}_jaw_b", wrist, end_3 - open_3 * thumb_3, -axis_3, (-0.2, 0.8), mimics=(f"{name}_jaw_a", 1.0)
+        )
         jaws = [(first, 1.0), (second, -1.0)]
     else:
         jaws = [(plan.join(f"{name}_jaw", wrist, end_3 + open_3 * thumb_3, axis_3, (-0.4, 1.2)), 1.0)]

@@ -55,7 +55,12 @@ def humanoid(seed: int) -> Humanoid:
     pelvis = plan.body("pelvis")
     height = legs.height
     if base == "legs":
-        plan.solid(pelvis, np.array([0.0, -0.05, height]), np.array([0.0, 0.05, height + 0.08]) * np.array([1, scale, 1]), 0.05 * scale)
+        plan.solid(
+            pelvis,
+            np.array([0.0, -0.05, height]),
+            np.array([0.0, 0.05, height + 0.08]) * np.array([1, scale, 1]),
+            0.05 * scale,
+        )
         for name in SIDES:
             leg(plan, pelvis, legs, name)
     elif base == "wheels":
@@ -66,7 +71,9 @@ def humanoid(seed: int) -> Humanoid:
                 plan.join(f"{name}_caster_wheel", caster, np.array([0.18, side * 0.15, 0.03]) * scale, Y, None)
     start = pelvis
     if base != "legs" and chance.maybe(0.4):
-        start = plan.join("lift", pelvis, np.array([0.0, 0.0, height]), Z, (0.0, 0.3 * scale), "prismatic", body="torso_lift")
+        start = plan.join(
+            "lift", pelvis, np.array([0.0, 0.0, height]), Z, (0.0, 0.3 * scale), "prismatic", body="torso_lift"
+        )
     chest, top = trunk(chance, plan, start, height + 0.1 * scale, waist)
     shoulder_3 = np.array([0.0, scale * chance.between(0.13, 0.22), top + scale * chance.between(0.25, 0.4)])
     plan.solid(chest, np.array([0.0, 0.0, top + 0.05 * scale]), shoulder_3 * np.array([1.0, 0.0, 1.0]), 0.08 * scale)
@@ -80,7 +87,9 @@ def humanoid(seed: int) -> Humanoid:
     _extras(chance, plan, head, scale)
     angles = zero_pose(chance, plan, shape, base == "legs")
     posed, moved = plan.posed(angles)
-    root = chance.either(pelvis, pelvis, pelvis, chest, len(plan.bodies) - 1 if base == "legs" and chance.maybe(0.1) else pelvis)
+    root = chance.either(
+        pelvis, pelvis, pelvis, chest, len(plan.bodies) - 1 if base == "legs" and chance.maybe(0.1) else pelvis
+    )
     style, tidy = chance.either(*STYLES), chance.maybe(0.4)
     base_44 = _base(chance, tidy)
     written = write(chance, posed, moved, root, base_44, style, tidy, chance.maybe(0.7))
@@ -89,8 +98,14 @@ def humanoid(seed: int) -> Humanoid:
     # The chest faces where its body has gone.
     chest_33 = moved[chest][:3, :3]
     roles = {
-        **{f"{name}_arm": [j.role for j in posed.joints if j.role.startswith(name) and _of_arm(j.role)] for name in SIDES},
-        **{f"{name}_leg": [j.role for j in posed.joints if j.role.startswith(name) and _of_leg(j.role)] for name in SIDES},
+        **{
+            f"{name}_arm": [j.role for j in posed.joints if j.role.startswith(name) and _of_arm(j.role)]
+            for name in SIDES
+        },
+        **{
+            f"{name}_leg": [j.role for j in posed.joints if j.role.startswith(name) and _of_leg(j.role)]
+            for name in SIDES
+        },
         "neck": [j.role for j in posed.joints if j.role.startswith("neck")],
     }
     chains = {name: tuple(written.joints[role] for role in found) for name, found in roles.items()}
@@ -110,7 +125,9 @@ def humanoid(seed: int) -> Humanoid:
         hand=hands.kind,
         wrist_joints=beyond,
         wrist_swings=shape.wrist_swings,
-        told=frozenset({f"names: {style}", f"base: {base}", f"frames: {'tidy' if tidy else 'by chance'}", f"hand: {hands.kind}"}),
+        told=frozenset(
+            {f"names: {style}", f"base: {base}", f"frames: {'tidy' if tidy else 'by chance'}", f"hand: {hands.kind}"}
+        ),
     )
 
 
@@ -141,8 +158,9 @@ def _extras(chance: Chance, plan: Plan, head: int, scale: float) -> None:
             plan.join(f"{name}_eye_pitch", eye, at_3, Y, (-0.5, 0.5))
         if kind == "bar" and f"{name}_elbow" in {joint.role for joint in plan.joints}:
             elbow = plan.joint(f"{name}_elbow")
-            plan.join(f"{name}_linkage", elbow.parent, elbow.point_3 + 0.05 * scale * Z - 0.02 * scale * X, elbow.axis_3,
-                      (-2.5, 2.5), mimics=(f"{name}_elbow", 1.0))  # fmt: skip
+            at_3 = elbow.point_3 + 0.05 * scale * Z - 0.02 * scale * X
+            source = (f"{name}_elbow", 1.0)
+            plan.join(f"{name}_linkage", elbow.parent, at_3, elbow.axis_3, (-2.5, 2.5), mimics=source)
     if kind == "lidar":
         plan.join("lidar_spin", head, high_3 + scale * np.array([0.0, 0.0, 0.2]), Z, None)
 

@@ -1,8 +1,8 @@
 """Arms, legs, neck and trunk of random humanoids, as real robots have them.
 
-Arms: with and without clavicles, shoulders whose axes cross or do not, two orders of the swings and one of an industrial
-arm, twists at shoulder or elbow or none, elbows before or on the arm's line, none to three joints at the wrist. Legs: the
-common orders of the hip, thighs and knees before the line. All in the planning frame, arms hanging (`plan`).
+Arms: with and without clavicles, shoulders whose axes cross or do not, two orders of the swings and one of an
+industrial arm, twists at the shoulder or none, elbows before or on the arm's line, none to three joints at the wrist.
+Legs: the common orders of the hip, thighs and knees before the line. All in the planning frame, arms hanging (`plan`).
 """
 
 from __future__ import annotations
@@ -123,7 +123,12 @@ def arm(plan: Plan, chest: int, shape: ArmShape, name: str, shoulder_3: np.ndarr
     ranges = {"pitch": shape.pitch_range, "roll": (-0.2, 2.8), "yaw": (-1.2, 1.6)}
     axes = {"pitch": Y, "roll": X, "yaw": Z}
     # The last swing passes the twist axis at a distance, at the shoulder's height; the first one passes both.
-    add(f"shoulder_{one}", shoulder_3 + np.array([dx if one != "roll" else 0.0, dy if one != "pitch" else 0.0, dz]), axes[one], *ranges[one])
+    add(
+        f"shoulder_{one}",
+        shoulder_3 + np.array([dx if one != "roll" else 0.0, dy if one != "pitch" else 0.0, dz]),
+        axes[one],
+        *ranges[one],
+    )
     aside_3 = np.array([dx, 0.0, 0.0]) if two == "pitch" else np.array([0.0, dy, 0.0])
     add(f"shoulder_{two}", shoulder_3 + aside_3 * shape.twist, axes[two], *ranges[two])
     if shape.twist:
@@ -131,7 +136,12 @@ def arm(plan: Plan, chest: int, shape: ArmShape, name: str, shoulder_3: np.ndarr
     carrier = body
     elbow_3 = shoulder_3 - shape.upper * Z
     hinge_3 = elbow_3 + shape.elbow_ahead * X
-    plan.solid(carrier, mirrored(shoulder_3 - 0.06 * shape.scale * Z, side), mirrored(elbow_3 + 0.06 * shape.scale * Z, side), 0.03 * shape.scale)
+    plan.solid(
+        carrier,
+        mirrored(shoulder_3 - 0.06 * shape.scale * Z, side),
+        mirrored(elbow_3 + 0.06 * shape.scale * Z, side),
+        0.03 * shape.scale,
+    )
     add("elbow", hinge_3, Y, -2.3, shape.both_ways)
     start_3 = hinge_3 if shape.forearm_on_hinge else elbow_3
     wrist_3 = start_3 - shape.fore * Z
@@ -156,7 +166,9 @@ class LegShape:
     def __init__(self, chance: Chance, scale: float) -> None:
         self.scale = scale
         self.thigh, self.shank = scale * chance.between(0.28, 0.42), scale * chance.between(0.28, 0.42)
-        self.order = chance.either("pitch roll yaw", "yaw roll pitch", "roll yaw pitch", "roll pitch yaw", "roll pitch", "yaw roll pitch")
+        self.order = chance.either(
+            "pitch roll yaw", "yaw roll pitch", "roll yaw pitch", "roll pitch yaw", "roll pitch", "yaw roll pitch"
+        )
         self.apart = scale * chance.shift(0.4, 0.02, 0.08)
         self.knee_ahead = scale * chance.either(0.0, 0.0, 0.02, 0.04)
         self.ankle = chance.either("pitch roll", "roll pitch", "pitch roll", "pitch")
@@ -193,13 +205,21 @@ def leg(plan: Plan, pelvis: int, shape: LegShape, name: str) -> None:
     ankle_3 = hip_3 - (shape.thigh + shape.shank) * Z
     add("knee", knee_3, Y, -shape.knee_back, 2.2)
     shank = body
-    plan.points[f"{name}_hip"], plan.points[f"{name}_knee"] = (thigh, mirrored(hip_3, side)), (thigh, mirrored(knee_3, side))
+    plan.points[f"{name}_hip"], plan.points[f"{name}_knee"] = (
+        (thigh, mirrored(hip_3, side)),
+        (thigh, mirrored(knee_3, side)),
+    )
     plan.points[f"{name}_ankle"] = (shank, mirrored(ankle_3, side))
     for kind in shape.ankle.split():
         add(f"ankle_{kind}", ankle_3, axes[kind], -0.7, 0.7)
     sole_3 = ankle_3 - shape.sole * Z
     length = 0.2 * shape.scale
-    plan.solid(body, mirrored(sole_3 + np.array([-0.3 * length, 0.0, 0.01]), side), mirrored(sole_3 + np.array([0.7 * length, 0.0, 0.02]), side), 0.01)
+    plan.solid(
+        body,
+        mirrored(sole_3 + np.array([-0.3 * length, 0.0, 0.01]), side),
+        mirrored(sole_3 + np.array([0.7 * length, 0.0, 0.02]), side),
+        0.01,
+    )
     if shape.toes:
         add("toe", sole_3 + np.array([0.5 * length, 0.0, 0.01]), Y, -0.5, 0.1)
 

@@ -29,14 +29,24 @@ def _styled(chance: Chance, style: str, role: str, kind: str, numbers: dict[str,
     side = {"left": "l", "right": "r"}.get(role.split("_")[0], "")
     rest = re.sub("^(left|right)_", "", role)
     if style == "camel":
-        return side.upper() + "".join(word.capitalize() for word in rest.split("_")) + ("Link" if kind == "link" else "")
+        return (
+            side.upper() + "".join(word.capitalize() for word in rest.split("_")) + ("Link" if kind == "link" else "")
+        )
     if style == "short":
         return "_".join(part for part in (side, rest[:9], kind[0]) if part)
     if style == "numbered sides":
-        limb = "arm" if re.search("should|elbow|arm|wrist|clav", rest) else "leg" if re.search("hip|knee|ank", rest) else rest.split("_")[0]
+        limb = (
+            "arm"
+            if re.search("should|elbow|arm|wrist|clav", rest)
+            else "leg"
+            if re.search("hip|knee|ank", rest)
+            else rest.split("_")[0]
+        )
         key = f"{limb}_{side}{kind}"
         numbers[key] = numbers.get(key, 0) + 1
-        return "_".join(part for part in (limb, {"l": "left", "r": "right"}.get(side, ""), str(numbers[key]), kind) if part)
+        return "_".join(
+            part for part in (limb, {"l": "left", "r": "right"}.get(side, ""), str(numbers[key]), kind) if part
+        )
     if style == "numbers":
         numbers[kind] = numbers.get(kind, 0) + 1
         return f"{kind}{numbers[kind]}"

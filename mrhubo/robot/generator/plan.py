@@ -69,7 +69,11 @@ class Plan:
         child = self.body(body or role)
         lower, upper = limits if limits is not None else (None, None)
         kind = "continuous" if limits is None and kind == "revolute" else kind
-        self.joints.append(PlannedJoint(role, kind, parent, child, np.array(point_3, float), np.array(axis_3, float), lower, upper, mimics))
+        self.joints.append(
+            PlannedJoint(
+                role, kind, parent, child, np.array(point_3, float), np.array(axis_3, float), lower, upper, mimics
+            )
+        )
         return child
 
     def fix(self, role: str, parent: int, point_3: np.ndarray) -> int:
@@ -125,7 +129,8 @@ class Plan:
         order = {joint.role: i for i, joint in enumerate(self.joints)}
         joints.sort(key=lambda joint: order[joint.role])
         points = {
-            name: (body, moved[body][:3, :3] @ point_3 + moved[body][:3, 3]) for name, (body, point_3) in self.points.items()
+            name: (body, moved[body][:3, :3] @ point_3 + moved[body][:3, 3])
+            for name, (body, point_3) in self.points.items()
         }
         directions = {name: (body, moved[body][:3, :3] @ way_3) for name, (body, way_3) in self.directions.items()}
         return Plan(self.bodies, joints, self.solids, points, directions), moved

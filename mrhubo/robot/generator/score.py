@@ -23,7 +23,12 @@ def mistakes(found: Discovery, truth: Humanoid, urdf: Path) -> list[str]:
     """What is wrong, as short phrases; the part stands first. A gripper's thumb is right on either jaw; without fingers
     there is none.
     """
-    return [*_heading(found, truth), *_joints(found, truth), *_points(found, truth), *_hands(found, truth, describe(urdf))]
+    return [
+        *_heading(found, truth),
+        *_joints(found, truth),
+        *_points(found, truth),
+        *_hands(found, truth, describe(urdf)),
+    ]
 
 
 def asked(found: Discovery, wrong: list[str]) -> bool:
@@ -50,9 +55,7 @@ def _joints(found: Discovery, truth: Humanoid) -> Iterator[str]:
 
 def _points(found: Discovery, truth: Humanoid) -> Iterator[str]:
     points = truth.points
-    arm = sum(
-        np.linalg.norm(points[f"left_{end}"] - points["left_elbow"]) for end in ("shoulder", "wrist")
-    )
+    arm = sum(np.linalg.norm(points[f"left_{end}"] - points["left_elbow"]) for end in ("shoulder", "wrist"))
     near = _NEAR * max(float(arm) / 0.5, 0.25)
     for name, true_3 in points.items():
         if name not in found.points:
@@ -79,7 +82,8 @@ def _hands(found: Discovery, truth: Humanoid, description: Description) -> Itera
         for joint in reversed(description.joints_above(end.link)):
             pose_33 = pose_33 @ joint.origin_44[:3, :3]
         fingers, thumb = (
-            _degrees(pose_33 @ np.array(end.axes[word]), truth.directions[f"{side}_{word}"]) for word in ("fingers", "thumb")
+            _degrees(pose_33 @ np.array(end.axes[word]), truth.directions[f"{side}_{word}"])
+            for word in ("fingers", "thumb")
         )
         if fingers > _POINTING:
             yield f"{side}_hand: fingers {fingers:.0f} degrees off"

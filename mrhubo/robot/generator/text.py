@@ -25,7 +25,14 @@ class Written:
 
 
 def write(
-    chance: Chance, plan: Plan, moved: list[np.ndarray], root: int, base_44: np.ndarray, style: str, tidy: bool, shapes: bool
+    chance: Chance,
+    plan: Plan,
+    moved: list[np.ndarray],
+    root: int,
+    base_44: np.ndarray,
+    style: str,
+    tidy: bool,
+    shapes: bool,
 ) -> Written:
     """The URDF of a plan.
 
@@ -50,10 +57,14 @@ def write(
         slide = 0.0 if tidy or small or not joint.moves else chance.shift(0.5, 0.0, 0.1)
         frames[joint.child] = np.eye(4)
         frames[joint.child][:3, :3], frames[joint.child][:3, 3] = turn_33, joint.point_3 + slide * joint.axis_3
-    flips = {joint.role: -1.0 if not tidy and joint.mimics is None and chance.maybe(0.5) else 1.0 for joint in plan.joints}
+    flips = {
+        joint.role: -1.0 if not tidy and joint.mimics is None and chance.maybe(0.5) else 1.0 for joint in plan.joints
+    }
     planned = {joint.role: joint for joint in plan.joints}
     # A reversed joint turns by the same angle about the opposite axis, which `rooted` has done.
-    parts = [_link(chance, plan, body, links[body], frames[body], moved[body], shapes) for body in range(len(plan.bodies))]
+    parts = [
+        _link(chance, plan, body, links[body], frames[body], moved[body], shapes) for body in range(len(plan.bodies))
+    ]
     parts += [_joint(joint, planned, names, links, frames, flips) for joint in joints]
     if not tidy:
         parts = [parts[i] for i in chance.random.permutation(len(parts))]
@@ -124,5 +135,3 @@ def _rpy(turn_33: np.ndarray) -> np.ndarray:
 
 def _numbers(values_N: np.ndarray) -> str:
     return " ".join(f"{value:.9g}" for value in values_N)
-
-
