@@ -92,7 +92,11 @@ def test_the_form_of_the_file_does_not_matter(robot: str, form: str, tmp_path: P
     path.write_text(text)
     found = discover(path)
     description = describe(path)
-    turn_33 = np.eye(3) if turn is None else description.joints["turned_joint" if not names else names.get("turned_joint", "")].origin_44[:3, :3]
+    turn_33 = (
+        np.eye(3)
+        if turn is None
+        else description.joints["turned_joint" if not names else names.get("turned_joint", "")].origin_44[:3, :3]
+    )
     same(found_of(robot), found, names, turn_33, scale)
     for joint, (low, high) in {name: (r.lower, r.upper) for name, r in found_of(robot).ranges.items()}.items():
         now = found.ranges[names.get(joint, joint)]
@@ -137,7 +141,12 @@ LEGS = """<robot name="walker"><link name="body"/>{}</robot>"""
 
 
 def _leg(side: str, y: float) -> str:
-    joints = [("hip_roll", "1 0 0", 0.0), ("hip_pitch", "0 1 0", 0.0), ("knee", "0 1 0", -0.3), ("ankle", "0 1 0", -0.3)]
+    joints = [
+        ("hip_roll", "1 0 0", 0.0),
+        ("hip_pitch", "0 1 0", 0.0),
+        ("knee", "0 1 0", -0.3),
+        ("ankle", "0 1 0", -0.3),
+    ]
     parts, parent = [], "body"
     for name, axis, z in joints:
         parts.append(
