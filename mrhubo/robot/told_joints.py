@@ -64,8 +64,8 @@ def tell_of_waist(body_map: BodyMap, joints: Sequence[str]) -> None:
         f"the {n} '{x}'" for n, x in zip(body_map.shared.views, body_map.shared.view_links, strict=True)
     )
     _warn(
-        f"robot.joints: {quoted(joints)} carry {views} and all that is seen from there, so no human pose tells their "
-        "angles: they are held at 0; leave them out, or choose where they stand: "
+        f"robot.joints: {quoted(joints)} {'carries' if len(joints) == 1 else 'carry'} {views} and all that is seen "
+        "from there, which no human pose tells, and is held at 0; leave it out, or choose where it stands: "
         f"hold: {{{', '.join(f'{joint}: 0.0' for joint in joints)}}}"
     )
 

@@ -34,7 +34,7 @@ def wrist(side: str) -> tuple[str, str]:
 
 
 def test_a_waist_is_held_and_said_so(pair: Pair) -> None:
-    message = r"robot.joints: 'waist' carry the chest 'chest' .* held at 0; .* hold: {waist: 0.0}"
+    message = r"robot.joints: 'waist' carries the chest 'chest' .* held at 0; .* hold: {waist: 0.0}"
     with pytest.warns(InputWarning, match=message):
         body_map = build_body_map(pair(WAIST, joints=["waist", *ARMS], ranges={"waist": [-1.0, 1.0]}))
     without = build_body_map(pair(WAIST))
