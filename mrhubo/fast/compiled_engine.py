@@ -15,7 +15,7 @@ import numpy as np
 
 from mrhubo.fast.answers import CHUNK, NO_ROTATION, SKEW, Answers
 from mrhubo.fast.description import Description
-from mrhubo.fast.kept import note_kept
+from mrhubo.fast.kept import is_kept, note_kept
 from mrhubo.fast.plain import judging, networks, steps
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.plain.steps import Model
@@ -46,8 +46,7 @@ class CompiledEngine:
         self._layers = networks.Activations(self._activate(ACTIVATIONS["gelu"]), self._activate(self._activation))
         self._threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self._pool: ThreadPoolExecutor | None = None
-        self._compiles = True
-        """Whether something that a motion needs may have been compiled since all of it was noted."""
+        self._unnoted = True
         self._nothing = np.zeros((0, 0), np.float32), np.zeros((0, len(description.trust.column_XD)))
 
     def _activate(self, kind: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -137,6 +136,7 @@ class CompiledEngine:
 
         def quadratic(_: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
             frames, joints = q_BN.shape
+            q_BN, target_BD3 = np.ascontiguousarray(q_BN), np.ascontiguousarray(target_BD3)
             found = np.empty((frames, blocks)), np.empty((frames, joints)), np.empty((frames, joints, joints))
             self._shared(
                 frames,
@@ -153,7 +153,9 @@ class CompiledEngine:
         for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
             coupling_KTM[lag - 1, : frames - lag] = coupling_TM
         lower_RW = np.empty((frames * joints, len(coupling_KTM) * joints + 1))
-        self._motion_kernels.factor(system.within_TMM, system.diagonal_TM, coupling_KTM, lower_RW)
+        # In one order of memory: for each other one, numba compiles anew.
+        within_TMM, diagonal_TM = np.ascontiguousarray(system.within_TMM), np.ascontiguousarray(system.diagonal_TM)
+        self._motion_kernels.factor(within_TMM, diagonal_TM, coupling_KTM, lower_RW)
 
         def solve(right_TM: np.ndarray) -> np.ndarray:
             found_R = right_TM.flatten()
@@ -186,10 +188,19 @@ class CompiledEngine:
 
             run(self._steps, six_BF)
             run(self._without_prior, judging.reconstruct(d, six_BF, self._layers.prior))
-        if self._compiles and "problem" in self.__dict__:
-            self._compiles = False
-            note_kept(kernel.stats.cache_path for kernel in self._kernels)
+        if self._unnoted and "problem" in self.__dict__:
+            self._note()
         return found
+
+    def _note(self) -> None:
+        """Notes that all that motions need is compiled, once it is."""
+        self._unnoted = False
+        if not is_kept():
+            nobody_0N, nothing_0D3 = np.zeros((0, len(self.description.cost.lower_N))), np.zeros((0, 1, 3))
+            self.giving_way.problem.quadratic(nobody_0N, nothing_0D3)
+            self.giving_way.close(nobody_0N)
+            self.avoid(nobody_0N, nothing_0D3)
+            note_kept(kernel.stats.cache_path for kernel in (*self._kernels, *self._motion_kernels))
 
     def _retarget(
         self, what: int, steps: tuple[int, bool], rows: slice, q_BN: np.ndarray, target_BD3: np.ndarray,
