@@ -53,7 +53,8 @@ def test_what_a_robot_has_at_home_is_not_fought(
     monkeypatch.setattr(robot, "home", lambda: folded_N)
     other = Avoidance(avoidance.problem.body_map)
     assert not bool(other.close(folded_N[None]).any())
-    assert float(other.contact.margin_P.min()) < 0 < CLEARANCE == pytest.approx(float(other.contact.margin_P.max()))
+    clear_P = other.collision.clearance(CLEARANCE)
+    assert float(clear_P.min()) < 0 < CLEARANCE == pytest.approx(float(clear_P.max()))
 
 
 def test_who_comes_near_gives_way_gradually(
