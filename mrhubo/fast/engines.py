@@ -29,8 +29,7 @@ class NumpyEngine:
 
     def __init__(self, description: Description) -> None:
         self.description = description
-        self.avoid = Avoidance(description)
-        """As `Engine.avoid`."""
+        self._avoidance = Avoidance(description)
 
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """As `Engine.wrong`."""
@@ -56,7 +55,11 @@ class NumpyEngine:
         if not polish or not len(q_BN):
             return q_BN
         found_BN = steps.polish(self.description, q_BN.astype(np.float64), target_BD3, polish)
-        return (self.avoid(found_BN, target_BD3) if avoid else found_BN).astype(np.float32)
+        return (self._avoidance(found_BN, target_BD3) if avoid else found_BN).astype(np.float32)
+
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+        """As `Engine.avoid`."""
+        return self._avoidance(q_BN, target_BD3)
 
     def follow(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
@@ -72,7 +75,7 @@ class NumpyEngine:
     @cached_property
     def giving_way(self) -> GivingWay:
         """As `Engine.giving_way`."""
-        return make_giving_way(self.avoid, halve, self.avoid)
+        return make_giving_way(self._avoidance, halve, self.avoid)
 
     def answer(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None

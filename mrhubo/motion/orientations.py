@@ -125,7 +125,7 @@ def turn_of(joint: str, points: Mapping[str, np.ndarray]) -> np.ndarray | None:
 
 def known_frames(value_TX: np.ndarray) -> np.ndarray:
     """In which frames (T,) all numbers of a value (T, ...) are known, and not NaN."""
-    return np.isfinite(value_TX).all(axis=tuple(range(1, value_TX.ndim)))
+    return np.asarray(np.isfinite(value_TX).all(axis=tuple(range(1, value_TX.ndim))))
 
 
 def frame_of(first_T3: np.ndarray, second_T3: np.ndarray) -> np.ndarray:

@@ -94,7 +94,7 @@ class _Build:
         missing = [name for name in names if name not in self.points]
         if missing:
             return np.zeros(self.frames, bool)
-        return np.stack([known_frames(self.points[name]) for name in names]).all(0)
+        return np.asarray(np.stack([known_frames(self.points[name]) for name in names]).all(0))
 
     def surety(self, known_T: np.ndarray, *names: str) -> np.ndarray:
         """How sure (T,) something is that hangs on these points: as the least sure of them; 0 where it is not known."""

@@ -32,15 +32,15 @@ class Avoidance(nn.Module):
     def __init__(self, body_map: BodyMap) -> None:
         super().__init__()
         self.collision = body_map.collision
-        self.contact = SelfCollisionTerm(self.collision, CLEARANCE, WEIGHT, self.collision.clearance(CLEARANCE))
+        clear_P = self.collision.clearance(CLEARANCE)
+        self.contact = SelfCollisionTerm(self.collision, CLEARANCE, WEIGHT, clear_P)
         self.problem = DirectionProblem(body_map, [self.contact])
 
     def close(self, q_BN: Tensor) -> Tensor:
         """Which frames (B,) have a pair nearer than its clearance, at joint angles (B, N) [rad]."""
         near = self.collision.near(q_BN, CLEARANCE)
-        short_X = near.distance_X < self.contact.margin_P[near.pair_X]
         found_B = torch.zeros(len(q_BN), dtype=torch.bool, device=q_BN.device)
-        return found_B.index_fill(0, near.row_X[short_X], True)
+        return found_B.index_fill(0, near.row_X[self.contact.lack(near) > 0], True)
 
     def forward(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
         """Joint angles (B, N) [rad], inside the limits, of which as few as possible touch.

@@ -181,12 +181,10 @@ class Retargeter(nn.Module):
         """`predict` for the parts of a motion, with their directions where they are needed."""
         q_TN = torch.cat([self.answer(*part, polish) for part in zip(parts, targets, strict=True)])
         avoidance = self.avoidance if polish and avoid_collisions else None
-        if frame_rate is None and avoidance is None:
-            return q_TN
-        target_TD3 = torch.cat([target for target in targets if target is not None])
-        if avoidance is not None and frame_rate is None:
-            return avoidance(q_TN, target_TD3)
-        return join_frames(self.directions, q_TN, target_TD3, frame_rate, avoidance)
+        known = [target for target in targets if target is not None]
+        if frame_rate is not None:
+            return join_frames(self.directions, q_TN, torch.cat(known), frame_rate, avoidance)
+        return q_TN if avoidance is None else avoidance(q_TN, torch.cat(known))
 
     @torch.no_grad()
     def retarget(

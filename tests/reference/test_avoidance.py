@@ -53,13 +53,14 @@ def test_what_a_robot_has_at_home_is_not_fought(
     monkeypatch.setattr(robot, "home", lambda: folded_N)
     other = Avoidance(avoidance.problem.body_map)
     assert not bool(other.close(folded_N[None]).any())
-    assert float(other.contact.margin_P.min()) < 0 < CLEARANCE == pytest.approx(float(other.contact.margin_P.max()))
+    clear_P = other.collision.clearance(CLEARANCE)
+    assert float(clear_P.min()) < 0 < CLEARANCE == pytest.approx(float(clear_P.max()))
 
 
 def test_who_comes_near_gives_way_gradually(
     avoidances: dict[str, Avoidance], retargeters: dict[str, OptimizationRetargeter], make_pose: Callable[..., Tensor]
 ) -> None:
-    """Arms that are lowered to the thighs and beyond: no step is much longer than without giving way."""
+    """Arms that are lowered to the thighs and beyond: when they come near, no step is much longer than before."""
     avoidance, retargeter = avoidances["nao"], retargeters["nao"]
     angle = torch.linspace(0.8, 1.7, 200)[:, None] * torch.tensor([0.0, 0.0, 1.0])
     pose_TJ33 = make_pose(left_shoulder=-angle, right_shoulder=angle)
@@ -67,26 +68,28 @@ def test_who_comes_near_gives_way_gradually(
     found_TN = avoidance(free_TN, retargeter.body_map.human_directions(pose_TJ33))
     moved_T = (found_TN - free_TN).abs().amax(dim=1)
     first = int(torch.nonzero(moved_T)[0, 0])
-    assert 0 < first < 199 and float(moved_T.max()) > 0.05
+    assert 0 < first < 185 and float(moved_T.max()) > 0.05
     assert float(moved_T[first]) < 0.02
-    assert float(found_TN.diff(dim=0).abs().max()) < 0.1
+    assert float(found_TN[: first + 15].diff(dim=0).abs().max()) < 0.05
 
 
 def test_a_motion_gives_way_without_jumps_and_at_no_higher_speed(
     retargeters: dict[str, OptimizationRetargeter], make_pose: Callable[..., Tensor]
 ) -> None:
-    """A human who claps through himself, quicker than the robot's joints turn."""
-    half = torch.linspace(0, 1, 30)[:, None]
+    """A human who hugs himself from a T pose and lets go, within a second."""
+    half = torch.linspace(0, 1, 12)[:, None]
     swing = torch.cat((half, half.flip(0)))
-    pose_TJ33 = make_pose(
-        left_shoulder=swing * torch.tensor([0.0, -1.6, 0.0]), right_shoulder=swing * torch.tensor([0.0, 1.6, 0.0])
-    )
+    turns = {}
+    for side, sign in (("left", -1), ("right", 1)):
+        turns[f"{side}_shoulder"] = swing * torch.tensor([0.0, sign * 1.9, sign * -0.9])
+        turns[f"{side}_elbow"] = swing * torch.tensor([0.0, sign * 1.6, 0.0])
+    pose_TJ33 = make_pose(**turns)
     retargeter, rate = retargeters["nao"], 24.0
     robot, collision = retargeter.body_map.robot, retargeter.body_map.collision
     plain_TN = retargeter(pose_TJ33, rate).q
     found_TN = retargeter(pose_TJ33, rate, avoid_collisions=True).q
     before, after = (float(collision.collides(q).float().mean()) for q in (plain_TN, found_TN))
-    assert before > 0.1 and after < 0.2 * before
+    assert before > 0.1 and after < 0.5 * before
     assert bool((found_TN.diff(dim=0).abs() * rate <= robot.velocity_N).all())
     target_TD3 = retargeter.body_map.human_directions(pose_TJ33)
     assert count_jumps(retargeter.problem, found_TN, target_TD3, rate) == 0

@@ -136,17 +136,7 @@ def minimise(t, work, q_N, steps):
         if not going or number == steps:
             break
         for c in range(blocks):
-            solve(
-                t,
-                work,
-                q_N,
-                whole(t, FIRST_C, c),
-                whole(t, FIRST_C, c + 1),
-                work.damping_C[c],
-                0.0,
-                work.lower_N,
-                work.upper_N,
-            )
+            _solve_block(t, work, q_N, c, 0.0)
         for n in range(len(q_N)):
             work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
 
@@ -179,17 +169,7 @@ def follow(t, work, target_BD3, b, pull, q_N):
         if number == FOLLOWED:
             return
         for c in range(blocks):
-            solve(
-                t,
-                work,
-                q_N,
-                whole(t, FIRST_C, c),
-                whole(t, FIRST_C, c + 1),
-                work.damping_C[c],
-                pull,
-                work.lower_N,
-                work.upper_N,
-            )
+            _solve_block(t, work, q_N, c, pull)
         for n in range(len(q_N)):
             work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
 

@@ -61,7 +61,7 @@ class Avoidance:
         found = near(capsules, placed.rotation_BL33, placed.position_BL3, self.clear_Y)
         short_X = self.clear_Y[found.pair_X] - found.distance_X
         row_X, rows_XN = found.row_X, -distance_jacobian(kinematics, capsules, placed, found, self._carried_LAN)
-        np.add.at(model.cost_BC, (row_X, 0), WEIGHT * short_X * short_X)
+        np.add.at(model.cost_BC[:, 0], row_X, WEIGHT * short_X * short_X)
         np.add.at(model.gradient_BN, row_X, WEIGHT * short_X[:, None] * rows_XN)
         np.add.at(model.hessian_BNN, row_X, WEIGHT * rows_XN[:, :, None] * rows_XN[:, None, :])
         return model

@@ -13,6 +13,7 @@ from torch import Tensor
 from mrhubo.reference.blocks import Blocks
 from mrhubo.reference.terms.term import Quadratic, State, Term
 from mrhubo.robot import SelfCollision
+from mrhubo.robot.collision import Contacts
 
 
 class SelfCollisionTerm(Term):
@@ -26,6 +27,10 @@ class SelfCollisionTerm(Term):
         self.collision, self.margin, self.weight = collision, margin, weight
         self.register_buffer("margin_P", margin_P, persistent=False)
 
+    def lack(self, near: Contacts) -> Tensor:
+        """By how much pairs are nearer than they are to be (X,) [m]; negative where they are not."""
+        return (self.margin if self.margin_P is None else self.margin_P[near.pair_X]) - near.distance_X
+
     def couplings(self) -> list[set[int]]:
         """All joints."""
         return [set(range(len(self.collision.robot.joint_names)))]
@@ -35,9 +40,7 @@ class SelfCollisionTerm(Term):
         which of the B problems they belong (X,).
         """
         near = self.collision.near(state.q_BN, self.margin, state.poses)
-        if self.margin_P is None:
-            return self.margin - near.distance_X, -near.jacobian_XN, near.row_X
-        short_X = self.margin_P[near.pair_X] - near.distance_X
+        short_X = self.lack(near)
         x = torch.nonzero(short_X > 0)[:, 0]
         return short_X[x], -near.jacobian_XN[x], near.row_X[x]
 
