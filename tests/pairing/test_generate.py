@@ -24,7 +24,7 @@ SMALL = [
     "pairs.reverse_share=0.4",
     "pairs.shard_size=100",
     "pairs.solver=fine",
-    "pairs.amortiser_steps=12",
+    "pairs.amortiser_steps=30",
     "pairs.fine_steps=3",
 ]
 
