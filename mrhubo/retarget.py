@@ -81,7 +81,6 @@ def main(argv: list[str]) -> int:
 
 
 def _answerer(package: str | None, robot: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
-    import mrhubo
     from mrhubo.retargeting import of_package, of_reference
 
     if package is not None:
