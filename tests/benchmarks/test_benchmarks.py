@@ -28,6 +28,7 @@ from mrhubo.robot import build_body_map
 SCRIPTS = [
     "collisions",
     "confidence",
+    "discovery",
     "inference",
     "pair_pictures",
     "pair_quality",
@@ -108,6 +109,13 @@ def few_pairs(folder: Path) -> list[str]:
 
 def two_clips(folder: Path) -> list[str]:
     return [f"evaluation.motions=[{folder}]", "evaluation.validation=[wave]"]
+
+
+def test_discovery(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "nothing.urdf").write_text("<robot name='a'><link name='b'/></robot>")
+    text = run("discovery", "--seeds", "600-603", "--urdfs", tmp_path)
+    assert "| all " in text and "no body of the robot carries two limbs" in text
+    assert len(re.findall(r"^\| (nao|coman|reachy) ", text, re.M)) == 18
 
 
 def test_every_benchmark_has_a_test(root: Path) -> None:

@@ -270,7 +270,7 @@ class _Finder:
                 question = Question(f"{side}_elbow", f"{text}robot.ranges if the arm bends backwards", (name,))
         ends = (straight, upper) if above else (lower, straight)
         why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human elbow one way; straight is at {straight:.2f}"
-        return FoundRange(*map(float, ends), why), question
+        return FoundRange(float(ends[0]), float(ends[1]), why), question
 
     def _questions(self) -> Iterator[Question]:
         heading, roles = self.heading, self.roles
