@@ -135,8 +135,7 @@ def solve_references(
                 answers = []
             shape = (len(motion), len(body_map.robot.joint_names))
             if not answers or any(answer.shape != shape for answer in answers):
-                reference = retargeter.retarget(motion.local_TJ33, motion.frame_rate).q_TN.float()
-                answers = [reference, retargeter.solve_frames(motion.local_TJ33)[0].float()]
+                answers = [q.float() for q in retargeter.motion_and_optima(motion.local_TJ33, motion.frame_rate)]
                 write_tensors(path, dict(zip(("q", "optimum"), answers, strict=True)), header)
             clips.append(Clip(motion, *answers))
         progress.update(len(everything))

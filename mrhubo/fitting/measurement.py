@@ -112,17 +112,20 @@ class Measured:
 
 def measure(prepared: Prepared, report: Reporter, retargeter: Retargeter, clips: Sequence[Clip]) -> Measured:
     """Answers and scores in every way, and how long a frame takes."""
-    predictions: list[Tensor] = []
-    ways: dict[str, Sequence[Evaluation]] = {}
     sets = {"": clips, _SUFFIX: reshare_clips(clips)}
-    with report.step("evaluation", 2 * len(_WAYS) * len(clips), "clips") as progress:
-        for suffix, asked in sets.items():
-            for name, way in _WAYS.items():
-                progress.update(len(ways) * len(clips), name + suffix)
-                found = way.answer(retargeter, [clip.motion for clip in asked])
-                predictions = predictions or found
-                ways[name + suffix] = _score(prepared, found, asked)
-        progress.update(2 * len(_WAYS) * len(clips))
+    asked = [clip for chosen in sets.values() for clip in chosen]
+    found: dict[str, list[Tensor]] = {}
+    with report.step("evaluation", len(_WAYS) * len(asked), "clips") as progress:
+        for name, way in _WAYS.items():
+            progress.update(len(found) * len(asked), name)
+            # All at once: a stream takes as long for many people as for one.
+            found[name] = way.answer(retargeter, [clip.motion for clip in asked])
+        progress.update(len(_WAYS) * len(asked))
+    ways: dict[str, Sequence[Evaluation]] = {}
+    for i, (suffix, chosen) in enumerate(sets.items()):
+        part = slice(i * len(clips), (i + 1) * len(clips))
+        ways |= {name + suffix: _score(prepared, answers[part], chosen) for name, answers in found.items()}
+    predictions = next(iter(found.values()))[: len(clips)]
     ways[_REFERENCE] = _score(prepared, [clip.reference_TN for clip in clips], clips)
     polished = functools.partial(retargeter.predict, polish=POLISH)
     return Measured(predictions, ways, latencies(retargeter.predict, clips), latencies(polished, clips))

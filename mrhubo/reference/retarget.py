@@ -125,14 +125,28 @@ class OptimizationRetargeter(nn.Module):
         """
         check_frame_rate(frame_rate, needed=True)
         target_TD3 = self._targets(local_TJ33)
-        candidates_TSN, cost_TSC = self._candidates(target_TD3)
+        return self._result(self._motion(target_TD3, self._candidates(target_TD3), frame_rate), target_TD3, frame_rate)
+
+    @torch.no_grad()
+    def motion_and_optima(self, local_TJ33: MotionLike, frame_rate: float) -> tuple[Tensor, Tensor]:
+        """The joint angles (T, N) [rad] of `retarget` and those of `solve_frames`, in little more time than one of
+        them takes.
+
+        Raises:
+            UserError: as for `retarget`.
+        """
+        check_frame_rate(frame_rate, needed=True)
+        target_TD3 = self._targets(local_TJ33)
+        candidates = self._candidates(target_TD3)
+        return self._motion(target_TD3, candidates, frame_rate), self._polish(*candidates, target_TD3)[0]
+
+    def _motion(self, target_TD3: Tensor, candidates: tuple[Tensor, Tensor], frame_rate: float) -> Tensor:
+        """The motion (T, N) [rad] among and near candidates (T, S, N), whose blocks have a cost (T, S, C) each."""
         smoothness = self._smoothness(frame_rate)
         if smoothness.pull == 0 or len(target_TD3) == 1:
-            q_TN = self._polish(candidates_TSN, cost_TSC, target_TD3)[0]
-        else:
-            task = MotionTask(target_TD3, smoothness, *speed_bound(self.body_map.robot.velocity_N, frame_rate))
-            q_TN = smooth_motion(self.problem, candidates_TSN, cost_TSC, task)
-        return self._result(q_TN, target_TD3, frame_rate)
+            return self._polish(*candidates, target_TD3)[0]
+        task = MotionTask(target_TD3, smoothness, *speed_bound(self.body_map.robot.velocity_N, frame_rate))
+        return smooth_motion(self.problem, *candidates, task)
 
     @torch.no_grad()
     def retarget_collision_free(

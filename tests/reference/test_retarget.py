@@ -104,6 +104,16 @@ def test_one_frame_and_no_smoothness(
     torch.testing.assert_close(rough.q_TN, alone_TN, atol=1e-3, rtol=0)
 
 
+def test_a_motion_and_the_frames_optima_in_one_go(
+    retargeters: dict[str, OptimizationRetargeter], random_pose: Callable[[int, int], Tensor]
+) -> None:
+    local_TJ33 = random_pose(20, 9)
+    motion_TN, optima_TN = retargeters["nao"].motion_and_optima(local_TJ33, 24.0)
+    assert torch.equal(motion_TN, retargeters["nao"].retarget(local_TJ33, 24.0).q_TN)
+    assert torch.equal(optima_TN, retargeters["nao"].solve_frames(local_TJ33)[0])
+    assert not torch.equal(motion_TN, optima_TN)
+
+
 def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, OptimizationRetargeter]) -> None:
     problem = retargeters["nao"].problem
     q_TN = torch.zeros(4, 8)
