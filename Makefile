@@ -32,7 +32,7 @@ test: .venv/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
-	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n auto $(PYTEST_ARGS)
 	$(BIN)/mkdocs build --strict --quiet
 
 dashboard: export MLFLOW_SERVER_ENABLE_JOB_EXECUTION = false

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import torch
 from common import print_header, print_table, read_options
 from torch import Tensor
@@ -50,9 +51,10 @@ def gaps_in(motion: Motion, seconds: float, count: int) -> list[slice]:
 
 def across(direction_T23: Tensor, gap: slice) -> Tensor:
     """Directions (G, 2, 3) in a gap, from the frames before and after."""
-    known_T = torch.ones(len(direction_T23), dtype=torch.bool)
+    known_T = np.ones(len(direction_T23), dtype=bool)
     known_T[gap] = False
-    return torch.stack([fill_directions(direction_T3, known_T)[gap] for direction_T3 in direction_T23.unbind(1)], dim=1)
+    bones = direction_T23.numpy().swapaxes(0, 1)
+    return torch.from_numpy(np.stack([fill_directions(bone_T3, known_T)[gap] for bone_T3 in bones], axis=1)).float()
 
 
 def by_prior(prior: BodyPrior, local_TJ33: Tensor, side: str, hidden: Sequence[str]) -> Tensor:

@@ -6,12 +6,14 @@ import contextlib
 import importlib
 import io
 import os
+import resource
 import signal
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 from torch import Tensor
 
@@ -24,10 +26,11 @@ from mrhubo.fit import main as fit
 from mrhubo.pair import main as pair
 from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
+from tests.light import lighten
 
 ROOT = Path(__file__).resolve().parent.parent
 __all__ = [
-    "ROOT", "Motion", "answer", "as_command", "cut_motion", "fit", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
+    "ROOT", "Motion", "answer", "as_command", "as_torchrun", "cut_motion", "fit", "killed_at", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
     "read_tensors", "write_tensors",
 ]  # fmt: skip
 
@@ -39,16 +42,50 @@ def quietly(command: Callable[[list[str]], object], arguments: Sequence[str]) ->
     return output.getvalue()
 
 
-def as_command(name: str, arguments: Sequence[str], output: Path, environment: Mapping[str, str]) -> None:
-    """In a process of its own: what `python -m mrhubo.<name>` does, in a session of its own, its output in a file."""
+def as_command(
+    name: str, arguments: Sequence[str], output: Path, environment: Mapping[str, str], largest: int | None = None
+) -> None:
+    """In a process of its own: what `python -m mrhubo.<name>` does, in a session of its own, its output in a file, but
+    for what `lighten` says; no file can be larger than `largest` bytes.
+    """
+    lighten(pytest.MonkeyPatch())
+    if largest is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+    _go_apart(output, environment)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored below a shell's background job
+    sys.argv = [f"mrhubo.{name}", *arguments]
+    run_command(importlib.import_module(f"mrhubo.{name}").main)
+
+
+def as_torchrun(arguments: Sequence[str], output: Path, environment: Mapping[str, str]) -> None:
+    """In a process of its own: what `torchrun` does."""
+    _go_apart(output, environment)
+    importlib.import_module("torch.distributed.run").main(list(arguments))
+
+
+def _go_apart(output: Path, environment: Mapping[str, str]) -> None:
+    """Into a session of its own; what is printed goes to a file."""
     os.setsid()
     os.environ.update(environment)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored below a shell's background job
     stream = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     for standard in (1, 2):
         os.dup2(stream, standard)
-    sys.argv = [f"mrhubo.{name}", *arguments]
-    run_command(importlib.import_module(f"mrhubo.{name}").main)
+
+
+def killed_at(event: int, folder: Path, command: Callable[[list[str]], object], arguments: list[str]) -> None:
+    """In a process of its own: a command that is killed as it is about to touch a folder for the n-th time (files and
+    folders opened, made, renamed, removed), if it ever does.
+    """
+    left = [event]
+
+    def count(name: str, given: tuple[object, ...]) -> None:
+        if name in ("open", "os.rename", "os.remove", "os.mkdir") and str(given[0]).startswith(str(folder)):
+            left[0] -= 1
+            if left[0] == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    sys.addaudithook(count)
+    command(arguments)
 
 
 def load(folder: Path) -> Retargeter:

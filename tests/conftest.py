@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import sqlite3
@@ -22,22 +23,52 @@ if TYPE_CHECKING:
 # Tests share the cores with each other and with the processes that they start. Threads that spin while they wait make
 # all of them many times slower; read when torch is imported, after this.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+if "PYTEST_XDIST_WORKER" in os.environ:  # there is one for each core
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
-_LONGEST_FILES = (
-    "tests/test_fit.py", "tests/test_pair.py", "tests/golden/test_golden.py", "tests/fitting/test_steps.py",
-    "tests/callbacks/test_scale_search.py", "tests/test_sweep.py", "tests/baselines/s3le/test_s3le.py",
-    "tests/invariance/test_invariance.py", "tests/body/prior_training/test_train.py", "tests/paper/test_tables.py",
+_TOGETHER = (
+    ("tests/test_fit.py", "tests/test_pair.py", "tests/test_sweep.py"),  # `server` imports everything once
+    ("tests/fast/",),  # what numba compiles is compiled once
+)
+_LONGEST = (
+    "tests/test_fit.py", "tests/fast/", "tests/golden/test_golden.py", "tests/fitting/test_steps.py",
+    "tests/baselines/s3le/test_s3le.py", "tests/benchmarks/test_benchmarks.py", "tests/invariance/test_invariance.py",
+    "tests/callbacks/test_scale_search.py", "tests/paper/test_tables.py", "tests/body/prior_training/test_train.py",
 )  # fmt: skip
 """Begun first: of several processes that share the files, none is left alone with a long one at the end."""
 
 
+def _unit(file: str) -> str:
+    """What a file is run together with, in one process: the first of its group, or itself."""
+    return next((group[0] for group in _TOGETHER if file.startswith(group)), file)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files that take longest come first."""
-    order = {str(ROOT / name): place for place, name in enumerate(_LONGEST_FILES)}
-    items.sort(key=lambda item: order.get(str(item.path), len(order)))
+    order = {name: place for place, name in enumerate(_LONGEST)}
+    items.sort(key=lambda item: order.get(_unit(item.nodeid.split("::")[0]), len(order)))
+
+
+def pytest_collection_finish() -> None:
+    """What has been imported stays, so Python's collector of garbage need not look through it again and again."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Whole files go to a process, some of them together, in the order of `_LONGEST`."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class InUnits(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return _unit(nodeid.split("::")[0])
+
+    config.option.loadscopereorder = False  # not by the number of tests, which says nothing of their time
+    return InUnits(config, log)
 
 
 @pytest.fixture(scope="session")
@@ -58,17 +89,12 @@ def external_dir() -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def light_records(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Runs in this process are recorded as ever, but for what takes most of a small fit's time: a new database is a
-    copy of one that MLflow made (its migrations take three seconds), MLflow does not compare the installed versions
-    with those that it has just been told, and figures in pictures are blank.
+@pytest.fixture(scope="session")
+def copied_database(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Engine], None]:
+    """Stands in for what MLflow does to a new database: copies one that MLflow made, once for all processes (its
+    migrations take three seconds).
     """
     import mlflow.store.db.utils as databases
-    import mlflow.utils.environment as environment
-    from PIL import Image
-
-    from mrhubo.view import figures, pictures
 
     make = databases._initialize_tables
     shared = tmp_path_factory.getbasetemp()
@@ -92,11 +118,21 @@ def light_records(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         source.close()
         target.close()
 
+    return copy
+
+
+@pytest.fixture(scope="module")
+def light_records(copied_database: Callable[[Engine], None]) -> Iterator[None]:
+    """Runs in this process are recorded as ever, but for what takes most of a small fit's time (`lighten`), and a new
+    database is a copy.
+    """
+    import mlflow.store.db.utils as databases
+
+    from tests.light import lighten
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(databases, "_initialize_tables", copy)
-        patch.setattr(environment, "warn_dependency_requirement_mismatches", lambda requirements: None)
-        patch.setattr(pictures, "GIF_RATE", 1.0)
-        patch.setattr(figures, "render", lambda solids, size, *_, **__: Image.new("RGB", size))
+        patch.setattr(databases, "_initialize_tables", copied_database)
+        lighten(patch)
         yield
 
 
@@ -105,7 +141,7 @@ def server() -> ForkServerContext:
     """Starts processes that have imported everything already, which takes a fresh interpreter seconds."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(
-        ["mrhubo.fit", "mrhubo.pair", "mrhubo.sweep", "mrhubo.fitting.sweeping", "mrhubo.fitting.fit", "tests.chain",
+        ["mrhubo.fit", "mrhubo.pair", "mrhubo.sweep", "mrhubo.fitting.sweeping", "mrhubo.fitting.fit", "tests.chain", "tests.light",
          "mlflow.store.tracking.sqlalchemy_store"]
     )  # fmt: skip
     return context
@@ -123,12 +159,16 @@ def one_thread() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def empty_tracking(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with MLflow's database, to be copied: making one takes seconds."""
+def empty_tracking(tmp_path_factory: pytest.TempPathFactory, copied_database: Callable[[Engine], None]) -> Path:
+    """A folder with MLflow's database, to be copied."""
+    import mlflow.store.db.utils as databases
+
     from mrhubo.runtime.tracking import open_client
 
     folder = tmp_path_factory.mktemp("tracking")
-    open_client(folder, "mrhubo")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(databases, "_initialize_tables", copied_database)
+        open_client(folder, "mrhubo")
     return folder
 
 

@@ -7,7 +7,6 @@ import random
 import resource
 import signal
 import subprocess
-import sys
 import time
 from multiprocessing.context import ForkServerContext
 from pathlib import Path
@@ -23,6 +22,7 @@ from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.pair import main
 from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
+from tests.chain import as_command, as_torchrun, killed_at
 
 SMALL = [
     "pairs.solver=fine", "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=10", "pairs.fine_steps=4",
@@ -187,25 +187,28 @@ def test_a_bad_amortiser_is_trained_again(
     assert contents(tmp_path) == contents(undisturbed)
 
 
-def test_killed_at_25_moments_it_ends_with_the_same_bytes(
+def test_killed_at_many_moments_it_ends_with_the_same_bytes(
     root: Path, tmp_path: Path, undisturbed: Path, server: ForkServerContext
 ) -> None:
-    draw, stopped = random.Random(0), 0
+    """Some between two things that it does to its files, some at any time."""
+    draw, stopped = random.Random(0), {True: 0, False: 0}
     given = arguments(root, tmp_path)
-    for _ in range(200):
-        process = server.Process(target=main, args=(given,))
+    for turn in range(100):
+        at_files = turn % 3 > 0
+        event = draw.randrange(1, 16) if at_files else 10**9
+        process = server.Process(target=killed_at, args=(event, tmp_path, main, given))
         process.start()
-        process.join(draw.uniform(0.0, 1.5))  # from the first import to the last file
-        stopped += process.is_alive()
+        process.join(60 if at_files else draw.uniform(0.0, 1.0))
         process.kill()
         process.join()
         assert process.exitcode in (0, -signal.SIGKILL)
+        stopped[at_files] += process.exitcode != 0
         if process.exitcode == 0:  # begin again
             for path in tmp_path.rglob("*.safetensors"):
                 path.unlink()
-        if stopped == 25:
+        if stopped[True] >= 8 and stopped[False] >= 4:
             break
-    assert stopped == 25
+    assert stopped[True] >= 8 and stopped[False] >= 4
     main(given)
     assert store_of(root, tmp_path).missing() == []
     assert contents(tmp_path) == contents(undisturbed)
@@ -223,18 +226,19 @@ def test_two_processes_on_one_folder_do_not_disturb_each_other(
     assert contents(tmp_path) == contents(undisturbed)
 
 
-def test_a_full_disk_ends_in_one_sentence_and_no_broken_file(root: Path, tmp_path: Path) -> None:
-    large = [a for a in arguments(root, tmp_path, "pairs.solver=fast", "pairs.shard_size=5000", "pairs.count=5000")]
+def test_a_full_disk_ends_in_one_sentence_and_no_broken_file(
+    root: Path, tmp_path: Path, server: ForkServerContext
+) -> None:
+    output, folder = tmp_path / "output", tmp_path / "pairs"
+    large = arguments(root, folder, "pairs.solver=fast", "pairs.shard_size=5000", "pairs.count=5000")
     limit = 3_500_000  # the amortiser fits, the shard of 4 MB does not
-    process = subprocess.run(
-        [sys.executable, "-m", "mrhubo.pair", *large],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
-        capture_output=True,
-        text=True,
-    )
-    assert process.returncode == 2, process.stderr
-    assert process.stderr.count("\n") == 1 and "cannot be written: File too large" in process.stderr
-    (store,) = tmp_path.iterdir()
+    process = server.Process(target=as_command, args=("pair", large, output, {}, limit))
+    process.start()
+    process.join(120)
+    said = output.read_text()
+    assert process.exitcode == 2, said
+    assert said.count("\n") == 1 and "cannot be written: File too large" in said
+    (store,) = folder.iterdir()
     assert [path.name for path in store.iterdir()] == ["amortiser.safetensors"]
 
 
@@ -268,19 +272,24 @@ def test_a_worker_that_cannot_write_says_why(
 
 
 def test_ranks_share_the_work_and_a_dead_ranks_part(
-    root: Path, tmp_path: Path, spoilt: PairStore, undisturbed: Path
+    root: Path,
+    tmp_path: Path,
+    spoilt: PairStore,
+    undisturbed: Path,
+    server: ForkServerContext,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     for index in (1, 3):  # the part of rank 1 of 2
         spoilt.path(index).unlink()
-    command = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "-m", "mrhubo.pair"]
-    given = [a for a in arguments(root, tmp_path) if a != "--quiet"]
-    before = time.time()
-    process = subprocess.run(
-        [*command, *given], capture_output=True, text=True, env={**os.environ, "LOGLEVEL": "ERROR"}
-    )
-    assert process.returncode == 0, process.stderr
-    assert process.stdout.count("made 300 pairs") == 1, "one rank reports, for all"
-    assert "pairs: 150 of 150" in process.stderr, "each rank made one of the two"
+    given = ["--nproc-per-node", "2", "-m", "mrhubo.pair", *[a for a in arguments(root, tmp_path) if a != "--quiet"]]
+    before, output = time.time(), tmp_path_factory.mktemp("torchrun") / "output"
+    process = server.Process(target=as_torchrun, args=(given, output, {"LOGLEVEL": "ERROR"}))
+    process.start()
+    process.join(200)
+    said = output.read_text()
+    assert process.exitcode == 0, said
+    assert said.count("made 300 pairs") == 1, "one rank reports, for all"
+    assert "pairs: 150 of 150" in said, "each rank made one of the two"
     assert contents(tmp_path) == contents(undisturbed)
     assert sum(path.stat().st_mtime > before for path in spoilt.folder.glob("*-0*")) == 2
 

@@ -18,7 +18,7 @@ import pytest
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.sweep import main
-from tests.chain import as_command
+from tests.chain import as_command, cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
@@ -33,9 +33,8 @@ SPACE = (
 
 @pytest.fixture()
 def arguments(root: Path, tmp_path: Path) -> list[str]:
-    (tmp_path / "motions").mkdir()
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "motions")
+        cut_motion(name, tmp_path / "motions", (1, 2.5), every=3)
     (tmp_path / "sweep.yaml").write_text(SPACE)
     return [
         "--config", str(root / "conf" / "nao.yaml"), "--sweep", str(tmp_path / "sweep.yaml"), "--quiet", *SMALL,
@@ -66,8 +65,13 @@ def runs_of(folder: Path) -> list[Any]:
 
 
 def test_one_of_two_processes_dies(
-    arguments: list[str], tmp_path: Path, capfd: pytest.CaptureFixture[str], server: ForkServerContext
+    arguments: list[str],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    server: ForkServerContext,
+    empty_tracking: Path,
 ) -> None:
+    shutil.copytree(empty_tracking, tmp_path / "runs")
     outputs = [tmp_path / f"output{number}" for number in range(2)]
     two = [server.Process(target=as_command, args=("sweep", arguments, output, {})) for output in outputs]
     for process in two:

@@ -14,6 +14,9 @@ from torch import Tensor
 from mrhubo.evaluation.clips import Clip
 from mrhubo.runtime.threads import use_threads
 
+_MANY = 1_000
+"""Frames that are retargeted at once, beside one alone."""
+
 
 def latency_us(predict: Callable[[Tensor], Tensor], local_TJ33: Tensor, batch: int, seconds: float = 0.5) -> float:
     """Median time a frame [us] of `batch` frames at once, one thread, over calls that take `seconds` together."""
@@ -34,5 +37,5 @@ def latencies(predict: Callable[[Tensor], Tensor], clips: Sequence[Clip], second
     `latency_us`.
     """
     local_TJ33 = torch.cat([clip.motion.local_TJ33 for clip in clips])
-    batches = {"latency_us": 1, "latency_1000_us": 1_000}
+    batches = {"latency_us": 1, "latency_1000_us": _MANY}
     return {name: latency_us(predict, local_TJ33, batch, seconds) for name, batch in batches.items()}

@@ -11,15 +11,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-import torch
-from torch import Tensor
-from torch.nn.functional import normalize
+import numpy as np
 
-from mrhubo.body.latent_ik import inverse_kinematics
-from mrhubo.body.prior import BodyPrior
-from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, Skeleton
+from mrhubo.body.joints import JOINT_NAMES, KEYPOINT_NAMES
 from mrhubo.motion.gaps import fill_directions
-from mrhubo.rotation import sixd_to_matrix
 
 _RATE = 4.0
 """Frames a second that are solved; between them a bone turns evenly, so that it does not shake."""
@@ -36,8 +31,10 @@ class Bone:
     carrier: str
 
 
-def complete(local_TJ33: Tensor, frame_rate: float, given: Collection[str], bones: Sequence[Bone]) -> dict[str, Tensor]:
-    """Directions (T, 3) of bones by the names of their ends, each seen from its carrier, float64.
+def complete(
+    local_TJ33: np.ndarray, frame_rate: float, given: Collection[str], bones: Sequence[Bone]
+) -> dict[str, np.ndarray]:
+    """Directions (T, 3) of bones by the names of their ends, each seen from its carrier, float64. Imports PyTorch.
 
     Args:
         local_TJ33: a motion of our skeleton that is right in all but these bones.
@@ -45,11 +42,19 @@ def complete(local_TJ33: Tensor, frame_rate: float, given: Collection[str], bone
         given: keypoints that the source tells; none of them hangs on these bones.
         bones: those to be found.
     """
+    import torch  # by files that need it alone
+    from torch.nn.functional import normalize
+
+    from mrhubo.body.latent_ik import inverse_kinematics
+    from mrhubo.body.prior import BodyPrior
+    from mrhubo.body.skeleton import Skeleton
+    from mrhubo.rotation import sixd_to_matrix
+
     frames, skeleton = len(local_TJ33), Skeleton()
     step = max(1, round(frame_rate / _RATE), -(-frames // _MOST))
-    solved_T = torch.zeros(frames, dtype=torch.bool)
+    solved_T = np.zeros(frames, dtype=bool)
     solved_T[::step] = solved_T[-1] = True
-    seen_FK3 = skeleton.keypoints(local_TJ33[solved_T].float())
+    seen_FK3 = skeleton.keypoints(torch.from_numpy(local_TJ33[solved_T].astype(np.float32)))
     targets = {name: seen_FK3[:, KEYPOINT_NAMES.index(name)] for name in given}
     pose_FJ33 = sixd_to_matrix(inverse_kinematics(BodyPrior.open(), targets, skeleton))
     point_FK3, turn_FJ33 = skeleton.keypoints_and_rotations(pose_FJ33)
@@ -57,7 +62,8 @@ def complete(local_TJ33: Tensor, frame_rate: float, given: Collection[str], bone
     for bone in bones:
         start_F3, end_F3 = (point_FK3[:, KEYPOINT_NAMES.index(name)] for name in (bone.start, bone.end))
         carrier_F33 = turn_FJ33[:, JOINT_NAMES.index(bone.carrier)]
-        direction_T3 = torch.zeros(frames, 3, dtype=torch.float64)
-        direction_T3[solved_T] = normalize((carrier_F33.mT @ (end_F3 - start_F3)[..., None])[..., 0], dim=-1).double()
+        seen_F3 = normalize((carrier_F33.mT @ (end_F3 - start_F3)[..., None])[..., 0], dim=-1)
+        direction_T3 = np.zeros((frames, 3))
+        direction_T3[solved_T] = seen_F3.detach().numpy()
         found[bone.end] = fill_directions(direction_T3, solved_T)
     return found

@@ -26,6 +26,7 @@ from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
 SCRIPTS = [
+    "collisions",
     "confidence",
     "inference",
     "missing_points",
@@ -289,6 +290,14 @@ def test_stream(run: Run, package: Path, clips: Path) -> None:
     found = rows(text, "motion")
     assert [row[1] for row in found[:3]] == ["networks", "`retarget`", "stream"]
     assert all(row[4] == "0" and row[5] == "0.0%" for row in found if row[1] == "stream")
+
+
+def test_collisions(run: Run, package: Path, clips: Path) -> None:
+    text = run("collisions", package, "--motions", clips, "--rate", 10, "--rounds", 2, "--random", 300)
+    found = rows(text, "answers of")
+    assert [row[:2] for row in found[::2]] == [[name, "no"] for name in ("frames", "whole motions", "streams")]
+    assert all(row[3] == "0" and row[5] == "0.00%" for row in found[3:])
+    assert [row[1] for row in rows(text, "form")[:2]] == ["stay", "give way"]
 
 
 def test_training(run: Run) -> None:

@@ -32,6 +32,7 @@ from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.runs import start_run
 from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import quiet_lightning
+from tests.chain import cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
@@ -142,7 +143,7 @@ def test_it_goes_on_where_it_stopped(
     runs: tuple[Any, str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search(*runs)
+    whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search()
     stopped = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "stopped")
     measured = []
 
@@ -194,6 +195,9 @@ def test_as_a_callback_it_hands_what_it_finds_to_the_data_module(
     config: Config, body_map: BodyMap, prior: BodyPrior, clip: Clip, tmp_path: Path
 ) -> None:
     """`Trainer.fit` with the callback is all it takes."""
+    config = copy.deepcopy(config)
+    assert config.robot.search is not None
+    config.robot.search.trials = 4
     seen: list[ScaleResult] = []
     search = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path, found=seen.append)
     data = Searched()
@@ -214,9 +218,8 @@ def test_as_a_callback_it_hands_what_it_finds_to_the_data_module(
 
 
 def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
-    (tmp_path / "motions").mkdir()
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "motions")
+        cut_motion(name, tmp_path / "motions", (1, 4), every=3)
     arguments = [
         "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("24", "8"),
         "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=10", "pairs.fine_steps=5", "pairs.solver=fine",

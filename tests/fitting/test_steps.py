@@ -97,7 +97,9 @@ def test_a_filter_that_drops_every_pair_is_refused(home: Path, config: Config) -
 def test_pairs_wait_for_the_scale_factor(root: Path, home: Path) -> None:
     """Lightning calls the data module's `setup` before the callback that searches."""
     ranges = "robot.search={ranges: {factor: [1.0, 3.0]}}"
-    config = load_config(root / "conf" / "paper" / "nao.yaml", ["robot.scale=search", ranges, *SMALL])
+    config = load_config(
+        root / "conf" / "paper" / "nao.yaml", ["robot.scale=search", ranges, "pairs.solver=fine", *SMALL]
+    )
     prepared = prepare(config, search=True)
     data = PairData(prepared, build_network(config, prepared.body_map).features)
     data.setup("fit")

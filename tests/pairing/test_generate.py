@@ -52,8 +52,15 @@ def made(root: Path, tmp_path_factory: pytest.TempPathFactory) -> PairStore:
     return generate(config_of(root, tmp_path_factory.mktemp("pairs")))
 
 
-def test_aligned_humans_point_where_the_robot_does(root: Path, made: PairStore, tmp_path: Path) -> None:
-    before = generate(config_of(root, tmp_path, "pairs.align=false")).read_all()
+@pytest.fixture(scope="module")
+def unaligned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> PairStore:
+    return generate(config_of(root, tmp_path_factory.mktemp("unaligned"), "pairs.align=false"))
+
+
+def test_aligned_humans_point_where_the_robot_does(
+    root: Path, made: PairStore, unaligned: PairStore, tmp_path: Path
+) -> None:
+    before = unaligned.read_all()
     after, body_map = made.read_all(), build_body_map(config_of(root, tmp_path).robot)
     forward = ~after["reverse"]
     measured = body_map.measured
@@ -99,10 +106,9 @@ def test_where_more_of_a_pose_is_used_it_is_searched_for(root: Path, change: str
         pairing_settings(load_config(path, [*shipped, "pairs.solver=direct", change]))
 
 
-def test_pairs_are_what_they_say(root: Path, tmp_path: Path) -> None:
-    made = generate(config_of(root, tmp_path, "pairs.align=false"))
-    pairs = made.read_all()
-    config = config_of(root, made.folder.parent)
+def test_pairs_are_what_they_say(root: Path, unaligned: PairStore) -> None:
+    pairs = unaligned.read_all()
+    config = config_of(root, unaligned.folder.parent)
     body_map, prior = build_body_map(config.robot), BodyPrior.open()
     robot = body_map.robot
     assert len(pairs["q"]) == 250

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,11 @@ def body_map_of(root: Path, name: str, **keypoints: Any) -> BodyMap:
     return build_body_map(config)
 
 
+@functools.cache
+def shipped(root: Path, name: str) -> BodyMap:
+    return body_map_of(root, name)
+
+
 def directions(body_map: BodyMap, count: int = 50) -> torch.Tensor:
     return body_map.robot_directions(
         body_map.robot.forward(body_map.robot.sample(count, torch.Generator().manual_seed(0)))
@@ -33,7 +39,7 @@ def directions(body_map: BodyMap, count: int = 50) -> torch.Tensor:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_directions_are_unit_and_keypoints_have_the_humans_lengths(root: Path, name: str) -> None:
-    body_map = body_map_of(root, name)
+    body_map = shipped(root, name)
     found = directions(body_map)
     torch.testing.assert_close(found.norm(dim=-1), torch.ones(found.shape[:2]), atol=1e-5, rtol=0)
     points = body_map.human_keypoints(found)
@@ -49,7 +55,7 @@ def test_directions_are_unit_and_keypoints_have_the_humans_lengths(root: Path, n
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_keypoints_keep_the_directions(root: Path, name: str) -> None:
-    body_map = body_map_of(root, name)
+    body_map = shipped(root, name)
     found = directions(body_map)
     at = dict(zip(body_map.keypoint_names, body_map.human_keypoints(found).unbind(1), strict=True))
     for i, direction in enumerate(body_map.direction_names):
@@ -66,7 +72,7 @@ def test_zero_poses_look_as_they_should(root: Path) -> None:
     """NAO's arms point forward at zero, COMAN's and Reachy's hang down; Reachy looks ahead."""
     forward, down, up = torch.tensor([0.0, 0, 1]), torch.tensor([0.0, -1, 0]), torch.tensor([0.0, 1, 0])
     for name, expected in (("nao", forward), ("coman", down), ("reachy", down)):
-        body_map = body_map_of(root, name)
+        body_map = shipped(root, name)
         zero = body_map.robot_directions(body_map.robot.forward(body_map.robot.home()[None]))[0]
         at = dict(zip(body_map.direction_names, zero, strict=True))
         for side in ("left", "right"):
@@ -77,7 +83,7 @@ def test_zero_poses_look_as_they_should(root: Path) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_human_directions_are_seen_from_the_chest_and_mirror(root: Path, name: str) -> None:
-    body_map = body_map_of(root, name)
+    body_map = shipped(root, name)
     pose = rotation.axis_angle_to_matrix(0.6 * torch.randn(20, 21, 3))
     found = body_map.human_directions(pose)
     lengths = found.norm(dim=-1)
@@ -107,7 +113,7 @@ def _other_side(name: str) -> str:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_mirrored_robot_has_mirrored_directions(root: Path, name: str) -> None:
     """Left and right entries of a YAML are mirror images: a swap of the arms' angles mirrors every direction."""
-    body_map = body_map_of(root, name)
+    body_map = shipped(root, name)
     joints = body_map.robot.joint_names
     rolls = ("Roll", "Yaw", "Lat", "Wrj2", "Plate", "yaw", "roll", "neck_roll", "neck_yaw")
     sign = torch.tensor([-1.0 if j.endswith(rolls) else 1.0 for j in joints])
@@ -128,9 +134,9 @@ def _swap_joint(name: str, joints: tuple[str, ...]) -> str:
 
 
 def test_input_joints_follow_what_the_robot_has(root: Path) -> None:
-    assert "left_wrist" not in body_map_of(root, "nao").input_joints()
-    assert "left_wrist" in body_map_of(root, "coman").input_joints()
-    assert {"neck", "head"} <= set(body_map_of(root, "reachy").input_joints())
+    assert "left_wrist" not in shipped(root, "nao").input_joints()
+    assert "left_wrist" in shipped(root, "coman").input_joints()
+    assert {"neck", "head"} <= set(shipped(root, "reachy").input_joints())
 
 
 @pytest.mark.parametrize(

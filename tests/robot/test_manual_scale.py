@@ -4,6 +4,7 @@ directions.
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import ManualScaleConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.frames import base_to_human
-from mrhubo.pairing import PairGenerator
+from mrhubo.pairing import PairGenerator, lbfgs
 from mrhubo.robot import BodyMap, LinkPoses, build_body_map
 from mrhubo.robot.manual_scale import check_ranges, varied
 
@@ -29,6 +30,11 @@ def body_map_of(root: Path, name: str, **changes: Any) -> BodyMap:
     return build_body_map(config)
 
 
+@functools.cache
+def shipped(root: Path, name: str) -> BodyMap:
+    return body_map_of(root, name)
+
+
 def some_poses(body_map: BodyMap, count: int = 60) -> LinkPoses:
     return body_map.robot.forward(body_map.robot.sample(count, torch.Generator().manual_seed(0)))
 
@@ -39,7 +45,7 @@ def targets(body_map: BodyMap) -> dict[str, torch.Tensor]:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_authors_numbers_give_a_human(root: Path, name: str) -> None:
-    body_map = body_map_of(root, name)
+    body_map = shipped(root, name)
     at, directions = targets(body_map), body_map.robot_directions(some_poses(body_map))
     assert float(at["pelvis"].abs().max()) == 0
     rest = dict(zip(body_map.keypoint_names, body_map.skeleton.rest_K3[body_map.keypoint_indices], strict=True))
@@ -77,7 +83,7 @@ def test_factor_scales_all_alike(root: Path) -> None:
 
 
 def test_a_shift_moves_nothing_and_says_so(root: Path, recwarn: pytest.WarningsRecorder) -> None:
-    plain = targets(body_map_of(root, "reachy"))
+    plain = targets(shipped(root, "reachy"))
     assert not recwarn.list
     with pytest.warns(UserWarning, match=r"robot.manual.shift: \[0.1, 0.2, 0.3\] moves nothing.*pelvis"):
         moved = targets(body_map_of(root, "reachy", shift=[0.1, 0.2, 0.3]))
@@ -86,7 +92,7 @@ def test_a_shift_moves_nothing_and_says_so(root: Path, recwarn: pytest.WarningsR
 
 
 def test_what_the_warning_of_a_shift_advises_does_move(root: Path) -> None:
-    plain = targets(body_map_of(root, "reachy"))
+    plain = targets(shipped(root, "reachy"))
     config = load_config(root / "conf" / "paper" / "reachy.yaml").robot
     assert config.manual is not None
     config.manual.keypoints["pelvis"] = {"offset": [-0.1, -0.2, 0.6 - 0.3]}
@@ -109,7 +115,8 @@ def test_means_offsets_and_constants_are_in_the_base_frame(root: Path) -> None:
     torch.testing.assert_close(found[:, 2], torch.tensor([2.0, 3.0, 1.0]).expand(60, 3))
 
 
-def test_pairs_come_from_it(root: Path) -> None:
+def test_pairs_come_from_it(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lbfgs, "_ITERATIONS", 60)
     config = load_config(root / "conf" / "paper" / "nao.yaml", ["pairs.shard_size=100"])
     body_map, prior = build_body_map(config.robot), BodyPrior.open()
     maker = PairGenerator(body_map, prior, config)
@@ -151,7 +158,7 @@ def test_its_numbers_are_needed(root: Path) -> None:
 def test_varied_numbers_and_offsets(root: Path) -> None:
     start = load_config(root / "conf" / "paper" / "nao.yaml").robot
     assert start.manual is not None
-    plain = targets(body_map_of(root, "nao"))
+    plain = targets(shipped(root, "nao"))
     changed = load_config(root / "conf" / "paper" / "nao.yaml").robot
     changed.manual = varied(start.manual, {"factor": 1.0, "shoulder.y": 0.02, "pelvis.z": 0.1})
     moved = dict(zip(

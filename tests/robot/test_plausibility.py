@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ def motion(root: Path) -> Motion:
     return read_motion(root / "data" / "motions" / "conversation.npz")
 
 
+@functools.cache
 def body_map_of(root: Path, name: str) -> BodyMap:
     return build_body_map(load_config(root / "conf" / f"{name}.yaml").robot)
 

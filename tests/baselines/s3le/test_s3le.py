@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap, SelfCollision, build_body_map
 from mrhubo.rotation import matrix_to_axis_angle
 from mrhubo.runtime.database import database_uri
+from tests.chain import cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
@@ -108,9 +108,8 @@ def test_the_command_measures_searches_and_resumes(
     root: Path, tmp_path: Path, poses: torch.Tensor, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     motions = tmp_path / "motions"
-    motions.mkdir()
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", motions)
+        cut_motion(name, motions, (1, 4), every=3)
     axis_angle = matrix_to_axis_angle(poses).flatten(1)
     whole = torch.cat((torch.zeros(len(poses), 3), axis_angle), dim=1).numpy()
     np.savez(tmp_path / "poses.npz", poses=whole, clip_starts=np.array([0, 600]), clip_ids=np.array(["a"]))

@@ -28,8 +28,8 @@ FRAMES = 6
 
 
 def expected(pose: np.ndarray, family: str) -> torch.Tensor:
-    local = torch.from_numpy(matrices(pose[:, 1:]))
-    return from_family(local, family) if family else local
+    local = matrices(pose[:, 1:])
+    return torch.from_numpy(from_family(local, family) if family else local)
 
 
 def close(motion: Motion, pose: np.ndarray, family: str) -> bool:

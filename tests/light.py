@@ -1,0 +1,38 @@
+"""What small fits do without where it is not looked at: it takes most of their time, and has tests of its own."""
+
+from __future__ import annotations
+
+import functools
+import sqlite3
+from typing import Any
+
+import pytest
+
+
+def _leave_to_the_disk(connection: Any, _: object) -> None:
+    if isinstance(connection, sqlite3.Connection):
+        connection.execute("PRAGMA synchronous = OFF")
+
+
+def lighten(patch: pytest.MonkeyPatch) -> None:
+    """Confidence is calibrated on few poses, a frame's time is taken once and of few frames at a time, figures in
+    pictures are blank, MLflow does not compare the installed versions with those that it has just been told, and
+    databases, from now on, do not wait until the disk has what they have written, which a killed process leaves whole.
+    """
+    import mlflow.utils.environment as environment
+    from PIL import Image
+    from sqlalchemy import event
+    from sqlalchemy.engine import Engine
+
+    from mrhubo.evaluation import latency
+    from mrhubo.fitting import fit, measurement
+    from mrhubo.view import figures, pictures
+
+    patch.setattr(fit, "calibrate", functools.partial(fit.calibrate, poses=200))
+    patch.setattr(measurement, "latencies", functools.partial(measurement.latencies, seconds=0.0))
+    patch.setattr(latency, "_MANY", 20)
+    patch.setattr(environment, "warn_dependency_requirement_mismatches", lambda requirements: None)
+    patch.setattr(pictures, "GIF_RATE", 1.0)
+    patch.setattr(figures, "render", lambda solids, size, *_, **__: Image.new("RGB", size))
+    if not event.contains(Engine, "connect", _leave_to_the_disk):
+        event.listen(Engine, "connect", _leave_to_the_disk)
