@@ -1,12 +1,16 @@
-"""How long an answer takes in each form, and how near it is: one frame, batches, the start of a process.
+"""How long an answer takes in each form and by each rival, and how near it is: one frame, batches, a process's start.
 
     python benchmarks/inference.py PACKAGE [--batch 10000] [--rounds 300] [--frames 600]
 
 PACKAGE is the folder of a trained retargeter. Forms: PyTorch; NumPy and numba (`mrhubo.load_fast`), the latter where
-numba is installed; ONNX Runtime where it and onnx are. mink's loop of differential inverse kinematics, as
-docs/compare.md writes it, is timed beside them where mink and MuJoCo are and every limb of the robot runs from link to
-link. A frame is answered by one thread, batches by all cores; figures are medians, and what a busy machine adds is in
-them. Poses: the motions that ship (easy), and a path through poses drawn joint by joint, one a second (wide).
+numba is installed; ONNX Runtime where it and onnx are. A frame is answered by one thread, batches by all cores; figures
+are medians, and what a busy machine adds is in them.
+
+Rivals, where they can do the robot and are installed (what is left out is said): mink's loop of differential inverse
+kinematics with dense targets and with five (`mink_loop.py` says which), a closed form for arms of seven joints
+(`closed_form.py`), and our optimiser, which tries twelve starts for each frame. Joints, limbs and hands are those of
+arms; joints are compared with the optimiser's, which is fair only where one answer is best. Poses, 60 a second: parts
+of the motions that ship (easy), and a path through poses drawn joint by joint, one a second (wide).
 """
 
 from __future__ import annotations
@@ -18,27 +22,30 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from closed_form import ClosedForm, NoClosedForm
 from common import print_header, print_table, read_options
+from mink_loop import MinkLoop, NoLoop
 
 import mrhubo
 from mrhubo.fast.engines import FORMS
 from mrhubo.motion import Motion, read_motion, resample
 from mrhubo.pairing.random_poses import random_poses
-from mrhubo.reference import OptimizationRetargeter, direction_error
+from mrhubo.reference import DirectionProblem, OptimizationRetargeter, direction_error, joint_error
 from mrhubo.retargeter import Retargeter
 from mrhubo.robot import BodyMap
-from mrhubo.robot.keypoints import Limb
 from mrhubo.runtime.locations import project_root
 from mrhubo.runtime.threads import use_threads
 
 _RATE = 60.0
 _WARM_UP = 5
+OURS = ("network", "1 step", "10 steps")
 Answer = Callable[[np.ndarray], Any]
 """Of a frame (21, 3, 3), or of many."""
 
@@ -113,63 +120,26 @@ def onnx_answer(retargeter: Retargeter) -> Answer:
     return lambda poses: session.run(None, {"local_rotations": poses.reshape(-1, 21, 3, 3)})[0]
 
 
-class MinkLoop:
-    """mink's loop for a robot whose limbs run from link to link; it goes on from its last answer."""
+@dataclass(frozen=True)
+class Rival:
+    """A way of answering frame by frame."""
 
-    def __init__(self, body_map: BodyMap, iterations: int) -> None:
-        import mink  # pyright: ignore[reportMissingImports]
-        import mujoco  # pyright: ignore[reportMissingImports]
-
-        robot = body_map.robot
-        compiler = '<mujoco><compiler boundmass="0.01" boundinertia="0.001" fusestatic="false"/></mujoco>'
-        begin, rest = robot.urdf.read_text().split("<robot", 1)
-        head, body = rest.split(">", 1)
-        model = mujoco.MjModel.from_xml_string(f"{begin}<robot{head}>{compiler}{body}")
-        self._mink, self._body_map, self._iterations = mink, body_map, iterations
-        self._limbs = [limb for limb in body_map.directions if isinstance(limb, Limb)]
-        self._columns = [int(model.joint(name).qposadr[0]) for name in robot.joint_names]
-        self._tasks = {
-            limb.end.link: mink.FrameTask(limb.end.link, "body", position_cost=1.0, orientation_cost=0.0)
-            for limb in self._limbs
-        }
-        self._posture, self._limits = mink.PostureTask(model, cost=1e-3), [mink.ConfigurationLimit(model)]
-        self._configuration, q = mink.Configuration(model), np.zeros(model.nq)
-        q[self._columns] = robot.home().numpy()
-        self._configuration.update(q)
-        self._posture.set_target_from_configuration(self._configuration)
-        links = {link for limb in self._limbs for link in (limb.start.link, limb.end.link)}
-        self._rest = {
-            link: self._configuration.get_transform_frame_to_world(link, "body").translation() for link in links
-        }
-
-    @staticmethod
-    def can(body_map: BodyMap) -> bool:
-        """Whether every limb runs from link to link, and nothing else is to be imitated."""
-        limbs = [d for d in body_map.directions if isinstance(d, Limb)]
-        offsets = [point.offset_3 for limb in limbs for point in (limb.start, limb.end)]
-        return len(limbs) == len(body_map.measured) and not np.any(offsets)
-
-    def of_directions(self, direction_D3: np.ndarray) -> np.ndarray:
-        """Joint angles (N,) [rad] for a human's directions (D, 3)."""
-        places, names = dict(self._rest), self._body_map.direction_names
-        for limb in self._limbs:
-            length = np.linalg.norm(self._rest[limb.end.link] - self._rest[limb.start.link])
-            direction_3 = direction_D3[names.index(limb.name), [2, 0, 1]]  # in the robot's axes
-            places[limb.end.link] = places[limb.start.link] + length * direction_3
-            target = self._mink.SE3.from_translation(places[limb.end.link])
-            self._tasks[limb.end.link].set_target(target)
-        for _ in range(self._iterations):
-            tasks = [*self._tasks.values(), self._posture]
-            velocity = self._mink.solve_ik(self._configuration, tasks, 0.1, "daqp", limits=self._limits)
-            self._configuration.integrate_inplace(velocity, 0.1)
-        return self._configuration.q[self._columns].copy()
+    name: str
+    make: Callable[[], Answer]
+    """A new one, which has not answered yet: some go on from their last answer."""
+    directions: bool
+    """Whether it is asked by the human's directions (D, 3), not by the pose."""
+    batches: bool = False
+    """Whether it answers many frames at once."""
 
 
 def easy(frames: int) -> torch.Tensor:
-    """Frames of the motions that ship, evenly."""
+    """As many frames from the middle of each motion that ships, one after the other, at 60 a second."""
     motions = [read_motion(path) for path in sorted((project_root() / "data" / "motions").glob("*.npz"))]
-    every = torch.cat([motion.local_TJ33 for motion in motions])
-    return every[:: max(1, len(every) // frames)][:frames].float()
+    each = max(1, frames // len(motions))
+    middles = [resample(motion, _RATE).local_TJ33 for motion in motions]
+    middles = [local[max(0, (len(local) - each) // 2) :][:each] for local in middles]
+    return torch.cat(middles)[:frames].float()
 
 
 def wide(body_map: BodyMap, frames: int) -> torch.Tensor:
@@ -178,34 +148,82 @@ def wide(body_map: BodyMap, frames: int) -> torch.Tensor:
     return resample(Motion("wide", keys, 1.0), _RATE).local_TJ33[:frames].float()
 
 
-def limb_errors(body_map: BodyMap, q_TN: torch.Tensor, local_TJ33: torch.Tensor) -> torch.Tensor:
-    """Mean angle of each frame's measured directions (T,) [degrees]."""
-    return direction_error(body_map, q_TN, local_TJ33).mean(dim=1)
-
-
-def nearness(retargeter: Retargeter, forms: Mapping[str, Mapping[str, Answer]], frames: int) -> list[list[str]]:
-    """Limbs over the frame's optimum: mean, 99th percentile and largest, for each way and each kind of motion."""
-    body_map, rows = retargeter.body_map, []
+def rivals(retargeter: Retargeter, forms: Mapping[str, Mapping[str, Answer]]) -> tuple[list[Rival], list[str]]:
+    """Ways of answering frame by frame, and those that had to be left out, with the reason."""
+    body_map = retargeter.body_map
     best = "compiled" if "compiled" in forms else "numpy"
+    found = [Rival(f"{name} ({best})", lambda name=name: forms[best][name], False) for name in OURS]
+    missing = []
+    loops = {
+        "mink, dense targets, 1 iteration": {"iterations": 1},
+        "mink, dense targets, 10 iterations": {"iterations": 10},
+        "mink, five targets, 10 iterations": {"iterations": 10, "dense": False},
+    }
+    if there("mink", "mujoco", "daqp"):
+        try:
+            MinkLoop(body_map, 1)
+            found += [
+                Rival(name, lambda options=options: MinkLoop(body_map, **options).of_directions, True)
+                for name, options in loops.items()
+            ]
+        except NoLoop as error:
+            missing.append(f"mink's loop is not written for {error}")
+    else:
+        missing.append("mink: is not installed (pip install mink mujoco daqp)")
+    try:
+        form = ClosedForm(body_map)
+        found.append(Rival("closed form (NumPy)", lambda: form.of_directions, True, batches=True))
+    except NoClosedForm as error:
+        missing.append(f"closed form of seven-joint arms: {error}")
+    return found, missing
+
+
+def nearness(body_map: BodyMap, ways: Sequence[Rival], frames: int) -> list[list[str]]:
+    """Rows: what a frame takes [us], joints [rad] against the frame's optimum, limbs over it and hands over it [deg],
+    for each way and each kind of motion.
+    """
+    rows = []
+    reference = OptimizationRetargeter(body_map)
+    moved = [i for i, turned in enumerate(arm_joints(body_map)) if turned]
     for kind, poses in (("easy", easy(frames)), ("wide", wide(body_map, frames))):
-        optimum_T = limb_errors(body_map, OptimizationRetargeter(body_map).solve_frames(poses)[0], poses)
-        answers = {
-            name: torch.from_numpy(np.asarray(forms[best][name](poses.numpy()))) for name in list(forms[best])[:3]
-        }
-        if there("mink", "mujoco") and MinkLoop.can(body_map):
-            targets = body_map.human_directions(poses).numpy()
-            for iterations in (1, 10):
-                loop = MinkLoop(body_map, iterations)
-                found = np.stack([loop.of_directions(target) for target in targets])
-                answers[f"mink, iterations: {iterations}"] = torch.from_numpy(found).float()
-        for name, q_TN in answers.items():
-            rows.append([kind, name, *figures(limb_errors(body_map, q_TN, poses) - optimum_T)])
-        rows.append([kind, "optimum itself", *figures(optimum_T)])
+        optimum_TN = reference.solve_frames(poses)[0]
+        optimum = {region: errors(body_map, optimum_TN, poses, region) for region in ("arm", "hand")}
+        directions_TD3 = body_map.human_directions(poses).numpy()
+        for way in ways:
+            answer, taken, found = way.make(), [], []
+            for asked in directions_TD3 if way.directions else poses.numpy():
+                begun = time.perf_counter()
+                found.append(np.asarray(answer(asked)))
+                taken.append(time.perf_counter() - begun)
+            q_TN = torch.from_numpy(np.stack(found)).float()
+            over = {region: errors(body_map, q_TN, poses, region) - of for region, of in optimum.items()}
+            joints_T = joint_error(q_TN[:, moved], optimum_TN[:, moved])
+            cells = [f"{1e6 * statistics.median(taken):,.0f}", f"{float(joints_T.mean()):.3f}"]
+            rows.append([kind, way.name, *cells, *figures(over["arm"]), *figures(over["hand"])[:1]])
+        shown = poses[:: max(1, len(poses) // 5)][:5].numpy()
+        single = microseconds(lambda pose: reference.solve_frames(torch.from_numpy(pose[None])), shown, len(shown))
+        rows.append([kind, "reference", single, "0", *figures(optimum["arm"]), *figures(optimum["hand"])[:1]])
     return rows
 
 
+def arm_joints(body_map: BodyMap) -> list[bool]:
+    """Which joints (N,) turn something of an arm or a hand."""
+    problem = DirectionProblem(body_map)
+    of_arms = [direction.part.region in ("arm", "hand") for direction in body_map.directions]
+    turns_C = (problem.blocks.directions_DC[torch.tensor(of_arms)] > 0).any(dim=0)
+    return [bool(turns_C[block]) for block in problem.blocks.block_N.tolist()]
+
+
+def errors(body_map: BodyMap, q_TN: torch.Tensor, local_TJ33: torch.Tensor, region: str) -> torch.Tensor:
+    """Mean angle of a region's directions in each frame (T,) [degrees]; NaN where there are none."""
+    of = [d.part.region == region for i, d in enumerate(body_map.directions) if i in body_map.measured]
+    return direction_error(body_map, q_TN, local_TJ33)[:, torch.tensor(of)].mean(dim=1)
+
+
 def figures(error_T: torch.Tensor) -> list[str]:
-    """Mean, 99th percentile and largest."""
+    """Mean, 99th percentile and largest; nothing where the robot has no such part."""
+    if bool(error_T.isnan().any()):
+        return ["", "", ""]
     return [f"{float(figure):.2f}" for figure in (error_T.mean(), error_T.quantile(0.99), error_T.max())]
 
 
@@ -248,10 +266,6 @@ def main(argv: list[str]) -> None:
             [form, *(microseconds(ways[name], poses, rounds) if name in ways else "" for name in names)]
             for form, ways in forms.items()
         ]
-        if there("mink", "mujoco") and MinkLoop.can(retargeter.body_map):
-            targets = retargeter.body_map.human_directions(torch.from_numpy(poses)).numpy()
-            times = {n: microseconds(MinkLoop(retargeter.body_map, n).of_directions, targets, rounds) for n in (1, 10)}
-            rows.append(["mink, as many iterations", "", times[1], times[10], ""])
     print("one frame, one thread [us]; `all`: at most 10 steps, confidence and collision\n")
     print_table(["form", *names], rows)
     many = np.ascontiguousarray(np.resize(poses, (batch, 21, 3, 3)))
@@ -260,12 +274,21 @@ def main(argv: list[str]) -> None:
         [form, *(per_second(ways[name], many) if name in ways else "" for name in ("network", "all"))]
         for form, ways in forms.items()
     ]
+    ways, missing = rivals(retargeter, forms)
+    for way in ways:
+        if way.batches:
+            targets = retargeter.body_map.human_directions(torch.from_numpy(many)).numpy()
+            rows.append([way.name, per_second(way.make(), targets), ""])
     print_table(["form", "network", "all"], rows)
     print("\na new process, to its first answer (best of three)\n")
     ready = ["PyTorch", *(FORMS if there("numba") else FORMS[1:])]
     print_table(["form", "seconds", "memory [MB]", "torch"], [start(package, form) for form in ready])
-    print(f"\nlimbs over the frame's optimum [degrees], {frames} frames\n")
-    print_table(["motion", "way", "mean", "99%", "largest"], nearness(retargeter, forms, frames))
+    print(f"\nframe by frame by one thread, limbs and hands over the frame's optimum, {frames} frames\n")
+    with use_threads(1):
+        table = nearness(retargeter.body_map, ways, frames)
+    print_table(["motion", "way", "[us]", "joints [rad]", "limbs [deg]", "99%", "largest", "hands [deg]"], table)
+    for sentence in missing:
+        print(f"\nleft out: {sentence}")
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mrhubo.errors import UserError
     from mrhubo.fast import FastRetargeter, FastStream
     from mrhubo.motion import Motion, ReadOptions, read_motion
@@ -79,11 +81,22 @@ def load(source: str | os.PathLike[str]) -> Retargeter:
     """
     from mrhubo.retargeter import Retargeter
 
+    return Retargeter.load(package_folder(source))
+
+
+def package_folder(source: str | os.PathLike[str]) -> Path:
+    """The folder that `load` reads: the given one, or one into which a version in the registry has been fetched.
+
+    Raises:
+        UserError: there is no such version.
+    """
+    from pathlib import Path
+
     if str(source).startswith("models:"):
         from mrhubo.fitting.record.registry import fetch_package
 
         source = fetch_package(str(source))
-    return Retargeter.load(os.fspath(source))
+    return Path(source)
 
 
 def load_fast(source: str | os.PathLike[str], form: str | None = None) -> FastRetargeter:

@@ -17,6 +17,7 @@ class Verb(NamedTuple):
 
 
 VERBS = {
+    "describe": Verb("mrhubo.describe", "find out from a robot's URDF which link stands for what, and draw it"),
     "fit": Verb("mrhubo.fit", "make pairs for a robot, train a retargeter on them, measure and package it"),
     "pair": Verb("mrhubo.pair", "make, check or show the pairs alone"),
     "retarget": Verb("mrhubo.retarget", "make a robot's joint angles of files of human motion"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import BooleanOptionalAction
 from pathlib import Path
 
 from mrhubo.config import CommandParser, number, print_error, run_command
@@ -21,7 +22,7 @@ def build_parser() -> CommandParser[None]:
     who = parser.add_mutually_exclusive_group(required=True)
     package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
-    robot = "a robot without a package: its YAML file, or the name of one that ships with mrhubo"
+    robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
     parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help="motion files, and folders of them")
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
@@ -39,6 +40,8 @@ def build_parser() -> CommandParser[None]:
     person = "which of several people in a file, by the name or number that it has for them; default: seen longest"
     parser.add_argument("--person", metavar="PERSON", help=person)
     parser.add_argument("--bvh-map", metavar="FILE", help="YAML file that says which joint of a BVH file is which")
+    avoid = "whether frames in which the robot would touch itself give way, by its URDF's collision shapes"
+    parser.add_argument("--avoid-collisions", action=BooleanOptionalAction, default=True, help=avoid)
     parser.add_argument("--quiet", action="store_true", help="no progress lines")
     return parser
 
@@ -61,7 +64,7 @@ def main(argv: list[str]) -> int:
         mirrored=options.mirror,
         joint_order=None if options.joint_order is None else read_joint_order(Path(options.joint_order)),
     )
-    answerer = _answerer(options.retargeter, options.robot)
+    answerer = _answerer(options.retargeter, options.robot, options.avoid_collisions)
     print(answerer.described)
     outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
     if outcome.summaries:
@@ -77,13 +80,14 @@ def main(argv: list[str]) -> int:
     return print_error(f"{len(sentences)} of {len(files)} motions could not be retargeted: {names}")
 
 
-def _answerer(package: str | None, robot: str | None):  # noqa: ANN202 (importing its type takes torch)
-    import mrhubo
+def _answerer(package: str | None, robot: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
     from mrhubo.retargeting import of_package, of_reference
 
     if package is not None:
-        return of_package(mrhubo.load(package))
-    return of_reference(mrhubo.Robot.from_config(str(robot)))
+        return of_package(package, avoid_collisions)
+    from mrhubo.describing.run import open_robot
+
+    return of_reference(open_robot(str(robot)), avoid_collisions)
 
 
 if __name__ == "__main__":

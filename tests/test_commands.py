@@ -22,7 +22,7 @@ from mrhubo.errors import UserError
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = {
     name: f"mrhubo.{name}"
-    for name in ("fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
+    for name in ("describe", "fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
 }
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
 """Of the config; elsewhere `Config`."""
@@ -36,7 +36,7 @@ PAGES = [
 PLACEHOLDERS = {
     "<robot>": "nao", "<scale>": "manual", "$(CONFIG)": "conf/nao.yaml", "$(ARGS)": "", "--polish N": "--polish 1",
 }  # fmt: skip
-OWN_FILE = re.compile(r"(my\w*|mine|config|robot)\.yaml|[A-Z]+")
+OWN_FILE = re.compile(r"(conf/)?(my\w*|mine|config|robot)\.yaml|[A-Z]+")
 """What stands for a file of the reader's own."""
 STARTS = re.compile(
     r"(?:[\w.$()/-]*/)?(?:\S+ )*?(?:-m mrhubo\.(?P<module>[a-z][\w.]*)|(?<![\w./`-])mrhubo (?P<verb>[a-z]+))(?P<rest>.*)"
@@ -124,6 +124,8 @@ def test_what_pages_show_is_accepted(path: Path, name: str, arguments: list[str]
     if not arguments:
         return  # only named
     parse(name, arguments)
+    if name == "describe":
+        return  # its word is a model, of the reader's own
     settings = [text for text in arguments if re.match(r"[a-z][\w.]*=", text)]
     rest = [text for text in arguments if text not in settings]
     file = rest[rest.index("--config") + 1] if "--config" in rest else "" if not rest else rest[0]
@@ -206,8 +208,10 @@ GIVEN = {
     "--out": "wave.csv",
     "--robot": "nao",
     "--to": "numpy",
+    "FILE": "my.urdf",
 }
 NEEDED = {
+    "describe": 1,
     "fit": 1,
     "pair": 1,
     "retarget": 3,

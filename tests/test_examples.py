@@ -115,6 +115,25 @@ def test_ros_bag(package: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "wave.mcap: 433 points at 60 per second" in text and "what was written: 0 rad" in text
 
 
+def test_stream(package: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run("08_stream.py", package)
+    text = capsys.readouterr().out
+    speeds = re.findall(r"(\S+) rad/s at most, of (\S+)", text)
+    assert text.startswith("120 frames, ") and len(speeds) == 8
+    assert all(float(speed) <= float(limit) for speed, limit in speeds)
+    assert any(float(speed) > 0.1 for speed, _ in speeds)
+
+
+def test_onnx(package: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for needed in ("onnx", "onnxruntime"):
+        pytest.importorskip(needed)
+    run("09_onnx.py", package)
+    text = capsys.readouterr().out
+    assert (tmp_path / "robot.onnx").is_file() and "joints: LShoulderPitch, " in text
+    (off,) = re.findall(r"433 frames, (\S+) rad off at most", text)
+    assert float(off) < 1e-4
+
+
 def test_code_that_writes_runs(package: str) -> None:
     (code,) = [code for code in blocks("docs/python.md") if "read_joint_order" in code]
     motion = mrhubo.read_motion(ROOT / "data" / "motions" / "wave.npz")

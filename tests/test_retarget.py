@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import mrhubo
 from mrhubo.errors import UserError
+from mrhubo.motion import mirror, read_motion, resample
 from mrhubo.retarget import main
 from mrhubo.robot_motion import read_robot_motion
 from tests.chain import cut_motion, new_package
+from tests.motion.bvh_writer import Style, write_bvh
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +48,35 @@ def test_a_package_answers_a_file(
     assert "names neither joints nor its frame rate, which is 10" in output
 
 
+def test_a_package_answers_files_without_pytorch(package: Path, wave: Path, tmp_path: Path) -> None:
+    """Nor do SciPy and the robot's libraries take their time; the answer is PyTorch's."""
+    (tmp_path / "walk.bvh").write_text(write_bvh(read_motion(wave), Style()))
+    script = (
+        "import sys\n"
+        "class Refuse:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name.partition('.')[0] in ('torch', 'lightning', 'scipy', 'yourdfpy', 'pytorch_kinematics', 'mlflow'):\n"
+        "            raise ModuleNotFoundError(name)\n"
+        "sys.meta_path.insert(0, Refuse())\n"
+        "from mrhubo.cli import dispatch\n"
+        "sys.exit(dispatch(['retarget', *sys.argv[1:]]))\n"
+    )
+    given = ["--retargeter", str(package), "--motion", str(wave), "walk.bvh", "--out", "out/", "--out-rate", "15"]
+    done = subprocess.run(
+        [sys.executable, "-c", script, *given, "--mirror"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    for name, file in (("wave_mirrored", wave), ("walk_mirrored", tmp_path / "walk.bvh")):
+        found = read_robot_motion(tmp_path / "out" / f"{name}.npz")
+        wanted = mrhubo.load(package)(mirror(resample(read_motion(file), 15.0))).robot_motion
+        assert found.robot.made_by == wanted.robot.made_by and found.robot.checksum == wanted.robot.checksum
+        assert (found.name, found.source, found.frame_rate) == (name, wanted.source, 15.0)
+        for field in ("joint_names", "branch_names", "direction_names"):
+            assert getattr(found, field) == getattr(wanted, field)
+        for field, most in (("q", 1e-3), ("confidence", 1e-2), ("direction_error_deg", 0.1), ("phi", 1e-3)):
+            np.testing.assert_allclose(getattr(found, field), getattr(wanted, field), atol=most)
+
+
 def test_a_robot_without_a_package_is_answered_by_the_reference(
     wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -63,6 +98,16 @@ def test_a_bad_file_among_several_is_told_at_the_end(
     assert len(said.err.splitlines()) == 2 and (tmp_path / "out" / "wave.npz").is_file()
     with pytest.raises(UserError, match="bad.npz"):
         main([*given, "--motion", str(bad)])
+
+
+def test_the_robot_gives_way_unless_told_otherwise(root: Path, tmp_path: Path) -> None:
+    motion = str(root / "data" / "motions" / "crossing_arms.npz")
+    given = ["--robot", "nao", "--motion", motion, "--from", "2", "--to", "3", "--out-rate", "12"]
+    assert main([*given, "--out", str(tmp_path / "free.npz")]) == 0
+    assert main([*given, "--no-avoid-collisions", "--out", str(tmp_path / "shown.npz")]) == 0
+    free, shown = (read_robot_motion(tmp_path / f"{name}.npz") for name in ("free", "shown"))
+    assert free.collision is not None and shown.collision is not None
+    assert shown.collision.sum() > free.collision.sum() == 0
 
 
 @pytest.mark.parametrize(

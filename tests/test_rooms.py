@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = (
     "errors", "rotation", "frames", "files", "robot_motion", "fast", "config", "runtime", "search", "body", "robot", "motion", "reference",
-    "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "callbacks", "body.prior_training", "fitting", "baselines", "paper",
+    "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "describing", "callbacks", "body.prior_training", "fitting", "baselines", "paper",
     "commands",
 )  # fmt: skip
 """Each may import from itself and from those before it. `commands` is everything else that lies in the package's

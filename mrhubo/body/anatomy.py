@@ -19,13 +19,9 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body.skeleton import PAIRED_JOINTS, POSED_JOINT_NAMES, SIDE_OF, SIDES
+from mrhubo.body.joints import ELBOW_AXIS, PAIRED_JOINTS, POSED_JOINT_NAMES, SIDE_OF, SIDES
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-ELBOW_AXIS = (0.0, -1.0, 0.0)
-"""Hinge of the left elbow, SMPL's: turning about it by a positive angle flexes."""
-KNEE_AXIS = _X
-"""Hinge of the knees: turning about it by a positive angle flexes."""
 
 # part: (twist axis, range), (swing axis, range), (swing axis, range); degrees, left side.
 _Entry = tuple[tuple[float, float, float], tuple[float, float]]
@@ -60,13 +56,6 @@ def _table() -> tuple[Tensor, Tensor]:
 
 AXES_J33, LIMITS_J32 = _table()
 RIGHT = torch.tensor([SIDE_OF.get(name) == "right" for name in POSED_JOINT_NAMES])
-_HINGES = {f"{side}_{name}": axis for side in SIDES for name, axis in (("elbow", ELBOW_AXIS), ("knee", KNEE_AXIS))}
-
-
-def hinge_axis(name: str) -> tuple[float, float, float]:
-    """Axis about which a positive angle flexes the elbow or knee of this name."""
-    x, y, z = _HINGES[name]
-    return (x, -y, -z) if SIDE_OF[name] == "right" else (x, y, z)
 
 
 def joint_angles(matrix_BJ33: Tensor) -> Tensor:

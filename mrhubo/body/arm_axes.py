@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from mrhubo import rotation
-from mrhubo.body.anatomy import hinge_axis
-from mrhubo.body.skeleton import POSED_JOINT_NAMES, SIDES
+from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES, hinge_axis
+from mrhubo.fast.plain.human import cross, norm, normalize
+from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
 
 CMU_TILT = math.atan2(-0.491, 0.871)
 """Of the CMU recordings: their left elbow bends about (0, -0.871, 0.491)."""
@@ -32,12 +31,12 @@ _ACROSS = math.radians(10.0)
 """How far a hinge's axis may be from a right angle with the bone."""
 
 
-def untilt_arms(local_BJ33: Tensor, tilt: float) -> Tensor:
+def untilt_arms(local_BJ33: np.ndarray, tilt: float) -> np.ndarray:
     """Local rotations (B, 21, 3, 3) with both arms turned about their bones, so that elbows that bend about an axis
     tilted by `tilt` [rad] bend about SMPL's; limbs keep their directions, and hands their orientation.
     """
-    turn_33 = rotation.axis_angle_to_matrix(local_BJ33.new_tensor([tilt, 0.0, 0.0]))
-    found = local_BJ33.clone()
+    turn_33 = axis_angle_to_matrix(np.array([tilt, 0.0, 0.0], local_BJ33.dtype))
+    found = local_BJ33.copy()
     for side in SIDES:  # bones lie along x, and a turn about x is its own mirror image
         shoulder, elbow, wrist = (POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "elbow", "wrist"))
         found[:, shoulder] = local_BJ33[:, shoulder] @ turn_33
@@ -46,18 +45,18 @@ def untilt_arms(local_BJ33: Tensor, tilt: float) -> Tensor:
     return found
 
 
-def elbow_tilt(local_TJ33: Tensor) -> float | None:
+def elbow_tilt(local_TJ33: np.ndarray) -> float | None:
     """By what angle [rad] about the bones the axis of both elbows is tilted from SMPL's, where the elbows of a motion
     (T, 21, 3, 3) are hinges; None where they are not, or do not bend enough to tell.
     """
     tilts = []
     for elbow in (f"{side}_elbow" for side in SIDES):
-        turn_T3 = rotation.matrix_to_axis_angle(local_TJ33[:, POSED_JOINT_NAMES.index(elbow)])
-        axis_X3 = torch.nn.functional.normalize(turn_T3[turn_T3.norm(dim=-1) > _BENT], dim=-1)
+        turn_T3 = matrix_to_axis_angle(local_TJ33[:, POSED_JOINT_NAMES.index(elbow)])
+        axis_X3 = normalize(turn_T3[norm(turn_T3) > _BENT])
         if len(axis_X3) < _ENOUGH:
             continue
-        mean_3 = torch.nn.functional.normalize(axis_X3.mean(dim=0), dim=0)
-        strays = torch.linalg.cross(axis_X3, mean_3.expand_as(axis_X3)).norm(dim=-1).amax()
+        mean_3 = normalize(axis_X3.mean(axis=0))
+        strays = norm(cross(axis_X3, np.broadcast_to(mean_3, axis_X3.shape))).max()
         if float(strays) > math.sin(_PURE) or abs(float(mean_3[0])) > math.sin(_ACROSS):
             return None
         _, y, _ = hinge_axis(elbow)

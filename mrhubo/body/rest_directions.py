@@ -15,12 +15,16 @@ Legend: B batch, J = 21: SMPL's joints 1..21. Frame: x to the body's left, y up,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from mrhubo.body.skeleton import PARENTS, POSED_JOINT_NAMES, Skeleton
-from mrhubo.rotation import shortest_turn
+from mrhubo.body.joints import OFFSETS_J3, PARENTS, POSED_JOINT_NAMES
+from mrhubo.fast.plain.human import norm, normalize
+from mrhubo.fast.rotations import shortest_turn
+
+if TYPE_CHECKING:
+    from mrhubo.body.skeleton import Skeleton
 
 _SAME = 5e-3
 """Sine of an angle (0.3 degrees) between two directions up to which they are the same: those of the table are rounded
@@ -74,15 +78,15 @@ FAMILIES: dict[str, Family] = {
 """By the names that AMASS's `surface_model_type` has for them."""
 
 
-def from_family(local_BJ33: Tensor, family: str) -> Tensor:
+def from_family(local_BJ33: np.ndarray, family: str) -> np.ndarray:
     """Local rotations (B, 21, 3, 3) that refer to our skeleton, of those that refer to a family's mean body."""
-    turn_J33 = _turns(FAMILIES[family]).to(local_BJ33)
+    turn_J33 = _turns(FAMILIES[family]).astype(local_BJ33.dtype)
     return _above(turn_J33).mT @ local_BJ33 @ turn_J33
 
 
-def to_family(local_BJ33: Tensor, family: str) -> Tensor:
+def to_family(local_BJ33: np.ndarray, family: str) -> np.ndarray:
     """Local rotations (B, 21, 3, 3) that refer to a family's mean body, of those that refer to our skeleton."""
-    turn_J33 = _turns(FAMILIES[family]).to(local_BJ33)
+    turn_J33 = _turns(FAMILIES[family]).astype(local_BJ33.dtype)
     return _above(turn_J33) @ local_BJ33 @ turn_J33.mT
 
 
@@ -90,21 +94,20 @@ def is_ours(skeleton: Skeleton) -> bool:
     """Whether a skeleton's limbs point at rest where ours do, however long they are."""
     rows = [POSED_JOINT_NAMES.index(end) for end in _END.values()]
     theirs, ours = (
-        torch.nn.functional.normalize(s.offsets_J3[rows].double().cpu(), dim=1) for s in (skeleton, Skeleton())
+        normalize(offsets_J3[rows].astype(np.float64)) for offsets_J3 in (skeleton.offsets_J3.cpu().numpy(), OFFSETS_J3)
     )
-    return bool(((theirs - ours).norm(dim=1) < _SAME).all())
+    return bool((norm(theirs - ours) < _SAME).all())
 
 
-def _turns(family: Family) -> Tensor:
+def _turns(family: Family) -> np.ndarray:
     """The shortest turns (21, 3, 3), float64, from our rest directions to a family's; the identity where no limb is."""
-    ours = dict(zip(POSED_JOINT_NAMES, Skeleton().offsets_J3.double(), strict=True))
-    turns = torch.eye(3, dtype=torch.float64).repeat(len(POSED_JOINT_NAMES), 1, 1)
+    ours = dict(zip(POSED_JOINT_NAMES, OFFSETS_J3.astype(np.float64), strict=True))
+    turns = np.tile(np.eye(3), (len(POSED_JOINT_NAMES), 1, 1))
     for joint, direction in family.directions.items():
-        both = torch.stack((ours[_END[joint]], torch.tensor(direction, dtype=torch.float64)))
-        turns[POSED_JOINT_NAMES.index(joint)] = shortest_turn(*torch.nn.functional.normalize(both, dim=1))
+        turns[POSED_JOINT_NAMES.index(joint)] = shortest_turn(*normalize(np.stack((ours[_END[joint]], direction))))
     return turns
 
 
-def _above(turn_J33: Tensor) -> Tensor:
+def _above(turn_J33: np.ndarray) -> np.ndarray:
     """The turns (21, 3, 3) of the joints' parents; the pelvis's is the identity."""
-    return torch.cat((torch.eye(3).to(turn_J33)[None], turn_J33))[list(PARENTS[1:])]
+    return np.concatenate((np.eye(3, dtype=turn_J33.dtype)[None], turn_J33))[list(PARENTS[1:])]

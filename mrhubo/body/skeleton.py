@@ -1,156 +1,80 @@
-"""The human body: SMPL's tree of 22 body joints, points fixed to them, batched forward kinematics, mirroring.
-
-Frame: x to the body's left, y up, z forward, metres. Rest pose: T-pose, arms along +-x, legs along -y, palms down. A
-pose is the local rotation of joints 1..21 (the pelvis is the root and stays at the origin), in SMPL's order.
+"""The human body in PyTorch: batched forward kinematics, mirroring. Frames and names are those of `joints`.
 
 Legend: B batch, J = 21 posed joints, K keypoints (22 joints and the points fixed to them).
-Source of the lengths: mean skeleton of the CMU Graphics Lab Motion Capture Database (mocap.cs.cmu.edu); of the hand,
-eye and foot points: round numbers of an adult.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import torch
 from torch import Tensor, nn
 
-from mrhubo.errors import UserError, unknown_name
+from mrhubo.body.joints import (
+    JOINT_NAMES,
+    KEYPOINT_JOINT,
+    KEYPOINT_NAMES,
+    LEG_JOINTS,
+    LEVELS,
+    MIRROR,
+    OFFSETS_J3,
+    PAIRED_JOINTS,
+    PAIRED_KEYPOINTS,
+    PARENTS,
+    POINT_NAMES,
+    POINT_OFFSETS_E3,
+    POSED_JOINT_NAMES,
+    SIDE_OF,
+    SIDES,
+    ancestors,
+    joint_index,
+    keypoint_indices,
+    local_rotations,
+)
+from mrhubo.errors import UserError
 from mrhubo.files.storage import checksum_tensors
+
+__all__ = [
+    "JOINT_NAMES",
+    "KEYPOINT_JOINT",
+    "KEYPOINT_NAMES",
+    "LEG_JOINTS",
+    "PAIRED_JOINTS",
+    "PAIRED_KEYPOINTS",
+    "PARENTS",
+    "POINT_NAMES",
+    "POSED_JOINT_NAMES",
+    "SIDE_OF",
+    "SIDES",
+    "ancestors",
+    "joint_index",
+    "keypoint_indices",
+    "local_rotations",
+    "Skeleton",
+    "mirror_joints",
+    "mirror_pose",
+    "mirror_rotations",
+]
 
 _LONGEST = 2.0
 """No bone is that long [m]; other units than metres are."""
 _SHORTEST = 1e-3
 """Nor is one so short [m]."""
-_SIGNS = {"left": 1.0, "right": -1.0}
-SIDES: tuple[str, ...] = tuple(_SIGNS)
-"""Sides of the body; what there is on both is called `left_` and `right_` and its name."""
-PAIRED_JOINTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
-"""Joints that there are on both sides."""
-SIDE_OF: dict[str, str] = {f"{side}_{name}": side for side in SIDES for name in PAIRED_JOINTS}
-"""The side of each joint that there is on both."""
-LEG_JOINTS: tuple[str, ...] = tuple(f"{side}_{name}" for name in ("hip", "knee", "ankle", "foot") for side in SIDES)
-
-# name: (parent, offset from the parent at rest [m])
-_JOINTS: dict[str, tuple[str | None, tuple[float, float, float]]] = {
-    "pelvis": (None, (0.0, 0.0, 0.0)),
-    "left_hip": ("pelvis", (0.0901, -0.1018, 0.0392)),
-    "right_hip": ("pelvis", (-0.0901, -0.1018, 0.0392)),
-    "spine1": ("pelvis", (0.0, 0.0585, -0.0040)),
-    "left_knee": ("left_hip", (0.0, -0.4103, 0.0)),
-    "right_knee": ("right_hip", (0.0, -0.4103, 0.0)),
-    "spine2": ("spine1", (0.0, 0.0585, -0.0040)),
-    "left_ankle": ("left_knee", (0.0, -0.4357, 0.0)),
-    "right_ankle": ("right_knee", (0.0, -0.4357, 0.0)),
-    "spine3": ("spine2", (0.0, 0.1171, -0.0018)),
-    "left_foot": ("left_ankle", (0.0, -0.04, 0.119)),
-    "right_foot": ("right_ankle", (0.0, -0.04, 0.119)),
-    "neck": ("spine3", (0.0, 0.1175, 0.0030)),
-    "left_collar": ("spine3", (0.0278, 0.0875, 0.0030)),
-    "right_collar": ("spine3", (-0.0278, 0.0875, 0.0030)),
-    "head": ("neck", (0.0, 0.1479, 0.0004)),
-    "left_shoulder": ("left_collar", (0.1577, 0.0959, -0.0162)),
-    "right_shoulder": ("right_collar", (-0.1577, 0.0959, -0.0162)),
-    "left_elbow": ("left_shoulder", (0.3017, 0.0, 0.0)),
-    "right_elbow": ("right_shoulder", (-0.3017, 0.0, 0.0)),
-    "left_wrist": ("left_elbow", (0.26, 0.0, 0.0)),
-    "right_wrist": ("right_elbow", (-0.26, 0.0, 0.0)),
-}
-# name: (parent, whether it is on the point's own side, offset from it at rest [m], x mirrored on the right)
-_FIXED_POINTS: dict[str, tuple[str, bool, tuple[float, float, float]]] = {
-    "eye": ("head", False, (0.032, 0.065, 0.090)),
-    "thumb": ("wrist", True, (0.045, -0.015, 0.045)),
-    "index": ("wrist", True, (0.092, -0.003, 0.024)),
-    "middle": ("wrist", True, (0.095, 0.0, 0.0)),
-    "pinky": ("wrist", True, (0.080, -0.006, -0.042)),
-    "toe": ("foot", True, (0.0, -0.015, 0.070)),
-    "heel": ("ankle", True, (0.0, -0.060, -0.050)),
-}
-
-JOINT_NAMES: tuple[str, ...] = tuple(_JOINTS)
-"""SMPL's 22 body joints in SMPL's order."""
-POSED_JOINT_NAMES: tuple[str, ...] = JOINT_NAMES[1:]
-"""The 21 joints whose local rotations make a pose H."""
-PARENTS: tuple[int, ...] = tuple(-1 if p is None else JOINT_NAMES.index(p) for p, _ in _JOINTS.values())
-"""Index of each joint's parent in JOINT_NAMES; -1 for the pelvis."""
-
-
-def _fixed_points() -> dict[str, tuple[int, tuple[float, float, float]]]:
-    points = {}
-    for name, (parent, own_side, (x, y, z)) in _FIXED_POINTS.items():
-        for side, sign in _SIGNS.items():
-            carrier = f"{side}_{parent}" if own_side else parent
-            points[f"{side}_{name}"] = (JOINT_NAMES.index(carrier), (sign * x, y, z))
-    return points
-
-
-_POINTS = _fixed_points()
-POINT_NAMES: tuple[str, ...] = tuple(_POINTS)
-"""The points fixed to head, wrists, ankles and feet."""
-KEYPOINT_NAMES: tuple[str, ...] = JOINT_NAMES + POINT_NAMES
-"""The 22 joints, then the points fixed to head, wrists, ankles and feet."""
-PAIRED_KEYPOINTS: dict[str, tuple[str, ...]] = {
-    name: tuple(f"{side}_{name}" for side in SIDES) for name in (*PAIRED_JOINTS, *_FIXED_POINTS)
-}
-"""The left and the right keypoint of each that there are two of, by the name that they share."""
-KEYPOINT_JOINT: tuple[int, ...] = tuple(range(22)) + tuple(joint for joint, _ in _POINTS.values())
-"""Index in JOINT_NAMES of the joint that carries each keypoint (a joint's own keypoint is carried by itself)."""
-
-
-def joint_index(name: str) -> int:
-    """Position of a joint in JOINT_NAMES; UserError with the nearest name if there is none such."""
-    if name not in JOINT_NAMES:
-        raise UserError(unknown_name("human joint", name, JOINT_NAMES))
-    return JOINT_NAMES.index(name)
-
-
-def ancestors(joint: int) -> list[int]:
-    """The joint itself and all joints above it, nearest first, the pelvis last (indices in JOINT_NAMES)."""
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = PARENTS[joint]
-    return chain
-
-
-def _levels() -> list[list[int]]:
-    depth = [len(ancestors(j)) - 1 for j in range(len(JOINT_NAMES))]
-    levels = [[j for j in range(len(JOINT_NAMES)) if depth[j] == d] for d in range(1, max(depth) + 1)]
-    assert [j for level in levels for j in level] == list(range(1, len(JOINT_NAMES))), "SMPL's order is by depth"
-    return levels
-
-
-_LEVELS = _levels()
-_OTHER_SIDE = {
-    f"{side}_{name}": f"{other}_{name}"
-    for side, other in zip(SIDES, SIDES[::-1], strict=True)
-    for name in PAIRED_JOINTS
-}
-_MIRROR = [POSED_JOINT_NAMES.index(_OTHER_SIDE.get(name, name)) for name in POSED_JOINT_NAMES]
 
 
 def mirror_pose(pose_BJ6: Tensor) -> Tensor:
     """The pose (..., 21, 6) reflected in the body's left-right plane (R -> S R S with S = diag(-1, 1, 1))."""
     sign = pose_BJ6.new_tensor([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-    return pose_BJ6[..., _MIRROR, :] * sign
+    return pose_BJ6[..., MIRROR, :] * sign
 
 
 def mirror_rotations(matrix_BJ33: Tensor) -> Tensor:
     """`mirror_pose` for matrices (..., 21, 3, 3), exact to the bit."""
     sign = matrix_BJ33.new_tensor([-1.0, 1.0, 1.0])
-    return matrix_BJ33[..., _MIRROR, :, :] * sign[:, None] * sign
+    return matrix_BJ33[..., MIRROR, :, :] * sign[:, None] * sign
 
 
 def mirror_joints(values_BJ: Tensor) -> Tensor:
     """A value a joint (..., 21) with those of left and right exchanged."""
-    return values_BJ[..., _MIRROR]
-
-
-def local_rotations(world_BJ33: Tensor) -> Tensor:
-    """Rotations (..., 22, 3, 3) of all joints in one frame, whichever, to those of joints 1..21 relative to their
-    parents (..., 21, 3, 3); undoes `Skeleton.global_rotations`.
-    """
-    return world_BJ33[..., PARENTS[1:], :, :].mT @ world_BJ33[..., 1:, :, :]
+    return values_BJ[..., MIRROR]
 
 
 class Skeleton(nn.Module):
@@ -170,8 +94,7 @@ class Skeleton(nn.Module):
 
     def __init__(self, offsets_J3: Tensor | None = None, point_offsets_E3: Tensor | None = None) -> None:
         super().__init__()
-        ours = torch.tensor([o for _, o in _JOINTS.values()])[1:]
-        points = torch.tensor([o for _, o in _POINTS.values()])
+        ours, points = torch.from_numpy(OFFSETS_J3), torch.from_numpy(POINT_OFFSETS_E3)
         for name, given, default in (("offsets_J3", offsets_J3, ours), ("point_offsets_E3", point_offsets_E3, points)):
             if given is not None and given.shape != default.shape:
                 raise UserError(f"a skeleton's {name} must have the shape {tuple(default.shape)}, found {given.shape}")
@@ -188,11 +111,16 @@ class Skeleton(nn.Module):
         """xxh3 of its lengths, 16 hex digits."""
         return checksum_tensors({"offsets": self.offsets_J3, "points": self.point_offsets_E3}, {})
 
+    @property
+    def rest_points(self) -> dict[str, Tensor]:
+        """`rest_K3`, the keypoints (3,) [m] of a human at rest, by name."""
+        return dict(zip(KEYPOINT_NAMES, self.rest_K3, strict=True))
+
     def global_rotations(self, local_BJ33: Tensor) -> Tensor:
         """Local rotations (B, 21, 3, 3) of joints 1..21 to rotations relative to the pelvis (B, 22, 3, 3)."""
         root = torch.eye(3, dtype=local_BJ33.dtype, device=local_BJ33.device).expand(len(local_BJ33), 1, 3, 3)
         done = root
-        for level in _LEVELS:
+        for level in LEVELS:
             parents = [PARENTS[j] for j in level]
             done = torch.cat((done, done[:, parents] @ local_BJ33[:, level[0] - 1 : level[-1]]), dim=1)
         return done
@@ -206,7 +134,7 @@ class Skeleton(nn.Module):
         rotation = self.global_rotations(local_BJ33)
         bones = (rotation[:, PARENTS[1:]] @ self.offsets_J3[..., None])[..., 0]
         positions = [torch.zeros_like(bones[:, :1])]
-        for level in _LEVELS:
+        for level in LEVELS:
             done = positions[0] if len(positions) == 1 else torch.cat(positions, dim=1)
             parents = [PARENTS[j] for j in level]
             positions.append(done[:, parents] + bones[:, level[0] - 1 : level[-1]])
@@ -214,11 +142,3 @@ class Skeleton(nn.Module):
         carriers = list(KEYPOINT_JOINT[len(JOINT_NAMES) :])
         points = joints[:, carriers] + (rotation[:, carriers] @ self.point_offsets_E3[..., None])[..., 0]
         return torch.cat((joints, points), dim=1), rotation
-
-
-def keypoint_indices(names: Sequence[str]) -> list[int]:
-    """Positions of keypoints in KEYPOINT_NAMES; UserError with the nearest name for one that does not exist."""
-    for name in names:
-        if name not in KEYPOINT_NAMES:
-            raise UserError(unknown_name("human keypoint", name, KEYPOINT_NAMES))
-    return [KEYPOINT_NAMES.index(name) for name in names]

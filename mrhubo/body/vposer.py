@@ -19,8 +19,8 @@ from mrhubo import rotation
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.files.checkpoint import read_checkpoint, to_tensor
 from mrhubo.files.regular import read_regular
-from mrhubo.files.safe_pickle import read_checkpoint, to_tensor
 
 _PREFIX = "vp_model."
 _JOINTS = len(POSED_JOINT_NAMES)

@@ -18,7 +18,7 @@ from mrhubo.config.help import field_docs
 from mrhubo.config.kinds import keys_of
 from mrhubo.config.loading import load_config
 from mrhubo.config.places import places_named, where, with_places
-from mrhubo.config.plain import changed_settings, fingerprint, to_plain, to_yaml, without_paths
+from mrhubo.config.plain import changed_settings, fingerprint, flow_yaml, to_plain, to_yaml, without_paths
 from mrhubo.config.prior import SHIPPED_PRIOR, PriorConfig
 from mrhubo.config.schema import (
     BaselineConfig,
@@ -34,7 +34,7 @@ from mrhubo.config.schema import (
     TrackingConfig,
     TrainerConfig,
 )
-from mrhubo.config.shipped import find_config, shipped_root
+from mrhubo.config.shipped import find_config, is_config, shipped_root
 from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
 from mrhubo.config.typed import typed_value
 
@@ -71,7 +71,9 @@ __all__ = [
     "choice",
     "field_docs",
     "find_config",
+    "is_config",
     "fingerprint",
+    "flow_yaml",
     "keys_of",
     "load_config",
     "number",

@@ -28,13 +28,30 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
     added; those with a value take it once. ``--help`` prints the config's keys too, whatever else is wrong.
     """
 
-    def __init__(self, prog: str, description: str, schema: type[T] | None, takes_config: bool = True) -> None:
-        """`schema` is the config's dataclass, None for a command of flags alone; one with `takes_config` False has
-        configs of its own.
+    def __init__(
+        self,
+        prog: str,
+        description: str,
+        schema: type[T] | None,
+        takes_config: bool = True,
+        instead: str | None = None,
+        word: tuple[str, str] | None = None,
+    ) -> None:
+        """Prepares the arguments that all commands have.
+
+        Args:
+            prog: the command as it is typed.
+            description: what it does, for `--help`.
+            schema: the config's dataclass, None for a command of flags alone.
+            takes_config: False for a command that has configs of its own.
+            instead: a flag with a value that may take the config's place, ``--urdf FILE``.
+            word: name and meaning of the one word that stands alone in a command without config, ``FILE``; `parse_args`
+                gives it as `word`.
         """
         super().__init__(prog, description=description, add_help=False, allow_abbrev=False, exit_on_error=False)
         self.schema, self.takes_config = schema, takes_config and schema is not None
         self.needs_config = self.takes_config and schema is not None and requires_anything(schema)
+        self.instead, self.word = instead, word
         self.register("action", None, _StoreOnce)
         self.register("type", None, nonempty)
         self.add_argument("words", nargs="*", type=str, help=argparse.SUPPRESS)
@@ -61,12 +78,28 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
             raise UserError(self._sentence(error)) from None
         words = [*vars(options).pop("words"), *rest]
         vars(options).pop(_StoreOnce.SEEN, None)
+        if self.word is not None:
+            if len(words) != 1:
+                shown = f", found '{words[0]}' and '{words[1]}'" if words else ""
+                raise UserError(
+                    f"command line: {self.word[0]} is {'one' if words else 'missing'}: {self.word[1]}{shown}"
+                )
+            options.word, words = words[0], []
         named = getattr(options, "config", None)
         configs = [*([] if named is None else [named]), *(self._config_word(word) for word in words if "=" not in word)]
         if len(configs) > 1:
             raise UserError(f"command line: the config is given twice, '{configs[0]}' and '{configs[1]}'; one is read")
-        if self.needs_config and not configs:
-            raise UserError(f"command line: CONFIG is missing, for instance {self.prog} nao; --help lists its keys")
+        flag = (self.instead or "").partition(" ")[0]
+        given = getattr(options, flag.lstrip("-"), None) is not None if flag else False
+        if given and configs:
+            raise UserError(
+                f"command line: {flag} takes the place of the config, which is '{configs[0]}'; give one of them"
+            )
+        if self.needs_config and not configs and not given:
+            either = f", or {self.instead}" if flag else ""
+            raise UserError(
+                f"command line: CONFIG is missing, for instance {self.prog} nao{either}; --help lists its keys"
+            )
         options.config = find_config(configs[0]) if configs else None
         options.overrides = [word for word in words if "=" in word]
         if self.schema is None and options.overrides:
@@ -79,11 +112,15 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
 
     def format_usage(self) -> str:
         """The flags, the config, the overrides; what may be left out in brackets."""
-        either = "CONFIG | --config CONFIG"
+        either = "CONFIG | --config CONFIG" + (f" | {self.instead}" if self.instead else "")
         config = argparse.Action([], "config", None, metavar=f"({either})" if self.needs_config else f"[{either}]")
         overrides = argparse.Action([], "overrides", nargs="*", metavar="KEY=VALUE")
         formatter = argparse.HelpFormatter(self.prog, width=WIDTH)
-        shown = [*self._flags(), *([config] if self.takes_config else []), *([overrides] if self.schema else [])]
+        flags = [
+            action for action in self._flags() if action.option_strings[0] != (self.instead or "").partition(" ")[0]
+        ]
+        shown = [*flags, *([config] if self.takes_config else []), *([overrides] if self.schema else [])]
+        shown += [argparse.Action([], "word", None, metavar=self.word[0])] if self.word else []
         formatter.add_usage(None, shown, self._mutually_exclusive_groups)
         return formatter.format_help()
 
@@ -92,6 +129,8 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
         rows = {}
         if self.takes_config:
             rows["CONFIG, --config CONFIG"] = str(self._option_string_actions["--config"].help)
+        if self.word is not None:
+            rows[self.word[0]] = self.word[1]
         for action in self._flags():
             rows[_spelt(action)] = f"{action.help}; required" if action.required else str(action.help)
         rows["-h, --help"] = "print this"

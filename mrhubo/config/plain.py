@@ -57,6 +57,14 @@ def to_yaml(config: Any) -> str:
     return yaml.dump(_escaped(to_plain(config)), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
 
 
+def flow_yaml(value: Any) -> str:
+    """One value as YAML on one line, as `to_yaml` writes it: ``{link: torso, offset: [0.0, 0.1, 0.0]}``."""
+    text = yaml.dump(
+        _escaped(to_plain(value)), Dumper=_Dumper, default_flow_style=True, sort_keys=False, width=math.inf
+    )
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
 def fingerprint(value: Any) -> str:
     """16 hex digits of a config or of plain values: the order of keys does not count, 2 and 2.0 differ."""
     text = json.dumps(to_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -67,6 +67,10 @@ class RobotConfig:
     """Ranges narrower than the URDF's limits, [lower, upper] in rad, by joint name."""
     hold: dict[str, float] = field(default_factory=dict)
     """Angles in rad at which joints outside `joints` are held; default 0, clamped to the joint's limits."""
+    unsure: list[str] = field(default_factory=list)
+    """What `mrhubo describe` could not decide, by the entry that holds its best guess (`chest`, `left_hand`). Take
+    a name out when you have looked at the entry: until then nothing is trained, or, for a hand or head, with a
+    warning."""
     max_speed: float = bounded(12.0, 0.01, 1_000.0)
     """No joint of a motion turns faster [rad/s], nor faster than its limit in the URDF, where that tells one (it does
     not where it is 0). The default is 0.5 rad in 1/24 s, from where on a step counts as a jump."""

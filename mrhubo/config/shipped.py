@@ -46,3 +46,8 @@ def shipped_configs(folder: str = "") -> list[str]:
     root = shipped_root() / "conf" / folder
     names = [path.relative_to(root).with_suffix("").as_posix() for path in sorted(root.rglob("*.yaml"))]
     return [name for name in names if not name.startswith("sweeps/")]
+
+
+def is_config(text: str) -> bool:
+    """Whether a word of the command line names a config, there or not: a YAML file, or one that ships with mrhubo."""
+    return text.endswith((".yaml", ".yml")) or (not os.path.exists(text) and text in shipped_configs())

@@ -6,7 +6,7 @@ Legend: T frames, X steps between them, D directions, N joints.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
@@ -14,8 +14,8 @@ import torch
 from torch import Tensor
 
 from mrhubo.evaluation.clips import Clip
-from mrhubo.evaluation.scores import ClipScore, mean_score, score_clip
-from mrhubo.reference import DirectionProblem, angle_between, at_limit_share, count_jumps, direction_jerk
+from mrhubo.evaluation.scores import BY_JOINT, ClipScore, mean_score, number_fields, score_clip
+from mrhubo.reference import DirectionProblem, angle_between, at_limit_share, count_jumps, direction_jerk, limit_shares
 from mrhubo.robot import BodyMap, LinkPoses
 from mrhubo.robot.parts import Region
 
@@ -37,9 +37,12 @@ class Evaluation(ClipScore):
     at_limit: float
     """Share of joint angles at a limit."""
     collision: float
-    """Share of frames in which the robot's collision shapes overlap."""
+    """Share of frames in which the robot's collision shapes overlap. NaN: shapes of what moves are missing."""
     reference_collision: float
     """The same for the reference, which is not told to avoid it."""
+    geometric_limb_deg: float = nan
+    """`limb_deg` of limbs between the centres of the robot's joints, as its axes tell them (`BodyMap.geometric`): an
+    entry beside a joint shows in it. NaN: the axes tell none."""
     excess_deg: float = nan
     """Mean of the limbs' angle to the human less that of the frame's own optimum: what is the answer's fault. NaN: the
     optimum is not known."""
@@ -53,6 +56,13 @@ class Evaluation(ClipScore):
     """Share of steps in which a joint turns faster than it can (`Robot.velocity_N`)."""
     jumps: float = nan
     """Steps of more than 0.5 rad in 1/24 s that the human did not make (`mrhubo.reference.count_jumps`), in a clip."""
+    joints_at_limit: tuple[tuple[str, float], ...] = field(default=(), metadata={BY_JOINT: True})
+    """Share of the frames in which each joint is at a limit, by its name."""
+
+    @property
+    def most_at_limit(self) -> float:
+        """That of the joint which is there most."""
+        return max((share for _, share in self.joints_at_limit), default=nan)
 
 
 def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequence[str]) -> Evaluation:
@@ -66,7 +76,8 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         return float(angles_TD[:, _columns(body_map, region)].mean())  # NaN where there are none
 
     def collision_share(q_TN: Tensor, poses: LinkPoses) -> float:
-        return float(shapes.collides(q_TN, poses).float().mean()) if shapes.pairs else float("nan")
+        known = shapes.pairs and not shapes.unknown
+        return float(shapes.collides(q_TN, poses).float().mean()) if known else nan
 
     jerk, human_jerk = (
         float(direction_jerk(d[:, body_map.measured], clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3)
@@ -81,6 +92,8 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         at_limit=float(at_limit_share(robot, q_TN).mean()),
         collision=collision_share(q_TN, poses),
         reference_collision=collision_share(clip.reference_TN, reference_poses),
+        geometric_limb_deg=_geometric(clip, q_TN, body_map),
+        joints_at_limit=tuple(zip(robot.joint_names, limit_shares(robot, q_TN).tolist(), strict=True)),
         **_excess(clip, error_TD, human_TD3, body_map),
         **_speeds(clip, q_TN, human_TD3, body_map),
     )
@@ -88,6 +101,15 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
 
 def _columns(body_map: BodyMap, region: Region) -> list[int]:
     return [i for i, direction in enumerate(body_map.directions) if direction.part.region == region]
+
+
+def _geometric(clip: Clip, q_TN: Tensor, body_map: BodyMap) -> float:
+    geometric = body_map.geometric
+    if geometric is None:
+        return nan
+    robot_TD3 = geometric.robot_directions(geometric.robot.forward(q_TN))
+    error_TD = torch.rad2deg(angle_between(robot_TD3, geometric.human_directions(clip.motion.local_TJ33)))
+    return float(error_TD[:, _columns(geometric, "arm")].mean())
 
 
 def _excess(clip: Clip, error_TD: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, Any]:
@@ -124,7 +146,8 @@ def evaluate_clips(
 
 def measures(evaluation: Evaluation) -> dict[str, float]:
     """The measures by name; those that the robot does not have are left out."""
-    found = {field.name: getattr(evaluation, field.name) for field in fields(Evaluation)[2:]}
+    found = {name: getattr(evaluation, name) for name in number_fields(Evaluation)}
+    found |= {f"at_limit/{joint}": share for joint, share in evaluation.joints_at_limit}
     return {name: value for name, value in found.items() if value == value}
 
 

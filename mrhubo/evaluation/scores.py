@@ -31,17 +31,31 @@ class ClipScore:
     """Mean Euclidean distance of the key links."""
 
 
+BY_JOINT = "by joint"
+"""In the metadata of a field that holds (joint, value) pairs in place of a number."""
+
+
+def number_fields(kind: type[ClipScore]) -> list[str]:
+    """Names of the measures that are one number."""
+    return [field.name for field in fields(kind)[2:] if BY_JOINT not in field.metadata]
+
+
 Score = TypeVar("Score", bound=ClipScore)
 
 
 def mean_score(scores: Sequence[Score], over_frames: bool = False) -> Score:
     """Means of every measure over clips, each counted once, or over all their frames."""
-    names = [field.name for field in fields(scores[0])[2:]]
+    names = number_fields(type(scores[0]))
     frames = [score.frames for score in scores]
     share = torch.tensor(frames if over_frames else [1] * len(scores), dtype=torch.float64)
     table = torch.tensor([[getattr(score, name) for name in names] for score in scores], dtype=torch.float64)
     name = "mean over frames" if over_frames else "mean over clips"
-    return type(scores[0])(name, sum(frames), *((share / share.sum()) @ table).tolist())
+    means = dict(zip(names, ((share / share.sum()) @ table).tolist(), strict=True))
+    for column in (field.name for field in fields(scores[0]) if BY_JOINT in field.metadata):
+        rows = [dict(getattr(score, column)) for score in scores]
+        by_joint = torch.tensor([list(row.values()) for row in rows], dtype=torch.float64)
+        means[column] = tuple(zip(rows[0], ((share / share.sum()) @ by_joint).tolist(), strict=True))
+    return type(scores[0])(name, sum(frames), **means)
 
 
 @torch.no_grad()

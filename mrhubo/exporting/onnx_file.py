@@ -16,7 +16,8 @@ from torch import Tensor
 
 from mrhubo.errors import UserError
 from mrhubo.exporting.meaning import compared, meaning
-from mrhubo.fast.description import Description, Part
+from mrhubo.fast.description import Description
+from mrhubo.fast.sections import Part
 from mrhubo.files.atomic import atomic_path
 from mrhubo.retargeter import Retargeter
 

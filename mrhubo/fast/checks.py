@@ -1,7 +1,7 @@
 """Whether a description that was read from a file can be used: its arrays fit together, and no place in one lies
 outside another, where compiled functions would read what is not theirs.
 
-Legend: as in `mrhubo.fast.description`.
+Legend: as in `mrhubo.fast.sections`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from mrhubo.fast.description import Description, Layers, Part
+    from mrhubo.fast.description import Description
+    from mrhubo.fast.sections import Layers, Part
 
 _JOINTS = 21
 _ACTIVATIONS = ("silu", "leaky_relu", "tanh")

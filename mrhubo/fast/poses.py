@@ -26,7 +26,8 @@ class Poses:
     local_TJ33: np.ndarray
     shape: tuple[int, ...]
     frame_rate: float | None
-    name: str
+    name: str = ""
+    source: str = ""
 
 
 def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
@@ -36,13 +37,13 @@ def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
         UserError: it is neither, has another shape, or the frame rate is not positive; the axis-angle or 6D numbers
             are no rotations; or a motion's rotations refer to another rest pose than the retargeter's (`own_rest`).
     """
-    name = ""
-    if hasattr(given, "local_TJ33"):  # a Motion, which needs PyTorch and so is not imported
+    name = source = ""
+    if is_motion(given):
         if not own_rest:
             raise UserError(
                 "this retargeter is for a body model with a rest pose of its own; give it an array for that"
             )
-        frame_rate, name, given = given.frame_rate, given.name, given.local_TJ33
+        frame_rate, name, source, given = given.frame_rate, given.name, given.source, given.arrays.local_TJ33
     array = np.asarray(given)
     if array.dtype.kind not in "fiu":
         raise UserError(f"human motion: expected a Motion or an array of numbers, found {array.dtype}")
@@ -54,11 +55,16 @@ def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
             array = array.reshape(math.prod(shape), *axes)
             with np.errstate(over="ignore"):
                 local_TJ33 = np.ascontiguousarray(array if read is None else read(array, shape), np.float32)
-            return Poses(local_TJ33, shape, frame_rate, name)
+            return Poses(local_TJ33, shape, frame_rate, name, source)
     raise UserError(
         f"human poses must have the shape (..., {_JOINTS}, 3, 3) (matrices), (..., {3 * _JOINTS}) (axis-angle, rad) or"
         f" (..., {_JOINTS}, 6) (6D), found {array.shape}"
     )
+
+
+def is_motion(given: Any) -> bool:
+    """Whether it is a `mrhubo.Motion`, of which nothing is known here but its arrays."""
+    return hasattr(type(given), "local_TJ33")  # an object's own would be a tensor, and import PyTorch
 
 
 def check_frame_rate(frame_rate: float) -> None:

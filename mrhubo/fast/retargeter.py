@@ -3,7 +3,7 @@
     retargeter = mrhubo.load_fast("package")        # or the file runtime.safetensors of one, by itself
     answer = retargeter(pose)                       # joint angles of one frame or of many, with confidence, in NumPy
 
-It answers each frame on its own, as `Retargeter` does with `together=False`, with the same numbers.
+It answers as `Retargeter` does, with the same numbers: each frame on its own, or a motion as a whole.
 
 Legend: T frames, J = 21 posed joints, D directions, N joints, X branches.
 """
@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.fast.answers import Answers, Engine
 from mrhubo.fast.description import Description
-from mrhubo.fast.engines import FORMS, Answers, Engine, make_engine
+from mrhubo.fast.engines import FORMS, make_engine
 from mrhubo.fast.plain import judging
 from mrhubo.fast.poses import Poses, read_poses, refuse
+from mrhubo.fast.together.motion import join_frames
 from mrhubo.robot_motion import FollowingJoint, RobotFacts, RobotMotion
 
 POLISH = 10
@@ -47,7 +49,7 @@ class FastRetargeter:
         self._made: dict[str, Any] = {
             "joint_names": self.joint_names, "branch_names": self.branch_names,
             "direction_names": tuple(description.settings.direction_names[d] for d in description.trust.measured),
-            "robot": self.facts, "source": "", "root_position": None, "root_quaternion_wxyz": None,
+            "robot": self.facts, "root_position": None, "root_quaternion_wxyz": None,
         }  # fmt: skip
 
     @classmethod
@@ -79,35 +81,52 @@ class FastRetargeter:
             settings.robot, settings.facts["made_by"], settings.facts["checksum"], others=others, **limits
         )
 
-    def __call__(self, motion: Any, polish: int = POLISH, frame_rate: float | None = None) -> RobotMotion:
-        """Joint angles of human poses, each on its own, with their confidence.
+    def __call__(
+        self,
+        motion: Any,
+        polish: int = POLISH,
+        frame_rate: float | None = None,
+        together: bool | None = None,
+        avoid_collisions: bool = True,
+    ) -> RobotMotion:
+        """Joint angles of human poses, with their confidence.
 
         Args:
             motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
                 axis-angle [rad] (..., 63) or 6D (..., 21, 6). The answer has its leading axes, none for a single pose.
             polish: steps of optimisation after the networks at most; 0: none.
-            frame_rate: frames per second of an array that is one motion (the last leading axis is the time): confidence
-                then knows how much it shakes. A `Motion` has its own.
+            frame_rate: frames per second of an array of motions (the last leading axis is the time): confidence then
+                knows how much they shake. A `Motion` has its own.
+            together: all frames of a motion become one smooth motion, in which no joint turns faster than it can
+                (`mrhubo.retargeter.clip`), and not each frame on its own; None: where the frame rate is known.
+            avoid_collisions: frames in which the robot would touch itself give way, if there are steps at all.
 
         Raises:
             UserError: the array has another shape, or holds what is no rotation (says in which frame); `polish` is
-                negative, or the frame rate not positive.
+                negative, or the frame rate not positive, or missing and needed.
         """
         _check(polish)
         poses, target_TD3 = self._read(motion, frame_rate)
+        rate = poses.frame_rate
+        if together and rate is None:
+            raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
         q_TN = self.engine.network(poses.local_TJ33, target_TD3)
-        shake_TX = self._shake(target_TD3, poses.shape, poses.frame_rate)
-        found = self.engine.answer(q_TN, target_TD3, polish, shake_TX)
-        return self.told(found, poses.shape, poses.frame_rate, poses.name)
+        avoid = bool(polish) and avoid_collisions
+        if rate is not None and together is not False:
+            q_TN = self.engine.polish(q_TN, target_TD3, polish, False)
+            q_TN, polish = self._join(q_TN, target_TD3, poses.shape, rate, avoid), 0
+        found = self.engine.answer(q_TN, target_TD3, polish, avoid, self._shake(target_TD3, poses.shape, rate))
+        return self.told(found, poses.shape, rate, poses.name, poses.source)
 
-    def predict(self, motion: Any, polish: int = 0) -> np.ndarray:
+    def predict(self, motion: Any, polish: int = 0, avoid_collisions: bool = True) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
         _check(polish)
         poses, target_TD3 = self._read(motion)
-        q_TN = self.engine.polish(self.engine.network(poses.local_TJ33, target_TD3), target_TD3, polish)
+        network_TN = self.engine.network(poses.local_TJ33, target_TD3)
+        q_TN = self.engine.polish(network_TN, target_TD3, polish, avoid_collisions)
         return q_TN.reshape(*poses.shape, q_TN.shape[1])
 
-    def imitate(self, directions: Any, polish: int = POLISH) -> RobotMotion:
+    def imitate(self, directions: Any, polish: int = POLISH, avoid_collisions: bool = True) -> RobotMotion:
         """The answer to directions (..., D, 3) in place of poses: unit vectors in human axes (x left, y up, z forward)
         of the part that each is seen from, in the order of `description.settings.direction_names`; the length of a bend
         axis is how much it counts, 0 to 1.
@@ -131,7 +150,7 @@ class FastRetargeter:
         target_TD3 = np.ascontiguousarray(target_XD3.reshape(math.prod(shape), *target_XD3.shape[-2:]))
         nobody_TJ33 = np.zeros((len(target_TD3), 21, 3, 3), np.float32)
         q_TN = self.engine.network(nobody_TJ33, target_TD3)
-        return self.told(self.engine.answer(q_TN, target_TD3, polish, None), shape, None, "")
+        return self.told(self.engine.answer(q_TN, target_TD3, polish, avoid_collisions, None), shape, None)
 
     def directions(self, motion: Any) -> np.ndarray:
         """Directions (..., D, 3) of human poses, as `imitate` takes them."""
@@ -144,17 +163,29 @@ class FastRetargeter:
         refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
         return poses, self.engine.directions(poses.local_TJ33)
 
+    def _join(
+        self, q_TN: np.ndarray, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float, avoid: bool
+    ) -> np.ndarray:
+        """Answers (T, N) [rad] of motions, each made smooth, float32."""
+        joined_TN, ways = q_TN.copy(), (self.engine.problem, self.engine.giving_way if avoid else None)
+        for rows in _clips(len(q_TN), shape):
+            own_TN = q_TN[rows].astype(np.float64)
+            joined_TN[rows] = join_frames(self.description, *ways, own_TN, target_TD3[rows], frame_rate)
+        return joined_TN
+
     def _shake(self, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float | None) -> np.ndarray | None:
         """How much each branch shakes (T, X) [degrees]; None where no frame rate is known."""
         if frame_rate is None:
             return None
-        length, constants = shape[-1] if shape else 1, self.description.settings.constants
-        clips = target_TD3.reshape(-1, length, *target_TD3.shape[1:]) if len(target_TD3) else target_TD3[None]
-        shake_TD = np.concatenate([judging.shake(clip, frame_rate, constants) for clip in clips])
+        shake_TD, constants = np.zeros(target_TD3.shape[:2]), self.description.settings.constants
+        for rows in _clips(len(target_TD3), shape):
+            shake_TD[rows] = judging.shake(target_TD3[rows], frame_rate, constants)
         return np.degrees(judging.of_branches(shake_TD, self.description.trust.column_XD))
 
-    def told(self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str) -> RobotMotion:
-        """A form's answers, with the leading axes of the poses and what is known of the retargeter."""
+    def told(
+        self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str = "", source: str = ""
+    ) -> RobotMotion:
+        """A form's answers, with the leading axes of the poses and what is known of motion and retargeter."""
         trust_TX = found.trust_BX
         confidence_T = trust_TX.min(axis=1) if trust_TX.shape[1] else np.zeros_like(found.phi_B)
         return RobotMotion.trusted(
@@ -166,8 +197,15 @@ class FastRetargeter:
             collision=found.collision_B.reshape(shape),
             frame_rate=frame_rate,
             name=name,
+            source=source,
             **self._made,
         )
+
+
+def _clips(frames: int, shape: tuple[int, ...]) -> list[slice]:
+    """Which of some frames are one motion: those of the last leading axis."""
+    length = max(1, shape[-1] if shape else 1)
+    return [slice(first, first + length) for first in range(0, frames, length)]
 
 
 def _check(polish: int) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, one_euro, room
-from mrhubo.fast.poses import check_frame_rate, read_poses, refuse
+from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.fast.stream_settings import StreamSettings
@@ -63,7 +63,8 @@ class FastStream:
         stand_N = np.clip(0.0, cost.lower_N, cost.upper_N).astype(np.float32) if q is None else self._standing(q)
         self._filtered: Filtered | None = None
         """None: nobody has been seen."""
-        self._followed = Followed(stand_N.astype(np.float64), np.zeros(len(cost.cell_CU)))
+        stand_at_N = stand_N.astype(np.float64)
+        self._followed = Followed(stand_at_N, np.zeros(len(cost.cell_CU)), stand_at_N)
         self._joints = Joints(stand_N, np.zeros(len(stand_N)))
         self._unseen, self._placed = math.inf, q is not None
         self._seen_1J33 = _REST_J33[None].copy()
@@ -84,10 +85,10 @@ class FastStream:
                 last one. The stream is as it was.
         """
         seen, target_1D3 = self._advance(pose, time)
-        found = self._engine.answer(self._joints.q_N[None], target_1D3, 0, None)
+        found = self._engine.answer(self._joints.q_N[None], target_1D3, 0, False, None)
         if not seen:
             found.trust_BX[:] = 0.0
-        return self.retargeter.told(found, (), None, "")
+        return self.retargeter.told(found, (), None)
 
     def joints(self, pose: Any, time: float | None = None) -> np.ndarray:
         """The joint angles (N,) [rad] of `__call__` alone, in less time."""
@@ -115,20 +116,25 @@ class FastStream:
                 velocity_N = self._follow(self._filtered, local_1J33, target_D3)
             self._unseen = 0.0
         step = min(passed, self._longest_step)
-        self._joints = self._limits.follow(self._joints, self._followed.kept_N, velocity_N, step)
+        self._joints = self._limits.follow(self._joints, self._followed.goal_N, velocity_N, step)
         self._placed = True
 
     def _begin(self, local_1J33: np.ndarray, target_D3: np.ndarray) -> None:
         """Takes up the whole answer to a person who is seen for the first time."""
         self._filtered = Filtered(target_D3, np.zeros_like(target_D3), target_D3)
         network_1N = self._engine.network(local_1J33, target_D3[None])
-        first_N = self._engine.polish(network_1N, target_D3[None], POLISH)[0]
-        self._followed = Followed(first_N.astype(np.float64), np.zeros_like(self._followed.worse_C))
+        first_N = self._engine.polish(network_1N, target_D3[None], POLISH, False)[0].astype(np.float64)
+        goal_N = self._free(first_N, target_D3)
+        self._followed = Followed(first_N, np.zeros_like(self._followed.worse_C), goal_N)
         if not self._placed:
-            self._joints = Joints(first_N, np.zeros(len(first_N)))
+            self._joints = Joints(goal_N.astype(np.float32), np.zeros(len(first_N)))
+
+    def _free(self, q_N: np.ndarray, target_D3: np.ndarray) -> np.ndarray:
+        """Joint angles (N,) [rad] after steps away from self-collision, if the settings ask for them."""
+        return self._engine.avoid(q_N[None], target_D3[None])[0] if self.settings.avoid_collisions else q_N
 
     def _follow(self, last: Filtered, local_1J33: np.ndarray, target_D3: np.ndarray) -> np.ndarray:
-        """Follows both answers; how fast the kept one moves (N,) [rad/s]."""
+        """Follows both answers; how fast the goal moves (N,) [rad/s]: 0 where another answer is taken up."""
         cost, settings, since = self._cost, self.settings, min(self._unseen, self._longest_step)
         self._filtered = one_euro(last, target_D3, self._unseen, cost.partial_D, settings)
         aim_D3 = self._filtered.filtered_D3
@@ -136,15 +142,17 @@ class FastStream:
         start_2N = np.concatenate((self._followed.kept_N[None], network_1N))
         limits = room(cost, settings, self._followed.kept_N, since)
         both_2N, cost_2C = self._engine.follow(start_2N, np.stack((aim_D3, aim_D3)), *limits)
-        self._followed, velocity_N = cross_over(cost, settings, self._followed, both_2N, cost_2C, aim_D3, since)
-        return velocity_N
+        kept_N, worse_C, left_N = cross_over(cost, settings, self._followed, both_2N, cost_2C, aim_D3, since)
+        goal_N, last_N = self._free(kept_N, aim_D3), self._followed.goal_N
+        self._followed = Followed(kept_N, worse_C, goal_N)
+        return np.where(left_N, 0.0, (goal_N - last_N) / since)
 
     def _read(self, pose: Any) -> tuple[np.ndarray, bool]:
         """A pose (1, 21, 3, 3), the last one where nobody is seen, and whether somebody is."""
         if pose is None:
             return self._seen_1J33, False
         own_rest = self.retargeter.description.settings.own_rest
-        if hasattr(pose, "local_TJ33"):
+        if is_motion(pose):
             poses = read_poses(pose, None, own_rest)
             raise UserError(
                 f"stream: expected a pose, found a motion of {poses.shape[0]} frames; give its frames one by one"

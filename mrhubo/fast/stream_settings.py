@@ -34,13 +34,20 @@ class StreamSettings:
     ramp_time: float = 0.02
     """Time [s] from rest to a joint's full speed, which limits its acceleration; 0: no such limit. URDFs give none;
     a robot's maker may. Who starts or turns suddenly is followed half of this time later, at least."""
+    avoid_collisions: bool = True
+    """Whether answers in which the robot would touch itself give way (`mrhubo.reference.avoidance`), before the limits
+    of speed and acceleration."""
     longest_gap: float = 0.1
     """No more time [s] than this, or than one and a half frames, counts as passed since the last answer when joints
     move: after a gap the robot goes on from where it stands, and does not leap to where it would be by now. More than
     0."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.avoid_collisions, bool):
+            raise UserError(f"stream settings: avoid_collisions must be True or False, found {self.avoid_collisions}")
         for field in fields(self):
+            if field.name == "avoid_collisions":
+                continue
             value, positive = getattr(self, field.name), field.name in ("half_speed", "longest_gap")
             number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
             if not number or value < 0 or (positive and value == 0):

@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.files.records import RecordedObject, Stream
 from mrhubo.files.regular import open_regular
 from mrhubo.files.safe_pickle import number_type, shape_of
-from mrhubo.files.unpickler import RecordedObject, Stream
 
 _INLINE = "joblib.numpy_pickle.NumpyArrayWrapper"
 _LARGE = 2**20

@@ -17,13 +17,14 @@ import numpy as np
 
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.array_pickle import MODULES, load_pickle, steps_of
+from mrhubo.files.checkpoint import SAVE_ANEW, is_old_torch, read_torch, to_tensor
 from mrhubo.files.joblib_stream import Later
 from mrhubo.files.npz import open_npz, read_member
 from mrhubo.files.packed import is_packed, open_unpacked
+from mrhubo.files.records import RecordedObject, UnreadablePickle
 from mrhubo.files.regular import MAX_BYTES as MAX_FILE
 from mrhubo.files.regular import check_regular, naming, open_regular
-from mrhubo.files.safe_pickle import MAX_BYTES, SAVE_ANEW, is_old_torch, read_torch, to_array, to_number, to_tensor
-from mrhubo.files.unpickler import RecordedObject, UnreadablePickle
+from mrhubo.files.safe_pickle import MAX_BYTES, to_array, to_number
 
 _MAX_MADE = 2**26
 """Numbers that lists of arrays are put together to, in one file."""

@@ -1,6 +1,7 @@
 """A fit from its config to the package: its steps, one after the other.
 
 prepare        everything that a user can get wrong is checked            preparation
+look           the reference's answer to one motion shows the mapping      first_look
 references     the reference retargeter answers the motions that measure   references
 train          the scale factor if it is to be searched for, the pairs,
 the networks: Lightning's trainer with its hooks            training, datamodule, module
@@ -20,12 +21,14 @@ from mrhubo.callbacks import ScaleFactorSearch
 from mrhubo.config import Config
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip
+from mrhubo.fitting.first_look import look_first
 from mrhubo.fitting.measurement import measure, refuse_useless
 from mrhubo.fitting.preparation import Prepared, make_places, prepare
 from mrhubo.fitting.record import (
     Recording,
     dashboard_command,
     log_answers,
+    log_look,
     log_measures,
     log_pairs,
     log_scale,
@@ -79,7 +82,9 @@ def fit(config: Config, report: Reporter = SILENT, parent: str | None = None) ->
 def _run_steps(
     prepared: Prepared, report: Reporter, workspace: Workspace, ranks: Ranks, parent: str | None
 ) -> FitResult:
+    look = look_first(prepared, report)
     with Recording.start(prepared, workspace, parent) as recording:
+        log_look(recording, look)
         validation, test = make_references(prepared, report)
         ranks.wait()
         training = train(

@@ -26,6 +26,7 @@ from mrhubo.evaluation import (
     run_metrics,
     table,
 )
+from mrhubo.fitting.first_look import unknown_collisions
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.references import make_references
 from mrhubo.motion import Motion
@@ -33,7 +34,7 @@ from mrhubo.reference import at_limit_share
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.robot import Robot
 from mrhubo.runtime.progress import Reporter
-from mrhubo.streaming import Stream
+from mrhubo.streaming import Stream, StreamSettings
 
 _STILL_RAD, _MOVING_RAD = 1e-5, 0.1
 """Range of the joints' angles over all test clips that counts as none, and as one that should be there."""
@@ -56,12 +57,18 @@ class Way:
 
 
 _FRAMES, _REFERENCE = "frame by frame", "reference"
+_ASKED = StreamSettings(avoid_collisions=False)
 _WAYS: Mapping[str, Way] = {
     "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
-    _FRAMES: Way("retarget", lambda r, motions: [r.predict(m.local_TJ33, POLISH) for m in motions]),
-    "whole clips": Way("clip", lambda r, motions: [r.predict(m.local_TJ33, POLISH, m.frame_rate) for m in motions]),
-    "stream": Way("stream", lambda r, motions: [result.q for result in Stream(r).retarget_all(motions)]),
+    _FRAMES: Way("retarget", lambda r, motions: [_polished(r, m, None) for m in motions]),
+    "whole clips": Way("clip", lambda r, motions: [_polished(r, m, m.frame_rate) for m in motions]),
+    "stream": Way("stream", lambda r, motions: [found.q for found in Stream(r, settings=_ASKED).retarget_all(motions)]),
 }
+"""None avoids self-collision, as the reference, which they are measured against, does not."""
+
+
+def _polished(retargeter: Retargeter, motion: Motion, frame_rate: float | None) -> Tensor:
+    return retargeter.predict(motion.local_TJ33, POLISH, frame_rate, avoid_collisions=False)
 
 
 @dataclass(frozen=True)
@@ -194,15 +201,14 @@ def measure_package(
         )
     clips = make_references(prepared, report)[0 if validation else 1]
     if polish is not None:
-        predict = functools.partial(retargeter.predict, polish=polish)
+        predict = functools.partial(retargeter.predict, polish=polish, avoid_collisions=False)
         with report.step("evaluation", len(clips), "clips"):
             found = _score(prepared, [predict(clip.motion.local_TJ33) for clip in clips], clips)
         lines, latency = [table(found)], latencies(predict, clips)
     else:
         measured = measure(prepared, report, retargeter, clips)
         lines, latency = [measured.table], measured.networks_latency
-    if links := body_map.collision.uncovered:
-        lines.append(f"collision: {len(links)} links have meshes for collision, which are not read: {', '.join(links)}")
+    lines += unknown_collisions(body_map)
     one, many = latency.values()
     lines.append(f"latency, one thread: {one:.0f} us for one frame, {many:.1f} us a frame for 1,000 at once")
     return "\n".join([lines[0], "", *lines[1:]])

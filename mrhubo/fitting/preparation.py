@@ -12,6 +12,7 @@ from mrhubo.errors import UserError
 from mrhubo.evaluation import Motions, load_motions
 from mrhubo.pairing import PairSetup, pose_settings
 from mrhubo.retargeter import build_network
+from mrhubo.robot.unsure import check_unsure
 from mrhubo.runtime.folders import make_folders
 from mrhubo.runtime.locations import default_tracking
 from mrhubo.runtime.names import check_name
@@ -54,6 +55,7 @@ def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
         UserError: anything in the config, the URDF or the prior is wrong.
     """
     check_name("robot.name", config.robot.name)
+    check_unsure(config.robot)
     if config.robot.scale == "search" and not search:
         raise UserError(
             "robot.scale: 'search' is done by mrhubo.fit alone, in one process; take what it found, config.yaml in its "
@@ -73,9 +75,10 @@ def prepare(config: Config, search: bool = False) -> Prepared:
         UserError: anything in the config, the URDF, the prior or the motions is wrong.
     """
     setup = prepare_pairs(config, search)
-    build_network(config, setup.body_map)
-    motions = load_motions(config, setup.body_map.skeleton)
-    return Prepared(config, setup.body_map, setup.prior, setup.store, motions, tracking_dir(config))
+    config, body_map = setup.config, setup.body_map
+    build_network(config, body_map)
+    motions = load_motions(config, body_map.skeleton)
+    return Prepared(config, body_map, setup.prior, setup.store, motions, tracking_dir(config))
 
 
 def make_places(setup: PairSetup, *more: Path) -> None:

@@ -1,14 +1,24 @@
-"""Human motion: what it is in memory, how it is read and written."""
+"""Human motion: what it is in memory, how it is read and written.
+
+What works with PyTorch is imported when it is first asked for: reading a motion needs none.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from mrhubo.motion.editing import mirror, trim
 from mrhubo.motion.load import find_motions, motion_files, read_folder, read_motion
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.resample import resample
-from mrhubo.motion.resharing import reshare
 from mrhubo.motion.writers.amass import write_motion
+
+if TYPE_CHECKING:
+    from mrhubo.motion.poses import NOT_FINITE, MotionLike, Poses, read_poses, refuse_frames, to_tensor
+    from mrhubo.motion.resharing import reshare
 
 __all__ = [
     "NOT_FINITE",
@@ -30,3 +40,20 @@ __all__ = [
     "trim",
     "write_motion",
 ]
+_HOMES = {
+    "NOT_FINITE": "poses",
+    "MotionLike": "poses",
+    "Poses": "poses",
+    "read_poses": "poses",
+    "refuse_frames": "poses",
+    "reshare": "resharing",
+    "to_tensor": "poses",
+}
+"""Module of each name that needs PyTorch."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mrhubo.motion' has no attribute '{name}'")
+    globals()[name] = value = getattr(importlib.import_module(f"mrhubo.motion.{_HOMES[name]}"), name)
+    return value

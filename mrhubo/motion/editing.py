@@ -5,16 +5,14 @@ Legend: T frames, J = 21: SMPL's joints 1..21.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
-import torch
+import numpy as np
 
-from mrhubo.body.skeleton import mirror_joints, mirror_rotations
+from mrhubo.body.joints import MIRROR
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 
-_PER_FRAME = ("local_TJ33", "root_rotation_T33", "root_position_T3", "confidence_TJ")
 _SLACK = 1e-6
 """Of a frame: times that were rounded still name the frame that they are of."""
 
@@ -34,9 +32,8 @@ def trim(motion: Motion, start: float = 0.0, end: float | None = None) -> Motion
         length = max(0, len(motion) - 1) / motion.frame_rate
         span = f"from {start:g} s" + ("" if end is None else f" to {end:g} s")
         raise UserError(f"{motion.name}: has no frame {span}; it lasts from 0 to {length:.3f} s")
-    arrays = {name: getattr(motion, name) for name in _PER_FRAME}
-    cut = {name: array[first : last + 1] for name, array in arrays.items() if array is not None}
-    return dataclasses.replace(motion, **cut)
+    arrays = vars(motion.arrays)
+    return motion.changed(**{name: array[first : last + 1] for name, array in arrays.items() if array is not None})
 
 
 def check_span(start: float, end: float | None) -> None:
@@ -48,14 +45,14 @@ def check_span(start: float, end: float | None) -> None:
 
 def mirror(motion: Motion) -> Motion:
     """The motion as a mirror shows it: what the left arm did, the right one does; `NAME_mirrored`."""
-    root, place, trust = motion.root_rotation_T33, motion.root_position_T3, motion.confidence_TJ
-    sign = torch.tensor([-1.0, 1.0, 1.0])
-    return dataclasses.replace(
-        motion,
+    arrays = motion.arrays
+    root, place, trust = arrays.root_rotation_T33, arrays.root_position_T3, arrays.confidence_TJ
+    sign = np.array([-1.0, 1.0, 1.0], np.float32)
+    return motion.changed(
         name=f"{motion.name}_mirrored",
-        local_TJ33=mirror_rotations(motion.local_TJ33),
+        local_TJ33=arrays.local_TJ33[:, MIRROR] * sign[:, None] * sign,
         root_rotation_T33=None if root is None else root * sign[:, None] * sign,
         root_position_T3=None if place is None else place * sign,
-        confidence_TJ=None if trust is None else mirror_joints(trust),
+        confidence_TJ=None if trust is None else trust[:, MIRROR],
         notes=(*motion.notes, "left and right are exchanged, as asked"),
     )

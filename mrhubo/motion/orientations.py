@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import torch
-from torch import Tensor
-from torch.nn.functional import normalize
+import numpy as np
 
-from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, SIDES, Skeleton
+from mrhubo.body.joints import JOINT_NAMES, KEYPOINT_NAMES, REST_K3, SIDES
+from mrhubo.fast.plain.human import cross, norm, normalize
 
 _HEAD_POINTS = {
     "nose": (0.0, 0.035, 0.115),
@@ -101,13 +100,13 @@ TRIADS: dict[str, tuple[Triad, ...]] = _table()
 """By the joint that carries the part."""
 
 
-def rest_points() -> dict[str, Tensor]:
+def rest_points() -> dict[str, np.ndarray]:
     """Points (1, 3) [m] of our skeleton at rest, float64, and those of the head that it has not; the pelvis at 0."""
-    rest = dict(zip(KEYPOINT_NAMES, Skeleton().rest_K3.double()[:, None], strict=True))
-    return rest | {name: rest["head"] + torch.tensor([place]).double() for name, place in _HEAD_POINTS.items()}
+    rest = dict(zip(KEYPOINT_NAMES, REST_K3.astype(np.float64)[:, None], strict=True))
+    return rest | {name: rest["head"] + np.array([place]) for name, place in _HEAD_POINTS.items()}
 
 
-def turn_of(joint: str, points: Mapping[str, Tensor]) -> Tensor | None:
+def turn_of(joint: str, points: Mapping[str, np.ndarray]) -> np.ndarray | None:
     """Rotations (T, 3, 3) in the world of the part that a joint carries, relative to our rest pose; NaN in frames where
     points are missing or lie on one line; None where no triad's points are there at all.
 
@@ -119,35 +118,35 @@ def turn_of(joint: str, points: Mapping[str, Tensor]) -> Tensor | None:
         if not triad.names <= points.keys():
             continue
         frame_T33 = _frame(triad, points)
-        if bool(torch.isfinite(frame_T33).any()):
+        if np.isfinite(frame_T33).any():
             return frame_T33 @ _frame(triad, rest_points())[0].T
     return None
 
 
-def known_frames(value_TX: Tensor) -> Tensor:
+def known_frames(value_TX: np.ndarray) -> np.ndarray:
     """In which frames (T,) all numbers of a value (T, ...) are known, and not NaN."""
-    return torch.isfinite(value_TX).flatten(1).all(-1)
+    return np.asarray(np.isfinite(value_TX).all(axis=tuple(range(1, value_TX.ndim))))
 
 
-def frame_of(first_T3: Tensor, second_T3: Tensor) -> Tensor:
+def frame_of(first_T3: np.ndarray, second_T3: np.ndarray) -> np.ndarray:
     """Columns (T, 3, 3): a unit vector along the first, the second's part across it, and their cross product; NaN where
     they are short or nearly parallel.
     """
-    x_T3 = normalize(first_T3, dim=-1)
-    across_T3 = second_T3 - x_T3 * (x_T3 * second_T3).sum(-1, keepdim=True)
-    wrong_T = (across_T3.norm(dim=-1) < _PARALLEL * second_T3.norm(dim=-1)) | (first_T3.norm(dim=-1) < _SHORTEST)
-    wrong_T |= second_T3.norm(dim=-1) < _SHORTEST
-    y_T3 = normalize(across_T3, dim=-1)
-    frame_T33 = torch.stack((x_T3, y_T3, torch.linalg.cross(x_T3, y_T3)), dim=-1)
-    return torch.where(wrong_T[:, None, None], torch.nan, frame_T33)
+    x_T3 = normalize(first_T3)
+    across_T3 = second_T3 - x_T3 * (x_T3 * second_T3).sum(-1, keepdims=True)
+    second_T = norm(second_T3)
+    wrong_T = (norm(across_T3) < _PARALLEL * second_T) | (norm(first_T3) < _SHORTEST) | (second_T < _SHORTEST)
+    y_T3 = normalize(across_T3)
+    frame_T33 = np.stack((x_T3, y_T3, cross(x_T3, y_T3)), axis=-1)
+    return np.where(wrong_T[:, None, None], np.nan, frame_T33)
 
 
-def _frame(triad: Triad, points: Mapping[str, Tensor]) -> Tensor:
+def _frame(triad: Triad, points: Mapping[str, np.ndarray]) -> np.ndarray:
     return frame_of(*(_place(end, points) - _place(start, points) for start, end in (triad.first, triad.second)))
 
 
-def _place(place: Place, points: Mapping[str, Tensor]) -> Tensor:
-    return torch.stack([points[name] for name in place]).mean(dim=0)
+def _place(place: Place, points: Mapping[str, np.ndarray]) -> np.ndarray:
+    return np.stack([points[name] for name in place]).mean(axis=0)
 
 
 assert TRIADS.keys() <= set(JOINT_NAMES)

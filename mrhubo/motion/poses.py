@@ -17,20 +17,13 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton
 from mrhubo.errors import UserError
+from mrhubo.motion.checks import MAX_TURN, Turns, check_frame_rate
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
 
 MotionLike: TypeAlias = Motion | Tensor | np.ndarray | Sequence[Any]
 """A motion, or local rotations of SMPL's joints 1..21 as an array or nested lists: matrices (..., 21, 3, 3), axis-angle
 [rad] (..., 63), as AMASS's `pose_body` has it, or 6D (..., 21, 6); any leading axes, none for a single pose."""
-MAX_TURN = 6 * math.pi
-"""No joint of a body turns three times [rad]; numbers in degrees say so."""
-_BEYOND_HALF, _BEYOND_FULL = 3.5, 6.6
-"""Turns [rad] beyond half a turn and beyond a whole one. Half of one tells all rotations; sources that follow a joint
-from frame to frame give more now and then, of some joint."""
-_SHARE_BEYOND_HALF, _SHARE_BEYOND_FULL = 0.15, 0.03
-"""Of all joints and frames. In degrees, CMU's clips exceed one of them even where they are scaled down until no joint
-turns more than 10; in radians none of their joints turns more than half a turn."""
 _MANY = 50
 """Frames of an array from which on such shares say something."""
 _CHUNK = 16_384
@@ -53,36 +46,6 @@ class Poses:
     """The leading axes as they were given, T numbers in all: `()` for a single pose."""
     frame_rate: float | None
     """Frames per second, where it is known."""
-
-
-@dataclass
-class Turns:
-    """How far the joints of a motion turn, counted block by block: tells degrees from radians."""
-
-    joints: int = 0
-    beyond_half: int = 0
-    beyond_full: int = 0
-    largest: float = 0.0
-
-    def add(self, turn_TJ: Tensor) -> None:
-        """Counts some frames' angles (T, J) [rad]."""
-        if turn_TJ.numel():
-            self.joints += turn_TJ.numel()
-            self.beyond_half += int((turn_TJ > _BEYOND_HALF).sum())
-            self.beyond_full += int((turn_TJ > _BEYOND_FULL).sum())
-            self.largest = max(self.largest, float(turn_TJ.max()))
-
-    @property
-    def are_degrees(self) -> bool:
-        """Whether so many joints turn so far as do in no motion of a person."""
-        half, full = _SHARE_BEYOND_HALF * self.joints, _SHARE_BEYOND_FULL * self.joints
-        return self.beyond_half > half or self.beyond_full > full
-
-    @property
-    def described(self) -> str:
-        """In words, for a sentence."""
-        share = 100 * self.beyond_half / self.joints
-        return f"{share:.0f}% of the joints would turn by more than half a turn, up to {self.largest:.3g} rad"
 
 
 def read_poses(motion: MotionLike, frame_rate: float | None = None, skeleton: Skeleton | None = None) -> Poses:
@@ -120,13 +83,6 @@ def read_poses(motion: MotionLike, frame_rate: float | None = None, skeleton: Sk
     if turns.are_degrees and len(array) >= _MANY:
         raise UserError(f"human poses are no axis-angle in radians (degrees?): {turns.described}")
     return Poses(torch.cat(poses) if poses else array.float(), leading, frame_rate)
-
-
-def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
-    """Refuses what is no positive number of frames per second; None is one that is not known, unless it is needed."""
-    known = needed or frame_rate is not None
-    if known and not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
-        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
 
 
 def to_tensor(array: MotionLike, skeleton: Skeleton | None = None) -> Tensor:
@@ -192,7 +148,7 @@ def _read_axis_angle(numbers: Tensor, turns: Turns) -> tuple[Tensor, Tensor]:
     """Those that turn further than any joint of a body are wrong."""
     rotvec = numbers.unflatten(-1, (_JOINTS, 3))
     turn_TJ = rotvec.norm(dim=-1)
-    turns.add(turn_TJ)
+    turns.add(turn_TJ.cpu().numpy())
     return turn_TJ > MAX_TURN, axis_angle_to_matrix(rotvec)
 
 

@@ -19,18 +19,21 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import torch
-from torch import Tensor
-from torch.nn.functional import normalize
+import numpy as np
 
-from mrhubo.body.anatomy import hinge_axis
-from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton, local_rotations
+from mrhubo.body.joints import JOINT_NAMES, POSED_JOINT_NAMES, REST_K3, SIDES, hinge_axis, local_rotations
 from mrhubo.errors import UserError
+from mrhubo.fast.plain.human import BEND_DEG, bend_axis, cross, norm, normalize
+from mrhubo.fast.rotations import (
+    axis_angle_to_matrix,
+    matrix_to_axis_angle,
+    orthonormal,
+    shortest_turn,
+    turned,
+)
 from mrhubo.motion.gaps import Neighbours, fill_directions, fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.orientations import frame_of, known_frames, turn_of
-from mrhubo.robot.bending import bend_axis
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle, orthonormal, shortest_turn
 
 BENT = math.radians(12.0)
 """From which bend on the plane of two limbs tells the axis of the joint between them, whatever the upper limb's own
@@ -62,16 +65,16 @@ _LIMBS = (
 class BodyPoints:
     """What a source tells of a body, in a world whose y axis is up."""
 
-    points: Mapping[str, Tensor]
+    points: Mapping[str, np.ndarray]
     """Points (T, 3) [m] by the names of human keypoints, also `nose`, `left_ear`, `right_ear`, `head_top`; NaN where
     they are not known. Shoulders and hips are needed."""
-    turns: Mapping[str, Tensor] = field(default_factory=dict)
+    turns: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Rotations (T, 3, 3) in the world of pelvis, spine3 (the chest), head, wrists (the hands) or ankles (the feet),
     relative to our rest pose, where the source has them; else points tell."""
-    hinges: Mapping[str, Tensor] = field(default_factory=dict)
+    hinges: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Where shoulders and hips have the axes (T, 3) of elbow and knee by their bones' own turn, in the world, in the
     sense of `mrhubo.body.anatomy.hinge_axis`."""
-    confidence: Mapping[str, Tensor] = field(default_factory=dict)
+    confidence: Mapping[str, np.ndarray] = field(default_factory=dict)
     """How sure the source is of points (T,), 0..1."""
 
 
@@ -80,30 +83,29 @@ class _Build:
 
     def __init__(self, body: BodyPoints) -> None:
         self.body, self.notes = body, []
-        self.points = {name: point_T3.double() for name, point_T3 in body.points.items()}
+        self.points = {name: point_T3.astype(np.float64) for name, point_T3 in body.points.items()}
         self.frames = len(next(iter(self.points.values())))
-        self.world: dict[str, Tensor] = {}
-        self.sure: dict[str, Tensor] = {}
-        rest_K3 = Skeleton().rest_K3.double()
-        self.rest = dict(zip(JOINT_NAMES, rest_K3, strict=False))
+        self.world: dict[str, np.ndarray] = {}
+        self.sure: dict[str, np.ndarray] = {}
+        self.rest = dict(zip(JOINT_NAMES, REST_K3.astype(np.float64), strict=False))
 
-    def known(self, *names: str) -> Tensor:
+    def known(self, *names: str) -> np.ndarray:
         """In which frames (T,) all of these points are known."""
         missing = [name for name in names if name not in self.points]
         if missing:
-            return torch.zeros(self.frames, dtype=torch.bool)
-        return torch.stack([known_frames(self.points[name]) for name in names]).all(0)
+            return np.zeros(self.frames, bool)
+        return np.asarray(np.stack([known_frames(self.points[name]) for name in names]).all(0))
 
-    def surety(self, known_T: Tensor, *names: str) -> Tensor:
+    def surety(self, known_T: np.ndarray, *names: str) -> np.ndarray:
         """How sure (T,) something is that hangs on these points: as the least sure of them; 0 where it is not known."""
         told = [self.body.confidence[name] for name in names if name in self.body.confidence]
-        least_T = torch.stack([sure_T.double() for sure_T in told]).amin(0) if told else torch.ones(self.frames)
-        return torch.where(known_T, least_T.double(), 0.0)
+        least_T = np.stack(told).astype(np.float64).min(0) if told else np.ones(self.frames)
+        return np.where(known_T, least_T, 0.0)
 
-    def turn(self, joint: str) -> Tensor | None:
+    def turn(self, joint: str) -> np.ndarray | None:
         """Rotations (T, 3, 3) of a part, by the source or by its points, NaN where neither tells."""
         given = self.body.turns.get(joint)
-        return turn_of(joint, self.points) if given is None else given.double()
+        return turn_of(joint, self.points) if given is None else given.astype(np.float64)
 
 
 def motion_from_points(
@@ -129,30 +131,31 @@ def motion_from_points(
             _limb(build, limb, side)
     _head(build)
     world = build.world
-    local_TJ33 = local_rotations(torch.stack([world[joint] for joint in JOINT_NAMES], dim=1))
-    sure_TJ = torch.stack([build.sure.get(joint, build.sure["spine3"]) for joint in POSED_JOINT_NAMES], dim=1)
+    local_TJ33 = local_rotations(np.stack([world[joint] for joint in JOINT_NAMES], axis=1))
+    sure_TJ = np.stack([build.sure.get(joint, build.sure["spine3"]) for joint in POSED_JOINT_NAMES], axis=1)
     pelvis_T33 = world["pelvis"]
     position_T3 = None
     if {"left_hip", "right_hip"} <= build.points.keys():
         middle_T3, offset_3 = ((at["left_hip"] + at["right_hip"]) / 2 for at in (build.points, build.rest))
         position_T3 = fill_numbers(middle_T3, known_frames(middle_T3)) - pelvis_T33 @ offset_3
-    return Motion(
+        position_T3 = position_T3.astype(np.float32) if np.isfinite(position_T3).all() else None
+    return Motion.of(
         name=name,
-        local_TJ33=orthonormal(local_TJ33).float(),
+        local_TJ33=orthonormal(local_TJ33).astype(np.float32),
         frame_rate=float(frame_rate),
         description=name,
-        root_rotation_T33=orthonormal(pelvis_T33).float(),
-        root_position_T3=None if position_T3 is None or not bool(position_T3.isfinite().all()) else position_T3.float(),
+        root_rotation_T33=orthonormal(pelvis_T33).astype(np.float32),
+        root_position_T3=position_T3,
         source=source,
         notes=(*notes, *build.notes),
-        confidence_TJ=None if bool((sure_TJ == 1).all()) else sure_TJ.float().clamp(0.0, 1.0),
+        confidence_TJ=None if (sure_TJ == 1).all() else np.clip(sure_TJ.astype(np.float32), 0.0, 1.0),
     )
 
 
 def _trunk(build: _Build, what: str) -> None:
     """Pelvis, spine and collars; a pelvis that nothing tells is turned as the chest."""
     chest_T33, pelvis_T33 = build.turn("spine3"), build.turn("pelvis")
-    if chest_T33 is None or not bool(known_frames(chest_T33).any()):
+    if chest_T33 is None or not known_frames(chest_T33).any():
         raise UserError(
             f"{what}: nothing tells how the chest is turned; both shoulders and both hips must be known in some frame"
         )
@@ -160,7 +163,7 @@ def _trunk(build: _Build, what: str) -> None:
     known_T = known_frames(chest_T33)
     chest_T33 = fill_rotations(chest_T33, known_T)
     build.sure["spine3"] = build.surety(known_T, *(() if "spine3" in build.body.turns else sides))
-    if not bool(known_T.all()):
+    if not known_T.all():
         build.notes.append(f"how the chest is turned is not known in {_count(~known_T)}: filled in, confidence 0")
     pelvis_T33, _ = _filled(chest_T33, chest_T33 if pelvis_T33 is None else pelvis_T33)
     back_T3 = matrix_to_axis_angle(pelvis_T33.mT @ chest_T33)
@@ -178,30 +181,29 @@ def _limb(build: _Build, limb: _Limb, side: str) -> None:
     directions, known = [], []
     for start, end in ((upper, hinge), (hinge, tip)):
         known_T = build.known(start, end)
-        if bool(known_T.any()):
-            seen_T3 = (carrier_T33.mT @ (build.points[end] - build.points[start])[..., None])[..., 0]
-            known_T &= seen_T3.norm(dim=-1) > 1e-6
-        if bool(known_T.any()):
-            directions.append(fill_directions(normalize(torch.nan_to_num(seen_T3), dim=-1), known_T))
+        if known_T.any():
+            seen_T3 = turned(carrier_T33.mT, build.points[end] - build.points[start])
+            known_T &= norm(seen_T3) > 1e-6
+        if known_T.any():
+            directions.append(fill_directions(normalize(np.nan_to_num(seen_T3)), known_T))
         else:  # hangs, or goes on in the line of the upper bone
-            hangs_3 = torch.tensor(limb.hangs, dtype=torch.float64)
-            directions.append(directions[0] if directions else hangs_3.expand(build.frames, 3))
+            directions.append(directions[0] if directions else np.tile(limb.hangs, (build.frames, 1)))
         known.append(known_T)
         build.sure[start] = build.surety(known_T, start, end)
-        if not bool(known_T.all()):
-            what = "is never seen" if not bool(known_T.any()) else f"is not seen in {_count(~known_T)}"
+        if not known_T.all():
+            what = "is never seen" if not known_T.any() else f"is not seen in {_count(~known_T)}"
             build.notes.append(f"{_words(start)} to {_words(end)} {what}: filled in, confidence 0")
     upper_T3, lower_T3 = directions
     own_T3 = build.body.hinges.get(upper)
-    own_T3 = None if own_T3 is None else (carrier_T33.mT @ own_T3.double()[..., None])[..., 0]
-    bone_3 = normalize(build.rest[hinge] - build.rest[upper], dim=0)
-    rest_axis_3 = torch.tensor(hinge_axis(hinge), dtype=torch.float64)
-    usual_T3 = (shortest_turn(bone_3.expand_as(upper_T3), upper_T3) @ rest_axis_3[:, None])[..., 0]
+    own_T3 = None if own_T3 is None else turned(carrier_T33.mT, own_T3.astype(np.float64))
+    bone_3 = normalize(build.rest[hinge] - build.rest[upper])
+    rest_axis_3 = np.array(hinge_axis(hinge))
+    usual_T3 = shortest_turn(np.broadcast_to(bone_3, upper_T3.shape), upper_T3) @ rest_axis_3
     axis_T3 = _hinge(upper_T3, lower_T3, own_T3, usual_T3, known[0] & known[1], limb.one_way)
     at_rest_33 = frame_of(bone_3[None], rest_axis_3[None])[0]
     upper_T33 = frame_of(upper_T3, axis_T3) @ at_rest_33.T
-    lower_bone_3 = normalize(build.rest[tip] - build.rest[hinge], dim=0)
-    lower_T33 = shortest_turn((upper_T33 @ lower_bone_3[:, None])[..., 0], lower_T3) @ upper_T33
+    lower_bone_3 = normalize(build.rest[tip] - build.rest[hinge])
+    lower_T33 = shortest_turn(upper_T33 @ lower_bone_3, lower_T3) @ upper_T33
     build.world[upper], build.world[hinge] = carrier_T33 @ upper_T33, carrier_T33 @ lower_T33
     _tip(build, tip, hinge)
     if limb.carrier == "pelvis":
@@ -224,62 +226,67 @@ def _head(build: _Build) -> None:
     chest_T33, head_T33 = build.world["spine3"], build.turn("head")
     if head_T33 is None:
         head_T33 = chest_T33
-        build.sure["neck"] = build.sure["head"] = torch.zeros(build.frames, dtype=torch.float64)
+        build.sure["neck"] = build.sure["head"] = np.zeros(build.frames)
         build.notes.append("nothing tells how the head is turned: it stays as the chest, confidence 0")
     else:
         head_T33, known_T = _filled(chest_T33, head_T33)
         sure_T = build.surety(known_T, "nose", "left_ear", "right_ear")
         build.sure["neck"] = build.sure["head"] = sure_T
-        if not bool(known_T.all()):
+        if not known_T.all():
             build.notes.append(f"how the head is turned is not known in {_count(~known_T)}: filled in, confidence 0")
     half_T3 = matrix_to_axis_angle(chest_T33.mT @ head_T33) / 2
     build.world["neck"], build.world["head"] = chest_T33 @ axis_angle_to_matrix(half_T3), head_T33
 
 
-def _filled(carrier_T33: Tensor, part_T33: Tensor) -> tuple[Tensor, Tensor]:
+def _filled(carrier_T33: np.ndarray, part_T33: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How a part is turned (T, 3, 3), and in which frames (T,) that is known; where it is NaN, it is filled in as its
     carrier sees it.
     """
     known_T = known_frames(part_T33)
-    return carrier_T33 @ fill_rotations(torch.nan_to_num(carrier_T33.mT @ part_T33), known_T), known_T
+    return carrier_T33 @ fill_rotations(np.nan_to_num(carrier_T33.mT @ part_T33), known_T), known_T
 
 
 def _hinge(
-    upper_T3: Tensor, lower_T3: Tensor, own_T3: Tensor | None, usual_T3: Tensor, known_T: Tensor, one_way: bool
-) -> Tensor:
+    upper_T3: np.ndarray,
+    lower_T3: np.ndarray,
+    own_T3: np.ndarray | None,
+    usual_T3: np.ndarray,
+    known_T: np.ndarray,
+    one_way: bool,
+) -> np.ndarray:
     """The axis (T, 3) of a limb's hinge: by the plane of its bones where it is bent, else by the upper bone's own turn,
     else as when it was bent last.
     """
-    cross_T3 = torch.linalg.cross(upper_T3, lower_T3)
-    bend_T = torch.atan2(cross_T3.norm(dim=-1), (upper_T3 * lower_T3).sum(-1))
-    plane_T3 = normalize(cross_T3, dim=-1)
+    cross_T3 = cross(upper_T3, lower_T3)
+    bend_T = np.arctan2(norm(cross_T3), (upper_T3 * lower_T3).sum(-1))
+    plane_T3 = normalize(cross_T3)
     told_T = known_T & (bend_T > BENT)
     reference_T3 = usual_T3 if own_T3 is None else own_T3
     backward_T = one_way & (bend_T < _BACKWARD) & ((plane_T3 * reference_T3).sum(-1) < 0)
     told_T &= ~backward_T
     if own_T3 is None:
-        own_T3 = _carried(plane_T3, upper_T3, told_T) if bool(told_T.any()) else usual_T3
-    axis_T3 = torch.where(backward_T[:, None], own_T3, bend_axis(upper_T3, lower_T3, own_T3)[0])
-    across_T3 = axis_T3 - upper_T3 * (upper_T3 * axis_T3).sum(-1, keepdim=True)
-    lost_T = across_T3.norm(dim=-1) < 1e-3
-    return torch.where(lost_T[:, None], usual_T3, normalize(across_T3, dim=-1))
+        own_T3 = _carried(plane_T3, upper_T3, told_T) if told_T.any() else usual_T3
+    axis_T3 = np.where(backward_T[:, None], own_T3, bend_axis(upper_T3, lower_T3, own_T3, BEND_DEG)[0])
+    across_T3 = axis_T3 - upper_T3 * (upper_T3 * axis_T3).sum(-1, keepdims=True)
+    lost_T = norm(across_T3) < 1e-3
+    return np.where(lost_T[:, None], usual_T3, normalize(across_T3))
 
 
-def _carried(axis_T3: Tensor, upper_T3: Tensor, told_T: Tensor) -> Tensor:
+def _carried(axis_T3: np.ndarray, upper_T3: np.ndarray, told_T: np.ndarray) -> np.ndarray:
     """Axes (T, 3) at right angles to the upper bones (T, 3), from the last frame that tells one and the next: each is
     carried along by the shortest turn of the bone, and between the two the axis turns evenly about it.
     """
     near = Neighbours.of(told_T)
     before_T3, after_T3 = (
-        (shortest_turn(upper_T3[place_T], upper_T3) @ axis_T3[place_T][..., None])[..., 0]
+        turned(shortest_turn(upper_T3[place_T], upper_T3), axis_T3[place_T])
         for place_T in (near.before_T, near.after_T)
     )
-    sine_T = (upper_T3 * torch.linalg.cross(before_T3, after_T3)).sum(-1)
-    angle_T = torch.atan2(sine_T, (before_T3 * after_T3).sum(-1)) * near.share_T
-    return (axis_angle_to_matrix(upper_T3 * angle_T[:, None]) @ before_T3[..., None])[..., 0]
+    sine_T = (upper_T3 * cross(before_T3, after_T3)).sum(-1)
+    angle_T = np.arctan2(sine_T, (before_T3 * after_T3).sum(-1)) * near.share_T
+    return turned(axis_angle_to_matrix(upper_T3 * angle_T[:, None]), before_T3)
 
 
-def _count(missing_T: Tensor) -> str:
+def _count(missing_T: np.ndarray) -> str:
     return f"{int(missing_T.sum())} of {len(missing_T)} frames"
 
 

@@ -5,16 +5,14 @@ Legend: T frames, S frames of the new rate.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
+from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import check_frame_rate
-from mrhubo.rotation import axis_angle_to_matrix, matrix_to_axis_angle
 
 _MOST_FRAMES = 10_000_000
 
@@ -30,34 +28,35 @@ def resample(motion: Motion, frame_rate: float) -> Motion:
     """
     check_frame_rate(frame_rate, needed=True)
     if frame_rate == motion.frame_rate or not len(motion):
-        return dataclasses.replace(motion, frame_rate=float(frame_rate))
+        return motion.changed(frame_rate=float(frame_rate))
     # a hair more, so that a last frame that both have is not lost to rounding
     count = (len(motion) - 1) * frame_rate / motion.frame_rate * (1 + 1e-12)
     if count > _MOST_FRAMES:
         raise UserError(f"{motion.name}: {frame_rate:g} frames a second would be {count:.3g} frames")
-    place_S = torch.arange(math.floor(count) + 1, dtype=torch.float64) * (motion.frame_rate / frame_rate)
-    before_S = place_S.long().clamp(max=len(motion) - 1)
-    after_S, share_S = (before_S + 1).clamp(max=len(motion) - 1), place_S - before_S
+    place_S = np.arange(math.floor(count) + 1) * (motion.frame_rate / frame_rate)
+    before_S = np.minimum(place_S.astype(np.int64), len(motion) - 1)
+    after_S = np.minimum(before_S + 1, len(motion) - 1)
+    share_S = place_S - before_S
 
-    def line(values_TX: Tensor | None) -> Tensor | None:
+    def line(values_TX: np.ndarray | None) -> np.ndarray | None:
         if values_TX is None:
             return None
-        first, share_S1 = values_TX[before_S], share_S[:, None].to(values_TX)
+        first, share_S1 = values_TX[before_S], share_S[:, None].astype(values_TX.dtype)
         return first + share_S1 * (values_TX[after_S] - first)
 
-    root = motion.root_rotation_T33
-    return dataclasses.replace(
-        motion,
-        local_TJ33=_slerp(motion.local_TJ33, before_S, after_S, share_S),
+    arrays = motion.arrays
+    root = arrays.root_rotation_T33
+    return motion.changed(
+        local_TJ33=_slerp(arrays.local_TJ33, before_S, after_S, share_S),
         frame_rate=float(frame_rate),
         root_rotation_T33=None if root is None else _slerp(root, before_S, after_S, share_S),
-        root_position_T3=line(motion.root_position_T3),
-        confidence_TJ=line(motion.confidence_TJ),
+        root_position_T3=line(arrays.root_position_T3),
+        confidence_TJ=line(arrays.confidence_TJ),
     )
 
 
-def _slerp(rotation_TX33: Tensor, before_S: Tensor, after_S: Tensor, share_S: Tensor) -> Tensor:
+def _slerp(rotation_TX33: np.ndarray, before_S: np.ndarray, after_S: np.ndarray, share_S: np.ndarray) -> np.ndarray:
     first = rotation_TX33[before_S]
     turn = matrix_to_axis_angle(first.mT @ rotation_TX33[after_S])
-    share = share_S.to(turn).reshape(-1, *[1] * (turn.ndim - 1))
-    return torch.where(share[..., None] == 0, first, first @ axis_angle_to_matrix(share * turn))
+    share = share_S.astype(turn.dtype).reshape(-1, *[1] * (turn.ndim - 1))
+    return np.where(share[..., None] == 0, first, first @ axis_angle_to_matrix(share * turn))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mrhubo.body import BodyPrior, build_skeleton, open_prior
@@ -21,11 +23,22 @@ class PairSetup:
 
     @classmethod
     def open(cls, config: Config) -> PairSetup:
-        """Opens the files that the config names.
+        """Opens the files that the config names. In its own config are the joints that are not held (`BodyMap.of`).
 
         Raises:
             UserError: anything in the config, the URDF or the prior is wrong.
         """
         prior = open_prior(config.body)
         body_map = build_body_map(config.robot, build_skeleton(config.body))
+        config = _with_joints(config, body_map.robot.joint_names)
         return PairSetup(config, body_map, prior, PairStore.of(config, body_map, prior))
+
+
+def _with_joints(config: Config, joints: Sequence[str]) -> Config:
+    """The config with the joints that move alone: it is what is recorded, and what a package is made again from."""
+    if list(joints) == list(config.robot.joints):
+        return config
+    config = copy.deepcopy(config)
+    config.robot.joints = list(joints)
+    config.robot.ranges = {name: ends for name, ends in config.robot.ranges.items() if name in joints}
+    return config

@@ -1,5 +1,6 @@
 """Optimisation-based human -> robot retargeting (the ground truth, and the peer to beat), and the metrics."""
 
+from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.metrics import (
     angle_between,
@@ -7,6 +8,7 @@ from mrhubo.reference.metrics import (
     direction_error,
     direction_jerk,
     joint_error,
+    limit_shares,
     link_error,
 )
 from mrhubo.reference.polish import Polish
@@ -15,6 +17,7 @@ from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult, c
 from mrhubo.reference.solve import DirectionProblem
 
 __all__ = [
+    "Avoidance",
     "DirectionJacobian",
     "DirectionProblem",
     "OptimizationResult",
@@ -27,5 +30,6 @@ __all__ = [
     "direction_error",
     "direction_jerk",
     "joint_error",
+    "limit_shares",
     "link_error",
 ]

@@ -51,7 +51,17 @@ def direction_error(body_map: BodyMap, q_TN: Tensor, local_TJ33: Tensor, poses: 
 
 def at_limit_share(robot: Robot, q_TN: Tensor) -> Tensor:
     """Share of the joints (T,) that are at a limit, within 0.001 rad."""
-    return ((q_TN - robot.lower_N < _AT_LIMIT) | (robot.upper_N - q_TN < _AT_LIMIT)).float().mean(dim=-1)
+    return _at_limit(robot, q_TN).mean(dim=-1)
+
+
+def limit_shares(robot: Robot, q_TN: Tensor) -> Tensor:
+    """Share of the frames (N,) in which each joint is at a limit, within 0.001 rad."""
+    return _at_limit(robot, q_TN).mean(dim=0)
+
+
+def _at_limit(robot: Robot, q_TN: Tensor) -> Tensor:
+    """1 where a joint is at a limit (T, N), else 0."""
+    return ((q_TN - robot.lower_N < _AT_LIMIT) | (robot.upper_N - q_TN < _AT_LIMIT)).float()
 
 
 def direction_jerk(directions_TD3: Tensor, frame_rate: float) -> Tensor:

@@ -13,11 +13,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.reference.bounded import Banded, Bounds, bounded_minimum, solve_factored
+from mrhubo.fast.together.banded import Banded
+from mrhubo.fast.together.bounded import Bounds, bounded_minimum
+from mrhubo.fast.together.refine import PATIENCE
+from mrhubo.reference.banded import factor
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
-
-_PATIENCE = 6.0
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ def refine(
     damping_TC = torch.full_like(model.cost_BC, 1e-3)
     failures_C = torch.zeros_like(cost_C)
     for _ in range(sweeps):
-        running_C = failures_C < _PATIENCE
+        running_C = failures_C < PATIENCE
         trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
         trial_TN = torch.clamp(trial_TN, problem.lower_N, problem.upper_N)
         trial_TN = torch.where(running_C[problem.blocks.block_N], trial_TN, q_TN)
@@ -63,13 +64,13 @@ def refine(
         better_C = trial_cost_C < cost_C
         moved_C = ((trial_TN - q_TN).abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
         settled_C = better_C & (moved_C < tolerance)
-        failures_C = torch.where(better_C, torch.where(settled_C, _PATIENCE, 0), failures_C + 1)
+        failures_C = torch.where(better_C, torch.where(settled_C, PATIENCE, 0), failures_C + 1)
         factor_TC = torch.where(trial.cost_BC > model.cost_BC, 10.0, torch.where(better_C, 0.1, 1.0))
         damping_TC = (damping_TC * factor_TC).clamp(1e-3, 1e6)
         q_TN = torch.where(better_C[problem.blocks.block_N], trial_TN, q_TN)
         cost_C = torch.where(better_C, trial_cost_C, cost_C)
         model = model.where(better_C, problem.blocks.block_N, trial)
-        if bool((failures_C >= _PATIENCE).all()):
+        if bool((failures_C >= PATIENCE).all()):
             break
     return q_TN, cost_C
 
@@ -149,10 +150,10 @@ def _motion_step(
             )
             system = Banded(_array(within_TMM), diagonal_TM, couplings_TM)
             if bound is None:
-                step_TM = solve_factored(system.factor(), right_TM)
+                step_TM = factor(system)(right_TM)
             else:
                 bounds = _bounds(problem, q_TN, free_TN[:, 0], bound, joints_M)
-                step_TM = bounded_minimum(system, right_TM, bounds)
+                step_TM = bounded_minimum(system, right_TM, bounds, factor)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
 

@@ -18,8 +18,10 @@ from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.poses import MotionLike, check_frame_rate, read_poses, to_tensor
+from mrhubo.motion.poses import MotionLike, read_poses, to_tensor
+from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
 from mrhubo.reference.result import OptimizationResult
@@ -74,15 +76,20 @@ class OptimizationRetargeter(nn.Module):
         self.problem = DirectionProblem(self.body_map)
         self._pool = StartPool(self.problem, starts, seed)
         self._free: CollisionFreeProblem | None = None
+        self._avoidance: Avoidance | None = None
 
     if TYPE_CHECKING:
 
-        def __call__(self, motion: MotionLike, frame_rate: float | None = None) -> OptimizationResult:
+        def __call__(
+            self, motion: MotionLike, frame_rate: float | None = None, avoid_collisions: bool = False
+        ) -> OptimizationResult:
             """`forward`."""
             ...
 
     @torch.no_grad()
-    def forward(self, motion: MotionLike, frame_rate: float | None = None) -> OptimizationResult:
+    def forward(
+        self, motion: MotionLike, frame_rate: float | None = None, avoid_collisions: bool = False
+    ) -> OptimizationResult:
         """Joint angles of a human motion.
 
         Args:
@@ -91,6 +98,7 @@ class OptimizationRetargeter(nn.Module):
                 time, and the others are motions of their own; none for a single pose.
             frame_rate: frames per second of an array; a `Motion` has its own. Without one, every frame is solved on its
                 own.
+            avoid_collisions: frames in which the robot would touch itself give way (`mrhubo.reference.avoidance`).
 
         Raises:
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
@@ -99,7 +107,8 @@ class OptimizationRetargeter(nn.Module):
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
         clips = local_TJ33.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [local_TJ33]
-        answers = [self._solve(clip_TJ33, poses.frame_rate) for clip_TJ33 in clips if len(clip_TJ33)]
+        options = (poses.frame_rate, avoid_collisions)
+        answers = [self._solve(clip_TJ33, *options) for clip_TJ33 in clips if len(clip_TJ33)]
         robot = self.body_map.robot
         q_TN = torch.cat(answers) if answers else local_TJ33.new_zeros(0, len(robot.joint_names))
         links = robot.forward(q_TN)
@@ -112,20 +121,33 @@ class OptimizationRetargeter(nn.Module):
             robot_facts(robot, "the optimiser of mrhubo", robot.description.kinematics),
         )  # fmt: skip
 
-    def _solve(self, local_TJ33: Tensor, frame_rate: float | None) -> Tensor:
+    def _solve(self, local_TJ33: Tensor, frame_rate: float | None, avoid_collisions: bool) -> Tensor:
         """Joint angles (T, N) [rad] of one motion, or of frames on their own."""
-        return self.solve_frames(local_TJ33)[0] if frame_rate is None else self.retarget(local_TJ33, frame_rate).q_TN
+        if frame_rate is not None:
+            return self.retarget(local_TJ33, frame_rate, avoid_collisions).q_TN
+        q_TN = self.solve_frames(local_TJ33)[0]
+        return self.avoidance(q_TN, self._targets(local_TJ33)) if avoid_collisions else q_TN
+
+    @property
+    def avoidance(self) -> Avoidance:
+        """What makes answers give way that touch the robot itself; made when first asked for."""
+        if self._avoidance is None:
+            self._avoidance = Avoidance(self.body_map)
+        return self._avoidance
 
     @torch.no_grad()
-    def retarget(self, local_TJ33: MotionLike, frame_rate: float) -> ReferenceResult:
-        """The robot's motion for human poses, local rotations (T, 21, 3, 3) at `frame_rate` frames per second.
+    def retarget(self, local_TJ33: MotionLike, frame_rate: float, avoid_collisions: bool = False) -> ReferenceResult:
+        """The robot's motion for human poses, local rotations (T, 21, 3, 3) at `frame_rate` frames per second;
+        `avoid_collisions`: as for a call.
 
         Raises:
             UserError: the pose has the wrong shape or a frame that is no pose, or the frame rate is not positive.
         """
         check_frame_rate(frame_rate, needed=True)
         target_TD3 = self._targets(local_TJ33)
-        return self._result(self._motion(target_TD3, self._candidates(target_TD3), frame_rate), target_TD3, frame_rate)
+        avoidance = self.avoidance if avoid_collisions else None
+        q_TN = self._motion(target_TD3, self._candidates(target_TD3), frame_rate, avoidance)
+        return self._result(q_TN, target_TD3, frame_rate)
 
     @torch.no_grad()
     def motion_and_optima(self, local_TJ33: MotionLike, frame_rate: float) -> tuple[Tensor, Tensor]:
@@ -140,12 +162,20 @@ class OptimizationRetargeter(nn.Module):
         candidates = self._candidates(target_TD3)
         return self._motion(target_TD3, candidates, frame_rate), self._polish(*candidates, target_TD3)[0]
 
-    def _motion(self, target_TD3: Tensor, candidates: tuple[Tensor, Tensor], frame_rate: float) -> Tensor:
+    def _motion(
+        self,
+        target_TD3: Tensor,
+        candidates: tuple[Tensor, Tensor],
+        frame_rate: float,
+        avoidance: Avoidance | None = None,
+    ) -> Tensor:
         """The motion (T, N) [rad] among and near candidates (T, S, N), whose blocks have a cost (T, S, C) each."""
         smoothness = self._smoothness(frame_rate)
         if smoothness.pull == 0 or len(target_TD3) == 1:
-            return self._polish(*candidates, target_TD3)[0]
-        task = MotionTask(target_TD3, smoothness, *speed_bound(self.body_map.robot.velocity_N, frame_rate))
+            q_TN = self._polish(*candidates, target_TD3)[0]
+            return q_TN if avoidance is None else avoidance(q_TN, target_TD3)
+        bound = speed_bound(self.body_map.robot.velocity_N, frame_rate)
+        task = MotionTask(target_TD3, smoothness, *bound, avoidance=avoidance)
         return smooth_motion(self.problem, *candidates, task)
 
     @torch.no_grad()

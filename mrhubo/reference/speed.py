@@ -2,8 +2,8 @@
 
     |q_t - q_(t-1)| <= step        for every joint, from each frame to the next
 
-First the nearest motion that keeps to it, then the best one near that (`bounded`), whose last millionths the nearest
-motion takes away again.
+First the nearest motion that keeps to it, then the best one near that (`mrhubo.fast.together.bounded`), whose last
+millionths the nearest motion takes away again.
 
 Legend: T frames, N joints, D directions.
 """
@@ -15,15 +15,10 @@ import math
 import torch
 from torch import Tensor
 
+from mrhubo.fast.together.speed import AROUND_S, FLOAT, SWEEPS, TOLERANCE
 from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Smoothness
-
-_SWEEPS, _TOLERANCE = 5, 2e-3
-_AROUND_S = 0.5
-"""Frames this near in time [s] to those that were too fast may change."""
-_FLOAT = 4e-7
-"""Rounding of a difference of two angles of up to 2 pi [rad], float32."""
 
 
 def speed_bound(velocity_N: Tensor, frame_rate: float) -> tuple[Tensor, int]:
@@ -31,7 +26,7 @@ def speed_bound(velocity_N: Tensor, frame_rate: float) -> tuple[Tensor, int]:
     many frames away from those that were too fast are still worth changing.
     """
     step_N = velocity_N / frame_rate
-    return torch.maximum(step_N - 2 * _FLOAT, step_N / 2), math.ceil(_AROUND_S * frame_rate)
+    return torch.maximum(step_N - 2 * FLOAT, step_N / 2), math.ceil(AROUND_S * frame_rate)
 
 
 def nearest_slow(q_TN: Tensor, step_N: Tensor, fixed_T: Tensor | None = None) -> Tensor:
@@ -84,7 +79,7 @@ def keep_speed(
     free_T = widen(changed_TN.any(dim=1), around)
     if fixed_T is not None:
         free_T = free_T & ~fixed_T
-    found_TN = refine_around(problem, nearest_TN, target_TD3, smoothness, free_T, _SWEEPS, _TOLERANCE, step_N)
+    found_TN = refine_around(problem, nearest_TN, target_TD3, smoothness, free_T, SWEEPS, TOLERANCE, step_N)
     found_TN = nearest_slow(found_TN, step_N, fixed_T)
-    concerned_C = changed_TN.any(dim=0).float() @ problem.blocks.joints_NC > 0
+    concerned_C = changed_TN.any(dim=0).to(q_TN) @ problem.blocks.joints_NC > 0
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)

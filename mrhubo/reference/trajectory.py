@@ -14,16 +14,14 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from mrhubo.fast.together.motion import AHEAD, BRIDGE_STEPS, BRIDGE_TOLERANCE, JUMP, REACH, WINDOW
+from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.refine import refine
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed, nearest_slow
 from mrhubo.reference.terms import Smoothness
 
 _PART = 512
-_WINDOW, _AHEAD = 4096, 1024
-"""Frames that are worked on together, and how many of them only serve to look ahead."""
-_JUMP = 0.5
-_REACH = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True)
@@ -41,6 +39,8 @@ class MotionTask:
     sweeps: int = 100
     tolerance: float = 3e-4
     """How long a motion is refined, as for `refine`."""
+    avoidance: Avoidance | None = None
+    """What makes frames give way that touch; None: nothing does."""
 
     def at(self, part: slice) -> MotionTask:
         """The same for some frames alone."""
@@ -60,9 +60,9 @@ def smooth_motion(problem: DirectionProblem, candidates_TSN: Tensor, cost_TSC: T
     frames, found, settled = len(candidates_TSN), [candidates_TSN[:0, 0]], 0
     while settled < frames:
         before_LN = torch.cat(found[-2:])[-task.smoothness.reach :]
-        part = slice(settled - len(before_LN), settled + _WINDOW)
+        part = slice(settled - len(before_LN), settled + WINDOW)
         motion_XN = _smooth_window(problem, candidates_TSN[part], cost_TSC[part], task.at(part), before_LN)
-        used = _WINDOW - _AHEAD if settled + _WINDOW < frames else _WINDOW
+        used = WINDOW - AHEAD if settled + WINDOW < frames else WINDOW
         found.append(motion_XN[len(before_LN) :][:used])
         settled += used
     return nearest_slow(torch.cat(found), task.step_N)
@@ -85,10 +85,13 @@ def _smooth_window(
     if more_TSN.shape[1]:
         candidates_TSN, cost_TSC = torch.cat((candidates_TSN, more_TSN), 1), torch.cat((cost_TSC, more_cost_TSC), 1)
         other_TN = best_path(*_settled(candidates_TSN, cost_TSC, before_LN), joints_NC, smoothness.pull)[0]
-        if bool(((other_TN - path_TN).abs() > _JUMP).any()):
+        if bool(((other_TN - path_TN).abs() > JUMP).any()):
             other_TN, other_cost_C = polish(other_TN)
             motion_TN = torch.where((other_cost_C < cost_C)[problem.blocks.block_N], other_TN, motion_TN)
-    return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    if task.avoidance is None:
+        return motion_TN
+    return task.avoidance.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
 
 def _settled(candidates_TSN: Tensor, cost_TSC: Tensor, before_LN: Tensor) -> tuple[Tensor, Tensor]:
@@ -135,16 +138,16 @@ def _bridge(
     is not the best. It is looked for from the path's angles a few frames before and after; elsewhere the path is
     repeated.
     """
-    frames, reach_S = len(path_TN), torch.tensor(_REACH, device=path_TN.device)
-    jumps_T = torch.nn.functional.pad((path_TN.diff(dim=0).abs() > _JUMP).any(dim=1).cumsum(0), (1, 0))
+    frames, reach_S = len(path_TN), torch.tensor(REACH, device=path_TN.device)
+    jumps_T = torch.nn.functional.pad((path_TN.diff(dim=0).abs() > JUMP).any(dim=1).cumsum(0), (1, 0))
     if not bool(jumps_T[-1]):
         return path_TN.new_empty(frames, 0, path_TN.shape[1]), path_cost_TC.new_empty(frames, 0, path_cost_TC.shape[1])
     source_TS = (torch.arange(frames, device=path_TN.device)[:, None] + reach_S).clamp(0, frames - 1)
     across_TS = jumps_T[source_TS] != jumps_T[:, None]
-    found_TSN = path_TN[:, None].repeat(1, len(_REACH), 1)
-    cost_TSC = path_cost_TC[:, None].repeat(1, len(_REACH), 1)
+    found_TSN = path_TN[:, None].repeat(1, len(REACH), 1)
+    cost_TSC = path_cost_TC[:, None].repeat(1, len(REACH), 1)
     frame_X = torch.nonzero(across_TS)[:, 0]
     found_TSN[across_TS], cost_TSC[across_TS] = problem.minimise(
-        path_TN[source_TS[across_TS]], target_TD3[frame_X], steps=12, tolerance=1e-2
+        path_TN[source_TS[across_TS]], target_TD3[frame_X], steps=BRIDGE_STEPS, tolerance=BRIDGE_TOLERANCE
     )
     return found_TSN, cost_TSC

@@ -12,7 +12,6 @@ Legend: B poses, C branches, S = 4 signals.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -21,10 +20,9 @@ from torch.nn.functional import binary_cross_entropy_with_logits, softplus
 from mrhubo.motion import Motion, reshare
 from mrhubo.reference import angle_between
 from mrhubo.retargeter.confidence import GOOD_DEG, SIGNALS, ConfidenceModel, Weights, scaled, shake
+from mrhubo.retargeter.judging import signals_of
+from mrhubo.retargeter.package import POLISH, Retargeter
 from mrhubo.retargeter.spoiling import bent_backwards, dislocated, shaken
-
-if TYPE_CHECKING:
-    from mrhubo.retargeter.package import Retargeter
 
 POSES = 2_000
 _SHARES = {"whole": 0.6, "noise": 0.2, "backwards": 0.1, "dislocated": 0.1}
@@ -67,7 +65,10 @@ def calibrate(retargeter: Retargeter, poses: int = POSES, seed: int = 0) -> Conf
     # People who stand still, each for as many frames.
     seen_BFD3 = torch.stack([body_map.human_directions(moment) for moment in moments], dim=1)
     shake_BD = shake(seen_BFD3, _RATE)[:, _FRAMES // 2]
-    signals, answer_BD3 = retargeter.signals(moments[_FRAMES // 2], shake_BD)
+    seen_BJ33, target_BD3 = moments[_FRAMES // 2], seen_BFD3[:, _FRAMES // 2]
+    q_BN = retargeter.answer(seen_BJ33, target_BD3, POLISH)
+    answer_BD3 = body_map.robot_directions(body_map.robot.forward(q_BN))
+    signals = signals_of(retargeter, target_BD3, answer_BD3, shake_BD)
     error_BD = torch.rad2deg(angle_between(answer_BD3, body_map.human_directions(true_BJ33.to(device))))
     error_BC = torch.stack([error_BD[:, list(b.columns)].mean(dim=1) for b in retargeter.branches], dim=1)
     good_X = (error_BC < GOOD_DEG).flatten().cpu()

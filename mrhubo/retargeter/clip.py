@@ -19,25 +19,22 @@ import math
 import torch
 from torch import Tensor
 
-from mrhubo.reference import DirectionProblem
+from mrhubo.fast.together.motion import SWEEPS, TOLERANCE
+from mrhubo.fast.together.smoothness import CALM_JERK, CUTOFF_HZ, SMOOTHNESS, WINDOW_S, pull_at
+from mrhubo.reference import Avoidance, DirectionProblem
 from mrhubo.reference.speed import speed_bound
-from mrhubo.reference.terms import Smoothness, pull_at
+from mrhubo.reference.terms import Smoothness
 from mrhubo.reference.trajectory import MotionTask, smooth_motion
-
-_SMOOTHNESS = 0.02
-_CUTOFF_HZ = 4.0
-"""Where a calm human's frequencies end. An error of a limb weighs about |q|^2, its jerk (2 pi f)^6 |q|^2 as much, so a
-motion at this frequency is followed by a half, one at half of it by 98%."""
-_CALM_JERK = 60.0
-"""[1/s^3]: the highest jerk of one radian in one second along the smoothest path, 60 A / T^3 (T. Flash, N. Hogan, "The
-coordination of arm movements", 1985). Far above it the weight falls with its square: the term costs no more."""
-_WINDOW_S = 0.2
-"""Time over which the human's jerk is averaged."""
-_SWEEPS, _TOLERANCE = 20, 2e-3
 
 
 @torch.no_grad()
-def join_frames(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> Tensor:
+def join_frames(
+    problem: DirectionProblem,
+    q_TN: Tensor,
+    target_TD3: Tensor,
+    frame_rate: float,
+    avoidance: Avoidance | None = None,
+) -> Tensor:
     """One motion (T, N) [rad] near answers that were found frame by frame (T, N), inside the limits of joints and of
     their speeds.
 
@@ -46,12 +43,13 @@ def join_frames(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, fra
         q_TN: the answers.
         target_TD3: the human's directions.
         frame_rate: frames per second.
+        avoidance: what makes frames give way in which the robot touches itself; None: nothing does.
     """
     if len(q_TN) < 2:
-        return q_TN
-    smoothness = Smoothness(pull_at(_SMOOTHNESS, frame_rate), jerk_weights(problem, target_TD3, frame_rate))
+        return q_TN if avoidance is None else avoidance(q_TN, target_TD3)
+    smoothness = Smoothness(pull_at(SMOOTHNESS, frame_rate), jerk_weights(problem, target_TD3, frame_rate))
     bound = speed_bound(problem.robot.velocity_N, frame_rate)
-    task = MotionTask(target_TD3, smoothness, *bound, _SWEEPS, _TOLERANCE)
+    task = MotionTask(target_TD3, smoothness, *bound, SWEEPS, TOLERANCE, avoidance)
     return smooth_motion(problem, q_TN[:, None], problem.cost(q_TN, target_TD3)[:, None], task)
 
 
@@ -64,9 +62,9 @@ def jerk_weights(problem: DirectionProblem, target_TD3: Tensor, frame_rate: floa
     weight_DC = (problem.blocks.directions_DC * problem.directions.weight_D[:, None])[columns]
     jerk_YC = jerk_YD @ (weight_DC / weight_DC.sum(dim=0).clamp(min=1e-9))
     if len(jerk_YC):
-        half = round(_WINDOW_S / 2 * frame_rate)
+        half = round(WINDOW_S / 2 * frame_rate)
         jerk_YC = torch.nn.functional.avg_pool1d(
             jerk_YC.T[:, None], 2 * half + 1, stride=1, padding=half, count_include_pad=False
         )[:, 0].T
-    calm = (frame_rate / (math.tau * _CUTOFF_HZ)) ** 6
-    return (calm / (1 + (jerk_YC / _CALM_JERK).square()))[:, problem.blocks.block_N]
+    calm = (frame_rate / (math.tau * CUTOFF_HZ)) ** 6
+    return (calm / (1 + (jerk_YC / CALM_JERK).square()))[:, problem.blocks.block_N]

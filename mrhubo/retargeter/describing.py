@@ -1,6 +1,6 @@
 """A retargeter as the plain arrays of `mrhubo.fast`: everything that can be worked out before the first pose comes.
 
-Legend: as in `mrhubo.fast.description`.
+Legend: as in `mrhubo.fast.sections`.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from mrhubo.body.rest_directions import is_ours
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
 from mrhubo.body.vposer import VPoser
 from mrhubo.errors import UserError
-from mrhubo.fast.description import (
+from mrhubo.fast.description import Description
+from mrhubo.fast.plain.human import BEND_DEG
+from mrhubo.fast.sections import (
     BEND,
     LIMB,
     ORIENT,
     SHARE,
-    Description,
     Features,
     Human,
     Layers,
@@ -46,7 +47,7 @@ from mrhubo.retargeter.describing_robot import (
 )
 from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures
 from mrhubo.retargeter.networks import Branched, ResidualMLP
-from mrhubo.robot import BodyMap, bending
+from mrhubo.robot import BodyMap
 from mrhubo.robot.parts import BendPart, LimbPart, OrientedPart
 
 if TYPE_CHECKING:
@@ -64,8 +65,7 @@ def describe(retargeter: Retargeter) -> Description:
     features, first, last = network.features, network.pre, network.post
     parts = [part for stage in (first, last) if isinstance(stage, Branched) for part in stage.parts]
     constants = {
-        "plane_low_deg": bending.PLANE_DEG[0], "plane_high_deg": bending.PLANE_DEG[1],
-        "needed_low_deg": bending.NEEDED_DEG[0], "needed_high_deg": bending.NEEDED_DEG[1],
+        **BEND_DEG,
         "far_rad": polish.FAR_RAD, "gain_rad": polish.GAIN_RAD, "first_steps": polish.FIRST_STEPS,
         "starts": polish.STARTS, "good_deg": confidence.GOOD_DEG, "excess_deg": confidence.EXCESS_DEG,
         "shake_deg": confidence.SHAKE_DEG, "acceleration": confidence.ACCELERATION,

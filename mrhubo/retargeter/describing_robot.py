@@ -1,6 +1,6 @@
 """A robot as the plain arrays of `mrhubo.fast`: kinematics, cost, collision shapes.
 
-Legend: as in `mrhubo.fast.description`.
+Legend: as in `mrhubo.fast.sections`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.fast.description import Capsules, Cost, Kinematics
+from mrhubo.fast.sections import Capsules, Cost, Kinematics
 from mrhubo.reference import DirectionProblem, polish
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.robot.joint import drive

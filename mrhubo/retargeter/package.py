@@ -25,18 +25,18 @@ from mrhubo.errors import UserError
 from mrhubo.fast.description import FILE, Description
 from mrhubo.files.storage import write_tensors
 from mrhubo.motion import Motion, MotionLike, read_poses
-from mrhubo.motion.poses import check_frame_rate
-from mrhubo.reference import DirectionProblem, Polish, angle_between
+from mrhubo.motion.checks import check_frame_rate
+from mrhubo.reference import Avoidance, DirectionProblem, Polish
 from mrhubo.retargeter.clip import join_frames
-from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, Signals, branches_of, find_signals, shake
+from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, branches_of, shake
 from mrhubo.retargeter.describing import describe
 from mrhubo.retargeter.features import DirectionFeatures
+from mrhubo.retargeter.judging import judge
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.retargeter.parts import pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
-from mrhubo.robot.plausibility import read
 from mrhubo.robot_motion import RobotFacts
 
 POLISH = 10
@@ -69,6 +69,7 @@ class Retargeter(nn.Module):
         self.directions = DirectionProblem(body_map)
         """The optimiser's cost, for `polish`."""
         self.polisher = Polish(self.directions)
+        self._avoidance: Avoidance | None = None
         self.confidence, self.branches = confidence, branches_of(self.directions)
         """How much each branch of an answer is to be trusted, and what the branches are."""
         self.origin, self.checksum = "a network of mrhubo that was not saved", ""
@@ -85,6 +86,13 @@ class Retargeter(nn.Module):
         return self.body_map.collision
 
     @property
+    def avoidance(self) -> Avoidance:
+        """What makes answers give way that touch the robot itself; made when first asked for."""
+        if self._avoidance is None:
+            self._avoidance = Avoidance(self.body_map)
+        return self._avoidance
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Joints of the output, in order."""
         return self.body_map.robot.joint_names
@@ -97,17 +105,19 @@ class Retargeter(nn.Module):
     if TYPE_CHECKING:
 
         def __call__(
-            self,
-            motion: MotionLike,
-            polish: int = POLISH,
-            frame_rate: float | None = None,
-            together: bool | None = None,
-        ) -> RetargetResult:
+            self, motion: MotionLike, polish: int = POLISH, frame_rate: float | None = None,
+            together: bool | None = None, avoid_collisions: bool = True,
+        ) -> RetargetResult:  # fmt: skip
             """`forward`."""
             ...
 
     def forward(
-        self, motion: MotionLike, polish: int = POLISH, frame_rate: float | None = None, together: bool | None = None
+        self,
+        motion: MotionLike,
+        polish: int = POLISH,
+        frame_rate: float | None = None,
+        together: bool | None = None,
+        avoid_collisions: bool = True,
     ) -> RetargetResult:
         """Joint angles of a human motion, with a confidence for each frame.
 
@@ -119,6 +129,7 @@ class Retargeter(nn.Module):
             frame_rate: frames per second of an array; a `Motion` has its own.
             together: all frames of a motion become one smooth motion, see `retarget`; None: where the frame rate is
                 known.
+            avoid_collisions: as for `predict`.
 
         Raises:
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
@@ -127,12 +138,19 @@ class Retargeter(nn.Module):
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         length = poses.shape[-1] if poses.shape and poses.frame_rate else len(poses.local_TJ33)
         clips = poses.local_TJ33.split(max(1, length))
-        answers = [self.retarget(clip_TJ33, polish, poses.frame_rate, together) for clip_TJ33 in clips]
+        options = (polish, poses.frame_rate, together, avoid_collisions)
+        answers = [self.retarget(clip_TJ33, *options) for clip_TJ33 in clips]
         told = (motion.name, motion.source) if isinstance(motion, Motion) else ()
         return join_results(answers).with_leading(poses.shape, poses.frame_rate, *told)
 
     @torch.no_grad()
-    def predict(self, local_TJ33: MotionLike, polish: int = 0, frame_rate: float | None = None) -> Tensor:
+    def predict(
+        self,
+        local_TJ33: MotionLike,
+        polish: int = 0,
+        frame_rate: float | None = None,
+        avoid_collisions: bool = True,
+    ) -> Tensor:
         """Joint angles (T, N) [rad] of human poses; inside the limits.
 
         Args:
@@ -143,6 +161,8 @@ class Retargeter(nn.Module):
                 `mrhubo.reference.polish`. 0: the networks alone.
             frame_rate: frames per second: all frames become one smooth motion, in which no joint turns faster than it
                 can (`mrhubo.retargeter.clip`). None: each frame on its own.
+            avoid_collisions: frames in which the robot would touch itself give way (`mrhubo.reference.avoidance`), if
+                there are steps of optimisation at all.
 
         Raises:
             UserError: the poses have another shape, or hold NaN, infinite numbers or some that no rotation has;
@@ -152,17 +172,19 @@ class Retargeter(nn.Module):
         parts = list(self._parts(local_TJ33, polish))
         directed = bool(polish or frame_rate) or isinstance(self.network.features, DirectionFeatures)
         targets = [self.body_map.human_directions(part) for part in parts] if directed else [None] * len(parts)
-        return self._predict(parts, targets, polish, frame_rate)
+        return self._predict(parts, targets, polish, frame_rate, avoid_collisions)
 
     def _predict(
-        self, parts: Sequence[Tensor], targets: Sequence[Tensor | None], polish: int, frame_rate: float | None
-    ) -> Tensor:
+        self, parts: Sequence[Tensor], targets: Sequence[Tensor | None], polish: int, frame_rate: float | None,
+        avoid_collisions: bool,
+    ) -> Tensor:  # fmt: skip
         """`predict` for the parts of a motion, with their directions where they are needed."""
         q_TN = torch.cat([self.answer(*part, polish) for part in zip(parts, targets, strict=True)])
-        if frame_rate is None:
-            return q_TN
+        avoidance = self.avoidance if polish and avoid_collisions else None
         known = [target for target in targets if target is not None]
-        return join_frames(self.directions, q_TN, torch.cat(known), frame_rate)
+        if frame_rate is not None:
+            return join_frames(self.directions, q_TN, torch.cat(known), frame_rate, avoidance)
+        return q_TN if avoidance is None else avoidance(q_TN, torch.cat(known))
 
     @torch.no_grad()
     def retarget(
@@ -171,6 +193,7 @@ class Retargeter(nn.Module):
         polish: int = POLISH,
         frame_rate: float | None = None,
         together: bool | None = None,
+        avoid_collisions: bool = True,
     ) -> RetargetResult:
         """Joint angles, by default after steps of optimisation until they have converged, with a confidence for each
         frame.
@@ -180,6 +203,7 @@ class Retargeter(nn.Module):
             polish: as for `predict`.
             frame_rate: frames per second, if the poses are one motion; a `Motion` has its own.
             together: all frames become one smooth motion, as for `predict`; None: where the frame rate is known.
+            avoid_collisions: as for `predict`.
 
         Raises:
             UserError: as for `predict`; or a motion without a frame rate is to become smooth.
@@ -192,29 +216,11 @@ class Retargeter(nn.Module):
         check_frame_rate(joined_at)
         parts = list(self._parts(local_TJ33, polish))
         targets = [self.body_map.human_directions(part) for part in parts]
-        q_TN = self._predict(parts, targets, polish, joined_at)
+        q_TN = self._predict(parts, targets, polish, joined_at, avoid_collisions)
         shake_TD = None if frame_rate is None else shake(torch.cat(targets), frame_rate)
         sizes = [len(target) for target in targets]
         shakes = [None] * len(sizes) if shake_TD is None else shake_TD.split(sizes)
-        return join_results([self._judge(*part) for part in zip(q_TN.split(sizes), targets, shakes, strict=True)])
-
-    @torch.no_grad()
-    def signals(self, local_TJ33: Tensor, shake_TD: Tensor | None, polish: int = POLISH) -> tuple[Signals, Tensor]:
-        """What tells how far to trust the answers to poses (T, 21, 3, 3), and the answers' directions (T, D, 3).
-
-        Args:
-            local_TJ33: local rotations (T, 21, 3, 3), of which no more are given than fit into memory.
-            shake_TD: how much directions shake (`mrhubo.retargeter.confidence.shake`), where that is known.
-            polish: as for `predict`.
-        """
-        target_TD3 = self.body_map.human_directions(local_TJ33)
-        q_TN = self.answer(local_TJ33, target_TD3, polish)
-        robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
-        return self._signals(target_TD3, robot_TD3, shake_TD), robot_TD3
-
-    def _signals(self, target_TD3: Tensor, robot_TD3: Tensor, shake_TD: Tensor | None) -> Signals:
-        reading = read(self.body_map, self.prior, target_TD3)
-        return find_signals(self.branches, target_TD3, robot_TD3, reading, shake_TD)
+        return join_results([judge(self, *part) for part in zip(q_TN.split(sizes), targets, shakes, strict=True)])
 
     @torch.no_grad()
     def judge(self, q_TN: Tensor, local_TJ33: Tensor, frame_rate: float | None = None) -> RetargetResult:
@@ -222,25 +228,7 @@ class Retargeter(nn.Module):
         both on the retargeter's device, float32; with frames per second, if they are one motion.
         """
         target_TD3 = self.body_map.human_directions(local_TJ33)
-        return self._judge(q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
-
-    def _judge(self, q_TN: Tensor, target_TD3: Tensor, shake_TD: Tensor | None) -> RetargetResult:
-        links = self.body_map.robot.forward(q_TN)
-        robot_TD3, columns = self.body_map.robot_directions(links), self.body_map.measured
-        trust_TC = self.confidence(signals := self._signals(target_TD3, robot_TD3, shake_TD))
-        nothing_T = torch.zeros_like(q_TN[:, 0])
-        return RetargetResult(
-            q_TN,
-            self.joint_names,
-            trust_TC.amin(dim=1) if self.branches else nothing_T,
-            torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns])),
-            signals.phi.amax(dim=1) if self.branches else nothing_T,
-            self.collision.collides(q_TN, links),
-            trust_TC,
-            tuple(branch.name for branch in self.branches),
-            self.body_map.measured_names,
-            robot=self.facts,
-        )
+        return judge(self, q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
 
     def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
         if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:

@@ -32,7 +32,8 @@ class RetargetResult(Answer):
     """Reconstruction error (T,) under the body prior of what the robot reads of the human pose, of the branch where it
     is largest; see `mrhubo.robot.plausibility`."""
     collision: Tensor
-    """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it."""
+    """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it, and what
+    comes after them does nearly always."""
     branch_confidence: Tensor
     """(T, C), 0..1: the probability that the limbs of each branch of the robot, an arm or the head, point where the
     person's did, to 15 degrees; see `mrhubo.retargeter.confidence`."""

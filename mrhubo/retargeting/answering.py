@@ -1,16 +1,24 @@
-"""Who answers a motion: a package, or the optimiser for a robot that has none."""
+"""Who answers a motion: a package, or the optimiser for a robot that has none.
+
+What needs PyTorch is imported where it is needed: most packages are answered without.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from mrhubo.motion import Motion
-from mrhubo.reference import OptimizationRetargeter
-from mrhubo.retargeter import Retargeter
-from mrhubo.robot import Axis, BodyMap, Robot, robot_facts
-from mrhubo.robot.bending import BendAxis
-from mrhubo.robot_motion import RobotMotion
+import numpy as np
+
+from mrhubo.fast.description import FILE, Description
+from mrhubo.robot_motion import RobotFacts, RobotMotion
+
+if TYPE_CHECKING:
+    from mrhubo.motion import Motion
+    from mrhubo.robot import BodyMap, Robot
 
 
 @dataclass(frozen=True)
@@ -20,36 +28,83 @@ class Answerer:
     described: str
     """What it is, a sentence."""
     answer: Callable[[Motion], RobotMotion]
-    body_map: BodyMap
+    joint_names: tuple[str, ...]
+    facts: RobotFacts
+    """Of the robot, with the limits of its joints."""
+    limb_names: tuple[str, ...]
+    """The directions of a robot motion that are of limbs, and not of a hand or the head."""
 
     @property
     def at_rest(self) -> RobotMotion:
         """A motion of one frame in which the robot stands still."""
-        robot = self.body_map.robot
-        return RobotMotion(robot.home()[None].cpu().numpy(), robot.joint_names, robot=robot_facts(robot, "", ""))
-
-    @property
-    def limb_names(self) -> tuple[str, ...]:
-        """The directions of a robot motion that are of limbs, and not of a hand or the head."""
-        limbs = {d.name for d in self.body_map.directions if not isinstance(d, Axis | BendAxis)}
-        return tuple(name for name in self.body_map.measured_names if name in limbs)
+        home_N = np.clip(np.zeros(len(self.joint_names), np.float32), self.facts.lower, self.facts.upper)
+        return RobotMotion(home_N[None], self.joint_names, robot=self.facts)
 
 
-def of_package(retargeter: Retargeter) -> Answerer:
-    """A package's networks and their steps of optimisation, each motion as a whole."""
+def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) -> Answerer:
+    """A package's networks and their steps of optimisation, each motion as a whole.
+
+    Args:
+        source: as for `mrhubo.load`.
+        avoid_collisions: as for `Retargeter.predict`.
+
+    Raises:
+        UserError: there is no such package, or it is damaged.
+    """
+    import mrhubo
+
+    folder = mrhubo.package_folder(source)
+    described = Description.read(folder) if (folder / FILE).is_file() else None
+    if described is not None and described.settings.own_rest:
+        return _of_description(folder, described, avoid_collisions)
+    retargeter = mrhubo.load(folder)
     return Answerer(
-        f"{retargeter.origin}: robot '{retargeter.body_map.robot.name}', {len(retargeter.joint_names)} joints",
-        lambda motion: retargeter(motion).robot_motion,
-        retargeter.body_map,
+        _describe(folder, retargeter.body_map.robot.name, retargeter.joint_names),
+        lambda motion: retargeter(motion, avoid_collisions=avoid_collisions).robot_motion,
+        retargeter.joint_names,
+        retargeter.facts,
+        _limb_names(retargeter.body_map),
     )
 
 
-def of_reference(robot: Robot) -> Answerer:
+def _of_description(folder: Path, description: Description, avoid_collisions: bool) -> Answerer:
+    """A package without PyTorch."""
+    from mrhubo.retargeting.forms import Forms
+
+    forms, names = Forms(description, avoid_collisions), description.settings.direction_names
+    measured = [d for d in description.trust.measured if description.kinematics.limb_D[d]]
+    return Answerer(
+        _describe(folder, description.settings.robot, forms.fast.joint_names),
+        forms,
+        forms.fast.joint_names,
+        forms.fast.facts,
+        tuple(names[d] for d in measured),
+    )
+
+
+def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     """The optimiser, which needs no training and takes longer."""
+    from mrhubo.reference import OptimizationRetargeter
+    from mrhubo.robot import robot_facts
+
     reference = OptimizationRetargeter(robot)
     return Answerer(
         f"no package: the reference retargeter answers, by optimisation and without any training; robot '{robot.name}',"
         f" {len(robot.joint_names)} joints",
-        lambda motion: reference(motion).robot_motion,
-        reference.body_map,
+        lambda motion: reference(motion, avoid_collisions=avoid_collisions).robot_motion,
+        robot.joint_names,
+        robot_facts(robot, "", ""),
+        _limb_names(reference.body_map),
     )
+
+
+def _describe(folder: Path, robot: str, joint_names: tuple[str, ...]) -> str:
+    return f"package {folder.resolve().name}: robot '{robot}', {len(joint_names)} joints"
+
+
+def _limb_names(body_map: BodyMap) -> tuple[str, ...]:
+    from mrhubo.robot import Axis
+    from mrhubo.robot.bending import BendAxis
+
+    limbs = {d.name for d in body_map.directions if not isinstance(d, Axis | BendAxis)}
+    return tuple(name for name in body_map.measured_names if name in limbs)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, mirror, read_motion, resample, trim
+from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.editing import check_span
-from mrhubo.motion.poses import check_frame_rate
 from mrhubo.retargeting.answering import Answerer
 from mrhubo.retargeting.places import Places
 from mrhubo.retargeting.summary import Summary

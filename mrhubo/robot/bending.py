@@ -17,17 +17,13 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from mrhubo.fast.plain.human import NEEDED_DEG, PLANE_DEG
 from mrhubo.robot.keypoints import Keypoints
 from mrhubo.robot.parts import BendPart, LimbPart
 
 if TYPE_CHECKING:
     from mrhubo.robot.model import Robot
 
-PLANE_DEG = (3.0, 12.0)
-"""Below the first bend the upper arm's turn alone tells the axis, from the second on the plane of the limbs alone.
-Motion capture is some two degrees exact, so the plane of limbs with less than five between them says little."""
-NEEDED_DEG = (8.0, 25.0)
-"""Up to the first bend the axis counts in full, from the second on not at all: the limbs say everything."""
 _PROBES, _SEED, _TURN = 64, 0, 1e-3
 _HINGE = 0.7
 """How much of a hinge's turn the bend changes by: 1 on a human; less where limbs are not at right angles to it."""

@@ -5,7 +5,9 @@ Legend: B batch, D directions, K keypoints, N robot joints.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
+from functools import cached_property
 
 from torch import Tensor, nn
 
@@ -21,7 +23,9 @@ from mrhubo.robot.entries import check_names
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb, read_keypoints
 from mrhubo.robot.manual_scale import ManualScale, check_ranges
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.told_joints import tell_of_waist, waist_joints
 from mrhubo.robot.urdf import describe
+from mrhubo.robot.yardstick import Yardstick
 
 
 class BodyMap(nn.Module):
@@ -68,12 +72,17 @@ class BodyMap(nn.Module):
         skeleton: Skeleton | None = None,
         manual: ManualScale | None = None,
     ) -> BodyMap:
-        """A body map that has been checked; arguments as for the class.
+        """A body map that has been checked, without joints that carry all that is seen and so are told by nothing: they
+        are held. Arguments as for the class.
 
         Raises:
             UserError: the map cannot be right (`mrhubo.robot.checks`); names what is wrong.
         """
         body_map = cls(robot, keypoints, skeleton, manual)
+        waist = waist_joints(body_map)
+        if waist and len(waist) < len(robot.joint_names):
+            tell_of_waist(body_map, waist)
+            body_map = cls(robot.without(waist), body_map.keypoints, body_map.skeleton, manual)
         check_body_map(body_map)
         return body_map
 
@@ -113,6 +122,23 @@ class BodyMap(nn.Module):
         if self._collision is None:
             self._collision = SelfCollision(self.robot)
         return self._collision
+
+    @cached_property
+    def yardstick(self) -> Yardstick:
+        """What the robot's own axes tell of its body; looked for when first asked for."""
+        return Yardstick(self.robot)
+
+    @cached_property
+    def geometric(self) -> BodyMap | None:
+        """The same with limbs from one joint's centre to the next, as the robot's axes tell them (`yardstick`): what a
+        limb is measured by, so that a point beside a joint shows. None where the axes tell no centre.
+        """
+        points = dict(self.keypoints.points)
+        points |= {n: c for n, p in points.items() if (c := self.yardstick.centre(n, p.link)) is not None}
+        if points == self.keypoints.points:
+            return None if self.yardstick.found is None else self
+        keypoints = dataclasses.replace(self.keypoints, points=points)
+        return BodyMap(self.robot.with_links(keypoints.links), keypoints, self.skeleton)
 
     def robot_directions(self, poses: LinkPoses) -> Tensor:
         """Unit directions (B, D, 3) of the robot, in human axes of the parts from which they are seen."""

@@ -15,10 +15,16 @@ from typing import TYPE_CHECKING
 import torch
 
 from mrhubo.errors import UserError
-from mrhubo.robot.entries import End
+from mrhubo.robot.ancestry import Ancestry
+from mrhubo.robot.centres import check_centres
 from mrhubo.robot.keypoints import Limb
+from mrhubo.robot.mirrored import check_mirrored
 from mrhubo.robot.model import Robot
+from mrhubo.robot.offsets import check_offsets
 from mrhubo.robot.placement import check_placement, warn
+from mrhubo.robot.suggestions import quoted
+from mrhubo.robot.told_joints import name_unlisted, refuse_untold
+from mrhubo.robot.yardstick import Yardstick
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
@@ -50,11 +56,15 @@ def check_body_map(body_map: BodyMap) -> None:
         limb.part.name: (float(shortest), float(longest))
         for limb, shortest, longest in zip(limbs, length_BE.amin(0), length_BE.amax(0), strict=True)
     }
+    check_offsets(body_map)
     _check_shared(body_map)
     _check_tree(body_map, limbs, lengths)
-    _check_lengths(limbs, lengths)
+    _check_lengths(body_map, limbs, lengths)
     check_placement(body_map, q_BN)
-    _check_moved(body_map)
+    refuse_untold(body_map)
+    name_unlisted(body_map)
+    check_centres(body_map)
+    check_mirrored(body_map)
 
 
 def check_key_links(robot: Robot, key_links: Sequence[str]) -> None:
@@ -66,9 +76,12 @@ def check_key_links(robot: Robot, key_links: Sequence[str]) -> None:
     position_BL3 = robot.forward(robot.sample(_POSES, torch.Generator().manual_seed(0))).position_BL3
     moved_BK3 = position_BL3[:, [robot.link_index(link) for link in key_links]]
     if float((moved_BK3 - moved_BK3[:1]).abs().max()) < _NO_LENGTH:
+        found = Yardstick(robot).found
+        moving = [] if found is None else [link for link in found.key_links if link in robot.moving_links]
+        advice = f": key_links: [{', '.join(moving)}]" if moving else ""
         raise UserError(
-            f"robot.key_links: none of robot.joints moves {_quoted(key_links)}, so their error would always be 0; name "
-            "links of the arms"
+            f"robot.key_links: none of robot.joints moves {quoted(key_links)}, so their error would always be 0; name "
+            f"links of the arms{advice}"
         )
 
 
@@ -79,7 +92,7 @@ def _check_shared(body_map: BodyMap) -> None:
         if point == same:
             raise UserError(
                 f"robot.keypoints.{other}: is where '{name}' is, on the link '{point.link}'; one point cannot be two "
-                "body parts"
+                f"body parts{body_map.yardstick.advice(name, other)}"
             )
     seen_from = {part.name: part.seen_from for part in body_map.keypoints.parts}
     for (name, end), (other, same) in itertools.combinations(ends.items(), 2):
@@ -88,39 +101,14 @@ def _check_shared(body_map: BodyMap) -> None:
         if seen_from[other] != name and seen_from[name] != other:
             raise UserError(
                 f"robot.keypoints.{other}: is the link '{end.link}', as is '{name}'; one link cannot stand for both"
+                f"{body_map.yardstick.advice(name, other)}"
             )
         warn(f"robot.keypoints.{other}: is the link '{end.link}', as is '{name}', against which it never turns")
 
 
-class _Tree:
-    """Who is above whom in the robot's tree."""
-
-    def __init__(self, robot: Robot) -> None:
-        self._description, self._driven = robot.description, set(robot.driven_joints)
-
-    def turning(self, link: str) -> dict[str, None]:
-        """The joints that turn a link as q says, nearest first."""
-        above = self._description.joints_above(link)
-        return {joint.name: None for joint in above if joint.name in self._driven}
-
-    def turns_apart(self, inner: str, outer: str) -> str | None:
-        """A joint that turns the inner link and not the outer one."""
-        outside = self.turning(outer)
-        return next((joint for joint in self.turning(inner) if joint not in outside), None)
-
-    def is_above(self, link: str, other: str) -> bool:
-        """Whether a link is another one, or above it."""
-        return link == other or any(joint.parent == link for joint in self._description.joints_above(other))
-
-    def is_inward(self, limb: Limb, view: End) -> bool:
-        """Whether the tree runs through a limb towards the body: its root is a foot, or a hand."""
-        inner, outer = limb.start.link, limb.end.link
-        return inner != outer and self.is_above(outer, inner) and self.turns_apart(inner, view.link) is None
-
-
 def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]]) -> None:
     """Refuses a part that does not move with what carries it, and a limb that does not run outwards."""
-    tree, ends, by_part = _Tree(body_map.robot), body_map.keypoints.ends, {limb.part.name: limb for limb in limbs}
+    tree, ends, by_part = Ancestry(body_map.robot), body_map.keypoints.ends, {limb.part.name: limb for limb in limbs}
     inward = {x.part.name for x in limbs if x.part.seen_from and tree.is_inward(x, ends[x.part.seen_from])}
     for part in (part for part in body_map.keypoints.parts if part.name in by_part or part.name in ends):
         limb, carrier = by_part.get(part.name), part.hangs_on
@@ -133,6 +121,7 @@ def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tup
                 raise UserError(
                     f"robot.keypoints.{carrier}: '{ends[carrier].link}' is turned by the joint '{joint}', which does "
                     f"not turn '{name}' ('{link}') with it; name the link that carries '{name}'"
+                    f"{body_map.yardstick.advice(carrier)}"
                 )
         elif limb is None and carrier in by_part and carrier not in inward:
             inner, link = by_part[carrier], ends[part.name].link
@@ -140,12 +129,13 @@ def _check_tree(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tup
                 raise UserError(
                     f"robot.keypoints.{part.name}: '{link}' is not turned by the joint '{joint}', which turns "
                     f"'{inner.part.start}' ('{inner.start.link}'); the two are on different chains"
+                    f"{body_map.yardstick.advice(part.name)}"
                 )
     for limb in (limb for limb in limbs if limb.part.name not in inward):
-        _check_limb(tree, limb, lengths[limb.part.name])
+        _check_limb(tree, limb, lengths[limb.part.name], body_map.yardstick.advice(limb.part.start, limb.part.end))
 
 
-def _check_limb(tree: _Tree, limb: Limb, length: tuple[float, float]) -> None:
+def _check_limb(tree: Ancestry, limb: Limb, length: tuple[float, float], advice: str) -> None:
     inner, outer = limb.start.link, limb.end.link
     if tree.is_above(inner, outer):
         return
@@ -154,30 +144,32 @@ def _check_limb(tree: _Tree, limb: Limb, length: tuple[float, float]) -> None:
     if tree.is_above(outer, inner):
         if joint is not None or not any(limb.end.offset_3):
             raise UserError(
-                f"{place} lies below '{limb.part.end}' ('{outer}') in the robot's tree, and a limb runs outwards; are "
-                "the two exchanged?"
+                f"{place} lies below '{limb.part.end}' ('{outer}') in the robot's tree, and a limb runs outwards (are "
+                f"the two exchanged?){advice}"
             )
     elif joint is not None and length[1] > _STEADY * length[0]:
         raise UserError(
             f"{place} is turned by the joint '{joint}', and '{limb.part.end}' ('{outer}') is not: the two are on "
-            f"different chains, {_centimetres(length)} apart"
+            f"different chains, {_centimetres(length)} apart{advice}"
         )
 
 
-def _check_lengths(limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]]) -> None:
+def _check_lengths(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]]) -> None:
     """Refuses a limb between two points that are one; warns of lengths that no limb has."""
     for limb in limbs:
         shortest, longest = lengths[limb.part.name]
+        advice = body_map.yardstick.advice(limb.part.start, limb.part.end)
         if shortest < _NO_LENGTH:
             raise UserError(
                 f"robot.keypoints: '{limb.part.start}' and '{limb.part.end}' lie on one point, so the limb has no "
-                "direction; choose another link or an offset"
+                f"direction; choose another link or an offset{advice}"
             )
         between = f"from '{limb.part.start}' ('{limb.start.link}') to '{limb.part.end}' ('{limb.end.link}')"
         if longest > _STRETCHED * shortest:
             warn(
                 f"robot.keypoints: the {_words(limb)} {between} is {_centimetres((shortest, longest))} long, as the "
                 "joints stand, and a limb keeps its length; take links or offsets at its two joints"
+                f"{advice}"
             )
         elif longest > _LONG:
             warn(
@@ -189,27 +181,9 @@ def _check_lengths(limbs: Sequence[Limb], lengths: dict[str, tuple[float, float]
             if not _RATIO[0] <= longest / inner[1] <= _RATIO[1]:
                 warn(
                     f"robot.keypoints: the {_words(limb)} {between} is {_centimetres((shortest, longest))} long, and "
-                    f"what it hangs on {_centimetres(inner)}; are these points at the limbs' joints?"
+                    f"what it hangs on {_centimetres(inner)} (are these points at the limbs' joints?)"
+                    f"{advice}"
                 )
-
-
-def _check_moved(body_map: BodyMap) -> None:
-    """Refuses a joint that turns no direction: no human pose could tell its angle."""
-    robot, shared = body_map.robot, body_map.shared
-    q_BN = robot.sample(16, torch.Generator().manual_seed(0))
-    before = body_map.robot_directions(robot.forward(q_BN))
-    for column, joint in enumerate(robot.joint_names):
-        moved = q_BN.clone()
-        moved[:, column] = (robot.lower_N + robot.upper_N)[column] - q_BN[:, column]  # mirrored in its range
-        change = (body_map.robot_directions(robot.forward(moved)) - before).abs().max()
-        if float(change) < 1e-4:
-            seen_from = ", ".join(
-                f"the {name} '{link}'" for name, link in zip(shared.views, shared.view_links, strict=True)
-            )
-            raise UserError(
-                f"robot.joints: '{joint}' turns no limb, hand or head of robot.keypoints relative to {seen_from}, "
-                "so no human pose could tell its angle; leave it out or name what it moves"
-            )
 
 
 def _words(limb: Limb) -> str:
@@ -219,7 +193,3 @@ def _words(limb: Limb) -> str:
 def _centimetres(length: tuple[float, float]) -> str:
     shortest, longest = (f"{100 * metres:.3g}" for metres in length)
     return f"{shortest} cm" if shortest == longest else f"{shortest} .. {longest} cm"
-
-
-def _quoted(names: Sequence[str]) -> str:
-    return ", ".join(f"'{name}'" for name in names)

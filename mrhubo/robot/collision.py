@@ -1,8 +1,8 @@
 """Self-collision of a robot: signed distances between the capsules of its links, and how they change with the joints.
 
-The shapes are those of the URDF's collision elements, each inside one or more capsules: a sphere and a cylinder with
-round ends are capsules, a flat-ended cylinder gets round ends, a box becomes capsules side by side. Meshes are not
-read; `uncovered` names the links that have nothing else.
+The shapes are those of the URDF's collision elements: a sphere and a cylinder with round ends are capsules, and one to
+three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`). Meshes are not read; `uncovered` names the
+links that have nothing else, and `unknown` those of them for which nobody knows whether the robot touches itself.
 
 Links that the sampled joints do not move against each other are one body. Two bodies that share a joint cannot be kept
 apart, so they are not compared; nor are two of which some capsules overlap in more than half of all random poses (an
@@ -132,6 +132,11 @@ class SelfCollision(nn.Module):
         solid = (link.name for link in urdf.robot.links if link.collisions or link.name in unread)
         self.uncovered = tuple(name for name in solid if name not in found)
         """Links that are not looked at: their collision geometry is of meshes alone, cannot be read, or is too much."""
+        joints = [self.robot.description.joints[name] for name in self.robot.driven_joints]
+        carrying = {joint.parent for joint in joints}
+        moved = {name for name in self.uncovered if self._body(name) != self.robot.description.root}
+        self.unknown = tuple(name for name in self.uncovered if name in moved | carrying)
+        """Those of `uncovered` that move, or carry what moves: whether they touch anything is not known."""
         self._links = [link for link, some in found.items() for _ in some]
         ends = [(start_3, end_3) for some in found.values() for start_3, end_3, _ in some]
         radii = [radius for some in found.values() for _, _, radius in some]
@@ -200,6 +205,14 @@ class SelfCollision(nn.Module):
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """The links (a, b) of each pair."""
         return tuple((self._links[i], self._links[j]) for i, j in self._pair_2P.T.tolist())
+
+    def clearance(self, most: float) -> Tensor:
+        """The distance [m] that each pair is to keep (P,): `most`, or what it has in the robot's home pose, if that is
+        less. So no pair is asked to be further apart than whoever made the robot has it at home, and shapes that
+        overlap there (a cover around the next link) are not fought.
+        """
+        home = self.near(self.robot.home()[None], most)
+        return self._reach_C.new_full((self._pair_2P.shape[1],), most).index_copy(0, home.pair_X, home.distance_X)
 
     def collides(self, q_BN: Tensor, poses: LinkPoses | None = None) -> Tensor:
         """Whether any pair overlaps (B,), at joint angles (B, N) [rad]; `poses` as for `near`."""

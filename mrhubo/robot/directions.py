@@ -81,7 +81,9 @@ class Directions(nn.Module):
         self._bends = len(bends)
         ends = [[d.start for _, d in limbs], [d.end for _, d in limbs]]
         tensors = {
-            "limb_links_2E": torch.tensor([[robot.link_index(point.link) for point in points] for points in ends]),
+            "limb_links_2E": torch.tensor(
+                [[robot.link_index(point.link) for point in points] for points in ends], dtype=torch.long
+            ),
             "limb_offsets_2E3": torch.tensor([[point.offset_3 for point in points] for points in ends]).reshape(
                 2, -1, 3
             ),

@@ -165,6 +165,7 @@ def _split(element: etree._Element) -> tuple[str, str, str]:
 
 def _root(tag: str) -> str:
     if tag in _NO_URDF_ROOTS:
-        return f"it is {_NO_URDF_ROOTS[tag]} (its root element is <{tag}>); name the robot's URDF, or convert it to one"
+        convert = "`mrhubo describe` makes one of it" if tag == "mujoco" else "convert it to one"
+        return f"it is {_NO_URDF_ROOTS[tag]} (its root element is <{tag}>); name the robot's URDF, or {convert}"
     near = ", not <robot>" if nearest(tag, ["robot"]) is None else "; write it <robot>"
     return f"its root element is <{tag}>{near}"

@@ -27,7 +27,7 @@ from mrhubo.config import (
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.urdf import Description
 
-_DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
+DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,9 @@ def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
             raise UserError(f"{key}: has no '{word}'; it is {form}")
     axes = []
     for word in words:
-        if word not in given and word not in _DEFAULT_AXES:
+        if word not in given and word not in DEFAULT_AXES:
             raise UserError(f"{key}: '{word}' is missing; give {form} in the link's frame")
-        axes.append(torch.tensor(read_vector(f"{key}.{word}", given.get(word, _DEFAULT_AXES.get(word)))))
+        axes.append(torch.tensor(read_vector(f"{key}.{word}", given.get(word, DEFAULT_AXES.get(word)))))
     first, second = axes
     if first.norm() < 1e-6 or torch.linalg.cross(first, second).norm() < 1e-3 * first.norm() * max(second.norm(), 1e-6):
         raise UserError(f"{key}: {words[0]} and {words[1]} must be two different directions")

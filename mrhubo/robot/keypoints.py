@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from mrhubo.body.skeleton import PAIRED_KEYPOINTS
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.entries import End, Point, read_end, read_point
 from mrhubo.robot.parts import PARTS, BendPart, BodyPart, LimbPart, OrientedPart
@@ -64,6 +65,14 @@ class Keypoints:
         """Names of the points and oriented parts that are elsewhere on the other robot, or that only one has."""
         mine, theirs = ({**keypoints.points, **keypoints.ends} for keypoints in (self, other))
         return [name for name in {**mine, **theirs} if not _same(mine.get(name), theirs.get(name))]
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Entries of which the robot has the left and the right one: points, and parts by the joints that turn them."""
+        both = [(left, right) for left, right in PAIRED_KEYPOINTS.values() if {left, right} <= self.points.keys()]
+        ends = {self._row(name).joint: name for name in self.ends}
+        both += [(ends[left], ends[right]) for left, right in PAIRED_KEYPOINTS.values() if {left, right} <= ends.keys()]
+        return tuple(both)
 
     def _row(self, name: str) -> BodyPart:
         return next(part for part in self.parts if part.name == name)

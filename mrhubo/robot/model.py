@@ -83,6 +83,9 @@ class Robot(nn.Module):
         description = urdf if isinstance(urdf, Description) else describe(Path(urdf))
         self.urdf, self.name = description.path, name or description.path.stem
         self.description = description
+        self._made_with = {"links": tuple(links), "ranges": ranges, "hold": hold, "max_speed": max_speed}
+        self.hold = hold
+        """Angles [rad] that somebody has chosen for joints that are not sampled; `held` has those of all."""
         self.keypoints: Keypoints | None = None
         """Which links stand for which body parts, where `from_urdf` or `from_config` has been told."""
         self.key_links: tuple[str, ...] = ()
@@ -115,7 +118,8 @@ class Robot(nn.Module):
         speeds = [joint_speed(description.joints, j, max_speed) for j in self.joint_names]
         self.register_buffer("velocity_N", _inward(speeds, -torch.inf), persistent=False)
         self.moving_links = tuple(description.joint(j).child for j in self.joint_names)
-        self.links = tuple(dict.fromkeys((*self.moving_links, *(description.check_link(x) for x in links))))
+        more = [description.check_link(link) for link in self._made_with["links"]]
+        self.links = tuple(dict.fromkeys((*self.moving_links, *more)))
         self.held = {j.name: held_angle(j, hold.get(j.name)) for j in description.joints.values() if j.kind != "fixed"}
         self._prepare_chain()
 
@@ -210,6 +214,21 @@ class Robot(nn.Module):
                 description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name,
                 robot.max_speed,
             )  # fmt: skip
+
+    def without(self, joints: Collection[str]) -> Robot:
+        """The same robot with some of `joint_names` held at 0, or at the limit nearest to 0; at least one must stay."""
+        kept = [name for name in self.joint_names if name not in joints]
+        ranges = {name: ends for name, ends in self._made_with["ranges"].items() if name in kept}
+        return self._again(kept, ranges=ranges)
+
+    def with_links(self, links: Iterable[str]) -> Robot:
+        """The same robot, which computes the poses of more links."""
+        return self._again(self.joint_names, links=(*self._made_with["links"], *links))
+
+    def _again(self, joints: Sequence[str], **changed: Any) -> Robot:
+        robot = Robot(self.description, joints, name=self.name, **{**self._made_with, **changed})
+        robot.keypoints, robot.key_links = self.keypoints, self.key_links
+        return robot.to(self.lower_N.device)
 
     def link_index(self, link: str) -> int:
         """Position of a link in `links`."""

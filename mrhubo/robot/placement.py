@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from mrhubo.body.skeleton import KEYPOINT_NAMES
 from mrhubo.errors import InputWarning, UserError
+from mrhubo.robot.discovery.names import sides
 from mrhubo.robot.keypoints import Axis, Limb
+from mrhubo.robot.suggestions import exchanged
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
@@ -44,9 +45,21 @@ def check_placement(body_map: BodyMap, q_BN: Tensor) -> None:
     limbs = [direction for direction in body_map.directions if isinstance(direction, Limb)]
     for name in body_map.shared.views:
         hanging = [limb for limb in limbs if limb.part.hangs_on == limb.part.seen_from == name]
-        if hanging:
-            _Starts(body_map, name, hanging, q_BN).check()
+        if not (hanging and _Starts(body_map, name, hanging, q_BN).check()):
+            _check_facing(body_map, name)
     _check_axes(body_map, q_BN)
+
+
+def _check_facing(body_map: BodyMap, name: str) -> None:
+    """Warns of a part from which others are seen that looks elsewhere than the robot does."""
+    end, yardstick = body_map.keypoints.ends[name], body_map.yardstick
+    turned = yardstick.turned(end, name)
+    if turned is not None and turned > _ODD_MIDDLE:
+        sides = f"; left and right then: {exchanged(body_map.keypoints)}" if turned > 180 - _ODD_MIDDLE else ""
+        warn(
+            f"robot.keypoints.{name}: its forward and up are turned by {turned:.0f} degrees from where the robot "
+            f"faces, as {yardstick.facing_cue} tell; write {yardstick.entry(name)}{sides}"
+        )
 
 
 def warn(sentence: str) -> None:
@@ -59,6 +72,7 @@ class _Starts:
 
     def __init__(self, body_map: BodyMap, name: str, limbs: list[Limb], q_BN: Tensor) -> None:
         self.name, self.limbs, self.end = name, limbs, body_map.keypoints.ends[name]
+        self._body_map = body_map
         poses = body_map.robot.forward(q_BN)
         shared = body_map.shared
         view = shared.view_robot(poses)
@@ -71,18 +85,18 @@ class _Starts:
         self.local_E3 = ((view.start_BE3[:, rows] - origin_B3[:, None]) @ axes_B33).mean(0)
         """From the link's origin; both in human axes of the part."""
         part = next(part for part in body_map.keypoints.parts if part.name == name)
-        rest = dict(zip(KEYPOINT_NAMES, body_map.skeleton.rest_K3, strict=True))
+        rest = body_map.skeleton.rest_points
         self.human_E3 = torch.stack([rest[limb.part.start] - rest[part.joint] for limb in limbs])
         self.length = float((view.end_BE3 - view.start_BE3)[:, rows].norm(dim=-1).mean())
 
-    def check(self) -> None:
-        """Looks at every two limbs, or at the only one."""
+    def check(self) -> bool:
+        """Looks at every two limbs, or at the only one; whether it has warned."""
         if len(self.limbs) == 1:
-            self._check_one()
-        for (i, one), (j, other) in itertools.combinations(enumerate(self.limbs), 2):
-            self._check_two(i, j, one, other)
+            return self._check_one()
+        pairs = itertools.combinations(enumerate(self.limbs), 2)
+        return any([self._check_two(i, j, one, other) for (i, one), (j, other) in pairs])
 
-    def _check_one(self) -> None:
+    def _check_one(self) -> bool:
         human, robot = float(self.human_E3[0, 0]), float(self.local_E3[0, 0])
         if robot * math.copysign(1.0, human) < -_ASIDE * self.length:
             side, wrong = ("left", "right") if human > 0 else ("right", "left")
@@ -91,34 +105,56 @@ class _Starts:
                 f"robot.keypoints.{start}: lies on the {wrong} of '{self.name}' ('{self.end.link}'), a human's on the "
                 f"{side}; {self._advice()}"
             )
+            return True
+        return False
 
-    def _check_two(self, i: int, j: int, one: Limb, other: Limb) -> None:
+    def _check_two(self, i: int, j: int, one: Limb, other: Limb) -> bool:
         line_3 = self.start_E3[i] - self.start_E3[j]
         off = _degrees(line_3, self.human_E3[i] - self.human_E3[j])
         line = f"the line from '{other.part.start}' to '{one.part.start}'"
         sentence = (
             f"robot.keypoints.{self.name}: {line} points {off:.0f} degrees away from a human's, seen from "
-            f"'{self.end.link}'; are left and right exchanged? {self._advice()}"
+            f"'{self.end.link}'; {self._remedies(one, other, off)}"
         )
         if off > _WRONG_LINE:
             raise UserError(sentence)
         if off > _ODD_LINE:
             warn(sentence)
-            return
+            return True
         middle_3 = (self.human_E3[i] + self.human_E3[j]) / 2
         seen = [(offset_E3[i] + offset_E3[j]) / 2 for offset_E3 in (self.start_E3, self.local_E3)]
         angles = [_degrees(robot_3, middle_3) for robot_3 in seen if robot_3.norm() >= line_3.norm() / 2]
-        if angles and min(angles) > _ODD_MIDDLE:
+        turned = self._body_map.yardstick.turned(self.end, self.name)
+        if angles and min(angles) > _ODD_MIDDLE and (turned is None or turned > _ODD_LINE):
             warn(
                 f"robot.keypoints.{self.name}: '{one.part.start}' and '{other.part.start}' lie {min(angles):.0f} "
                 f"degrees from where they lie on a human, seen from '{self.end.link}'; {self._advice()}"
             )
+            return True
+        return False
+
+    def _remedies(self, one: Limb, other: Limb, off: float) -> str:
+        """What to write: what is known of the robot's facing tells whether the sides or the frame are wrong, else names
+        tell which is likelier. Sides that are exchanged turn the line right round.
+        """
+        left, right = (one, other) if self.human_E3[self.limbs.index(one), 0] > 0 else (other, one)
+        ends = [(limb.start.link, limb.end.link) for limb in (left, right)]
+        turned = self._body_map.yardstick.turned(self.end, self.name)
+        frame = f"the {self.name} does not look forward and up: {self._entry()}"
+        exchange = f"left and right are exchanged: write {exchanged(self._body_map.keypoints)}"
+        if turned is not None and turned <= _ODD_LINE < 180 - off:
+            starts = self._body_map.yardstick.advice(one.part.start, other.part.start, after=" ")
+            return f"are these points where the limbs start?{starts}"
+        if turned is not None:
+            return frame if turned > _ODD_LINE else exchange
+        return f"{exchange}; or {frame}" if sides(zip(*ends, strict=True)) < 0 else f"{frame}; or {exchange}"
 
     def _advice(self) -> str:
-        return (
-            f"A {self.name}'s frame has x forward and z up; where it has not, write {{link: {self.end.link}, forward: "
-            "[x, y, z], up: [x, y, z]}"
-        )
+        return f"does the {self.name} look forward and up? {self._entry()}"
+
+    def _entry(self) -> str:
+        entry = self._body_map.yardstick.entry(self.name)
+        return f"write {entry or f'{self.name}: {{link: {self.end.link}, forward: [x, y, z], up: [x, y, z]}}'}"
 
 
 def _check_axes(body_map: BodyMap, q_BN: Tensor) -> None:
@@ -126,7 +162,7 @@ def _check_axes(body_map: BodyMap, q_BN: Tensor) -> None:
     robot = body_map.robot
     random_BD3, home_BD3 = (body_map.robot_directions(robot.forward(q)) for q in (q_BN, robot.home()[None]))
     column = {name: i for i, name in enumerate(body_map.direction_names)}
-    rest = dict(zip(KEYPOINT_NAMES, body_map.skeleton.rest_K3, strict=True))
+    rest = body_map.skeleton.rest_points
     limbs = {direction.part.name: direction for direction in body_map.directions if isinstance(direction, Limb)}
     for axis in (direction for direction in body_map.directions if isinstance(direction, Axis)):
         rest_3, carrier = torch.tensor(axis.rest), limbs.get(axis.part.hangs_on or "")

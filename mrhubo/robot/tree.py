@@ -69,6 +69,8 @@ class Tree:
     """What cannot be read and is not needed."""
     unread_collisions: frozenset[str]
     """Links with a collision element that cannot be read."""
+    masses: dict[str, tuple[float, float, float, float]]
+    """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
 
 
 @dataclass
@@ -112,7 +114,10 @@ def read_tree(path: Path) -> Tree:
     robot.extend(_link(document, links[name], found) for name in links if name not in lost)
     robot.extend(_joint(document, joint, found) for joint in joints.values() if _child(joint) not in lost)
     collisions = frozenset(found.unread_collisions)
-    return Tree(path, root, tuple(links), joints, robot, found.faults, found.doubts, tuple(found.left_out), collisions)
+    masses = {name: mass for name, link in links.items() if (mass := _mass(link)) is not None}
+    return Tree(
+        path, root, tuple(links), joints, robot, found.faults, found.doubts, tuple(found.left_out), collisions, masses
+    )
 
 
 def _child(joint: etree._Element) -> str:
@@ -247,6 +252,16 @@ def _link(document: Document, link: etree._Element, found: _Findings) -> etree._
         if element.tag == "collision":
             found.unread_collisions.add(name)
     return clean
+
+
+def _mass(link: etree._Element) -> tuple[float, float, float, float] | None:
+    """Mass and centre of a link; None where they cannot be read, or there is no mass."""
+    mass, origin = (link.find(f"inertial/{tag}") for tag in ("mass", "origin"))
+    kilograms = read_numbers(mass.get("value", ""), 1) if mass is not None else []
+    centre_3 = [0.0] * 3 if origin is None else read_numbers(origin.get("xyz", "0 0 0"), 3, MOST_METRES)
+    if isinstance(kilograms, str) or isinstance(centre_3, str) or not kilograms or not 0 < kilograms[0] < math.inf:
+        return None
+    return kilograms[0], centre_3[0], centre_3[1], centre_3[2]
 
 
 def _shape_problem(element: etree._Element) -> str | None:

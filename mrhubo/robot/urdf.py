@@ -46,6 +46,8 @@ class Description:
     """What else cannot be read and is not needed."""
     unread_collisions: frozenset[str] = field(default=frozenset(), repr=False, compare=False)
     """Links with a collision element that cannot be read."""
+    masses: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict, repr=False, compare=False)
+    """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
 
     @cached_property
     def kinematics(self) -> str:
@@ -158,7 +160,7 @@ def describe(path: Path) -> Description:
     above = {joint.child: joint for joint in joints.values()}
     return Description(
         path, tree.root, tree.links, joints, above, parsed,
-        tree.faults, tree.doubts, tree.left_out, tree.unread_collisions,
+        tree.faults, tree.doubts, tree.left_out, tree.unread_collisions, tree.masses,
     )  # fmt: skip
 
 

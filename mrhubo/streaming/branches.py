@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.fast import StreamSettings
-from mrhubo.reference import DirectionProblem
+from mrhubo.reference import Avoidance, DirectionProblem
 from mrhubo.reference.terms import REFERENCE_RATE, Quadratic
 from mrhubo.streaming.people import OfPeople
 
@@ -33,23 +33,30 @@ class BranchState(OfPeople):
     """The answer that the robot takes [rad], before limits of acceleration and of crossing over."""
     worse_BC: Tensor
     """Since how long [s] the network's answer has been clearly better."""
+    goal_BN: Tensor
+    """The answer that the robot takes, after steps away from self-collision where it would touch."""
 
     @classmethod
-    def at(cls, q_BN: Tensor, blocks: int) -> BranchState:
+    def at(cls, q_BN: Tensor, blocks: int, goal_BN: Tensor | None = None) -> BranchState:
         """Where a stream begins."""
-        return cls(q_BN, q_BN.new_zeros(len(q_BN), blocks))
+        return cls(q_BN, q_BN.new_zeros(len(q_BN), blocks), q_BN if goal_BN is None else goal_BN)
 
 
 class Branches:
     """The two answers for one robot."""
 
-    def __init__(self, problem: DirectionProblem, settings: StreamSettings) -> None:
-        self.problem, self.settings = problem, settings
+    def __init__(self, problem: DirectionProblem, settings: StreamSettings, avoidance: Avoidance | None = None) -> None:
+        """`avoidance`: what makes answers give way that touch the robot itself; None: nothing does."""
+        self.problem, self.settings, self.avoidance = problem, settings, avoidance
+
+    def free(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
+        """Joint angles (B, N) [rad] after steps away from self-collision, if there are to be any."""
+        return q_BN if self.avoidance is None else self.avoidance(q_BN, target_BD3)
 
     def advance(
         self, state: BranchState, network_BN: Tensor, target_BD3: Tensor, passed_B: Tensor
     ) -> tuple[BranchState, Tensor]:
-        """The next state, and how fast the kept answer moves [rad/s] (B, N): 0 where it has been left for the other.
+        """The next state, and how fast the goal moves [rad/s] (B, N): 0 where another answer has been taken up.
 
         Args:
             state: the last one.
@@ -76,8 +83,10 @@ class Branches:
         )
         leave_BC = worse_BC > max(self.settings.worse_time, 1e-9)
         leave_BN = leave_BC[:, problem.blocks.block_N]
-        velocity_BN = torch.where(leave_BN, 0.0, (moved_BN - kept_BN) / passed_B[:, None])
-        return BranchState(torch.where(leave_BN, other_BN, moved_BN), torch.where(leave_BC, 0.0, worse_BC)), velocity_BN
+        kept_BN = torch.where(leave_BN, other_BN, moved_BN)
+        goal_BN = self.free(kept_BN, target_BD3)
+        velocity_BN = torch.where(leave_BN, 0.0, (goal_BN - state.goal_BN) / passed_B[:, None])
+        return BranchState(kept_BN, torch.where(leave_BC, 0.0, worse_BC), goal_BN), velocity_BN
 
     def _steps(
         self, q_YN: Tensor, target_YD3: Tensor, pull_Y: Tensor, bounds: tuple[Tensor, Tensor]

@@ -37,7 +37,8 @@ class Follower:
         """`longest_step`: no more time [s] counts as passed when joints move."""
         body_map = retargeter.body_map
         self.retargeter, self.settings, self.longest_step = retargeter, settings, longest_step
-        self.branches = Branches(retargeter.directions, settings)
+        avoidance = retargeter.avoidance if settings.avoid_collisions else None
+        self.branches = Branches(retargeter.directions, settings, avoidance)
         self.limits = JointLimits(body_map.robot, settings.ramp_time)
         unit_D1 = torch.zeros(len(body_map.directions), 1)
         unit_D1[body_map.measured] = 1.0
@@ -86,9 +87,10 @@ class Follower:
                 velocity_BN = torch.where(known_B[:, None], speed_BN, velocity_BN)
             if bool(new_B.any()):
                 first_BN = self.retargeter.answer(local_BJ33, aim_BD3, POLISH)
-                branches = branches.where(new_B, BranchState.at(first_BN, branches.worse_BC.shape[1]))
-                joints = joints.where(new_B & ~state.placed_B, JointState.at_rest(first_BN))
+                goal_BN = self.branches.free(first_BN, aim_BD3)
+                branches = branches.where(new_B, BranchState.at(first_BN, branches.worse_BC.shape[1], goal_BN))
+                joints = joints.where(new_B & ~state.placed_B, JointState.at_rest(goal_BN))
             unseen_B = torch.where(seen_B, 0.0, unseen_B)
         step_B = torch.full_like(unseen_B, min(passed, self.longest_step))
-        joints = self.limits.follow(joints, branches.kept_BN, velocity_BN, step_B)
+        joints = self.limits.follow(joints, branches.goal_BN, velocity_BN, step_B)
         return StreamState(filtered, branches, joints, unseen_B, torch.ones_like(state.placed_B))

@@ -21,7 +21,7 @@ from mrhubo.errors import UserError
 from mrhubo.fast import StreamSettings
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.motion import Motion, MotionLike, read_poses, to_tensor
-from mrhubo.motion.poses import check_frame_rate
+from mrhubo.motion.checks import check_frame_rate
 from mrhubo.retargeter import Retargeter, RetargetResult, join_results
 from mrhubo.streaming.follow import Follower, StreamState
 

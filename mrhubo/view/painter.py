@@ -17,6 +17,7 @@ from PIL import Image
 from mrhubo.view.camera import Camera
 from mrhubo.view.raster import FACE, Canvas, draw, half_axes
 from mrhubo.view.solids import Color, Solids
+from mrhubo.view.surfaces import Surface, draw_surface
 
 WHITE: Color = (1.0, 1.0, 1.0)
 LIGHT = (-0.45, 0.62, 0.75)
@@ -31,13 +32,15 @@ def render(
     supersample: int = 2,
     ground: float | str | None = "auto",
     light: tuple[float, float, float] = LIGHT,
+    surface: Surface | None = None,
 ) -> Image.Image:
     """Picture of one or several figures.
 
     ``size``: width, height in pixels. ``camera``: default :meth:`Camera.framing` the figures. ``background``: RGB
     0..1, or None for a transparent RGBA picture. ``supersample``: samples per pixel in either direction. ``ground``:
     height z of the floor that takes a soft shadow, m; "auto" is the lowest point of the figures, None draws no shadow.
-    ``light``: direction towards the lamp, picture frame.
+    ``light``: direction towards the lamp, picture frame. ``surface``: drawn among the figures; it throws no shadow, and
+    does not count where figures are framed.
     """
     solids = solids if isinstance(solids, Solids) else Solids.concatenate(solids)
     width, height = size
@@ -52,9 +55,12 @@ def render(
 
     canvas = Canvas(width * supersample, height * supersample, camera.width_m / (width * supersample))
     draw(canvas, local)
+    tall_m = float(np.ptp(local.extent(np.array([0.0, 1.0, 0.0])))) if len(local) else 1.0
+    if surface is not None and len(surface):
+        draw_surface(canvas, surface.transformed(pose_44), len(local))
+        local = Solids.concatenate([local, _stand_in(surface)])
     linear_HW4 = _shade(canvas, local, basis_33[:, 2], np.asarray(light, float))
     linear_HW4 = _shrink(linear_HW4, supersample)
-    tall_m = float(np.ptp(local.extent(np.array([0.0, 1.0, 0.0])))) if len(local) else 1.0
     linear_HW4[..., :3] *= 1.0 - _crevices(canvas, supersample, tall_m)[..., None]
     if ground == "auto":
         ground = solids.extent(np.array([0.0, 0.0, 1.0]))[0] if len(solids) else None
@@ -62,6 +68,11 @@ def render(
     if ground is not None:
         shadow_HW = _ground_shadow(solids, camera, float(ground), size)
     return _compose(linear_HW4, shadow_HW, background)
+
+
+def _stand_in(surface: Surface) -> Solids:
+    """A solid with a surface's colour, in which its pixels have their row."""
+    return Solids.capsules([(np.zeros(3), np.zeros(3), 1.0, 1.0)], surface.color)
 
 
 def _shade(canvas: Canvas, local: Solids, up_3: np.ndarray, light_3: np.ndarray) -> np.ndarray:
@@ -73,6 +84,9 @@ def _shade(canvas: Canvas, local: Solids, up_3: np.ndarray, light_3: np.ndarray)
         return picture_HW4
     owner_N = canvas.owner_HW.ravel()[pixels_N]
     normal_3N = _normals(canvas, local, pixels_N, owner_N)
+    if canvas.normal_HW3 is not None:  # of a surface, the last of the solids
+        disc_N = owner_N == len(local) - 1
+        normal_3N[:, disc_N] = canvas.normal_HW3.reshape(-1, 3)[pixels_N[disc_N]].T
     n_w = normal_3N[2]
 
     light_3 = light_3 / np.linalg.norm(light_3)

@@ -36,6 +36,8 @@ class Canvas:
         self.owner_HW = np.full((height, width), -1, np.int32)
         self.t_HW = np.zeros((height, width), np.float32)
         self.pixel_m = pixel_m
+        self.normal_HW3: np.ndarray | None = None
+        """Of what is drawn as discs (`mrhubo.view.surfaces`), picture frame."""
 
     def window(self, u_low: float, u_high: float, v_low: float, v_high: float) -> tuple[slice, slice]:
         """Rows and columns whose pixel centres may lie in the rectangle."""

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
+from PIL.PngImagePlugin import PngInfo
 
 from mrhubo.files.atomic import atomic_path
 
@@ -175,11 +176,17 @@ def _edges(phi_B: np.ndarray, threshold: float) -> tuple[np.ndarray, bool]:
     return (np.exp(edges) if logarithmic else edges), logarithmic
 
 
-def save_png(image: Image.Image, path: str | Path) -> Path:
-    """Write a PNG so that ``path`` is either the whole new picture or what it was before; makes missing folders."""
-    path = Path(path)
+def save_png(image: Image.Image, path: str | Path, software: str | None = None) -> Path:
+    """Write a PNG so that ``path`` is either the whole new picture or what it was before; makes missing folders.
+
+    ``software``: what the file names as its maker (`Software` in its text).
+    """
+    path, more = Path(path), {}
+    if software is not None:
+        more["pnginfo"] = PngInfo()
+        more["pnginfo"].add_text("Software", software)
     with atomic_path(path) as temporary:
-        image.save(temporary, format="PNG")
+        image.save(temporary, format="PNG", **more)
     return path
 
 

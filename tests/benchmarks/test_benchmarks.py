@@ -26,6 +26,7 @@ from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 
 SCRIPTS = [
+    "collisions",
     "confidence",
     "inference",
     "pair_pictures",
@@ -39,7 +40,7 @@ SCRIPTS = [
     "scaling",
 ]
 SCRIPTS += ["stream", "training"]
-LIBRARIES = ["common", "levenberg_marquardt"]
+LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
 
@@ -209,8 +210,9 @@ def test_inference(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> 
     text = run("inference", "--batch", 40, "--rounds", 2, "--frames", 4, package)
     assert {row[0] for row in rows(text, "form")} >= {"PyTorch", "numpy"}
     assert re.search(r"^\| numpy +\| \d+\.\d+ +\| \d+ +\| no +\|$", text, re.M), text
-    over = {(row[0], row[1]): float(row[2]) for row in rows(text, "motion")}
+    over = {(row[0], row[1].removesuffix(" (numpy)")): float(row[4]) for row in rows(text, "motion")}
     assert over["wide", "10 steps"] < over["wide", "1 step"] < over["wide", "network"]
+    assert "left out: mink: is not installed" in text and "left out: closed form of seven-joint arms: no arm" in text
 
 
 def test_polish(run: Run, package: Path, tmp_path: Path) -> None:
@@ -279,6 +281,14 @@ def test_stream(run: Run, package: Path, clips: Path) -> None:
     found = rows(text, "motion")
     assert [row[1] for row in found[:3]] == ["networks", "`retarget`", "stream"]
     assert all(row[4] == "0" and row[5] == "0.0%" for row in found if row[1] == "stream")
+
+
+def test_collisions(run: Run, package: Path, clips: Path) -> None:
+    text = run("collisions", package, "--motions", clips, "--rate", 10, "--rounds", 2, "--random", 300)
+    found = rows(text, "answers of")
+    assert [row[:2] for row in found[::2]] == [[name, "no"] for name in ("frames", "whole motions", "streams")]
+    assert all(row[3] == "0" and row[5] == "0.00%" for row in found[3:])
+    assert [row[1] for row in rows(text, "form")[:2]] == ["stay", "give way"]
 
 
 def test_training(run: Run) -> None:

@@ -10,6 +10,7 @@ import torch
 
 from mrhubo import rotation
 from mrhubo.body import KEYPOINT_NAMES, POSED_JOINT_NAMES, Skeleton, anatomy, mirror_pose
+from mrhubo.body.joints import hinge_axis
 from mrhubo.body.prior_training.poses import load_training_poses
 from mrhubo.motion import read_folder
 
@@ -49,7 +50,7 @@ def test_hinges_bend_the_way_people_do(side: str) -> None:
     """A flexed knee takes the ankle back, a flexed elbow the wrist forward; backwards they are outside."""
     skeleton = Skeleton()
     for joint, end, forward in (("knee", "ankle", -1), ("elbow", "wrist", 1)):
-        axis = anatomy.hinge_axis(f"{side}_{joint}")
+        axis = hinge_axis(f"{side}_{joint}")
         flexed, backward = (posed(f"{side}_{joint}", axis, degrees) for degrees in (70.0, -70.0))
         tip = KEYPOINT_NAMES.index(f"{side}_{end}")
         moved = skeleton.keypoints(flexed)[0, tip] - skeleton.rest_K3[tip]

@@ -291,7 +291,7 @@ def test_the_usage_line_tells_what_is_needed(command: str) -> None:
     needed = [action.option_strings[0] for action in found._flags() if action.required]
     groups = [group for group in found._mutually_exclusive_groups if group.required]
     either = [action.option_strings[0] for group in groups for action in group._group_actions]
-    assert ("(CONFIG | --config CONFIG)" in usage) == found.needs_config
+    assert ("(CONFIG | --config CONFIG" in usage) == found.needs_config
     for action in found._flags():
         flag = action.option_strings[0]
         optional = f"[{flag}" in usage or (f"| {flag}" in usage and flag not in either)

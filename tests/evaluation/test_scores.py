@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from pathlib import Path
@@ -29,6 +30,7 @@ from mrhubo.reference import OptimizationRetargeter
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import BodyMap, build_body_map
 from tests.chain import cut_motion
+from tests.robot.more_robots import more_robot
 
 
 @functools.cache
@@ -195,3 +197,36 @@ def test_the_command_measures_a_package_and_refuses_another_robots(
         main(["--config", str(root / "conf" / "nao.yaml")])
     with pytest.raises(UserError, match="is no package of a retargeter"):
         main(["--config", str(root / "conf" / "nao.yaml"), "--retargeter", str(tmp_path)])
+
+
+def test_joints_at_a_limit_are_named(root: Path) -> None:
+    body_map, key_links = body_map_of(root, "nao")
+    robot = body_map.robot
+    q = ((robot.lower_N + robot.upper_N) / 2).repeat(4, 1)
+    q[:3, 1], q[:1, 2] = robot.upper_N[1], robot.lower_N[2]
+    clip = Clip(Motion("a", torch.eye(3).expand(4, 21, 3, 3), 24.0), q)
+    found = evaluate_clip(clip, q, body_map, key_links)
+    assert dict(found.joints_at_limit) == {
+        n: [0, 0.75, 0.25][i] if i < 3 else 0 for i, n in enumerate(robot.joint_names)
+    }
+    both = [found, dataclasses.replace(found, frames=12, joints_at_limit=tuple((n, 0.0) for n in robot.joint_names))]
+    means = [mean_score(both), mean_score(both, over_frames=True)]
+    assert [mean.most_at_limit for mean in means] == pytest.approx([0.375, 0.1875])
+    assert (
+        table([*both, *means]).splitlines()[-1]
+        == "at a limit, share of the frames: LShoulderRoll 18.8%, LElbowYaw 6.2%"
+    )
+    assert measures(means[0])["at_limit/LShoulderRoll"] == pytest.approx(0.375)
+
+
+@pytest.mark.filterwarnings("ignore::mrhubo.errors.InputWarning")
+def test_a_point_beside_a_joint_shows_in_the_geometric_error_alone(local_TJ33: torch.Tensor) -> None:
+    found = []
+    for link in ("left_shoulder_roll_link", "left_shoulder_pitch_link"):
+        body_map = build_body_map(more_robot("g1", keypoints={"left_shoulder": link}))
+        q = OptimizationRetargeter(body_map).retarget(local_TJ33[:20], 24.0).q_TN
+        found.append(evaluate_clip(Clip(Motion("a", local_TJ33[:20], 24.0), q), q, body_map, ["left_wrist_yaw_link"]))
+    right, beside = found
+    assert max(right.limb_deg, beside.limb_deg) < 1
+    # The upper arm is one limb of four, and 40 mm of its 20 cm are 11 degrees.
+    assert 1.5 < beside.geometric_limb_deg - right.geometric_limb_deg < 5

@@ -59,9 +59,26 @@ def test_steps_are_those_of_the_optimiser(
     start = torch.from_numpy(fast.predict(array)).double()
     for steps in (1, 10):
         wanted = exact.polisher(start.clone(), target, steps)
-        found = fast.predict(array, steps)
+        found = fast.predict(array, steps, avoid_collisions=False)
         assert largest(found, wanted) < SAME_RAD
-        assert np.abs(fast.predict(array[3], steps) - found[3]).max() < SAME_RAD
+        assert np.abs(fast.predict(array[3], steps, avoid_collisions=False) - found[3]).max() < SAME_RAD
+
+
+def test_steps_away_from_self_collision_are_those_of_pytorch(
+    fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
+) -> None:
+    assert retargeter.avoidance.collision is retargeter.collision  # its shapes are read in float32
+    exact = copy.deepcopy(retargeter).double()
+    target = exact.body_map.human_directions(poses.double())
+    start = exact.polisher(torch.from_numpy(fast.predict(array)).double(), target, 10)
+    wanted = exact.avoidance(start, target)
+    assert int((wanted != start).any(dim=1).sum()) >= 5, "hardly any pose touches"
+    found = fast.predict(array, 10)
+    assert largest(found, wanted) < SAME_RAD
+    assert np.abs(fast(array).q - found).max() < SAME_RAD
+    for frame in range(0, len(array), 4):
+        assert np.abs(fast(array[frame]).q - found[frame]).max() < SAME_RAD
+    np.testing.assert_array_equal(fast.predict(array, 0), fast.predict(array, 0, avoid_collisions=False))
 
 
 def test_what_is_told_of_an_answer(
@@ -79,10 +96,12 @@ def test_what_is_told_of_an_answer(
 def test_answers_are_inside_the_limits_and_no_worse_than_pytorchs(
     fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
 ) -> None:
-    found = torch.from_numpy(fast(array).q)
+    found = torch.from_numpy(fast(array, avoid_collisions=False).q)
     assert bool(((found >= retargeter.directions.lower_N) & (found <= retargeter.directions.upper_N)).all())
     target = retargeter.body_map.human_directions(poses)
-    cost = [retargeter.directions.cost(q, target) for q in (found, retargeter.predict(poses, 10))]
+    cost = [
+        retargeter.directions.cost(q, target) for q in (found, retargeter.predict(poses, 10, avoid_collisions=False))
+    ]
     assert bool((cost[0] <= cost[1] + 1e-4).all())
 
 

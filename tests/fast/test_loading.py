@@ -65,7 +65,7 @@ def test_every_form_of_poses(fast: FastRetargeter, poses: torch.Tensor, array: n
 
 def test_a_motion_is_answered_frame_by_frame(fast: FastRetargeter, nao: Retargeter, poses: torch.Tensor) -> None:
     motion = Motion("some", poses, 30.0)
-    found, wanted = fast(motion), nao(motion, together=False)
+    found, wanted = fast(motion, together=False), nao(motion, together=False)
     assert (found.frame_rate, found.name) == (30.0, "some")
     assert float(np.median(np.abs(found.q - wanted.q.numpy()))) < 2e-6
     assert float(np.abs(found.confidence - wanted.confidence.numpy()).max()) < 5e-3

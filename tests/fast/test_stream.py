@@ -80,6 +80,12 @@ def irregular(seen: Tensor) -> Frames:
     return frames
 
 
+def in_double(retargeter: Retargeter) -> Retargeter:
+    """The same in float64; collision shapes are read in float32 before."""
+    assert retargeter.avoidance.collision is retargeter.collision
+    return copy.deepcopy(retargeter).double()
+
+
 @contextmanager
 def double() -> Iterator[None]:
     """PyTorch works in float64."""
@@ -98,7 +104,7 @@ def test_the_numbers_are_those_of_the_stream_in_pytorch(
     name: str, frames: Callable[[Tensor], Frames],
 ) -> None:  # fmt: skip
     given, settings = frames(seen), StreamSettings(worse_time=0.05)
-    retargeter = copy.deepcopy(make(name)).double()
+    retargeter = in_double(make(name))
     with double():
         exact = Stream(retargeter, settings=settings)
         wanted = [exact.joints(None if pose is None else pose.double(), time).numpy() for pose, time in given]
@@ -111,6 +117,27 @@ def test_the_numbers_are_those_of_the_stream_in_pytorch(
     stays = run("numpy", StreamSettings(worse_time=1e3))
     assert np.abs(stays - wanted).max() > 0.1, "nothing has gone over to the other answer"
     np.testing.assert_allclose(run("compiled", settings), wanted, atol=SAME_RAD, rtol=0)
+
+
+@pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
+def test_who_touches_gives_way_as_in_pytorch(
+    make: Callable[[str], Retargeter], make_fast: Callable[[str, str], FastRetargeter], root: Path, name: str
+) -> None:
+    """Arms that cross in front of the chest, and a hand that is led through the other."""
+    motion = read_motion(root / "data" / "motions" / "crossing_arms.npz").local_TJ33[100:340:6]
+    retargeter = in_double(make(name))
+    with double():
+        exact = Stream(retargeter, rate=10)
+        wanted = np.stack([exact.joints(pose.double()).numpy() for pose in motion])
+    for form in FORMS:
+        stream = FastStream(make_fast(name, form), rate=10)
+        found = np.stack([stream.joints(pose.numpy()) for pose in motion])
+        np.testing.assert_allclose(found, wanted, atol=SAME_RAD, rtol=0)
+    stream = FastStream(make_fast(name, "numpy"), rate=10, settings=StreamSettings(avoid_collisions=False))
+    shown = np.stack([stream.joints(pose.numpy()) for pose in motion])
+    touching = make(name).collision.collides
+    before, after = (float(touching(torch.from_numpy(q)).float().sum()) for q in (shown, wanted))
+    assert before > 4 * after and before >= 2
 
 
 @FORM

@@ -19,7 +19,10 @@ from hypothesis import strategies as st
 from mrhubo.body import VPoser, open_skeleton
 from mrhubo.errors import UserError
 from mrhubo.files import unpickler
-from mrhubo.files.safe_pickle import RecordedObject, read_checkpoint, to_array, to_tensor, unpickle
+from mrhubo.files.checkpoint import read_checkpoint, to_tensor
+from mrhubo.files.records import RecordedObject
+from mrhubo.files.safe_pickle import to_array
+from mrhubo.files.unpickler import unpickle
 from tests.files.bounded import bounded
 
 MODULES = ("numpy", "scipy", "collections", "_codecs", "__builtin__")

@@ -17,9 +17,9 @@ FRAMES = 40
 def body_of(local_TJ33: Tensor, with_turns: bool = True) -> BodyPoints:
     """Points, and how trunk, head, hands and feet are turned, of rotations."""
     point, turn = Skeleton().double().keypoints_and_rotations(local_TJ33)
-    points = {name: point[:, i] for i, name in enumerate(KEYPOINT_NAMES)}
+    points = {name: point[:, i].numpy() for i, name in enumerate(KEYPOINT_NAMES)}
     told = ("pelvis", "spine3", "head", *(f"{side}_{joint}" for side in SIDES for joint in ("wrist", "ankle")))
-    return BodyPoints(points, {name: turn[:, JOINT_NAMES.index(name)] for name in told} if with_turns else {})
+    return BodyPoints(points, {name: turn[:, JOINT_NAMES.index(name)].numpy() for name in told} if with_turns else {})
 
 
 def convert(body: BodyPoints) -> Tensor:
@@ -80,7 +80,7 @@ def test_a_bone_that_tells_its_own_turn_is_believed_where_the_arm_is_straight() 
     body = body_of(pose)
     shoulder = Skeleton().double().global_rotations(pose)[:, JOINT_NAMES.index("left_shoulder")]
     down = torch.tensor([0.0, -1.0, 0.0], dtype=torch.float64)
-    found = convert(BodyPoints(body.points, body.turns, {"left_shoulder": shoulder @ down}))
+    found = convert(BodyPoints(body.points, body.turns, {"left_shoulder": (shoulder @ down).numpy()}))
     place = POSED_JOINT_NAMES.index("left_shoulder")
     assert float(geodesic_distance(found[:, place], pose[:, place]).max()) < 1e-5
 

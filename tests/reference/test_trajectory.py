@@ -74,8 +74,8 @@ def test_windows_do_not_show(retargeters: dict[str, OptimizationRetargeter], mon
     )
     found = []
     for window, ahead in ((1000, 100), (220, 110)):
-        monkeypatch.setattr(trajectory, "_WINDOW", window)
-        monkeypatch.setattr(trajectory, "_AHEAD", ahead)
+        monkeypatch.setattr(trajectory, "WINDOW", window)
+        monkeypatch.setattr(trajectory, "AHEAD", ahead)
         found.append(smooth_motion(problem, q_TN[:, None], problem.cost(q_TN, target_TD3)[:, None], task))
         assert bool((found[-1].diff(dim=0).abs() * rate <= problem.robot.velocity_N / 2).all())
     torch.testing.assert_close(*found, atol=5e-3, rtol=0)

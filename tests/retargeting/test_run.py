@@ -35,7 +35,9 @@ def answerer(body_map: BodyMap) -> Answerer:
             robot=robot_facts(body_map.robot, "a stub", ""),
         )  # fmt: skip
 
-    return Answerer("a stub", answer, body_map)
+    facts = robot_facts(body_map.robot, "", "")
+    limbs = ("left_elbow", "left_wrist", "right_elbow", "right_wrist")
+    return Answerer("a stub", answer, body_map.robot.joint_names, facts, limbs)
 
 
 @pytest.fixture
@@ -74,7 +76,7 @@ def test_spans_rates_and_mirrors_are_those_of_the_request(
 
 
 def test_what_is_assumed_of_all_is_said_once(tmp_path: Path, answerer: Answerer, files: list[Path]) -> None:
-    names = answerer.body_map.robot.joint_names
+    names = answerer.joint_names
     said: list[str] = []
     request = Request(joint_order=JointOrder((*names[::-1], "LHipRoll"), "order.txt"))
     places = plan_places(f"{tmp_path}/out/", "unitree", files)
@@ -90,7 +92,7 @@ def test_what_is_assumed_of_all_is_said_once(tmp_path: Path, answerer: Answerer,
 
 def test_a_dataset_takes_all_of_them(tmp_path: Path, answerer: Answerer, files: list[Path]) -> None:
     places = plan_places(f"{tmp_path}/set", "lerobot", files)
-    order = JointOrder(answerer.body_map.robot.joint_names[:2])
+    order = JointOrder(answerer.joint_names[:2])
     retarget_files(files, answerer, places, Request(joint_order=order), SILENT, lambda _: None)
     found = read_lerobot(tmp_path / "set")
     assert [(m.name, len(m), m.joint_names) for m in found] == [(n, 15, order.names) for n in ("wave", "drinking")]

@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from mrhubo import rotation
-from mrhubo.body import BodyPrior, anatomy, mirror_pose
+from mrhubo.body import BodyPrior, mirror_pose
+from mrhubo.body.joints import hinge_axis
 from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.robot import BodyMap, align_pose, build_body_map
@@ -25,7 +26,7 @@ def humans() -> torch.Tensor:
     poses = BodyPrior.open().decode_matrices(torch.randn(64, 32, generator=generator))
     for name in ELBOWS:
         angle_B1 = 2.0 * torch.rand(64, 1, generator=generator)
-        hinge_3 = torch.tensor(anatomy.hinge_axis(name))
+        hinge_3 = torch.tensor(hinge_axis(name))
         poses[:, POSED_JOINT_NAMES.index(name)] = rotation.axis_angle_to_matrix(angle_B1 * hinge_3)
     return poses
 
@@ -70,7 +71,7 @@ def test_elbows_bend_about_their_hinges(root: Path, name: str) -> None:
         turn_B3 = rotation.matrix_to_axis_angle(aligned[:, POSED_JOINT_NAMES.index(elbow)])
         bent_B = turn_B3.norm(dim=1) > 0.25
         assert int(bent_B.sum()) > 20
-        hinge = torch.tensor(anatomy.hinge_axis(elbow))
+        hinge = torch.tensor(hinge_axis(elbow))
         torch.testing.assert_close((turn_B3 @ hinge)[bent_B], turn_B3.norm(dim=1)[bent_B], atol=1e-3, rtol=0)
 
 

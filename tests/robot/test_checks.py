@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
+import yaml
 
 from mrhubo.config import RobotConfig, load_config
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.robot import BodyMap, Robot, build_body_map
+from tests.robot.two_arms import KEYPOINTS
 
 Pair = Callable[..., RobotConfig]
 SIDES = ("left", "right")
+OTHER_SIDE = {f"{side}_{point}": f"{other}_{point}" for side, other in (SIDES, SIDES[::-1])
+              for point in ("shoulder", "elbow", "wrist")}  # fmt: skip
 
 
 def on(link: str, *offset: float) -> dict[str, Any]:
@@ -38,6 +44,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({f"{side}_hand": {"link": "l_hand", "fingers": [0, 0, -1], "thumb": [1, 0, 0]} for side in SIDES},
      r"right_hand: is the link 'l_hand', as is 'left_hand'; one link cannot stand for both"),
     ({"left_elbow": "l_shoulder"}, r"lies below|lie on one point"),
+    ({"left_wrist": on("l_lower", 0, 0, -220)},
+     r"left_wrist: lies 219 m from every link of a robot of 0.98 m; .* millimetres\? Write left_wrist: {link: l_lower, offset: \[0, 0, -0.22\]}"),
 ]  # fmt: skip
 
 
@@ -54,7 +62,7 @@ ODD: list[tuple[dict[str, Any], str]] = [
     ({"left_shoulder": "chest"}, r"left upper arm .* is \d+(\.\d)? .. \d+(\.\d)? cm long, as the joints stand"),
     ({"left_shoulder": "base"}, r"left upper arm .* as the joints stand"),
     ({"right_elbow": "r_hand", "right_wrist": None}, r"right upper arm .* as the joints stand"),
-    ({"left_wrist": on("l_lower", 0, 0, -220)}, r"left forearm .* is 220 m long; .* in millimetres"),
+    ({"left_wrist": on("l_lower", 0.9, 0, 0)}, r"left_wrist: lies 0.\d* m from every link of a robot of 0.98 m; offsets are in metres"),
     ({"head": "chest"}, r"robot.keypoints.head: is the link 'chest', as is 'chest', against which it never turns"),
 ]  # fmt: skip
 
@@ -65,14 +73,51 @@ def test_what_may_be_a_mistake_is_warned_of(pair: Pair, keypoints: dict[str, Any
         build_body_map(pair(keypoints=keypoints))
 
 
+ENTRY = re.compile(r"(\w+): (\{link: [^}]*\}|\w+)")
+
+
+@pytest.mark.parametrize(
+    "keypoints",
+    [
+        *(keypoints for keypoints, _ in (*WRONG[:10], WRONG[-2], WRONG[-1], *ODD[:7])),
+        {"left_shoulder": on("l_upper", 0, 0.05, 0)},
+        {"left_elbow": on("l_fore", 0, 0, 0.25)},
+        {"chest": {"link": "chest", "forward": [-1, 0, 0]}},
+        {name: KEYPOINTS[OTHER_SIDE.get(name, name)] for name in KEYPOINTS},
+        {"chest": {"link": "chest", "forward": [-1, 0, 0]}}
+        | {name: KEYPOINTS[OTHER_SIDE[name]] for name in KEYPOINTS if name in OTHER_SIDE},
+    ],
+)
+def test_who_pastes_what_is_said_gets_a_right_map(pair: Pair, keypoints: dict[str, Any]) -> None:
+    """Every sentence has an entry to paste; of two, the first is taken."""
+    entries = {**KEYPOINTS, **{name: entry for name, entry in keypoints.items() if entry is not None}}
+    for _ in range(6):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                build_body_map(pair(keypoints=entries))
+                said = [str(warning.message) for warning in caught]
+            except UserError as error:
+                said = [str(error)]
+        if not said:
+            break
+        for sentence in said[:1]:
+            after = re.split(r"\b(?:tell:?|[Ww]rite|cross at) ", sentence, maxsplit=1)[-1]
+            found = ENTRY.findall(re.split(r"[;,] or ", after)[0])
+            pasted = {name: yaml.safe_load(entry) for name, entry in found if name in KEYPOINTS}
+            assert pasted, sentence
+            entries |= pasted
+    assert said == []
+
+
 RIGHT: list[dict[str, Any]] = [
     {},
     {"left_shoulder": on("chest", 0, 0.2, 0.3)},  # a point of the trunk where the shoulder turns
     {"left_shoulder": "l_shoulder", "left_elbow": "l_fore"},
     {"left_elbow": on("l_upper", 0, 0, -0.25), "left_wrist": on("l_lower", 0, 0, -0.22)},
     {"left_elbow": on("l_hand", 0, 0, 0.22), "left_wrist": on("l_lower", 0, 0, -0.22)},  # below in the tree, not on the arm
-    {"right_wrist": on("r_lower", 0, 0, -0.4)},
-    {"left_shoulder": on("l_upper", 0.03, 0, -0.02), "left_elbow": on("l_lower", 0, 0.01, 0)},
+    {"left_wrist": on("l_lower", 0, 0, -0.4), "right_wrist": on("r_lower", 0, 0, -0.4)},
+    {"left_shoulder": on("l_upper", 0.01, 0, -0.01), "left_elbow": on("l_lower", 0, 0.01, 0)},
     {"chest": "base"},
     {"head": "head"},
     {f"right_{point}": None for point in ("shoulder", "elbow", "wrist")},

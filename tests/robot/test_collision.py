@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given
@@ -14,8 +16,10 @@ from hypothesis import strategies as st
 
 from mrhubo.config import RobotConfig, load_config
 from mrhubo.errors import InputWarning
-from mrhubo.robot import Robot, SelfCollision, build_body_map, collision
-from mrhubo.robot.capsules import closest_points
+from mrhubo.robot import LinkGeometry, Robot, SelfCollision, build_body_map, collision, read_collision_geometry
+from mrhubo.robot.capsules import capsules, closest_points
+from mrhubo.robot.shapes import Kind
+from tests.robot import exact_shapes
 
 ROBOTS = ["nao", "coman", "reachy"]
 
@@ -124,20 +128,72 @@ def test_distance_of_spheres_is_exact(tmp_path: Path) -> None:
     assert float(near.jacobian_XN[:, 0].abs().max()) < 1e-6  # the shoulder turns both about the trunk's centre
 
 
-def test_boxes_lie_inside_their_capsules(tmp_path: Path) -> None:
-    for size in ((0.1, 0.2, 0.3), (0.02, 0.3, 0.2), (0.1, 0.1, 0.1)):
-        box = f"<box size='{size[0]} {size[1]} {size[2]}'/>"
-        shapes = SelfCollision(toy(tmp_path, "<sphere radius='0.000001'/>", trunk=box))
-        corner = torch.tensor(list(itertools.product(*([-x / 2, 0.0, x / 2] for x in size))))
-        ends, radius = shapes._ends_C23[:-1], shapes._radius_C[:-1]
-        nearest = [
-            min(
-                float((closest_points(end, c.expand(2, 3))[0] - c).norm()) - float(r)
-                for end, r in zip(ends, radius, strict=True)
-            )
-            for c in corner
-        ]
-        assert max(nearest) <= 1e-6
+SHAPES = [("box", (0.1, 0.1, 0.1)), ("box", (0.1, 0.15, 0.3)), ("box", (0.3, 0.05, 0.2)), ("box", (0.04, 0.2, 0.05)),
+          ("cylinder", (0.05, 0.3)), ("cylinder", (0.05, 0.07)), ("cylinder", (0.05, 0.04)), ("cylinder", (0.1, 0.05))]  # fmt: skip
+
+
+def outside(kind: str, size: tuple[float, ...], points_X3: np.ndarray) -> np.ndarray:
+    """How far points are outside a box or a cylinder at the origin; negative inside."""
+    if kind == "box":
+        over = np.abs(points_X3) - np.array(size) / 2
+    else:
+        round_ = np.hypot(points_X3[:, 0], points_X3[:, 1]) - size[0]
+        over = np.stack((round_, np.abs(points_X3[:, 2]) - size[1] / 2), axis=1)
+    return np.linalg.norm(np.maximum(over, 0), axis=1) + np.minimum(over.max(axis=1), 0)
+
+
+@pytest.mark.parametrize(("kind", "size"), SHAPES)
+def test_capsules_hug_boxes_and_cylinders(kind: Kind, size: tuple[float, ...]) -> None:
+    """They take up as much room, and neither sticks out of the other far."""
+    found = capsules(LinkGeometry("link", kind, size, np.eye(4), (0, 0, 0)), np.eye(4))
+    assert len(found) <= 3
+    half_3 = np.array(size if kind == "box" else (2 * size[0], 2 * size[0], size[1])) / 2
+    points = np.random.default_rng(0).uniform(-1, 1, (20_000, 3)) * (half_3 + 0.03)
+    inside = outside(kind, size, points)
+    apart = []
+    for start_3, end_3, radius in found:
+        along_3 = end_3 - start_3
+        share = np.clip((points - start_3) @ along_3 / max(along_3 @ along_3, 1e-12), 0, 1)
+        apart.append(np.linalg.norm(points - start_3 - share[:, None] * along_3, axis=1) - radius)
+    covered = np.min(apart, axis=0)
+    assert 0.9 < (covered <= 0).sum() / (inside <= 0).sum() < 1.1
+    assert inside[covered <= 0].max() < 0.8 * half_3.min()
+    assert covered[inside <= 0].max() < 1.1 * half_3.min()
+    assert ((inside <= 0) & (covered > 0)).sum() < 0.25 * (inside <= 0).sum()
+
+
+@pytest.mark.parametrize(("kind", "size"), [("box", (0.04, 0.09, 0.16)), ("cylinder", (0.07, 0.04)), ("cylinder", (0.03, 0.14))])  # fmt: skip
+def test_what_is_reported_is_near_what_is_exact(
+    root: Path, kind: Kind, size: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """NAO's arms in other shapes, of which the overlap is known exactly."""
+    robot = robot_of(root, "nao")
+    places = {s.link: s for s in read_collision_geometry(robot.description.parsed)}
+    shapes = [
+        dataclasses.replace(places[link], kind=kind, size=size) for link in ("torso", "LForeArm", "RForeArm", "Head")
+    ]
+    for module in (collision, exact_shapes):
+        monkeypatch.setattr(module, "read_collision_geometry", lambda _: shapes)
+    found = SelfCollision(robot)
+    q_BN = robot.sample(150, torch.Generator().manual_seed(0))
+    exact = exact_shapes.collides_exactly(robot, found, q_BN)
+    reported = found.collides(q_BN).numpy()
+    assert 0.03 < exact.mean() < 0.9
+    assert (reported != exact).mean() < 0.08
+
+
+def test_exact_overlap_of_shapes_that_are_easily_told() -> None:
+    def at(x: float) -> np.ndarray:
+        pose = np.eye(4)
+        pose[0, 3] = x
+        return pose
+
+    box = LinkGeometry("a", "box", (0.2, 0.2, 0.2), np.eye(4), (0, 0, 0))
+    ball = LinkGeometry("b", "sphere", (0.1,), np.eye(4), (0, 0, 0))
+    rod = LinkGeometry("c", "cylinder", (0.1, 0.4), np.eye(4), (0, 0, 0))
+    for one, other in itertools.product((box, ball, rod), repeat=2):
+        assert exact_shapes.overlap(one, at(0.0), other, at(0.199))
+        assert not exact_shapes.overlap(one, at(0.0), other, at(0.201))
 
 
 def test_no_pose_is_no_special_case(root: Path) -> None:
@@ -149,7 +205,9 @@ def test_no_pose_is_no_special_case(root: Path) -> None:
 
 def test_meshes_are_named_as_not_covered(tmp_path: Path) -> None:
     mesh = "<collision><geometry><mesh filename='a.stl'/></geometry></collision>"
-    assert SelfCollision(toy(tmp_path, "<sphere radius='0.05'/>", mesh)).uncovered == ("upper",)
+    shapes = SelfCollision(toy(tmp_path, "<sphere radius='0.05'/>", mesh))
+    assert shapes.uncovered == shapes.unknown == ("upper",)
+    assert SelfCollision(toy(tmp_path, "<sphere radius='0.05'/>")).unknown == ()
 
 
 def test_a_robot_without_shapes_never_collides(tmp_path: Path) -> None:

@@ -29,7 +29,8 @@ def swapped(*points: str) -> dict[str, Any]:
 
 def test_arms_on_the_wrong_sides_are_refused(pair: Pair) -> None:
     with pytest.raises(
-        UserError, match=r"robot.keypoints.chest: the line from 'right_shoulder' .* 180 degrees .*exchanged\?"
+        UserError,
+        match=r"robot.keypoints.chest: the line from 'right_shoulder' .* 180 degrees .*exchanged: write left_shoulder: l_upper",
     ):
         build_body_map(pair(keypoints=swapped("shoulder", "elbow", "wrist")))
 

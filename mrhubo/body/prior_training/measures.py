@@ -12,6 +12,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import anatomy
+from mrhubo.body.joints import hinge_axis
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.prior import BodyPrior
 from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
@@ -60,7 +61,7 @@ def bend_backwards(pose_BJ6: Tensor, generator: torch.Generator) -> Tensor:
     low, high = _BEND_DEG
     angle = -torch.deg2rad(low + (high - low) * torch.rand(batch, generator=generator))
     joint = torch.tensor([POSED_JOINT_NAMES.index(name) for name in _HINGES])[which]
-    axis = torch.tensor([anatomy.hinge_axis(name) for name in _HINGES])[which]
+    axis = torch.tensor([hinge_axis(name) for name in _HINGES])[which]
     bent = rotation.matrix_to_sixd(rotation.axis_angle_to_matrix(axis * angle[:, None]))
     result = pose_BJ6.clone()
     result[torch.arange(batch), joint] = bent.to(pose_BJ6)

@@ -39,7 +39,7 @@ def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
     sixd = torch.empty(len(poses), len(POSED_JOINT_NAMES), 6)
     for start in range(0, len(poses), 50_000):
         block = torch.from_numpy(poses[start : start + 50_000, 3:].astype(np.float32)).unflatten(-1, (-1, 3))
-        local = untilt_arms(rotation.axis_angle_to_matrix(block), CMU_TILT)
+        local = torch.from_numpy(untilt_arms(rotation.axis_angle_to_matrix(block).numpy(), CMU_TILT))
         sixd[start : start + 50_000] = rotation.matrix_to_sixd(local)
     return sixd, [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)], [str(n) for n in names]
 

@@ -8,14 +8,12 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.human import (
-    add,
     bend_axis,
     cross,
     dot,
     identity,
     multiply,
     orthonormal,
-    put,
     put3,
     row,
     row3,
@@ -26,11 +24,9 @@ from mrhubo.fast.compiled.human import (
 from mrhubo.fast.compiled.networks import mlp
 from mrhubo.fast.compiled.tables import (
     AXIS_T33,
-    BODY_S,
     COLUMN_XD,
     COUNT_5,
     DIRECTION_K3,
-    END_S23,
     EXCESS,
     GOOD,
     INNER,
@@ -39,10 +35,7 @@ from mrhubo.fast.compiled.tables import (
     LIMIT_T32,
     MIRROR_T,
     OF_K,
-    PAIR_Y2,
     PARENT_T,
-    RADIUS_S,
-    REACH_S,
     REST_K23,
     SCALE_4,
     SEEN_D,
@@ -59,8 +52,8 @@ from mrhubo.fast.compiled.tables import (
     vector,
     whole,
 )
-from mrhubo.fast.description import BEND, LIMB, ORIENT, SHARE
-from mrhubo.fast.plain.judging import PARALLEL, SHORT
+from mrhubo.fast.plain.judging import SHORT
+from mrhubo.fast.sections import BEND, LIMB, ORIENT, SHARE
 
 _TINY = 1e-12
 
@@ -227,51 +220,6 @@ def angle_between(a, b):
     """Angle [rad] between vectors."""
     across = cross(a, b)
     return math.atan2(math.sqrt(dot(across, across)), dot(a, b))
-
-
-@njit(**INNER)
-def collides(t, rotation_L33, position_L3, ends_S3):
-    """Whether any pair of capsules overlaps. `ends_S3`: room for both ends of each."""
-    for e in range(len(ends_S3)):
-        body = whole(t, BODY_S, e // 2)
-        put(ends_S3, e, add(turn(rotation_L33, body, vector(t, END_S23, e)), row(position_L3, body), 1.0))
-    for y in range(size(t, PAIR_Y2) // 2):
-        i, j = whole(t, PAIR_Y2, 2 * y), whole(t, PAIR_Y2, 2 * y + 1)
-        apart = 0.0
-        for x in range(3):
-            middle = ends_S3[2 * i, x] + ends_S3[2 * i + 1, x] - ends_S3[2 * j, x] - ends_S3[2 * j + 1, x]
-            apart += middle * middle
-        reach = real(t, REACH_S, i) + real(t, REACH_S, j)
-        if apart < 4 * reach * reach:
-            touch = real(t, RADIUS_S, i) + real(t, RADIUS_S, j)
-            if _squared_distance(ends_S3, 2 * i, 2 * j) < touch * touch:
-                return True
-    return False
-
-
-@njit(**INNER)
-def _squared_distance(ends_S3, i, j):
-    """Of two segments, whose first ends these are."""
-    start_a, start_b = row(ends_S3, i), row(ends_S3, j)
-    along_a, along_b = add(row(ends_S3, i + 1), start_a, -1.0), add(row(ends_S3, j + 1), start_b, -1.0)
-    r = add(start_a, start_b, -1.0)
-    a, e, b, c, f = (
-        dot(along_a, along_a),
-        dot(along_b, along_b),
-        dot(along_a, along_b),
-        dot(along_a, r),
-        dot(along_b, r),
-    )
-    safe_a, safe_e = max(a, SHORT), max(e, SHORT)
-    determinant = a * e - b * b
-    s = 0.0
-    if determinant > PARALLEL * a * e:
-        s = (b * f - c * e) / max(determinant, SHORT * SHORT)
-    u = min(max((b * min(max(s, 0.0), 1.0) + f) / safe_e, 0.0), 1.0)
-    s = min(max((b * u - c) / safe_a, 0.0), 1.0)
-    u = min(max((b * s + f) / safe_e, 0.0), 1.0)
-    apart = add(add(r, along_a, s), along_b, -u)
-    return dot(apart, apart)
 
 
 @njit(**INNER)

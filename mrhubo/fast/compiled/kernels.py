@@ -11,17 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import xxhash
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast import description, plain
+from mrhubo.fast.compiled import avoidance, collision, judging, networks, steps, tables
 from mrhubo.fast.compiled import human as humans
-from mrhubo.fast.compiled import judging, networks, steps, tables
 from mrhubo.fast.compiled import robot as robots
+from mrhubo.fast.kept import checksum
 
 
 class Kernels(NamedTuple):
@@ -32,6 +30,7 @@ class Kernels(NamedTuple):
     directions: Callable[..., Any]
     networks: Callable[..., Any]
     follow: Callable[..., Any]
+    avoid: Callable[..., Any]
     retarget: Callable[..., Any]
 
 
@@ -39,22 +38,12 @@ STEPS, ALL, WITHOUT_PRIOR = range(3)
 """What `retarget` does: steps alone; steps and judging; judging alone, with the prior's answer given."""
 
 
-def _checksum() -> str:
-    """Of all that is compiled."""
-    digest = xxhash.xxh3_64()
-    folders = (Path(__file__).parent, Path(str(plain.__file__)).parent)
-    sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
-    for path in (*sources, Path(description.__file__)):  # whose kinds of steps are constants of what is compiled
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 @cache
 def make_kernels() -> Kernels:
     """The functions, the same for all retargeters; each is compiled when it is first called, which takes some seconds,
     or read from the cache.
     """
-    version = _checksum()
+    version = checksum()
 
     @njit(cache=True, **tables.EXACT)
     def wrong(local_BJ33, skew):
@@ -113,18 +102,28 @@ def make_kernels() -> Kernels:
                 cost_BC[b, c] = work.cost_C[c]
 
     @njit(cache=True, **tables.COMPILED)
+    def avoid(t, target_BD3, q_BN):
+        """Steps away from self-collision from `q_BN`, where the answers will stand."""
+        _ = version
+        work = robots.make_work(t)
+        for b in range(len(q_BN)):
+            steps.aim(t, work, target_BD3, b)
+            avoidance.avoid(t, work, q_BN[b])
+
+    @njit(cache=True, **tables.COMPILED)
     def retarget(
-        t, activation, polish, what, target_BD3, q_BN, six_BF, shake_BX, error_BM, phi_B, collision_B, trust_BX
+        t, activation, polish, avoid, what, target_BD3, q_BN, six_BF, shake_BX, error_BM, phi_B, collision_B, trust_BX
     ):  # fmt: skip
-        """Makes steps from `q_BN`, where the answers will stand, and says how good they are. `six_BF`: the numbers of
-        poses as the robot reads them (STEPS), or of their reconstructions (WITHOUT_PRIOR).
+        """Makes steps from `q_BN`, where the answers will stand, and if `avoid` away from self-collision; and says how
+        good they are. `six_BF`: the numbers of poses as the robot reads them (STEPS), or of their reconstructions
+        (WITHOUT_PRIOR).
         """
         _ = version
         work = robots.make_work(t)
         turned, widest = tables.size(t, tables.PARENT_T), networks.widest(t)
         one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
         turn_T33, local_T33 = np.empty((turned + 1, 3, 3)), np.empty((turned, 3, 3))
-        between_333, ends_S3 = np.empty((3, 3, 3)), np.empty((2 * tables.size(t, tables.BODY_S), 3))
+        between_333 = np.empty((3, 3, 3))
         angle_D, error_T, excess_T = np.empty(target_BD3.shape[1]), np.empty(turned), np.empty(turned)
         joints, measured, branches = q_BN.shape[1], error_BM.shape[1], trust_BX.shape[1]
         q_N = np.empty(joints)
@@ -133,6 +132,8 @@ def make_kernels() -> Kernels:
                 q_N[n] = q_BN[b, n]
             if polish and what != WITHOUT_PRIOR:
                 steps.polish(t, work, target_BD3, b, q_N, polish)
+                if avoid:
+                    avoidance.avoid(t, work, q_N)
                 for n in range(joints):
                     q_BN[b, n] = q_N[n]
                     q_N[n] = q_BN[b, n]
@@ -146,7 +147,7 @@ def make_kernels() -> Kernels:
             judging.robot_angles(t, work, target_BD3, b, angle_D)
             for m in range(measured):
                 error_BM[b, m] = math.degrees(angle_D[tables.whole(t, tables.MEASURED, m)])
-            collision_B[b] = judging.collides(t, work.rotation_L33, work.position_L3, ends_S3)
+            collision_B[b] = collision.touches(t, work, False)
             if what == ALL:
                 judging.prior_input(local_T33, one_E)
                 judging.reconstruct(t, activation, one_E, two_E, three_E)
@@ -163,4 +164,4 @@ def make_kernels() -> Kernels:
                 trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
                 phi_B[b] = max(phi_B[b], phi)
 
-    return Kernels(wrong, activate, directions, network, follow, retarget)
+    return Kernels(wrong, activate, directions, network, follow, avoid, retarget)

@@ -13,6 +13,7 @@ from mrhubo.fast.compiled.tables import (
     ACROSS_A33,
     AXIS_A3,
     BLOCK_N,
+    BODY_S,
     COLUMN_A,
     COLUMN_Q,
     DIRECTION_Q,
@@ -83,6 +84,9 @@ class Work(NamedTuple):
     best_C: np.ndarray
     start_N: np.ndarray
     begin_N: np.ndarray
+    ends_S3: np.ndarray
+    """Both ends of each capsule, then twice the middle of each."""
+    contact_N: np.ndarray
 
 
 @njit(**INNER)
@@ -103,6 +107,7 @@ def make_work(t):
         np.zeros((joints, joints)), np.empty(blocks), np.empty(joints), np.zeros((joints, joints)), np.empty(joints),
         np.empty(blocks), np.empty((joints, joints)), np.empty(joints), np.empty(blocks), lower_N, upper_N,
         np.empty(blocks), np.empty(blocks), np.empty(joints), np.empty(joints),
+        np.empty((3 * size(t, BODY_S), 3)), np.empty(joints),
     )  # fmt: skip
 
 

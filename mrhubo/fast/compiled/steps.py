@@ -37,13 +37,11 @@ from mrhubo.fast.plain.steps import DAMPING, EASIER, FLOOR, FOLLOWED, HARDER, LE
 
 
 @njit(**INNER)
-def solve(t, work, q_N, c, damping, pull, lower_N, upper_N):
-    """The damped step of a block's joints that no limit holds, into `work.step_N`. `pull`: what is added to the
-    Hessian's diagonal; the gradient has it already.
+def solve(t, work, q_N, first, last, damping, pull):
+    """The damped step of those joints of some of `order_N`, a block's or all, that no limit holds, into `work.step_N`.
+    `pull`: what is added to the Hessian's diagonal; the gradient has it already.
     """
-    first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
-    count = last - first
-    system = work.system_NN
+    count, system, lower_N, upper_N = last - first, work.system_NN, work.lower_N, work.upper_N
     for x in range(count):
         n = whole(t, ORDER_N, first + x)
         held = _held(q_N[n], work.gradient_N[n], lower_N[n], upper_N[n])
@@ -72,6 +70,11 @@ def solve(t, work, q_N, c, damping, pull, lower_N, upper_N):
         for k in range(x + 1, count):
             found -= system[k, x] * work.step_N[whole(t, ORDER_N, first + k)]
         work.step_N[n] = found / system[x, x]
+
+
+@njit(**INNER)
+def _solve_block(t, work, q_N, c, pull):
+    solve(t, work, q_N, whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1), work.damping_C[c], pull)
 
 
 @njit(**INNER)
@@ -133,7 +136,7 @@ def minimise(t, work, q_N, steps):
         if not going or number == steps:
             break
         for c in range(blocks):
-            solve(t, work, q_N, c, work.damping_C[c], 0.0, work.lower_N, work.upper_N)
+            _solve_block(t, work, q_N, c, 0.0)
         for n in range(len(q_N)):
             work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
 
@@ -166,7 +169,7 @@ def follow(t, work, target_BD3, b, pull, q_N):
         if number == FOLLOWED:
             return
         for c in range(blocks):
-            solve(t, work, q_N, c, work.damping_C[c], pull, work.lower_N, work.upper_N)
+            _solve_block(t, work, q_N, c, pull)
         for n in range(len(q_N)):
             work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
 

@@ -1,6 +1,6 @@
 """A description in four flat arrays, which a compiled function takes at once: handing over sixty takes 14 us.
 
-Legend: as in `mrhubo.fast.description`; and G layers, H networks.
+Legend: as in `mrhubo.fast.sections`; and G layers, H networks.
 """
 
 from __future__ import annotations
@@ -11,8 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.description import SECTIONS, Description, Layers, Part
+from mrhubo.fast.description import Description
+from mrhubo.fast.plain.avoidance import CLEARANCE
+from mrhubo.fast.plain.collision import clearances, reaches
 from mrhubo.fast.plain.human import skew
+from mrhubo.fast.sections import SECTIONS, Layers, Part
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -23,21 +26,22 @@ _KEYS = (
     "ridge_N", "weight_D", "polish_4", "pool_ridge_CU", "pool_UD3", "pool_UN",
     "kind_K", "slot_K", "of_K", "seen_K", "last_K", "direction_K3", "parent_T", "mirror_T", "rest_K23", "share_K",
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
-    "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S",
+    "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S", "clear_Y",
     "net_H6", "layer_G5", "column", "count_5", "number",
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
 )  # fmt: skip
-"""The tables, as in `mrhubo.fast.description` but for these:
+"""The tables, as in `mrhubo.fast.sections` but for these:
 
 bend_4: ends of the bend axes' ranges [rad]. A joint's turn by the angle t is origin + sin t * across + (1 - cos t) *
 twice, across = origin [axis]x and twice = origin [axis]x^2. The joints of block c are order_N[first_C[c] : first_C[c +
 1]], its directions likewise. polish_4: squares of the angles [rad^2] that are far, and that are a gain; starts, and
 their first steps. scale_4: good and excessive angle, shaking [degrees], usual phi. reach_S: half of a capsule's length
-and its radius. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
-network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in
-`number`, and 1 where the weights are among `shorts`, whose scales stand after the biases then; column:
-all columns; count_5: networks of the first stage, of both; whether directions are seen, tanh bounds, nets are residual.
+and its radius. clear_Y: distance [m] that a pair is to keep. net_H6: first and number of layers, place and number of
+input columns, and of output columns, of each network, the prior's coders last; layer_G5: numbers in and out, where
+weights and biases begin in `number`, and 1 where the weights are among `shorts`, whose scales stand after the biases
+then; column: all columns; count_5: networks of the first stage, of both; whether directions are seen, tanh bounds, nets
+are residual.
 """
 (
     JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
@@ -48,7 +52,7 @@ all columns; count_5: networks of the first stage, of both; whether directions a
     RIDGE_N, WEIGHT_D, POLISH_4, POOL_RIDGE_CU, POOL_UD3, POOL_UN,
     KIND_K, SLOT_K, OF_K, SEEN_K, LAST_K, DIRECTION_K3, PARENT_T, MIRROR_T, REST_K23, SHARE_K,
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
-    BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S,
+    BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S, CLEAR_Y,
     NET_H6, LAYER_G5, COLUMN, COUNT_5, NUMBER,
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
 ) = np.arange(len(_KEYS))  # fmt: skip
@@ -108,7 +112,6 @@ def _derived(d: Description) -> dict[str, np.ndarray]:
     for own_XC in (d.cost.joints_NC, d.cost.directions_DC):
         orders.append(np.concatenate([np.flatnonzero(column) for column in own_XC.T]))
         firsts.append(np.concatenate(([0], own_XC.sum(axis=0).cumsum())).astype(np.int64))
-    half_S = np.linalg.norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0], axis=-1) / 2
     ends = [constants[f"{name}_deg"] for name in ("plane_low", "plane_high", "needed_low", "needed_high")]
     polish = [constants["far_rad"] ** 2, constants["gain_rad"] ** 2, constants["starts"], constants["first_steps"]]
     scale = [constants[name] for name in ("good_deg", "excess_deg", "shake_deg", "usual_phi")]
@@ -116,7 +119,7 @@ def _derived(d: Description) -> dict[str, np.ndarray]:
         "position_A3": k.origin_A34[..., 3], "origin_A33": origin_A33, "across_A33": origin_A33 @ across_A33,
         "twice_A33": origin_A33 @ across_A33 @ across_A33, "order_N": orders[0], "first_C": firsts[0],
         "order_D": orders[1], "first_D": firsts[1], "bend_4": np.radians(ends), "polish_4": np.array(polish),
-        "scale_4": np.array(scale), "reach_S": half_S + capsules.radius_S,
+        "scale_4": np.array(scale), "reach_S": reaches(capsules), "clear_Y": clearances(d, CLEARANCE),
     }  # fmt: skip
 
 

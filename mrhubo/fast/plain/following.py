@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Cost
 from mrhubo.fast.plain.human import norm, normalize
 from mrhubo.fast.plain.steps import weights
+from mrhubo.fast.sections import Cost
 from mrhubo.fast.stream_settings import StreamSettings
 
 _REFERENCE_RATE = 24.0
@@ -42,6 +42,8 @@ class Followed:
     """The answer that the robot takes [rad], before limits of acceleration and of crossing over."""
     worse_C: np.ndarray
     """Since how long [s] the network's answer has been clearly better."""
+    goal_N: np.ndarray
+    """The kept answer, after steps away from self-collision where it would touch."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,9 @@ def cross_over(
     cost_2C: np.ndarray,
     aim_D3: np.ndarray,
     passed: float,
-) -> tuple[Followed, np.ndarray]:
-    """The next state, and how fast the kept answer moves (N,) [rad/s]: 0 where it has been left for the other.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The next kept answer (N,) [rad], since how long it has been worse (C,) [s], and which joints have left the last
+    one for the other answer (N,).
 
     Args:
         cost: the robot's.
@@ -98,13 +101,12 @@ def cross_over(
         aim_D3: the human's directions.
         passed: time since the last state [s].
     """
-    root_2C, moved_N = np.sqrt(cost_2C), both_2N[0]
+    root_2C = np.sqrt(cost_2C)
     excess_C = (root_2C[0] - root_2C[1]) / np.sqrt(np.maximum(weights(cost, aim_D3[None])[0], _SMALL))
     worse_C = np.where(excess_C > math.radians(settings.worse_deg), last.worse_C + passed, 0.0)
     leave_C = worse_C > max(settings.worse_time, _SMALL)
     leave_N = leave_C[cost.block_N]
-    velocity_N = np.where(leave_N, 0.0, (moved_N - last.kept_N) / passed)
-    return Followed(np.where(leave_N, both_2N[1], moved_N), np.where(leave_C, 0.0, worse_C)), velocity_N
+    return np.where(leave_N, both_2N[1], both_2N[0]), np.where(leave_C, 0.0, worse_C), leave_N
 
 
 class Limits:

@@ -9,14 +9,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mrhubo.fast.description import Human
+from mrhubo.fast.sections import Human
 
+PLANE_DEG = (3.0, 12.0)
+"""Below the first bend the upper arm's turn alone tells the axis of an elbow, from the second on the plane of the limbs
+alone. Motion capture is some two degrees exact, so the plane of limbs with less than five between them says little."""
+NEEDED_DEG = (8.0, 25.0)
+"""Up to the first bend the axis counts in full, from the second on not at all: the limbs say everything."""
+BEND_DEG = {
+    "plane_low_deg": PLANE_DEG[0], "plane_high_deg": PLANE_DEG[1],
+    "needed_low_deg": NEEDED_DEG[0], "needed_high_deg": NEEDED_DEG[1],
+}  # fmt: skip
+"""The same as `bend_axis` takes them."""
 _TINY = 1e-12
 _SHORT = 1e-12
 """Of `torch.nn.functional.normalize`."""
 
 
-def orthonormal(columns_X32: np.ndarray) -> np.ndarray:
+def orthonormal_columns(columns_X32: np.ndarray) -> np.ndarray:
     """Rotations (..., 3, 3) of two columns each (..., 3, 2): Gram-Schmidt, as `mrhubo.rotation.sixd_to_matrix`."""
     first, second = columns_X32[..., 0], columns_X32[..., 1]
     x = first / np.sqrt((first * first).sum(-1, keepdims=True) + _TINY)
@@ -59,7 +69,7 @@ def rodrigues(axis_X3: np.ndarray, sine_X: np.ndarray, cosine_X: np.ndarray) -> 
 
 def directions_of(human: Human, constants: Mapping[str, float], local_BJ33: np.ndarray) -> np.ndarray:
     """Directions (B, D, 3) of local rotations (B, 21, 3, 3), as `BodyMap.human_directions`."""
-    local_BP33 = orthonormal(local_BJ33[:, human.joint_P, :, :2].astype(np.float64))
+    local_BP33 = orthonormal_columns(local_BJ33[:, human.joint_P, :, :2].astype(np.float64))
     places = np.empty((len(local_BJ33), len(human.joint_P) + 1, 3, 3))
     places[:, 0] = np.eye(3)
     for place, parent in enumerate(human.parent_P, 1):

@@ -1,9 +1,8 @@
-"""What is told beside joint angles: what the robot reads of a pose, its plausibility, touching, and confidence.
+"""What is told beside joint angles: what the robot reads of a pose, its plausibility, and confidence.
 
-Sources: `mrhubo.robot.plausibility`, `mrhubo.robot.alignment`, `mrhubo.body.anatomy`, `mrhubo.robot.collision`,
-`mrhubo.retargeter.confidence`.
+Sources: `mrhubo.robot.plausibility`, `mrhubo.robot.alignment`, `mrhubo.body.anatomy`, `mrhubo.retargeter.confidence`.
 
-Legend: B frames, D directions, T turned human joints, X branches, S capsules, Y pairs of them, L bodies.
+Legend: B frames, D directions, T turned human joints, X branches.
 """
 
 from __future__ import annotations
@@ -12,11 +11,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mrhubo.fast.description import BEND, LIMB, SHARE, Capsules, Description, Reading
-from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal, rodrigues
+from mrhubo.fast.description import Description
+from mrhubo.fast.plain.human import bend_axis, cross, norm, normalize, orthonormal_columns, rodrigues
 from mrhubo.fast.plain.networks import ACTIVATIONS, Activation, mlp
+from mrhubo.fast.sections import BEND, LIMB, SHARE, Reading
 
-SHORT, PARALLEL = 1e-9, 1e-7
+SHORT = 1e-9
 _TINY = 1e-12
 
 
@@ -119,7 +119,7 @@ def reconstruction_error(description: Description, local_BT33: np.ndarray) -> np
     off_BF = (six_BT6 - [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]).reshape(len(six_BT6), -1).astype(np.float32)
     raw_BF = reconstruct(description, off_BF, ACTIVATIONS[description.settings.activation])
     columns_BT32 = raw_BF.astype(np.float64).reshape(*six_BT6.shape[:2], 2, 3).swapaxes(-1, -2)
-    again_BT32 = orthonormal(columns_BT32)[..., :2]
+    again_BT32 = orthonormal_columns(columns_BT32)[..., :2]
     return ((again_BT32 - local_BT33[..., :2]) ** 2).mean(axis=(-2, -1))
 
 
@@ -150,39 +150,6 @@ def shake(target_TD3: np.ndarray, frame_rate: float, constants: Mapping[str, flo
     padded_XD = np.pad(beyond_YD**2, ((near + 1, near + 1), (0, 0)), mode="edge")
     windows_TDW = np.lib.stride_tricks.sliding_window_view(padded_XD, 2 * near + 1, axis=0)
     return np.sqrt(windows_TDW.mean(axis=-1))
-
-
-def collides(capsules: Capsules, rotation_BL33: np.ndarray, position_BL3: np.ndarray) -> np.ndarray:
-    """Whether any pair of capsules overlaps (B,)."""
-    touches_B = np.zeros(len(position_BL3), bool)
-    if not len(capsules.pair_Y2):
-        return touches_B
-    turned_BS33 = rotation_BL33[:, capsules.body_S]
-    ends_BS23 = capsules.end_S23 @ turned_BS33.swapaxes(-1, -2) + position_BL3[:, capsules.body_S, None]
-    i_Y, j_Y = capsules.pair_Y2.T
-    reach_S = norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0]) / 2 + capsules.radius_S
-    centre_BS3 = ends_BS23.mean(axis=2)
-    # The spheres around the capsules tell cheaply which pairs need a closer look.
-    row_X, pair_X = np.nonzero(norm(centre_BS3[:, i_Y] - centre_BS3[:, j_Y]) < reach_S[i_Y] + reach_S[j_Y])
-    i_X, j_X = i_Y[pair_X], j_Y[pair_X]
-    apart_X = segment_distance(ends_BS23[row_X, i_X], ends_BS23[row_X, j_X])
-    touches_B[row_X[apart_X < capsules.radius_S[i_X] + capsules.radius_S[j_X]]] = True
-    return touches_B
-
-
-def segment_distance(a_X23: np.ndarray, b_X23: np.ndarray) -> np.ndarray:
-    """Distances (X,) of segments [m]: C. Ericson, Real-Time Collision Detection (2005), section 5.1.9."""
-    start_a, start_b = a_X23[:, 0], b_X23[:, 0]
-    along_a, along_b, r = a_X23[:, 1] - start_a, b_X23[:, 1] - start_b, start_a - start_b
-    a, e, b = (along_a * along_a).sum(-1), (along_b * along_b).sum(-1), (along_a * along_b).sum(-1)
-    c, f = (along_a * r).sum(-1), (along_b * r).sum(-1)
-    safe_a, safe_e = np.maximum(a, SHORT), np.maximum(e, SHORT)
-    determinant = a * e - b * b
-    s = np.where(determinant > PARALLEL * a * e, (b * f - c * e) / np.maximum(determinant, SHORT * SHORT), 0.0)
-    t = np.clip((b * np.clip(s, 0, 1) + f) / safe_e, 0, 1)
-    s = np.clip((b * t - c) / safe_a, 0, 1)
-    t = np.clip((b * s + f) / safe_e, 0, 1)
-    return norm(r + s[:, None] * along_a - t[:, None] * along_b)
 
 
 def confidence(

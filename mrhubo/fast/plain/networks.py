@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Description, Layers, Part
+from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import cross, norm, normalize
+from mrhubo.fast.sections import Layers, Part
 
 # erf(x) = x P(x^2) / Q(x^2) up to |x| = 4, beyond which it is 1 in float32: a rational fit with an error below 3e-8,
 # found by iteratively reweighted least squares on the values of scipy.special.erf.
@@ -21,12 +22,17 @@ ERF_TOP = (1.1283789765461936, 0.19624791356658905, 0.053467330137303405, 0.0040
 ERF_BOTTOM = (1.0, 0.5072513450242637, 0.11647597831624709, 0.015444325421374245, 0.001216345537898967,
               3.7480720233753056e-05)  # fmt: skip
 ERF_END = 4.0
+_NEAR = 2**15
+"""Numbers that are worked on at a time, so that they stay near the processor."""
 Activation = Callable[[np.ndarray], np.ndarray]
 _HALF, _ROOT = np.float32(0.5), np.float32(np.sqrt(0.5))
 
 
 def gelu(x_X: np.ndarray) -> np.ndarray:
     """x (1 + erf(x / sqrt 2)) / 2, of float32 numbers; NumPy has no erf, and SciPy takes long to import."""
+    if x_X.size > _NEAR and len(x_X) > 1:
+        rows = max(1, _NEAR * len(x_X) // x_X.size)
+        return np.concatenate([gelu(x_X[first : first + rows]) for first in range(0, len(x_X), rows)])
     z_X = np.clip(x_X * _ROOT, np.float32(-ERF_END), np.float32(ERF_END))
     square_X = z_X * z_X
     top_X, bottom_X = _polynomial(ERF_TOP, square_X), _polynomial(ERF_BOTTOM, square_X)

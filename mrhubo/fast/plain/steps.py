@@ -5,13 +5,15 @@ Legend: B frames, D directions, N joints, C blocks, U poses of the pool, S start
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.description import Cost, Description
+from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.plain.robot import jacobian, place, unseen
+from mrhubo.fast.sections import Cost
 
 TOLERANCE = 1e-4
 """A block whose joints all move by less [rad] in a step has converged."""
@@ -19,8 +21,15 @@ DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, FLOOR = 1e-2, 0.1, 10.0, 1e-7, 1e6,
 """At first; after a step that helped; after one that did not; its bounds; above which a step that does not help is the
 last; and what is added to the Hessian's diagonal, which it multiplies. As `DirectionProblem` has them."""
 SHORTEST = 1e-6
+_CHUNK = 512
+"""Frames that are worked on at a time: their numbers stay near the processor."""
 FOLLOWED = 2
 """Steps of a stream with each frame."""
+
+
+def chunks(frames: int, most: int) -> list[slice]:
+    """Frames in pieces of so many at most."""
+    return [slice(start, start + most) for start in range(0, frames, most)]
 
 
 @dataclass
@@ -47,20 +56,34 @@ class Model:
 
 def quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
     """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
+    if len(q_BN) <= _CHUNK:
+        return _quadratic(description, q_BN, target_BD3)
+    parts = [_quadratic(description, q_BN[rows], target_BD3[rows]) for rows in chunks(len(q_BN), _CHUNK)]
+    together = zip(*((part.cost_BC, part.gradient_BN, part.hessian_BNN) for part in parts), strict=True)
+    return Model(*map(np.concatenate, together))
+
+
+def _quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
     kinematics, cost, human = description.kinematics, description.cost, description.human
     placed = place(kinematics, q_BN)
-    jacobian_BDN3 = jacobian(kinematics, placed, len(cost.lower_N))
-    length_BD = np.where(cost.partial_D > 0, norm(target_BD3), 1.0)
-    unit_BD3 = target_BD3 / np.maximum(length_BD, SHORTEST)[..., None]
-    miss_BD3 = placed.direction_BD3 - unseen(human.seen_D, placed.view_BV33, unit_BD3)
-    weight_BD = cost.weight_D * length_BD
+    jacobian_D3NB = jacobian(kinematics, placed, len(cost.lower_N))
+    target_D3B = np.ascontiguousarray(np.moveaxis(target_BD3, 0, -1))
+    length_DB = np.sqrt(np.einsum("dib,dib->db", target_D3B, target_D3B))
+    length_DB = np.where(cost.partial_D[:, None] > 0, length_DB, 1.0)
+    unit_D3B = target_D3B / np.maximum(length_DB, SHORTEST)[:, None]
+    miss_D3B = placed.direction_D3B - unseen(human.seen_D, placed.view_V33B, unit_D3B)
+    weight_DB = cost.weight_D[:, None] * length_DB
     from_middle_BN = q_BN - cost.middle_N
-    cost_BC = ((miss_BD3 * miss_BD3).sum(-1) * weight_BD) @ cost.directions_DC
+    cost_BC = (np.einsum("dib,dib->db", miss_D3B, miss_D3B) * weight_DB).T @ cost.directions_DC
     cost_BC += (from_middle_BN * from_middle_BN * cost.ridge_N) @ cost.joints_NC
-    rows_BNR = jacobian_BDN3.swapaxes(1, 2).reshape(len(q_BN), len(cost.lower_N), -1)
-    weighted_BNR = rows_BNR * np.repeat(weight_BD, 3, axis=1)[:, None]
-    gradient_BN = (weighted_BNR @ miss_BD3.reshape(len(q_BN), -1, 1))[..., 0] + from_middle_BN * cost.ridge_N
-    hessian_BNN = weighted_BNR @ rows_BNR.swapaxes(1, 2)
+    gradient_BN, hessian_BNN = from_middle_BN * cost.ridge_N, np.zeros((*q_BN.shape, q_BN.shape[1]))
+    for block in range(cost_BC.shape[1]):
+        own_D, own_N = np.flatnonzero(cost.block_D == block), np.flatnonzero(cost.block_N == block)
+        rows_RN3B = jacobian_D3NB.swapaxes(1, 2)[own_D[:, None], own_N]
+        weighted_RN3B = rows_RN3B * weight_DB[own_D, None, None]
+        gradient_BN[:, own_N] += np.einsum("rnib,rib->nb", weighted_RN3B, miss_D3B[own_D]).T
+        own_NNB = np.einsum("rnib,rmib->nmb", weighted_RN3B, rows_RN3B)
+        hessian_BNN[:, own_N[:, None], own_N] = np.moveaxis(own_NNB, -1, 0)
     diagonal(hessian_BNN)[:] += cost.ridge_N
     return Model(cost_BC, gradient_BN, hessian_BNN)
 
@@ -82,8 +105,17 @@ def step(
     return -np.linalg.solve(system_BNN, (model.gradient_BN * free_BN)[..., None])[..., 0]
 
 
+Quadratic = Callable[[Description, np.ndarray, np.ndarray], Model]
+"""What `quadratic` is, however it is worked out."""
+
+
 def minimise(
-    description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, steps: int
+    description: Description,
+    q_BN: np.ndarray,
+    target_BD3: np.ndarray,
+    steps: int,
+    tolerance: float = TOLERANCE,
+    quadratic: Quadratic = quadratic,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles (B, N) [rad] after as many steps at most, and what each block costs there (B, C)."""
     cost = description.cost
@@ -98,7 +130,7 @@ def minimise(
         trial = quadratic(description, trial_BN, target_BD3)
         better_BC = trial.cost_BC < model.cost_BC
         moved_BC = (np.abs(trial_BN - q_BN)[..., None] * joints_NC).max(axis=1)
-        going_B = ~((moved_BC < TOLERANCE) | (~better_BC & (damping_BC > STUCK))).all(axis=1)
+        going_B = ~((moved_BC < tolerance) | (~better_BC & (damping_BC > STUCK))).all(axis=1)
         q_BN = np.where(better_BC[:, block_N], trial_BN, q_BN)
         model = model.where(better_BC, block_N, trial)
         damping_BC = np.clip(np.where(better_BC, damping_BC * EASIER, damping_BC * HARDER), LEAST, MOST)

@@ -14,7 +14,8 @@ from typing import Any
 
 from torch import Tensor
 
-from mrhubo.evaluation import Clip
+from mrhubo.evaluation import Clip, Evaluation
+from mrhubo.fitting.first_look import FirstLook
 from mrhubo.fitting.measurement import Measured
 from mrhubo.fitting.record.predictions import log_predictions
 from mrhubo.fitting.record.recording import Recording
@@ -26,12 +27,25 @@ _DIGITS = 10
 """After the point."""
 
 
+def log_look(recording: Recording, look: FirstLook) -> None:
+    """What the reference made of the mapping before the fit."""
+    recording.logger.log_metrics(look.metrics)
+    recording.client.log_text(recording.run_id, "\n".join([str(look), *look.doubts]) + "\n", "mapping.txt")
+
+
 def log_measures(recording: Recording, measured: Measured, best_link_cm: float) -> None:
     """Metrics and a table of the test clips; `best_link_cm` is the best validation link error."""
     networks = measured.networks
     recording.logger.log_metrics({"val/best_link_cm": best_link_cm, **measured.metrics})
-    log_rows(recording, [dataclasses.asdict(score) for score in networks])
+    log_rows(recording, [_row(score) for score in networks])
     recording.client.log_text(recording.run_id, measured.table + "\n", "test/clips.txt")
+
+
+def _row(score: Evaluation) -> dict[str, Any]:
+    """A score's numbers, a joint's share at a limit among them each in a column of its own."""
+    row = dataclasses.asdict(score)
+    shares = row.pop("joints_at_limit")
+    return {**row, **{f"at a limit: {joint}": share for joint, share in shares}}
 
 
 def log_rows(recording: Recording, rows: Sequence[Mapping[str, Any]]) -> None:

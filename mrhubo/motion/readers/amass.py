@@ -16,8 +16,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
@@ -92,7 +90,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         betas = _read_betas(file, notes)
         family, rest = find_family(file, betas)
     name = motion_name(path)
-    motion = Motion(
+    motion = Motion.of(
         name=name,
         local_TJ33=local_TJ33,
         frame_rate=frame_rate,
@@ -107,7 +105,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
     return to_our_rest(upright(motion, WORLDS, rest))
 
 
-def _read_pose(file: NpzFile) -> tuple[str, Form, Tensor]:
+def _read_pose(file: NpzFile) -> tuple[str, Form, np.ndarray]:
     """The key that holds the pose, its form, and local rotations (T, 21, 3, 3), float32."""
     path, keys = file.path, file.keys
     key = next((key for key in _POSE_KEYS if key in keys), None)
@@ -133,7 +131,7 @@ def _blocks(file: NpzFile, key: str) -> Iterator[tuple[int, np.ndarray]]:
 
 def _read_root(
     file: NpzFile, pose_key: str, form: Form, frames: int, notes: list[str]
-) -> tuple[Tensor | None, Tensor | None]:
+) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Rotations (T, 3, 3) and places (T, 3) of the root, as the file has them."""
     rotation_T33 = None
     if "root_orient" in file.keys:
@@ -150,10 +148,10 @@ def _read_root(
         if position_T3 is not None and not (np.abs(position_T3) <= FARTHEST_M).all():
             notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
             position_T3 = None
-    return rotation_T33, None if position_T3 is None else torch.from_numpy(position_T3).float()
+    return rotation_T33, None if position_T3 is None else position_T3.astype(np.float32)
 
 
-def _root_matrices(key: str, rows_TX: np.ndarray | None, notes: list[str]) -> Tensor | None:
+def _root_matrices(key: str, rows_TX: np.ndarray | None, notes: list[str]) -> np.ndarray | None:
     """Rotations (T, 3, 3) of rows (T, 3 or 9); None, and a note, where they are none."""
     if rows_TX is None:
         return None

@@ -6,7 +6,6 @@ Legend: T frames, J = 21: SMPL's joints 1..21.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
 from mrhubo.body.rest_directions import from_family
@@ -34,14 +33,16 @@ def to_our_rest(motion: Motion) -> Motion:
     motion without a family may be of such a one.
     """
     if motion.family:
-        for part in motion.local_TJ33.split(BLOCK):
-            part.copy_(from_family(part, motion.family))
+        local_TJ33 = motion.arrays.local_TJ33
+        for start in range(0, len(motion), BLOCK):
+            rows = slice(start, start + BLOCK)
+            local_TJ33[rows] = from_family(local_TJ33[rows], motion.family)
         return motion
-    tilt = elbow_tilt(motion.local_TJ33)
+    tilt = elbow_tilt(motion.arrays.local_TJ33)
     if tilt is None or abs(tilt) <= _LEVEL:
         return motion
     note = f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"
-    return replace(motion, local_TJ33=untilt_arms(motion.local_TJ33, tilt), notes=(*motion.notes, note))
+    return motion.changed(local_TJ33=untilt_arms(motion.arrays.local_TJ33, tilt), notes=(*motion.notes, note))
 
 
 def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
@@ -52,12 +53,11 @@ def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
         worlds: those of `mrhubo.motion.readers.world` that the file's may be.
         rest: what its rotations refer to, for the end of its source.
     """
-    rotation_T33, position_T3 = motion.root_rotation_T33, motion.root_position_T3
+    rotation_T33, position_T3 = motion.arrays.root_rotation_T33, motion.arrays.root_position_T3
     if rotation_T33 is None:
-        return replace(motion, root_position_T3=None, source=f"{motion.source}; {rest}")
+        return motion.changed(root_position_T3=None, source=f"{motion.source}; {rest}")
     up, turn_33 = find_up(rotation_T33[:, :, 1], worlds)
-    return replace(
-        motion,
+    return motion.changed(
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,
         source=f"{motion.source}, {up}; {rest}",

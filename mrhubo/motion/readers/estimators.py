@@ -10,6 +10,7 @@ import numpy as np
 from mrhubo.files.packed import is_packed
 from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.layouts import find_layout
 from mrhubo.motion.readers.options import ReadOptions
@@ -69,6 +70,8 @@ def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[lis
     notes = list(layout.notes)
     track = choose(path, layout.tracks, options, notes)
     arrays = track.read()
+    if layout.camera_beside:
+        arrays = in_world(path, arrays, notes)
     return motion_of(path, arrays, layout.kind, rate(notes), notes)
 
 

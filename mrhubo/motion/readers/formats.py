@@ -2,44 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import importlib
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.advice import advice
-from mrhubo.motion.readers.amass import is_amass, read_amass
-from mrhubo.motion.readers.amc import is_amc, read_acclaim
-from mrhubo.motion.readers.bvh import is_bvh, read_bvh
 from mrhubo.motion.readers.content import Content, NoMotion
-from mrhubo.motion.readers.estimators import is_container, read_estimated
-from mrhubo.motion.readers.keypoints import is_keypoints, read_keypoints
 from mrhubo.motion.readers.options import ReadOptions
 
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file and who reads it."""
+    """A kind of file and who reads it; a reader is imported when a file may be its own."""
 
     name: str
     """For a sentence that lists what is read."""
-    recognises: Callable[[Content], bool]
-    """Whether a file is of this kind; must not raise."""
-    read: Callable[[Path, ReadOptions], Motion]
-    """Raises a UserError that names the path where the file is bad."""
+    module: str
+    """In `mrhubo.motion.readers`."""
+    recogniser: str
+    """A function in it, of a `Content`: whether a file is of this kind; does not raise."""
+    reader: str
+    """A function in it, of a path and options, that gives a `Motion`; raises a UserError that names the path where the
+    file is bad.
+    """
     endings: tuple[str, ...]
     """The endings, in small letters, of files in a folder that are of this kind or damaged."""
+
+    def recognises(self, content: Content) -> bool:
+        """Whether a file is of this kind."""
+        return getattr(self._imported(), self.recogniser)(content)
+
+    def read(self, path: Path, options: ReadOptions) -> Motion:
+        """Reads a file of this kind.
+
+        Raises:
+            UserError: the file is bad.
+        """
+        return getattr(self._imported(), self.reader)(path, options)
+
+    def _imported(self) -> ModuleType:
+        return importlib.import_module(f"mrhubo.motion.readers.{self.module}")
 
 
 _PYTHON = (".pkl", ".pickle", ".joblib", ".pt", ".pth", ".npy")
 
 FORMATS: tuple[Format, ...] = (
-    Format("AMASS and SMPL-family .npz", is_amass, read_amass, (".npz",)),
-    Format("BVH", is_bvh, read_bvh, (".bvh",)),
-    Format("ASF/AMC", is_amc, read_acclaim, (".amc",)),
-    Format("keypoints (.json, .npy, .npz)", is_keypoints, read_keypoints, ()),
+    Format("AMASS and SMPL-family .npz", "amass", "is_amass", "read_amass", (".npz",)),
+    Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
+    Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
+    Format("keypoints (.json, .npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     # the last row: whatever else holds arrays in dictionaries
-    Format("what an estimator of human pose writes", is_container, read_estimated, _PYTHON),
+    Format("what an estimator of human pose writes", "estimators", "is_container", "read_estimated", _PYTHON),
 )
 """The first row that recognises a file reads it."""
 

@@ -9,9 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import torch
 
-from mrhubo.body.skeleton import SIDES
+from mrhubo.body.joints import SIDES
 from mrhubo.errors import UserError, listed
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
@@ -79,8 +78,8 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     points, world = _to_world(points, notes)
     sure = {} if found.confidence_TK is None else {n: found.confidence_TK[:, place] for n, place in places.items()}
     body = BodyPoints(
-        {name: torch.from_numpy(np.ascontiguousarray(point_T3)) for name, point_T3 in points.items()},
-        confidence={name: torch.from_numpy(np.ascontiguousarray(sure_T)) for name, sure_T in sure.items()},
+        points,
+        confidence=sure,
     )
     source = f"keypoints {found.where}, {what}, {world}"
     return motion_from_points(body, motion_name(path), rate, source, tuple(notes), str(path))

@@ -35,6 +35,8 @@ class Layout:
     kind: Kind
     tracks: list[Track]
     notes: tuple[str, ...] = ()
+    camera_beside: bool = False
+    """Whether its writer keeps the camera's way through the world in a file of its own."""
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -218,7 +220,7 @@ def _single(tree: Tree) -> Layout | None:
         worlds = CAMERAS if "incam" in found.node.where else ANY_WORLD
         return Layout(Kind(name, "smplx", worlds), found.tracks())
     if "pred_rotmat" in keys:
-        return Layout(Kind("TRAM", "smpl", CAMERAS), found.tracks())
+        return Layout(Kind("TRAM", "smpl", CAMERAS), found.tracks(), camera_beside=True)
     if found.names.pose == "local_rot_mats":
         return Layout(Kind("Kimodo with SMPL-X's skeleton", "smplx", ANY_WORLD), found.tracks())
     if "pred_thetas" in keys:

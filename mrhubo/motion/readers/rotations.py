@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.motion.poses import MAX_TURN, Turns, are_crooked
-from mrhubo.rotation import axis_angle_to_matrix, orthonormal
+from mrhubo.fast.rotations import are_crooked, axis_angle_to_matrix, orthonormal
+from mrhubo.motion.checks import MAX_TURN, Turns
 
 JOINTS = 21
 """SMPL's joints 1..21."""
@@ -63,7 +61,7 @@ def find_form(shape: tuple[int, ...], counts: Collection[int]) -> Form | None:
 
 def read_local(
     path: Path, key: str, frames: int, blocks: Iterable[tuple[int, np.ndarray]], form: Form, first: int
-) -> Tensor:
+) -> np.ndarray:
     """Local rotations (T, 21, 3, 3), float32, of 21 joints of an array.
 
     Args:
@@ -77,7 +75,7 @@ def read_local(
     Raises:
         UserError: something is no rotation (says in which frame), or angles are in degrees.
     """
-    local_TJ33 = torch.empty(frames, JOINTS, 3, 3)
+    local_TJ33 = np.empty((frames, JOINTS, 3, 3), np.float32)
     turns, columns = Turns(), slice(first * form.numbers, (first + JOINTS) * form.numbers)
     for start, rows_NX in blocks:
         joints_NJX = rows_NX[:, columns].reshape(-1, JOINTS, form.numbers)
@@ -93,7 +91,7 @@ def read_local(
     return local_TJ33
 
 
-def to_matrices(rows_TX: np.ndarray, form: Form, largest: float) -> Tensor | None:
+def to_matrices(rows_TX: np.ndarray, form: Form, largest: float) -> np.ndarray | None:
     """Rotations (T, K, 3, 3), float32, of rows that are not needed; None where they are none.
 
     Args:
@@ -103,14 +101,14 @@ def to_matrices(rows_TX: np.ndarray, form: Form, largest: float) -> Tensor | Non
     """
     values_TKX = rows_TX.reshape(len(rows_TX), form.joints, form.numbers).astype(np.float64)
     if form.matrices:
-        matrix_TK33 = torch.from_numpy(values_TKX).unflatten(-1, (3, 3))
-        return None if bool(are_crooked(matrix_TK33).any()) else orthonormal(matrix_TK33).float()
+        matrix_TK33 = values_TKX.reshape(*values_TKX.shape[:2], 3, 3)
+        return None if are_crooked(matrix_TK33).any() else orthonormal(matrix_TK33).astype(np.float32)
     if not (np.abs(values_TKX) <= largest).all():
         return None
-    return axis_angle_to_matrix(torch.from_numpy(values_TKX)).float()
+    return axis_angle_to_matrix(values_TKX).astype(np.float32)
 
 
-def _from_axis_angle(path: Path, key: str, values_NJ3: np.ndarray, start: int, column: int, turns: Turns) -> Tensor:
+def _from_axis_angle(path: Path, key: str, values_NJ3: np.ndarray, start: int, column: int, turns: Turns) -> np.ndarray:
     turn_NJ = np.linalg.norm(values_NJ3, axis=-1)
     bad_M2 = np.argwhere(~(turn_NJ <= MAX_TURN))
     if len(bad_M2):
@@ -122,16 +120,16 @@ def _from_axis_angle(path: Path, key: str, values_NJ3: np.ndarray, start: int, c
         raise UserError(
             f"{path}: '{key}' {why} in frame {start + frame}, number {column + 3 * joint + place}: {value:g}"
         )
-    turns.add(torch.from_numpy(turn_NJ))
-    return axis_angle_to_matrix(torch.from_numpy(values_NJ3)).float()
+    turns.add(turn_NJ)
+    return axis_angle_to_matrix(values_NJ3).astype(np.float32)
 
 
-def _from_matrices(path: Path, key: str, values_NJ9: np.ndarray, start: int, column: int) -> Tensor:
-    matrix_NJ33 = torch.from_numpy(values_NJ9).unflatten(-1, (3, 3))
-    bad_M2 = are_crooked(matrix_NJ33).nonzero()
+def _from_matrices(path: Path, key: str, values_NJ9: np.ndarray, start: int, column: int) -> np.ndarray:
+    matrix_NJ33 = values_NJ9.reshape(*values_NJ9.shape[:2], 3, 3)
+    bad_M2 = np.argwhere(are_crooked(matrix_NJ33))
     if len(bad_M2):
         frame, joint = bad_M2[0].tolist()
         finite = np.isfinite(values_NJ9[frame, joint]).all()
         why = "is no rotation matrix" if finite else "is not finite"
         raise UserError(f"{path}: '{key}' {why} in frame {start + frame}, joint {column // 9 + joint}")
-    return orthonormal(matrix_NJ33).float()
+    return orthonormal(matrix_NJ33).astype(np.float32)

@@ -17,11 +17,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from mrhubo.body.skeleton import SIDES
+from mrhubo.body.joints import SIDES
 from mrhubo.errors import UserError
+from mrhubo.fast.plain.human import cross, normalize
 from mrhubo.files.regular import naming
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
@@ -79,29 +78,28 @@ def read_sam3d(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]]
     tracks = [Person(name, count) for name, (count, _) in people.items()]
     chosen = choose(tree.path, tracks, options, notes)
     seen = people[chosen.person][1]()
-    points_TK3 = torch.from_numpy(seen.points.astype(np.float64))
-    if not bool((points_TK3.nan_to_num().abs() < FARTHEST_M).all()):
+    points_TK3 = seen.points.astype(np.float64)
+    if not (np.abs(np.nan_to_num(points_TK3)) < FARTHEST_M).all():
         raise UserError(f"{tree.path}: '{_KEY}' holds infinite numbers, or some beyond {FARTHEST_M:g} m")
     if seen.camera is not None:
-        points_TK3 = points_TK3 + torch.from_numpy(seen.camera.astype(np.float64))[:, None]
-    up_T3 = points_TK3[:, [5, 6]].mean(dim=1) - points_TK3[:, [9, 10]].mean(dim=1)
-    known_T = up_T3.isfinite().all(-1)
-    if not bool(known_T.any()):
+        points_TK3 = points_TK3 + seen.camera.astype(np.float64)[:, None]
+    up_T3 = points_TK3[:, [5, 6]].mean(axis=1) - points_TK3[:, [9, 10]].mean(axis=1)
+    known_T = np.isfinite(up_T3).all(-1)
+    if not known_T.any():
         raise UserError(f"{tree.path}: in no frame of '{_KEY}' are both shoulders and hips known")
     up, turn_33 = find_up(up_T3[known_T], ANY_WORLD)
     points_TK3 = points_TK3 @ turn_33.T
-    points = {name: points_TK3[:, list(places)].mean(dim=1) for name, places in _PLACES.items()}
+    points = {name: points_TK3[:, list(places)].mean(axis=1) for name, places in _PLACES.items()}
     body = BodyPoints(points, hinges={f"{side}_shoulder": _hinge(points_TK3, points, side) for side in SIDES})
     source = f"SAM 3D Body's points, '{_KEY}', {up}"
     return motion_from_points(body, motion_name(tree.path), find_rate(notes), source, tuple(notes))
 
 
-def _hinge(points_TK3: Tensor, points: dict[str, Tensor], side: str) -> Tensor:
+def _hinge(points_TK3: np.ndarray, points: dict[str, np.ndarray], side: str) -> np.ndarray:
     """The axis (T, 3) about which an elbow bends: across the upper arm and the way from the elbow's tip to its pit."""
     tip, pit = _ELBOWS[side]
     upper_T3 = points[f"{side}_elbow"] - points[f"{side}_shoulder"]
-    axis_T3 = torch.linalg.cross(upper_T3, points_TK3[:, pit] - points_TK3[:, tip])
-    return torch.nn.functional.normalize(axis_T3.nan_to_num(), dim=-1)
+    return normalize(np.nan_to_num(cross(upper_T3, points_TK3[:, pit] - points_TK3[:, tip])))
 
 
 def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _Seen]]]:

@@ -13,12 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from torch import Tensor
-from torch.nn.functional import normalize
 
-from mrhubo.body.skeleton import JOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton, local_rotations
+from mrhubo.body.joints import JOINT_NAMES, OFFSETS_J3, POSED_JOINT_NAMES, SIDES, local_rotations
 from mrhubo.errors import UserError
+from mrhubo.fast.plain.human import normalize
+from mrhubo.fast.rotations import orthonormal, shortest_turn
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES, MAX_ROOT_TURN, upright
@@ -26,7 +25,6 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.rotations import find_form, to_matrices
 from mrhubo.motion.readers.smpl_names import search
 from mrhubo.motion.readers.world import WORLDS
-from mrhubo.rotation import orthonormal, shortest_turn
 
 _FINGERS = tuple(
     f"Hand{finger}{part}"
@@ -119,14 +117,14 @@ def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | N
     world = _world(tree, arrays)
     if arrays.places is not None:
         _point(world, arrays, notes)
-    local_TJ33 = local_rotations(torch.stack([world[_OURS[joint]] for joint in JOINT_NAMES], dim=1))
+    local_TJ33 = local_rotations(np.stack([world[_OURS[joint]] for joint in JOINT_NAMES], axis=1))
     name = motion_name(tree.path)
-    motion = Motion(
+    motion = Motion.of(
         name=name,
-        local_TJ33=orthonormal(local_TJ33).float(),
+        local_TJ33=orthonormal(local_TJ33).astype(np.float32),
         frame_rate=find_rate(notes),
         description=name,
-        root_rotation_T33=world["Hips"].float(),
+        root_rotation_T33=world["Hips"].astype(np.float32),
         root_position_T3=_root(arrays, len(local_TJ33), notes),
         source=f"{arrays.source}, '{arrays.key}'",
         notes=tuple(notes),
@@ -180,7 +178,7 @@ def _soma_x(node: Tree, poses: np.ndarray, names: tuple[str, ...]) -> _Arrays:
     return _Arrays("SOMA-X", "poses", poses, names, None, None if root is None else root * metres)
 
 
-def _world(tree: Tree, arrays: _Arrays) -> dict[str, Tensor]:
+def _world(tree: Tree, arrays: _Arrays) -> dict[str, np.ndarray]:
     """Rotations (T, 3, 3) in the world, float64, of the joints that are read."""
     frames, joints = arrays.local.shape[:2]
     form = find_form(arrays.local.shape, (joints,))
@@ -191,32 +189,31 @@ def _world(tree: Tree, arrays: _Arrays) -> dict[str, Tensor]:
     local_TK33 = to_matrices(arrays.local.reshape(frames, -1), form, MAX_ROOT_TURN)
     if local_TK33 is None:
         raise UserError(f"{tree.path}: '{arrays.key}' holds NaN, infinite numbers, or what is no rotation")
-    identity_T33 = torch.eye(3, dtype=torch.float64).expand(frames, 3, 3)
-    world: dict[str, Tensor] = {"": identity_T33}
+    identity_T33 = np.broadcast_to(np.eye(3), (frames, 3, 3))
+    world: dict[str, np.ndarray] = {"": identity_T33}
     for name, parent in _CHAIN.items():
-        turn_T33 = local_TK33[:, arrays.names.index(name)].double() if name in arrays.names else identity_T33
+        turn_T33 = local_TK33[:, arrays.names.index(name)].astype(np.float64) if name in arrays.names else identity_T33
         world[name] = world[parent] @ turn_T33
     return world
 
 
-def _point(world: dict[str, Tensor], arrays: _Arrays, notes: list[str]) -> None:
+def _point(world: dict[str, np.ndarray], arrays: _Arrays, notes: list[str]) -> None:
     """Turns limbs by the shortest way so that they point as the joints' places say."""
     assert arrays.places is not None
     if not np.isfinite(arrays.places).all():
         notes.append("'posed_joints' is left out: it holds NaN or infinite numbers")
         return
-    offsets = dict(zip(POSED_JOINT_NAMES, Skeleton().offsets_J3.double(), strict=True))
+    offsets = dict(zip(POSED_JOINT_NAMES, OFFSETS_J3.astype(np.float64), strict=True))
     for joint, end in _LIMBS.items():
         start_T3, end_T3 = (
-            torch.from_numpy(arrays.places[:, arrays.names.index(_OURS[name])].astype(np.float64))
-            for name in (joint, end)
+            arrays.places[:, arrays.names.index(_OURS[name])].astype(np.float64) for name in (joint, end)
         )
-        limb_T3 = normalize(end_T3 - start_T3, dim=-1)
-        rest_3 = normalize(offsets[end], dim=0)
+        limb_T3 = normalize(end_T3 - start_T3)
+        rest_3 = normalize(offsets[end])
         world[_OURS[joint]] = shortest_turn(world[_OURS[joint]] @ rest_3, limb_T3) @ world[_OURS[joint]]
 
 
-def _root(arrays: _Arrays, frames: int, notes: list[str]) -> Tensor | None:
+def _root(arrays: _Arrays, frames: int, notes: list[str]) -> np.ndarray | None:
     root = arrays.root
     if root is None:
         return None
@@ -224,4 +221,4 @@ def _root(arrays: _Arrays, frames: int, notes: list[str]) -> Tensor | None:
     if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < FARTHEST_M).all():
         notes.append(f"where the root goes is left out: its shape is {root.shape}, or it holds no finite numbers")
         return None
-    return torch.from_numpy(rows_TX.astype(np.float32))
+    return rows_TX.astype(np.float32)

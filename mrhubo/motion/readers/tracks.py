@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from mrhubo.errors import UserError, nearest, shortened
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
@@ -142,11 +140,11 @@ def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, not
     if known_T is not None:
         missing, frames = int((~known_T).sum()), len(known_T)
         notes.append(f"not seen in {missing:,} of {frames:,} frames: filled in, confidence 0")
-        confidence_TJ = known_T.float()[:, None].expand(-1, JOINTS).clone()
+        confidence_TJ = np.repeat(known_T.astype(np.float32)[:, None], JOINTS, axis=1)
     if position_T3 is not None and root_T33 is None:
         notes.append("where the root goes is left out: without its rotation the up axis is not known")
     name = motion_name(path)
-    motion = Motion(
+    motion = Motion.of(
         name=name,
         local_TJ33=local_TJ33,
         frame_rate=frame_rate,
@@ -162,7 +160,7 @@ def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, not
     return to_our_rest(upright(motion, kind.worlds, rest_in_words(kind.family)))
 
 
-def _root(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
+def _root(arrays: SmplArrays, notes: list[str]) -> np.ndarray | None:
     """Rotations (S, 3, 3) of the root; None, and a note, where they cannot be used."""
     seen, form = len(arrays.pose), arrays.form
     if arrays.root is not None:
@@ -184,7 +182,7 @@ def _root(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
     return rotation_S133[:, 0]
 
 
-def _position(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
+def _position(arrays: SmplArrays, notes: list[str]) -> np.ndarray | None:
     """Places (S, 3) of the root; None, and a note, where they cannot be used."""
     if arrays.position is None:
         return None
@@ -195,7 +193,7 @@ def _position(arrays: SmplArrays, notes: list[str]) -> Tensor | None:
     if not (np.abs(rows_SX) <= FARTHEST_M).all():
         notes.append(f"where the root goes is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
         return None
-    return torch.from_numpy(rows_SX.astype(np.float32))
+    return rows_SX.astype(np.float32)
 
 
 def _betas(arrays: SmplArrays, notes: list[str]) -> tuple[float, ...] | None:
@@ -212,8 +210,8 @@ def _betas(arrays: SmplArrays, notes: list[str]) -> tuple[float, ...] | None:
 
 
 def _filled(
-    path: Path, arrays: SmplArrays, local_SJ33: Tensor, root_S33: Tensor | None, position_S3: Tensor | None
-) -> tuple[Tensor, Tensor | None, Tensor | None, Tensor | None]:
+    path: Path, arrays: SmplArrays, local_SJ33: np.ndarray, root_S33: np.ndarray | None, position_S3: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """All frames from the first to the last, and in which (T,) somebody is seen: None where in all of them."""
     if arrays.frames is None:
         return local_SJ33, root_S33, position_S3, None
@@ -226,13 +224,12 @@ def _filled(
     frames = int(order[-1] - order[0]) + 1
     if frames * _SCARCEST > len(order) or frames > MAX_FRAMES:
         raise UserError(f"{path}: somebody who is seen in {len(order):,} of {frames:,} frames makes no motion")
-    index_S, place_S = torch.from_numpy(order - order[0]), torch.from_numpy(places)
-    known_T = torch.zeros(frames, dtype=torch.bool)
+    index_S, known_T = order - order[0], np.zeros(frames, bool)
     known_T[index_S] = True
 
-    def spread(values_SX: Tensor) -> Tensor:
-        values_TX = values_SX.new_zeros(frames, *values_SX.shape[1:])
-        values_TX[index_S] = values_SX[place_S]
+    def spread(values_SX: np.ndarray) -> np.ndarray:
+        values_TX = np.zeros((frames, *values_SX.shape[1:]), values_SX.dtype)
+        values_TX[index_S] = values_SX[places]
         return values_TX
 
     local_TJ33 = spread(local_SJ33)

@@ -6,8 +6,7 @@ that the body's own up axis follows on the mean is the world's.
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
+import numpy as np
 
 _TO_Y_UP: dict[str, tuple[tuple[float, float, float], ...]] = {
     "y up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -24,9 +23,9 @@ ANY_WORLD = ("y up", "y down", "z up")
 """Of files that do not say whose they are."""
 
 
-def find_up(body_up_T3: Tensor, worlds: tuple[str, ...]) -> tuple[str, Tensor]:
+def find_up(body_up_T3: np.ndarray, worlds: tuple[str, ...]) -> tuple[str, np.ndarray]:
     """Which of some worlds a body's own up axes (T, 3) are in, and the matrix (3, 3) that makes y its up axis."""
-    up_3 = body_up_T3.mean(dim=0)
-    turns = {world: torch.tensor(_TO_Y_UP[world]).to(up_3) for world in worlds}
+    up_3 = body_up_T3.mean(axis=0)
+    turns = {world: np.array(_TO_Y_UP[world], up_3.dtype) for world in worlds}
     best = max(worlds, key=lambda world: float((turns[world] @ up_3)[1]))
     return best, turns[best]

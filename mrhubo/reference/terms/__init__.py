@@ -1,9 +1,10 @@
 """The terms of the reference retargeter's cost, one a file."""
 
+from mrhubo.fast.together.smoothness import REFERENCE_RATE, pull_at
 from mrhubo.reference.terms.directions import DirectionTerm
 from mrhubo.reference.terms.posture import PostureTerm
 from mrhubo.reference.terms.self_collision import SelfCollisionTerm
-from mrhubo.reference.terms.smoothness import REFERENCE_RATE, Smoothness, pull_at
+from mrhubo.reference.terms.smoothness import Smoothness
 from mrhubo.reference.terms.term import Quadratic, State, Term
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Links keep a distance from each other:  weight * sum_p max(0, margin - distance_p(q))^2
+"""Links keep a distance from each other:  weight * sum_p max(0, margin_p - distance_p(q))^2
 
 Any link may meet any other, so all joints are one block.
 
@@ -7,20 +7,29 @@ Legend: B problems, N joints, C blocks, X contacts.
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor
 
 from mrhubo.reference.blocks import Blocks
 from mrhubo.reference.terms.term import Quadratic, State, Term
 from mrhubo.robot import SelfCollision
+from mrhubo.robot.collision import Contacts
 
 
 class SelfCollisionTerm(Term):
     """The term above."""
 
-    def __init__(self, collision: SelfCollision, margin: float, weight: float) -> None:
-        """`margin` [m], `weight` [1/m^2]."""
+    margin_P: Tensor | None
+
+    def __init__(self, collision: SelfCollision, margin: float, weight: float, margin_P: Tensor | None = None) -> None:
+        """`margin` [m] of all pairs, or at most, where each has one of its own (P,); `weight` [1/m^2]."""
         super().__init__()
         self.collision, self.margin, self.weight = collision, margin, weight
+        self.register_buffer("margin_P", margin_P, persistent=False)
+
+    def lack(self, near: Contacts) -> Tensor:
+        """By how much pairs are nearer than they are to be (X,) [m]; negative where they are not."""
+        return (self.margin if self.margin_P is None else self.margin_P[near.pair_X]) - near.distance_X
 
     def couplings(self) -> list[set[int]]:
         """All joints."""
@@ -31,7 +40,9 @@ class SelfCollisionTerm(Term):
         which of the B problems they belong (X,).
         """
         near = self.collision.near(state.q_BN, self.margin, state.poses)
-        return self.margin - near.distance_X, -near.jacobian_XN, near.row_X
+        short_X = self.lack(near)
+        x = torch.nonzero(short_X > 0)[:, 0]
+        return short_X[x], -near.jacobian_XN[x], near.row_X[x]
 
     def add_to(self, model: Quadratic | None, state: State, blocks: Blocks) -> Quadratic:
         """As `Term.add_to`."""

@@ -17,14 +17,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-REFERENCE_RATE = 24.0
-"""Frames per second at which a smoothness is stated."""
 _THIRD = (-1.0, 3.0, -3.0, 1.0)
-
-
-def pull_at(smoothness: float, frame_rate: float) -> float:
-    """`pull` [1/rad^2] at a frame rate: the same for the same velocity, with the reference rate as the unit of time."""
-    return smoothness * (frame_rate / REFERENCE_RATE) ** 2
 
 
 @dataclass(frozen=True)

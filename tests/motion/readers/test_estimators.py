@@ -28,8 +28,8 @@ FRAMES = 6
 
 
 def expected(pose: np.ndarray, family: str) -> torch.Tensor:
-    local = torch.from_numpy(matrices(pose[:, 1:]))
-    return from_family(local, family) if family else local
+    local = matrices(pose[:, 1:])
+    return torch.from_numpy(from_family(local, family) if family else local)
 
 
 def close(motion: Motion, pose: np.ndarray, family: str) -> bool:
@@ -75,6 +75,40 @@ def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, nam
         UserError, match=rf"no person 'Bob'; there are '{names[taken]}' \(6 frames\), '{names[others]}'"
     ):
         read_motion(path, ReadOptions(rate=30, person="Bob"))
+
+
+def test_trams_camera_beside_puts_the_root_into_the_world(tmp_path: Path) -> None:
+    """Who walks along, and a camera that turns beside them, as its first picture saw the world."""
+    generator, frames = np.random.default_rng(0), np.arange(FRAMES) + 5
+    pose = made_up(FRAMES, camera=True)
+    turn = Rotation.from_rotvec(0.2 * generator.standard_normal((FRAMES + 9, 3))).as_matrix()
+    place = generator.standard_normal((FRAMES + 9, 3))
+    (tmp_path / "hps").mkdir()
+    path, camera = tmp_path / "hps" / "hps_track_0.npy", tmp_path / "camera.npy"
+    WRITERS["tram"].write(path, {0: pose})
+    alone = read_motion(path, RATE)
+    assert "no camera.npy lies beside" in alone.notes[-1]
+
+    def save(**content: np.ndarray) -> Motion:
+        with camera.open("wb") as file:
+            np.save(file, content)  # type: ignore[arg-type]
+        return read_motion(path, RATE)
+
+    found = save(pred_cam_R=turn.astype(np.float32), pred_cam_T=place)
+    world, up = turn[frames] @ matrices(pose[:, 0]), np.diag((1.0, -1.0, -1.0))
+    np.testing.assert_allclose(found.root_rotation_T33, up @ world, atol=1e-5)
+    np.testing.assert_allclose(found.root_position_T3, (turn[frames].sum(axis=2) + place[frames]) @ up, atol=1e-5)
+    assert torch.equal(found.local_TJ33, alone.local_TJ33) and "in the world" in found.notes[-1]
+    for content, why in [
+        ({"pred_cam_R": turn[:8], "pred_cam_T": place[:8]}, "has 8 frames, and the person is seen in others"),
+        ({"pred_cam_R": 2 * turn, "pred_cam_T": place}, "no rotation"),
+        ({"pred_cam_R": turn, "pred_cam_T": np.nan * place}, "NaN"),
+        ({"pred_cam_R": turn}, "has no 'pred_cam_R'"),
+    ]:
+        left = save(**content)
+        assert why in left.notes[-1] and torch.equal(left.root_rotation_T33, alone.root_rotation_T33)
+    camera.write_bytes(b"no array")
+    assert "the camera's way is left out" in read_motion(path, RATE).notes[-1]
 
 
 def test_frames_in_which_nobody_is_seen_are_filled_in_without_confidence(tmp_path: Path) -> None:

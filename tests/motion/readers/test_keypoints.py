@@ -49,7 +49,7 @@ def points(pose: torch.Tensor) -> dict[str, np.ndarray]:
     found = dict(zip(KEYPOINT_NAMES, point.unbind(1), strict=True))
     rest, head = rest_points(), JOINT_NAMES.index("head")
     for name in ("nose", "left_ear", "right_ear", "head_top"):
-        found[name] = found["head"] + (turn[:, head] @ (rest[name] - rest["head"]).T)[..., 0]
+        found[name] = found["head"] + turn[:, head] @ torch.from_numpy(rest[name] - rest["head"])[0]
     return {name: value.numpy() + [0.3, 1.0, -2.0] for name, value in found.items()}
 
 
@@ -68,8 +68,8 @@ def bone_error(found: mrhubo.Motion, pose: torch.Tensor) -> float:
     worst = 0.0
     for joint, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")):
         for side in SIDES:
-            bone = rest[f"{side}_{end}"] - rest[f"{side}_{joint}"]
-            ways = [(world(x, f"{side}_{joint}") @ bone.T)[..., 0] for x in (found.local_TJ33, pose)]
+            bone = torch.from_numpy(rest[f"{side}_{end}"] - rest[f"{side}_{joint}"])[0]
+            ways = [world(x, f"{side}_{joint}") @ bone for x in (found.local_TJ33, pose)]
             sine = torch.linalg.cross(*ways).norm(dim=-1)
             worst = max(worst, float(torch.rad2deg(torch.atan2(sine, (ways[0] * ways[1]).sum(-1))).max()))
     return worst

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.fast.rotations import turned
 from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.limbs import Limbs, find_limbs
 from mrhubo.motion.readers.tree.names import is_head, is_neck, is_spine, left_votes
@@ -110,8 +111,8 @@ def _steadiest(shape: Shape, carrier: int, ends: list[int], above: list[int], mi
     width = max(shape.distance(*ends), 1e-9)
 
     def moves(place: int) -> float:
-        back, base_F3 = shape.pose.turn[place].inv(), shape.pose.point[place]
-        seen = [back.apply(shape.pose.point[end] - base_F3) / width for end in ends]
+        back_F33, base_F3 = shape.pose.matrix[place].mT, shape.pose.point[place]
+        seen = [turned(back_F33, shape.pose.point[end] - base_F3) / width for end in ends]
         return float(np.sqrt(np.mean([np.var(x_F3, axis=0).sum() for x_F3 in seen])))
 
     if above and misplaced(shape.tree.names[carrier]):

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
@@ -75,9 +74,11 @@ def tree_motion(
         reference = reference.in_world(world_33, unit)
     parts, hinges = find_parts(tree, sample, reference, place), find_hinges(sample, reference)
     blocks = [_read(tree, slice(start, start + _BLOCK), place, world_33, unit) for start in range(0, len(tree), _BLOCK)]
-    points = {joint: torch.cat([block.point[joint] for block in blocks]) for joint in place}
-    turns = {joint: torch.cat([block.turn[joint] @ part_33 for block in blocks]) for joint, part_33 in parts.items()}
-    axes = {joint: torch.cat([block.turn[joint] @ axis_3 for block in blocks]) for joint, axis_3 in hinges.items()}
+    points = {joint: np.concatenate([block.point[joint] for block in blocks]) for joint in place}
+    turns, axes = (
+        {joint: np.concatenate([block.turn[joint] @ constant for block in blocks]) for joint, constant in found.items()}
+        for found in (parts, hinges)
+    )
     rest = f"rest is {reference.what}" if reference else "no pose at rest: how parts are turned is told by the motion"
     source = (
         f"{kind} {len(tree.joints)} joints, {unit_name}, {axis} up ({why}); {rest}; the chest is "
@@ -91,6 +92,6 @@ def _read(
 ) -> Frames:
     """Our joints in some frames, in the y-up world."""
     pose = tree.pose(frames, list(place.values()))
-    point = {name: torch.from_numpy(unit * pose.point[p] @ world_33.T) for name, p in place.items()}
-    turn = {name: torch.from_numpy(world_33 @ pose.matrix[p]) for name, p in place.items()}
+    point = {name: unit * pose.point[p] @ world_33.T for name, p in place.items()}
+    turn = {name: world_33 @ pose.matrix[p] for name, p in place.items()}
     return Frames(point, turn)

@@ -6,7 +6,6 @@ Frame: the hand's own axes in the file.
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from mrhubo.motion.orientations import frame_of
 from mrhubo.motion.readers.tree.hierarchy import JointTree
@@ -52,7 +51,7 @@ def hand_axes(tree: JointTree, wrist: int) -> np.ndarray | None:
     if len(bases) > 1:  # knuckles lie across the hand; a thumb also stands off the palm
         by_thumb = sorted(bases, key=lambda base: float(np.linalg.norm(base - thumb)))
         across = by_thumb[0] - by_thumb[-1]
-    frame_33 = frame_of(torch.from_numpy(along)[None], torch.from_numpy(across)[None])[0].numpy()
+    frame_33 = frame_of(along[None], across[None])[0]
     return frame_33 if np.isfinite(frame_33).all() else None
 
 

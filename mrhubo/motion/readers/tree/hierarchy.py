@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 _ADDED = 0.1
 """Positions smaller than this share of a bone's offset are added to it; as the bone itself they would be none."""
@@ -129,11 +128,6 @@ class Pose:
     """(F, 3) by joint."""
     matrix: dict[int, np.ndarray]
     """Rotations (F, 3, 3) by joint, relative to how it is turned when all angles are 0."""
-
-    @cached_property
-    def turn(self) -> dict[int, Rotation]:
-        """The same as SciPy has them; for some frames, as it takes time."""
-        return {place: Rotation.from_matrix(matrix_F33) for place, matrix_F33 in self.matrix.items()}
 
 
 def _turned(joint: Joint, above_33F: np.ndarray, value_FC: np.ndarray) -> np.ndarray:

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from mrhubo.fast.rotations import turned
 from mrhubo.motion.readers.tree.hierarchy import JointTree, Pose
 
 _UPRIGHT_DEG = 30.0
@@ -43,8 +43,8 @@ class Reference:
 
     point: Mapping[str, np.ndarray]
     """(3,) by our joints' names."""
-    turn: Mapping[str, Rotation]
-    """One rotation by our joints' names."""
+    turn: Mapping[str, np.ndarray]
+    """(3, 3) by our joints' names."""
     axes_33: np.ndarray
     """Columns: the body's left, up and forward."""
     what: str
@@ -52,10 +52,9 @@ class Reference:
 
     def in_world(self, world_33: np.ndarray, unit: float) -> Reference:
         """The same in another world, into which a turn leads, in metres."""
-        to_world = Rotation.from_matrix(world_33)
         return Reference(
             {name: unit * world_33 @ point_3 for name, point_3 in self.point.items()},
-            {name: to_world * turn for name, turn in self.turn.items()},
+            {name: world_33 @ turn for name, turn in self.turn.items()},
             world_33 @ self.axes_33,
             self.what,
         )
@@ -83,8 +82,8 @@ def first_frame_jumps(tree: JointTree, place: Mapping[str, int]) -> bool:
     if len(tree) < 4 or _read(tree.pose(slice(0, 1), list(place.values())), place, "", True) is None:
         return False
     pose = tree.pose(slice(0, _STEPS + 2), list(place.values()))
-    hips = pose.turn[place["pelvis"]]
-    seen = [hips.inv().apply(pose.point[p] - pose.point[place["pelvis"]]) for p in place.values()]
+    back_F33, hips_F3 = pose.matrix[place["pelvis"]].mT, pose.point[place["pelvis"]]
+    seen = [turned(back_F33, pose.point[p] - hips_F3) for p in place.values()]
     step_F = np.linalg.norm(np.diff(np.stack(seen), axis=1), axis=-1).max(0)
     ends = [pose.point[place[f"left_{name}"]][0] for name in ("hip", "knee", "ankle")]
     leg = np.linalg.norm(np.diff(ends, axis=0), axis=-1).sum()
@@ -94,7 +93,7 @@ def first_frame_jumps(tree: JointTree, place: Mapping[str, int]) -> bool:
 def _read(pose: Pose, place: Mapping[str, int], what: str, strict: bool) -> Reference | None:
     """The pose as one of rest, if it is. Strict: arms are held out and straight, as nobody does by chance."""
     point = {name: pose.point[p][0] for name, p in place.items()}
-    turn = {name: pose.turn[p][:1] for name, p in place.items()}
+    turn = {name: pose.matrix[p][0] for name, p in place.items()}
     hips = point["left_hip"] - point["right_hip"]
     shoulders = point["left_shoulder"] - point["right_shoulder"]
     up = (point["left_shoulder"] + point["right_shoulder"]) - (point["left_hip"] + point["right_hip"])

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.motion.readers.tree.hierarchy import Pose
 from mrhubo.motion.readers.tree.reference import Reference
 
@@ -67,7 +67,7 @@ def to_y_up(axis: str) -> np.ndarray:
     if axis == "y":
         return np.eye(3)
     across = np.array([1.0, 0.0, 0.0]) if axis == "-y" else np.cross(unit, [0.0, 1.0, 0.0])
-    return np.round(Rotation.from_rotvec(across * (np.pi if axis == "-y" else np.pi / 2)).as_matrix())
+    return np.round(axis_angle_to_matrix(across * (np.pi if axis == "-y" else np.pi / 2)))
 
 
 def unit_of(pose: Pose, place: Mapping[str, int], given: float | None) -> tuple[float, str]:

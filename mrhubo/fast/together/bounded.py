@@ -14,7 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from mrhubo.fast.together.banded import Banded, Factor, Solve
 
 _ITERATIONS = 30
 _GAP = 1e-5
@@ -26,45 +27,6 @@ _SLACK = 0.05
 _GIVE = 1e-6
 """How far a bound gives way [rad] for each unit of its multiplier: so there is a minimum, too, where bounds leave no
 room between them (a joint that must run all the way from one settled frame to another)."""
-
-
-@dataclass(frozen=True)
-class Banded:
-    """A symmetric positive definite matrix of T M rows, frame after frame."""
-
-    within_TMM: np.ndarray
-    """Entries between joints of one frame; its diagonal does not count."""
-    diagonal_TM: np.ndarray
-    couplings_TM: list[np.ndarray]
-    """Entries between a joint and the same joint one, two ... frames later (T - 1, M), (T - 2, M) ..."""
-
-    def factor(self, extra_TM: np.ndarray | float = 0.0, next_XM: np.ndarray | float = 0.0) -> np.ndarray:
-        """Cholesky factor in lower banded form, with something added to the diagonal and to the first coupling."""
-        frames, joints = self.diagonal_TM.shape
-        # Row k holds the entries k below the diagonal; the next frame's same joint is `joints` below.
-        banded = np.zeros((len(self.couplings_TM) * joints + 1, frames, joints))
-        banded[0] = self.diagonal_TM + extra_TM
-        for k in range(1, joints):
-            banded[k, :, : joints - k] = np.diagonal(self.within_TMM, offset=-k, axis1=1, axis2=2)
-        for lag, coupling_TM in enumerate(self.couplings_TM, start=1):
-            banded[lag * joints, : frames - lag] = coupling_TM
-        banded[joints, : frames - 1] += next_XM
-        return cholesky_banded(banded.reshape(len(banded), -1), overwrite_ab=True, lower=True, check_finite=False)
-
-    def times(self, x_TM: np.ndarray) -> np.ndarray:
-        """The product (T, M) with moves (T, M)."""
-        found_TM = self.diagonal_TM * x_TM
-        lower_TMM = np.tril(self.within_TMM, -1)
-        found_TM += np.einsum("tmn,tn->tm", lower_TMM, x_TM) + np.einsum("tnm,tn->tm", lower_TMM, x_TM)
-        for lag, coupling_TM in enumerate(self.couplings_TM, start=1):
-            found_TM[lag:] += coupling_TM * x_TM[:-lag]
-            found_TM[:-lag] += coupling_TM * x_TM[lag:]
-        return found_TM
-
-
-def solve_factored(factor: np.ndarray, right_TM: np.ndarray) -> np.ndarray:
-    """The solution (T, M) of a system, of whose matrix the factor is given."""
-    return cho_solve_banded((factor, True), right_TM.ravel(), check_finite=False).reshape(right_TM.shape)
 
 
 @dataclass(frozen=True)
@@ -114,7 +76,7 @@ class _System:
     """The linear system of one iteration."""
 
     bounds: Bounds
-    factor: np.ndarray
+    solve: Solve
     slope_TM: np.ndarray
     """Derivative of the Lagrangian by the moves."""
     lack: np.ndarray
@@ -126,18 +88,19 @@ class _System:
         """Changes of moves, slacks and multipliers that bring slack * dual down by `product`, slope and lack to 0."""
         soft = self.slack + _GIVE * self.dual
         push = (self.dual * self.lack - product) / soft
-        dx_TM = solve_factored(self.factor, -self.slope_TM - self.bounds.transposed(push))
+        dx_TM = self.solve(-self.slope_TM - self.bounds.transposed(push))
         moved = self.bounds.apply(dx_TM)
         d_dual = push + self.dual / soft * moved
         return dx_TM, _GIVE * d_dual - self.lack - moved, d_dual
 
 
-def bounded_minimum(matrix: Banded, right_TM: np.ndarray, bounds: Bounds) -> np.ndarray:
+def bounded_minimum(matrix: Banded, right_TM: np.ndarray, bounds: Bounds, factor: Factor) -> np.ndarray:
     """The moves (T, M) [rad].
 
     Args:
         matrix: A; its rows of frames that stay are those of the identity.
         right_TM: b; 0 in frames that stay.
+        factor: solves systems of the band of A.
         bounds: kept to but for millionths.
     """
     x_TM, upper = np.zeros_like(right_TM), bounds.upper
@@ -148,8 +111,8 @@ def bounded_minimum(matrix: Banded, right_TM: np.ndarray, bounds: Bounds) -> np.
         if gap < _GAP and np.abs(lack).max() < _GAP:
             break
         slope_TM = matrix.times(x_TM) - right_TM + bounds.transposed(dual)
-        factor = matrix.factor(*bounds.stiffness(dual / (slack + _GIVE * dual)))
-        system = _System(bounds, factor, slope_TM, lack, slack, dual)
+        solve = factor(matrix.plus(*bounds.stiffness(dual / (slack + _GIVE * dual))))
+        system = _System(bounds, solve, slope_TM, lack, slack, dual)
         _, d_slack, d_dual = system.direction(slack * dual)
         length = min(_reach(slack, d_slack), _reach(dual, d_dual))
         centre = float(((slack + length * d_slack) * (dual + length * d_dual)).mean())

@@ -1,0 +1,169 @@
+"""How often detection of a humanoid's mapping is right: on the shipped robots, however their files are written, on
+random humanoids, and on other URDF files.
+
+    python benchmarks/discovery.py [--seeds 0-1000] [--urdfs FOLDER]
+
+The shipped robots' hand-written configs are the measure of theirs. A random humanoid counts as right when its joints,
+points (2 cm on an arm of half a metre), up, forward and hands are; where something is wrong, it counts whether a
+question asks about it. Of other files only what was found is printed, as nobody wrote down what is true of them.
+"""
+
+from __future__ import annotations
+
+import collections
+import math
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from common import print_header, print_table, read_options
+
+from mrhubo.config import load_config
+from mrhubo.errors import UserError
+from mrhubo.robot import read_keypoints
+from mrhubo.robot.discovery import Discovery, discover
+from mrhubo.robot.generator import humanoid
+from mrhubo.robot.generator.score import asked, mistakes
+from mrhubo.robot.generator.variants import variant
+from mrhubo.robot.urdf import describe
+from mrhubo.runtime.locations import project_root
+
+FORMS = {
+    "as it is": {},
+    "renamed": {"rename": True},
+    "reordered": {"reorder": True},
+    "axes negated": {"negate": True},
+    "y up": {"turn": (math.pi / 2, 0.0, 0.0)},
+    "turned, scaled by 3, and all else": {
+        "turn": (0.4, 2.0, -1.0), "scale": 3.0, "rename": True, "reorder": True, "negate": True,
+    },
+}  # fmt: skip
+
+
+def main(argv: list[str]) -> None:
+    """Prints the tables."""
+    options, argv = read_options(argv, seeds="0-1000", urdfs="")
+    if argv:
+        sys.exit(f"{argv[0]}: is unknown")
+    print_header()
+    shipped()
+    first, _, last = options["seeds"].partition("-")
+    made(range(int(first), int(last)))
+    if options["urdfs"]:
+        others(Path(options["urdfs"]))
+
+
+def shipped() -> None:
+    """The shipped robots in every form."""
+    rows = []
+    for robot in ("nao", "coman", "reachy"):
+        config = load_config(project_root() / f"conf/{robot}.yaml").robot
+        points = read_keypoints(config.keypoints).points
+        description = describe(config.urdf)
+        for form, changes in FORMS.items():
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "robot.urdf"
+                text, names = variant(config.urdf, seed=1, **changes)
+                path.write_text(text)
+                found = discover(path)
+                new = {joint: names.get(joint, joint) for joint in description.joints}
+                missing = {new[joint] for joint in config.joints} - set(found.joints)
+                scale = float(changes.get("scale", 1.0))
+                placed = describe(path)
+                apart = [
+                    math.dist(
+                        position(placed, names.get(point.link, point.link), scale * np.array(point.offset_3)),
+                        found.points[name].root_3,
+                    )
+                    / scale
+                    for name, point in points.items()
+                ]
+            extra = len(found.joints) - len(config.joints)
+            rows.append(
+                [
+                    robot,
+                    form,
+                    str(len(missing)),
+                    str(extra),
+                    f"{1000 * max(apart):.0f}",
+                    f"{found.forward.confidence:.2f}",
+                ]
+            )
+    print_table(["robot", "form", "joints missing", "joints more", "farthest point [mm]", "sure of facing"], rows)
+    print()
+
+
+def position(description, link: str, offset_3: np.ndarray) -> np.ndarray:
+    """Of a point on a link (3,) at zero, in the root's frame."""
+    pose_44 = np.eye(4)
+    for joint in reversed(description.joints_above(link)):
+        pose_44 = pose_44 @ joint.origin_44
+    return pose_44[:3, :3] @ offset_3 + pose_44[:3, 3]
+
+
+def made(seeds: range) -> None:
+    """Random humanoids: how many are right, and of what kind those are that are not."""
+    groups: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+    faults: collections.Counter[str] = collections.Counter()
+    silent: list[str] = []
+    seconds = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "made.urdf"
+        for seed in seeds:
+            truth = humanoid(seed)
+            path.write_text(truth.urdf)
+            start = time.perf_counter()
+            try:
+                found = discover(path)
+            except UserError:
+                wrong, told = ["refused"], True
+            else:
+                wrong = mistakes(found, truth, path)
+                told = not wrong or asked(found, wrong)
+            seconds += time.perf_counter() - start
+            outcome = "right" if not wrong else "asks" if told else "wrong"
+            for group in ("all", *truth.told):
+                groups[group][outcome] += 1
+            faults.update({phrase.split(":")[0].removeprefix("left_").removeprefix("right_") for phrase in wrong})
+            if outcome == "wrong":
+                silent.append(f"{seed}: {'; '.join(wrong)[:160]}")
+    rows = [
+        [
+            group,
+            str(sum(counts.values())),
+            *(f"{100 * counts[kind] / sum(counts.values()):.1f}" for kind in ("right", "asks", "wrong")),
+        ]
+        for group, counts in sorted(groups.items())
+    ]
+    print_table(["random humanoids", "count", "right [%]", "wrong, asks [%]", "wrong, silent [%]"], rows)
+    print(f"\n{1000 * seconds / max(len(seeds), 1):.0f} ms each; wrong parts: {dict(faults.most_common())}")
+    for line in silent[:20]:
+        print(f"silent {line}")
+    print()
+
+
+def others(folder: Path) -> None:
+    """What is found of every URDF in a folder."""
+    rows = [[path.stem[-40:], *_summary(path)] for path in sorted(folder.glob("*.urdf"))]
+    print_table(["file", "arms", "neck", "waist", "legs", "facing", "sure", "questions"], rows)
+
+
+def _summary(path: Path) -> list[str]:
+    try:
+        found: Discovery = discover(path)
+    except UserError as refusal:
+        return ["", "", "", "", "", "", str(refusal).rpartition(": ")[2][:80]]
+    counts = [str(len(found.chains.get(name, ()))) for name in ("left_arm", "neck", "waist", "left_leg")]
+    facing = " ".join(f"{number:.2f}" for number in found.forward.root_3)
+    return [
+        *counts,
+        facing,
+        f"{found.forward.confidence:.2f}",
+        ", ".join(question.about for question in found.questions),
+    ]
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,65 @@
+"""What a user names as a robot: a URDF, a MuJoCo model, or a robot of the package robot_descriptions."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from mrhubo.errors import UserError, first_line, shortened
+
+_DESCRIPTIONS = "robot_descriptions"
+_PATHS = ("URDF_PATH", "MJCF_PATH")
+
+
+def find_model(word: str) -> Path:
+    """The file that a word names: a path, or the name of a robot of robot_descriptions, such as `g1_description`.
+
+    Raises:
+        UserError: there is no such file, and no such robot, or the package cannot fetch it.
+    """
+    path = Path(word)
+    if os.path.exists(path) or not re.fullmatch(r"\w+", word):
+        if os.path.isdir(path):
+            raise UserError(f"{path} is a folder; name the robot's file in it")
+        if not os.path.exists(path):
+            raise UserError(f"{path} does not exist; name a URDF or a MuJoCo model")
+        return path
+    if importlib.util.find_spec(_DESCRIPTIONS) is None:
+        raise UserError(
+            f"'{word}' is no file; a robot of the package robot_descriptions can be named too, where it is installed: "
+            "pip install robot_descriptions"
+        )
+    return _described(word)
+
+
+def _described(word: str) -> Path:
+    """The file of a robot of robot_descriptions, which fetches it when it is first asked for."""
+    names = [word] if word.endswith("_description") else [f"{word}_description", f"{word}_mj_description", word]
+    known = [name for name in names if importlib.util.find_spec(f"{_DESCRIPTIONS}.{name}") is not None]
+    if not known:
+        raise UserError(f"'{word}' is no file, and no robot of the package robot_descriptions")
+    try:
+        module = importlib.import_module(f"{_DESCRIPTIONS}.{known[0]}")
+    except Exception as error:  # git, the network, the disk: whatever fetching runs into
+        raise UserError(
+            f"{known[0]}: robot_descriptions cannot fetch it: {shortened(first_line(error), 300)}"
+        ) from error
+    found = next((path for name in _PATHS if (path := getattr(module, name, None)) is not None), None)
+    if found is None:
+        raise UserError(f"{known[0]}: robot_descriptions has neither a URDF nor a MuJoCo model of it")
+    return Path(found)
+
+
+@contextlib.contextmanager
+def model_named() -> Iterator[None]:
+    """A `UserError` in here about `robot.urdf` is about the file that the user has named, not about a config."""
+    try:
+        yield
+    except UserError as error:
+        error.args = (str(error).removeprefix("robot.urdf: ").replace("; name a URDF file, relative to the YAML", ""),)
+        raise

@@ -1,0 +1,205 @@
+"""From a robot's model to its config and picture, and from a config to its picture."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from mrhubo.config import is_config, load_config
+from mrhubo.describing.model_file import find_model, model_named
+from mrhubo.describing.picture import draw, save_picture
+from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, unsure
+from mrhubo.errors import InputWarning, UserError
+from mrhubo.files.atomic import atomic_path
+from mrhubo.robot import BodyMap, Robot, build_body_map
+from mrhubo.robot.discovery import Discovery, discover
+from mrhubo.robot.mjcf import is_mjcf, urdf_of_mjcf
+from mrhubo.robot.urdf import Description
+from mrhubo.robot.urdf import describe as read_urdf
+from mrhubo.runtime.names import check_name
+
+DEFAULT_FOLDER = Path("conf")
+_LONGEST_NAME = 40
+
+
+@dataclass(frozen=True)
+class Described:
+    """A robot whose config was written."""
+
+    found: Discovery
+    file: Path
+    """The config."""
+    picture: Path
+    """Where its picture belongs: beside it."""
+    urdf: Path
+    notes: tuple[str, ...]
+    """What was left out of a model that was no URDF."""
+
+    @property
+    def doubts(self) -> dict[str, str]:
+        """The entries that are guesses, and what was asked about each."""
+        return unsure(self.found)
+
+
+def read_model(word: str) -> Description:
+    """The links and joints of the model that a word names.
+
+    Raises:
+        UserError: there is no such model, or it cannot be read.
+    """
+    path = find_model(word)
+    with model_named(), tempfile.TemporaryDirectory() as folder:
+        if not is_mjcf(path):
+            return read_urdf(path)
+        urdf = Path(folder) / f"{path.stem}.urdf"
+        urdf.write_text(urdf_of_mjcf(path, Path(folder)).urdf, encoding="utf-8")
+        return read_urdf(urdf)
+
+
+def describe_model(word: str, out: Path | None = None, force: bool = False) -> Described:
+    """Finds out what a robot's links stand for, and writes its config, and its URDF where the model is MuJoCo's.
+
+    Args:
+        word: the model: a file, or the name of a robot of robot_descriptions.
+        out: the config to write; default: `conf/NAME.yaml`.
+        force: whether a file that is there already may be replaced.
+
+    Raises:
+        UserError: the model cannot be read or is no robot with arms, or a file is there already.
+    """
+    path = find_model(word)
+    with model_named(), _as_urdf(path, out, force) as (urdf, notes):
+        found = _discover(read_urdf(urdf))
+        file = out or default_config(path)
+        check_name("the config's file name", file.stem)
+        picture = file.with_suffix(".png")
+        if not force:
+            refuse_existing(file)
+        text = described_yaml(found, urdf, file, picture, path.name)
+        with atomic_path(file) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return Described(found, file, picture, urdf, notes)
+
+
+def config_of(word: str) -> tuple[Path, Described | None]:
+    """The config of a model: one that is there already, as the user may have changed it, or a new one.
+
+    Raises:
+        UserError: as for `describe_model`; or there is a config of that name, of another robot.
+    """
+    path = find_model(word)
+    file = default_config(path)
+    if not file.exists():
+        described = describe_model(word)
+        return described.file, described
+    urdf = load_config(file).robot.urdf
+    if not any(
+        there.exists() and urdf.exists() and there.samefile(urdf) for there in (path, file.with_suffix(".urdf"))
+    ):
+        raise UserError(
+            f"{file} is there already, of another model ({urdf}): name it, or describe yours by another --out"
+        )
+    return file, None
+
+
+def open_robot(word: str) -> Robot:
+    """The robot of a config, or of a model whose config nobody has written: what is a guess is told.
+
+    Raises:
+        UserError: the config or the model cannot be used.
+    """
+    if is_config(word):
+        return Robot.from_config(word)
+    description = read_model(word)
+    with model_named():
+        found = _discover(description)
+        robot = _robot(description, found, _file_name(find_model(word)))
+    for about, text in unsure(found).items():
+        warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
+    return robot
+
+
+def default_config(path: Path) -> Path:
+    """Where the config of a model goes if nobody says it."""
+    return DEFAULT_FOLDER / f"{_file_name(path)}.yaml"
+
+
+def draw_config(file: Path, picture: Path) -> str | None:
+    """Draws the robot of a config beside the human, whether the config makes sense or not; returns what a fit would
+    refuse about it.
+
+    Raises:
+        UserError: a link or a joint does not exist, or the picture cannot be written.
+    """
+    config = load_config(file)
+    with warnings.catch_warnings(action="ignore"):  # told by the check below
+        body_map = BodyMap(Robot.from_config(file))
+    save_picture(draw(body_map), picture)
+    try:
+        build_body_map(config.robot)
+    except UserError as error:
+        return str(error)
+    return None
+
+
+def refuse_existing(file: Path) -> None:
+    """Refuses to replace what somebody may have worked on."""
+    if file.exists():
+        raise UserError(f"{file} is there already, and may hold work of yours; name another by --out, or give --force")
+
+
+def _discover(description: Description) -> Discovery:
+    """What the links of a robot stand for; where joints cannot be used, and no whole robot is left, they are to blame.
+
+    Raises:
+        UserError: no two arms are found.
+    """
+    try:
+        found = discover(description)
+        if description.faults:
+            with warnings.catch_warnings(action="ignore"):
+                BodyMap.of(_robot(description, found, "robot"))
+    except UserError as error:
+        if not description.faults:
+            raise
+        fault = next(iter(description.faults.values()))
+        raise UserError(f"{description.path}, {fault}; without this joint no two whole arms are found") from error
+    return found
+
+
+def _robot(description: Description, found: Discovery, name: str) -> Robot:
+    ranges = {joint: [limits.lower, limits.upper] for joint, limits in found.ranges.items()}
+    return Robot.from_urdf(
+        description, found.joints, keypoint_entries(found), found.key_links, ranges, name=name
+    )  # fmt: skip
+
+
+@contextlib.contextmanager
+def _as_urdf(path: Path, out: Path | None, force: bool) -> Iterator[tuple[Path, tuple[str, ...]]]:
+    """The model's URDF, and what was left out of it. One that is made of MuJoCo's model lies beside the config to be;
+    it goes away again where the work in here fails.
+    """
+    if not is_mjcf(path):
+        yield path, ()
+        return
+    urdf = (out or default_config(path)).with_suffix(".urdf")
+    made = urdf_of_mjcf(path, urdf.parent)
+    if not force:
+        refuse_existing(urdf)
+    with atomic_path(urdf) as temporary:
+        temporary.write_text(made.urdf, encoding="utf-8")
+    try:
+        yield urdf, made.notes
+    except BaseException:
+        urdf.unlink(missing_ok=True)
+        raise
+
+
+def _file_name(path: Path) -> str:
+    """What a robot's config is called where nobody says it: as its model."""
+    plain = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in path.name.partition(".")[0])
+    return plain.strip("_-")[:_LONGEST_NAME] or "robot"

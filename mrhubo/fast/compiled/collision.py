@@ -1,0 +1,113 @@
+"""As `mrhubo.fast.plain.collision`, for one frame."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit  # pyright: ignore[reportMissingImports]
+
+from mrhubo.fast.compiled.human import add, cross, dot, put, row, turn
+from mrhubo.fast.compiled.tables import (
+    BODY_S,
+    CLEAR_Y,
+    COLUMN_A,
+    END_S23,
+    INNER,
+    PAIR_Y2,
+    PARENT_A,
+    RADIUS_S,
+    RATIO_A,
+    REACH_S,
+    ROTARY_A,
+    real,
+    size,
+    vector,
+    whole,
+)
+from mrhubo.fast.plain.collision import PARALLEL, SHORT
+
+
+@njit(**INNER)
+def place_capsules(t, work):
+    """Ends and middles of capsules, where the robot is placed."""
+    ends_S3, count = work.ends_S3, size(t, BODY_S)
+    for s in range(count):
+        body = whole(t, BODY_S, s)
+        origin = row(work.position_L3, body)
+        one = add(turn(work.rotation_L33, body, vector(t, END_S23, 2 * s)), origin, 1.0)
+        two = add(turn(work.rotation_L33, body, vector(t, END_S23, 2 * s + 1)), origin, 1.0)
+        put(ends_S3, 2 * s, one)
+        put(ends_S3, 2 * s + 1, two)
+        put(ends_S3, 2 * count + s, add(one, two, 1.0))
+
+
+@njit(**INNER)
+def apart(t, work, y, margin):
+    """Of a pair of placed capsules: signed distance [m], point on the first one's axis, and what leads there from the
+    second's. What is certainly further apart than the margin [m] is infinitely far.
+    """
+    ends_S3, count = work.ends_S3, size(t, BODY_S)
+    i, j = whole(t, PAIR_Y2, 2 * y), whole(t, PAIR_Y2, 2 * y + 1)
+    centre = 0.0
+    for x in range(3):
+        between = ends_S3[2 * count + i, x] - ends_S3[2 * count + j, x]
+        centre += between * between
+    reach = real(t, REACH_S, i) + real(t, REACH_S, j) + max(margin, 0.0)
+    if centre >= 4 * reach * reach:
+        return math.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    point, between = _closest(ends_S3, 2 * i, 2 * j)
+    return math.sqrt(dot(between, between)) - real(t, RADIUS_S, i) - real(t, RADIUS_S, j), point, between
+
+
+@njit(**INNER)
+def _closest(ends_S3, i, j):
+    """Of two segments, whose first ends these are: the nearest point of the first, and what leads there."""
+    start_a, start_b = row(ends_S3, i), row(ends_S3, j)
+    along_a, along_b = add(row(ends_S3, i + 1), start_a, -1.0), add(row(ends_S3, j + 1), start_b, -1.0)
+    r = add(start_a, start_b, -1.0)
+    a, e, b, c, f = (
+        dot(along_a, along_a),
+        dot(along_b, along_b),
+        dot(along_a, along_b),
+        dot(along_a, r),
+        dot(along_b, r),
+    )
+    safe_a, safe_e = max(a, SHORT), max(e, SHORT)
+    determinant = a * e - b * b
+    s = 0.0
+    if determinant > PARALLEL * a * e:
+        s = (b * f - c * e) / max(determinant, SHORT * SHORT)
+    u = min(max((b * min(max(s, 0.0), 1.0) + f) / safe_e, 0.0), 1.0)
+    s = min(max((b * u - c) / safe_a, 0.0), 1.0)
+    u = min(max((b * s + f) / safe_e, 0.0), 1.0)
+    return add(start_a, along_a, s), add(add(r, along_a, s), along_b, -u)
+
+
+@njit(**INNER)
+def touches(t, work, clear):
+    """Whether any pair of capsules overlaps, or, if `clear` is true, is nearer than its clearance; where the robot is
+    placed.
+    """
+    place_capsules(t, work)
+    for y in range(size(t, PAIR_Y2) // 2):
+        margin = real(t, CLEAR_Y, y) if clear else 0.0
+        if apart(t, work, y, margin)[0] < margin:
+            return True
+    return False
+
+
+@njit(**INNER)
+def distance_gradient(t, work, y, point, normal):
+    """How a pair's distance changes with joints [m/rad], into `work.contact_N`."""
+    for n in range(len(work.contact_N)):
+        work.contact_N[n] = 0.0
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        body = whole(t, BODY_S, whole(t, PAIR_Y2, 2 * y + side))
+        while body > 0:
+            axis = row(work.axis_A3, body - 1)
+            moved = axis
+            if whole(t, ROTARY_A, body - 1):
+                moved = cross(axis, add(point, row(work.position_L3, body), -1.0))
+            work.contact_N[whole(t, COLUMN_A, body - 1)] += sign * real(t, RATIO_A, body - 1) * dot(normal, moved)
+            body = whole(t, PARENT_A, body - 1)

@@ -1,0 +1,62 @@
+"""Whether numba has kept what it compiled of this version, told without importing numba, which takes as long as
+answering a short motion.
+
+A note in the user's cache names numba's files. It is written once all that a motion needs has been compiled, and counts
+as long as those files are there and neither mrhubo nor numba, Python or the machine has changed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import importlib.util
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import xxhash
+
+from mrhubo.errors import UserError
+from mrhubo.files.atomic import atomic_path
+
+_SOURCES = ("compiled", "plain")
+
+
+def checksum() -> str:
+    """Of all that is compiled, and of what it takes constants from."""
+    digest, here = xxhash.xxh3_64(), Path(__file__).parent
+    sources = [path for folder in _SOURCES for path in sorted((here / folder).glob("*.py"))]
+    for path in (*sources, here / "sections.py"):  # whose kinds of steps are constants of what is compiled
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def numba_is_there() -> bool:
+    """Whether numba is installed."""
+    return importlib.util.find_spec("numba") is not None
+
+
+def is_kept() -> bool:
+    """Whether the compiled form starts without compiling."""
+    try:
+        files = json.loads(_note().read_text())
+        return bool(files) and all(os.path.isfile(file) for file in files)
+    except (OSError, ValueError, TypeError, importlib.metadata.PackageNotFoundError):
+        return False
+
+
+def note_kept(folders: Iterable[str]) -> None:
+    """Notes that all has been compiled, and kept in numba's folders; where nothing can be written, nothing is noted."""
+    files = [str(file) for folder in sorted(set(folders)) for file in sorted(Path(folder).glob("*kernels.*.nbi"))]
+    with contextlib.suppress(UserError, importlib.metadata.PackageNotFoundError):
+        with atomic_path(_note()) as half:
+            half.write_text(json.dumps(files))
+
+
+def _note() -> Path:
+    told = (checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(cache) / "mrhubo" / f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"

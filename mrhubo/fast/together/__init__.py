@@ -1,0 +1,1 @@
+"""All frames of a motion together, without PyTorch: what `mrhubo.retargeter.clip` does."""

@@ -1,0 +1,119 @@
+"""Linear systems in which each frame of a motion is coupled with the next ones alone.
+
+Legend: T frames, M joints of one block, G groups of frames, H of them that are eliminated, E rows of a group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+Solve = Callable[[np.ndarray], np.ndarray]
+"""The solution (T, M) for a right side (T, M)."""
+
+
+@dataclass(frozen=True)
+class Banded:
+    """A symmetric positive definite matrix of T M rows, frame after frame."""
+
+    within_TMM: np.ndarray
+    """Entries between joints of one frame; its diagonal does not count."""
+    diagonal_TM: np.ndarray
+    couplings_TM: list[np.ndarray]
+    """Entries between a joint and the same joint one, two ... frames later (T - 1, M), (T - 2, M) ..."""
+
+    def plus(self, diagonal_TM: np.ndarray, next_XM: np.ndarray) -> Banded:
+        """The same with something added to the diagonal and to the first coupling."""
+        first_XM, *others = self.couplings_TM
+        return replace(self, diagonal_TM=self.diagonal_TM + diagonal_TM, couplings_TM=[first_XM + next_XM, *others])
+
+    def times(self, x_TM: np.ndarray) -> np.ndarray:
+        """The product (T, M) with moves (T, M)."""
+        found_TM = self.diagonal_TM * x_TM
+        lower_TMM = np.tril(self.within_TMM, -1)
+        found_TM += np.einsum("tmn,tn->tm", lower_TMM, x_TM) + np.einsum("tnm,tn->tm", lower_TMM, x_TM)
+        for lag, coupling_TM in enumerate(self.couplings_TM, start=1):
+            found_TM[lag:] += coupling_TM * x_TM[:-lag]
+            found_TM[:-lag] += coupling_TM * x_TM[lag:]
+        return found_TM
+
+
+Factor = Callable[[Banded], Solve]
+"""Whoever solves such systems: works on the matrix once, and then answers right sides."""
+
+
+def halve(system: Banded) -> Solve:
+    """Solves by cyclic reduction: groups of frames that are coupled with their neighbours alone; every other group is
+    eliminated, all of them at a time, until one is left. (R. A. Sweet, "A generalized cyclic reduction algorithm",
+    SIAM Journal on Numerical Analysis, 1974.) Steps are as many as halvings of the frames, not as many as frames, so
+    that NumPy alone does it.
+    """
+    frames, joints = system.diagonal_TM.shape
+    own_GEE, next_GEE = _grouped(system)
+    levels: list[tuple[np.ndarray, ...]] = []
+    while len(own_GEE) > 1:
+        kept_GEE, inverse_HEE = own_GEE[0::2].copy(), np.linalg.inv(own_GEE[1::2])
+        before_HEE, after_HEE = next_GEE[0::2], next_GEE[1::2]
+        first_HEE = inverse_HEE @ before_HEE.swapaxes(-1, -2)
+        second_HEE = inverse_HEE[: len(after_HEE)] @ after_HEE
+        kept_GEE[: len(before_HEE)] -= before_HEE @ first_HEE
+        kept_GEE[1 : 1 + len(after_HEE)] -= after_HEE.swapaxes(-1, -2) @ second_HEE
+        levels.append((inverse_HEE, before_HEE, after_HEE, first_HEE, second_HEE))
+        own_GEE, next_GEE = kept_GEE, -before_HEE[: len(after_HEE)] @ second_HEE
+    last_EE = own_GEE[0]
+
+    def solve(right_TM: np.ndarray) -> np.ndarray:
+        right_GE1 = np.zeros((-(-frames * joints // len(last_EE)), len(last_EE), 1))
+        right_GE1.reshape(-1)[: right_TM.size] = right_TM.ravel()
+        halves = []
+        for inverse_HEE, before_HEE, after_HEE, *_ in levels:
+            kept_GE1, own_HE1 = right_GE1[0::2].copy(), inverse_HEE @ right_GE1[1::2]
+            kept_GE1[: len(before_HEE)] -= before_HEE @ own_HE1
+            kept_GE1[1 : 1 + len(after_HEE)] -= after_HEE.swapaxes(-1, -2) @ own_HE1[: len(after_HEE)]
+            halves.append(own_HE1)
+            right_GE1 = kept_GE1
+        found_GE1 = np.linalg.solve(last_EE, right_GE1[0])[None]
+        for own_HE1, (*_, first_HEE, second_HEE) in zip(halves[::-1], levels[::-1], strict=True):
+            own_HE1 -= first_HEE @ found_GE1[: len(first_HEE)]
+            own_HE1[: len(second_HEE)] -= second_HEE @ found_GE1[1 : 1 + len(second_HEE)]
+            both_GE1 = np.empty((len(found_GE1) + len(own_HE1), *found_GE1.shape[1:]))
+            both_GE1[0::2], both_GE1[1::2] = found_GE1, own_HE1
+            found_GE1 = both_GE1
+        return found_GE1.reshape(-1)[: frames * joints].reshape(frames, joints)
+
+    return solve
+
+
+def _grouped(system: Banded) -> tuple[np.ndarray, np.ndarray]:
+    """The matrix in groups of as many frames as a frame is coupled with: entries of each group (G, E, E), and between
+    each group and the next (G - 1, E, E). Rows that fill up the last group are those of the identity.
+    """
+    frames, joints = system.diagonal_TM.shape
+    size = max(1, len(system.couplings_TM))
+    groups = -(-frames // size)
+
+    def filled(value_TX: np.ndarray, fill: float) -> np.ndarray:
+        full = np.full((groups * size, *value_TX.shape[1:]), fill)
+        full[: len(value_TX)] = value_TX
+        return full.reshape(groups, size, *value_TX.shape[1:])
+
+    own = np.zeros((groups, size, joints, size, joints))
+    following = np.zeros((groups, size, joints, size, joints))
+    lower_TMM = np.tril(system.within_TMM, -1)
+    within_GSMM, diagonal_GSM = filled(lower_TMM + lower_TMM.swapaxes(-1, -2), 0.0), filled(system.diagonal_TM, 1.0)
+    joint_M = np.arange(joints)
+    for i in range(size):
+        own[:, i, :, i] = within_GSMM[:, i]
+        own[:, i, joint_M, i, joint_M] = diagonal_GSM[:, i]
+    for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
+        coupling_GSM = filled(coupling_TM, 0.0)
+        for i in range(size):
+            inside, j = divmod(i + lag, size)
+            if inside == 0:
+                own[:, i, joint_M, j, joint_M] = own[:, j, joint_M, i, joint_M] = coupling_GSM[:, i]
+            else:
+                following[:, i, joint_M, j, joint_M] = coupling_GSM[:, i]
+    rows = size * joints
+    return own.reshape(groups, rows, rows), following[:-1].reshape(groups - 1, rows, rows)

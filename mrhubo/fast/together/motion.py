@@ -1,0 +1,156 @@
+"""From answers that were found frame by frame to one smooth motion, as `mrhubo.retargeter.clip` and
+`mrhubo.reference.trajectory` do it, where the reasons stand.
+
+Legend: T frames, L that are settled, S candidates per frame, D directions, N joints, C blocks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrhubo.fast.description import Description
+from mrhubo.fast.together.avoiding import GivingWay
+from mrhubo.fast.together.problem import Problem
+from mrhubo.fast.together.refine import refine
+from mrhubo.fast.together.smoothness import SMOOTHNESS, Smoothness, jerk_weights, pull_at
+from mrhubo.fast.together.speed import keep_speed, nearest_slow, speed_bound
+
+SWEEPS, TOLERANCE = 20, 2e-3
+WINDOW, AHEAD = 4096, 1024
+"""Frames that are worked on together, and how many of them only serve to look ahead."""
+JUMP = 0.5
+"""Steps of a path [rad] that are jumps."""
+REACH = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
+"""How many frames away the other side of a jump is looked for."""
+BRIDGE_STEPS, BRIDGE_TOLERANCE = 12, 1e-2
+
+
+def join_frames(
+    description: Description,
+    problem: Problem,
+    giving_way: GivingWay | None,
+    q_TN: np.ndarray,
+    target_TD3: np.ndarray,
+    frame_rate: float,
+) -> np.ndarray:
+    """One motion (T, N) [rad] near answers that were found frame by frame (T, N), inside the limits of joints and of
+    their speeds.
+
+    Args:
+        description: the robot's.
+        problem: what frames cost.
+        giving_way: what makes frames give way in which the robot touches itself; None: nothing does.
+        q_TN: the answers.
+        target_TD3: the human's directions.
+        frame_rate: frames per second.
+    """
+    if len(q_TN) < 2:
+        return q_TN if giving_way is None else giving_way.alone(q_TN, target_TD3)
+    smoothness = Smoothness(pull_at(SMOOTHNESS, frame_rate), jerk_weights(description, target_TD3, frame_rate))
+    task = Task(target_TD3, smoothness, *speed_bound(problem.cost.velocity_N, frame_rate), giving_way)
+    return smooth_motion(problem, q_TN, task)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a motion is to follow, and how."""
+
+    target_TD3: np.ndarray
+    """The human's directions."""
+    smoothness: Smoothness
+    step_N: np.ndarray
+    """The longest step of a joint from one frame to the next [rad]."""
+    around: int
+    """Frames this near to those that were too fast may change."""
+    giving_way: GivingWay | None = None
+
+    def at(self, part: slice) -> Task:
+        """The same for some frames alone."""
+        frame_X = np.arange(len(self.target_TD3))[part]
+        return replace(self, target_TD3=self.target_TD3[part], smoothness=self.smoothness.at(frame_X))
+
+
+def smooth_motion(problem: Problem, q_TN: np.ndarray, task: Task) -> np.ndarray:
+    """The cheapest motion (T, N) [rad] that is found near answers (T, N), without a step that is too long."""
+    frames, found, settled = len(q_TN), [q_TN[:0]], 0
+    while settled < frames:
+        before_LN = np.concatenate(found[-2:])[-task.smoothness.reach :]
+        part = slice(settled - len(before_LN), settled + WINDOW)
+        motion_XN = _smooth_window(problem, q_TN[part], task.at(part), before_LN)
+        used = WINDOW - AHEAD if settled + WINDOW < frames else WINDOW
+        found.append(motion_XN[len(before_LN) :][:used])
+        settled += used
+    return nearest_slow(np.concatenate(found), task.step_N)
+
+
+def _smooth_window(problem: Problem, q_TN: np.ndarray, task: Task, before_LN: np.ndarray) -> np.ndarray:
+    """`smooth_motion` of one window, whose first frames are settled (L, N)."""
+    smoothness, target_TD3 = task.smoothness, task.target_TD3
+    fixed_T = np.arange(len(q_TN)) < len(before_LN)
+    path_TN = np.concatenate((before_LN, q_TN[len(before_LN) :]))
+
+    def polish(path_TN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return refine(problem, path_TN, target_TD3, smoothness, SWEEPS, TOLERANCE, fixed_T)
+
+    motion_TN, cost_C = polish(path_TN)
+    other_TN = _without_jumps(problem, path_TN, target_TD3, smoothness.pull, len(before_LN))
+    if other_TN is not None:
+        other_TN, other_cost_C = polish(other_TN)
+        motion_TN = np.where((other_cost_C < cost_C)[problem.cost.block_N], other_TN, motion_TN)
+    motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    if task.giving_way is None:
+        return motion_TN
+    return task.giving_way.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+
+
+def _without_jumps(
+    problem: Problem, path_TN: np.ndarray, target_TD3: np.ndarray, pull: float, settled: int
+) -> np.ndarray | None:
+    """Another path (T, N), of which some frames are settled, through answers that are found from either side of the
+    path's jumps; None: it does not jump, or no other is better.
+    """
+    if not (np.abs(np.diff(path_TN, axis=0)) > JUMP).any():
+        return None
+    path_cost_TC = problem.quadratic(path_TN, target_TD3).cost_BC
+    path_cost_TC[:settled] = 0.0
+    more_TSN, more_cost_TSC = _bridge(problem, path_TN, path_cost_TC, target_TD3)
+    candidates_TSN = np.concatenate((path_TN[:, None], more_TSN), axis=1)
+    cost_TSC = np.concatenate((path_cost_TC[:, None], more_cost_TSC), axis=1)
+    candidates_TSN[:settled], cost_TSC[:settled] = path_TN[:settled, None], 0.0
+    other_TN = best_path(candidates_TSN, cost_TSC, problem.cost.joints_NC, pull)
+    return other_TN if (np.abs(other_TN - path_TN) > JUMP).any() else None
+
+
+def best_path(candidates_TSN: np.ndarray, cost_TSC: np.ndarray, joints_NC: np.ndarray, pull: float) -> np.ndarray:
+    """Each block's cheapest path (T, N) [rad] through its candidates (dynamic programming)."""
+    cost_TCS = cost_TSC.swapaxes(1, 2)
+    total_CS, back = cost_TCS[0], []
+    for before_SN, after_SN, cost_CS in zip(candidates_TSN[:-1], candidates_TSN[1:], cost_TCS[1:], strict=True):
+        move_SSC = (before_SN[:, None] - after_SN) ** 2 @ joints_NC * pull
+        reached_CSS = total_CS[:, :, None] + np.moveaxis(move_SSC, -1, 0)
+        back.append(reached_CSS.argmin(axis=1))
+        total_CS = reached_CSS.min(axis=1) + cost_CS
+    block_C = np.arange(len(total_CS))
+    states = [total_CS.argmin(axis=1)]
+    for came_from_CS in reversed(back):
+        states.append(came_from_CS[block_C, states[-1]])
+    state_TN = np.array(states[::-1])[:, joints_NC.argmax(axis=1)]
+    return np.take_along_axis(candidates_TSN, state_TN[:, None], axis=1)[:, 0]
+
+
+def _bridge(
+    problem: Problem, path_TN: np.ndarray, path_cost_TC: np.ndarray, target_TD3: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """More candidates (T, S, N) near the path's jumps, and their cost (T, S, C); elsewhere the path is repeated."""
+    frames, jumps_T = len(path_TN), np.zeros(len(path_TN), int)
+    jumps_T[1:] = (np.abs(np.diff(path_TN, axis=0)) > JUMP).any(axis=1).cumsum()
+    source_TS = np.clip(np.arange(frames)[:, None] + np.array(REACH), 0, frames - 1)
+    across_TS = jumps_T[source_TS] != jumps_T[:, None]
+    found_TSN, cost_TSC = (np.repeat(value[:, None], len(REACH), axis=1) for value in (path_TN, path_cost_TC))
+    frame_X = np.nonzero(across_TS)[0]
+    found_TSN[across_TS], cost_TSC[across_TS] = problem.minimise(
+        path_TN[source_TS[across_TS]], target_TD3[frame_X], BRIDGE_STEPS, BRIDGE_TOLERANCE
+    )
+    return found_TSN, cost_TSC

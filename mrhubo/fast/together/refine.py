@@ -1,0 +1,161 @@
+"""All frames of a motion refined together, as `mrhubo.reference.refine` does it, where the reasons stand.
+
+Legend: T frames, X some of them, D directions, N joints, C blocks, M joints of one block.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.fast.plain.steps import Model, diagonal
+from mrhubo.fast.together.banded import Banded
+from mrhubo.fast.together.bounded import Bounds, bounded_minimum
+from mrhubo.fast.together.problem import Problem
+from mrhubo.fast.together.smoothness import Smoothness
+
+PATIENCE = 6
+"""Steps in a row that are of no use, after which a block ends."""
+DAMPING, EASIER, HARDER, LEAST, MOST, FLOOR = 1e-3, 0.1, 10.0, 1e-3, 1e6, 0.01
+"""Damping at first; its factors after a step that helped and one that did not; its bounds; and what is added to the
+diagonal that it multiplies."""
+
+
+@dataclass(frozen=True)
+class StepBound:
+    """How far joints may turn from one frame to the next."""
+
+    step_N: np.ndarray
+    """[rad]."""
+    counts_X: np.ndarray
+    """Between which frames and the next (T - 1,)."""
+
+
+def refine(
+    problem: Problem,
+    q_TN: np.ndarray,
+    target_TD3: np.ndarray,
+    smoothness: Smoothness,
+    sweeps: int,
+    tolerance: float,
+    fixed_T: np.ndarray,
+    bound: StepBound | None = None,
+    blocks_C: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
+    `blocks_C`: the blocks that may move; None: all.
+    """
+    cost = problem.cost
+    model = _motion_quadratic(problem, q_TN, target_TD3, smoothness)
+    cost_C, damping_TC = model.cost_BC.sum(axis=0), np.full_like(model.cost_BC, DAMPING)
+    failures_C = np.zeros(len(cost_C), int) if blocks_C is None else np.where(blocks_C, 0, PATIENCE)
+    for _ in range(sweeps):
+        running_C = failures_C < PATIENCE
+        step_TN = _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
+        trial_TN = np.clip(q_TN + step_TN, cost.lower_N, cost.upper_N)
+        trial_TN = np.where(running_C[cost.block_N], trial_TN, q_TN)
+        trial = _motion_quadratic(problem, trial_TN, target_TD3, smoothness)
+        trial_cost_C = trial.cost_BC.sum(axis=0)
+        better_C = trial_cost_C < cost_C
+        moved_N = np.abs(trial_TN - q_TN).max(axis=0)
+        settled_C = better_C & ((moved_N[:, None] * cost.joints_NC).max(axis=0) < tolerance)
+        failures_C = np.where(better_C, np.where(settled_C, PATIENCE, 0), failures_C + 1)
+        factor_TC = np.where(trial.cost_BC > model.cost_BC, HARDER, np.where(better_C, EASIER, 1.0))
+        damping_TC = np.clip(damping_TC * factor_TC, LEAST, MOST)
+        q_TN = np.where(better_C[cost.block_N], trial_TN, q_TN)
+        cost_C = np.where(better_C, trial_cost_C, cost_C)
+        model = model.where(np.broadcast_to(better_C, damping_TC.shape), cost.block_N, trial)
+        if (failures_C >= PATIENCE).all():
+            break
+    return q_TN, cost_C
+
+
+def refine_around(
+    problem: Problem,
+    q_TN: np.ndarray,
+    target_TD3: np.ndarray,
+    smoothness: Smoothness,
+    free_T: np.ndarray,
+    sweeps: int,
+    tolerance: float,
+    step_N: np.ndarray | None = None,
+    blocks_C: np.ndarray | None = None,
+) -> np.ndarray:
+    """`refine` of some blocks (C,), or all, for the frames in `free_T` (T,), with a bound or none; the others stay."""
+    used_X = np.flatnonzero(widen(free_T, smoothness.reach))
+    if not len(used_X):
+        return q_TN
+    bound = None if step_N is None else StepBound(step_N, np.diff(used_X) == 1)
+    found_TN = q_TN.copy()
+    found_TN[used_X] = refine(
+        problem,
+        q_TN[used_X],
+        target_TD3[used_X],
+        smoothness.at(used_X),
+        sweeps,
+        tolerance,
+        ~free_T[used_X],
+        bound,
+        blocks_C,
+    )[0]
+    return found_TN
+
+
+def widen(mask_T: np.ndarray, frames: int) -> np.ndarray:
+    """Frames (T,) that are so many or fewer away from one in the mask."""
+    total_X = np.concatenate(([0], mask_T.cumsum()))
+    place_T = np.arange(len(mask_T))
+    return total_X[np.minimum(place_T + frames + 1, len(mask_T))] > total_X[np.maximum(place_T - frames, 0)]
+
+
+def _motion_quadratic(problem: Problem, q_TN: np.ndarray, target_TD3: np.ndarray, smoothness: Smoothness) -> Model:
+    """The model of each frame, with what couples it to others in gradients and in costs."""
+    model = problem.quadratic(q_TN, target_TD3)
+    model.cost_BC += smoothness.costs(q_TN, problem.cost.joints_NC)
+    model.gradient_BN += smoothness.gradient(q_TN)
+    return model
+
+
+def _motion_step(
+    problem: Problem,
+    q_TN: np.ndarray,
+    model: Model,
+    damping_TC: np.ndarray,
+    running_C: np.ndarray,
+    smoothness: Smoothness,
+    fixed_T: np.ndarray,
+    bound: StepBound | None,
+) -> np.ndarray:
+    """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
+    cost, gradient_TN = problem.cost, model.gradient_BN
+    free_TN = np.broadcast_to(~fixed_T[:, None], q_TN.shape)
+    if bound is None:
+        low_TN, high_TN = q_TN <= cost.lower_N, q_TN >= cost.upper_N
+        free_TN = free_TN & ~((low_TN & (gradient_TN > 0)) | (high_TN & (gradient_TN < 0)))
+    bands, damping_TN = smoothness.hessian(q_TN), damping_TC[:, cost.block_N]
+    diagonal_TN = diagonal(model.hessian_BNN) + bands[0]
+    diagonal_TN = np.where(free_TN, diagonal_TN + damping_TN * (diagonal_TN + FLOOR), 1.0)
+    couplings = [band * (free_TN[lag:] & free_TN[:-lag]) for lag, band in enumerate(bands[1:], start=1)]
+    right_TN, step_TN = -gradient_TN * free_TN, np.zeros_like(q_TN)
+    for block in np.flatnonzero(running_C):
+        joints_M = np.flatnonzero(cost.block_N == block)
+        both_TMM = free_TN[:, joints_M, None] & free_TN[:, None, joints_M]
+        within_TMM = model.hessian_BNN[:, joints_M[:, None], joints_M] * both_TMM
+        right_TM, diagonal_TM, *couplings_TM = (part[:, joints_M] for part in (right_TN, diagonal_TN, *couplings))
+        system = Banded(within_TMM, diagonal_TM, couplings_TM)
+        if bound is None:
+            step_TN[:, joints_M] = problem.factor(system)(right_TM)
+        else:
+            bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, ~fixed_T, bound, q_TN, joints_M)
+            step_TN[:, joints_M] = bounded_minimum(system, right_TM, bounds, problem.factor)
+    return step_TN
+
+
+def _bounds(
+    down_TN: np.ndarray, up_TN: np.ndarray, free_T: np.ndarray, bound: StepBound, q_TN: np.ndarray, joints_M: np.ndarray
+) -> Bounds:
+    moved_XM, most_M = np.diff(q_TN[:, joints_M], axis=0), bound.step_N[joints_M]
+    moves = np.stack((down_TN[:, joints_M], up_TN[:, joints_M]))
+    steps = np.stack((-most_M - moved_XM, most_M - moved_XM))
+    return Bounds(moves, steps, free_T, bound.counts_X & (free_T[1:] | free_T[:-1]))

@@ -1,0 +1,29 @@
+"""Banded systems by LAPACK, which takes a time proportional to the frames.
+
+Legend: T frames, M joints of one block.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from mrhubo.fast.together.banded import Banded, Solve
+
+
+def factor(system: Banded) -> Solve:
+    """Solves by a Cholesky factor in lower banded form."""
+    frames, joints = system.diagonal_TM.shape
+    # Row k holds the entries k below the diagonal; the next frame's same joint is `joints` below.
+    banded = np.zeros((len(system.couplings_TM) * joints + 1, frames, joints))
+    banded[0] = system.diagonal_TM
+    for k in range(1, joints):
+        banded[k, :, : joints - k] = np.diagonal(system.within_TMM, offset=-k, axis1=1, axis2=2)
+    for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
+        banded[lag * joints, : frames - lag] = coupling_TM
+    lower = cholesky_banded(banded.reshape(len(banded), -1), overwrite_ab=True, lower=True, check_finite=False)
+
+    def solve(right_TM: np.ndarray) -> np.ndarray:
+        return cho_solve_banded((lower, True), right_TM.ravel(), check_finite=False).reshape(right_TM.shape)
+
+    return solve

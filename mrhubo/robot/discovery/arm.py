@@ -1,0 +1,326 @@
+"""Shoulder, elbow and wrist from the axes of an arm.
+
+The way from the first axis to the last along common normals (`lines.measure`) does not depend on the zero pose. An
+elbow is the axis on it with long stretches on both sides, upper arm and forearm; what comes before turns the
+upper arm, what comes after forearm and hand.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.lines import Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.names import speaks_of
+
+_OUT = 1 / 3
+"""How long a forearm is at least, as a share of the upper arm."""
+_HAND = 0.5
+"""How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
+_BEFORE, _FEW = 3, 0.8
+"""Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
+below a clavicle."""
+_TWIST_SINE, _TWIST_MISS = 0.42, 0.35
+"""Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
+of its length."""
+_WRIST_JOINTS = 3
+"""Joints beyond an elbow that an arm can have: a twist and two swings."""
+_BESIDE = 0.025
+"""How far a jaw's axis passes the hand's line, as a share of the arm."""
+_SHORT = 4
+"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
+_CLAVICLE = 0.2
+"""How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+_ON = 1e-4
+_LEAST = 1e-3
+"""How long upper arm and forearm are at least, as a share of the robot."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A point and the body that carries it."""
+
+    point_3: np.ndarray
+    body: int
+    links: tuple[str, ...]
+    """Links in which it may be written down: the carrying one, and others in which it stays as well."""
+    cue: str
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Arm:
+    """An arm whose joints have their roles."""
+
+    chain: Chain
+    """All its joints, without those of the hand."""
+    elbow_at: int
+    """Position of the elbow's hinge in the chain."""
+    twist_at: int | None
+    """Of the upper arm's twist, if there is one."""
+    clavicles: int
+    """How many joints before the shoulder's belong to a clavicle."""
+    shoulder: Spot
+    elbow: Spot
+    hinge_3: np.ndarray
+    """The point of the elbow's hinge itself nearest to the upper arm's twist axis."""
+    wrist: Spot
+    forearm_twist_at: int | None
+    left_out: tuple[tuple[str, str], ...]
+    """Joints cut off at the end, and why."""
+
+    @property
+    def length(self) -> float:
+        """Upper arm and forearm [m]."""
+        upper = float(np.linalg.norm(self.elbow.point_3 - self.shoulder.point_3))
+        return upper + float(np.linalg.norm(self.wrist.point_3 - self.elbow.point_3))
+
+
+def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
+    """Position of the elbow's hinge: the axis with the longest stretches of the arm on either side of it. None if the
+    chain is too short to have one.
+    """
+    found = measure(lines_of(chain))
+    if len(chain) < 2:
+        return None
+    gap_N = np.diff(found.out_N, append=found.out_N[-1])
+    end_3 = found.nodes_N3[-1]
+    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(chain[-1])[0]])
+    beyond = float(np.linalg.norm(corners - end_3, axis=-1).max())
+    centre_3 = bodies.centre(chain[-1].end)
+    if centre_3 is not None:
+        beyond = max(beyond, 2 * float(np.linalg.norm(centre_3 - end_3)))
+    gap_N[-1] = _HAND * beyond
+    scores = np.zeros(len(chain))
+    for i in range(1, len(chain)):
+        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
+        after = max(gap_N[i : i + 2])
+        scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
+    best = int(np.argmax(scores))
+    if gap_N[best - 1] < 1e-3 * bodies.size:
+        return None
+    return best if scores[best] > 0 else int(np.argmax(gap_N[:-1])) + 1
+
+
+def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
+    """Roles and points of an arm's joints; None if it has no elbow."""
+    chain, left_out = _without_hand(bodies, chain)
+    elbow_at = find_elbow(bodies, chain)
+    if elbow_at is None:
+        return None
+    lines = lines_of(chain)
+    twist_at = _twist(lines, elbow_at)
+    shoulder, clavicles = _shoulder(chain, lines, elbow_at, twist_at)
+    hinge = lines[elbow_at]
+    if twist_at is None:
+        point_3 = hinge_3 = hinge.nearest(shoulder.point_3)
+        cue, sure = "the hinge's point nearest to the shoulder", 0.85
+    else:
+        point_3, hinge_3 = feet(lines[twist_at], hinge)
+        cue = f"where the hinge of '{chain[elbow_at].hinge.name}' is nearest to the upper arm's twist axis"
+        sure = 0.95
+    step = chain[elbow_at]
+    on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < _ON * bodies.size
+    links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
+    elbow = Spot(point_3, step.start, links, cue, sure)
+    wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
+    if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
+        return None
+    return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
+
+
+def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
+    """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
+    whole = chain
+    chain = without_gripper(chain)
+    end, why = len(chain), "others mimic it, or it slides: a gripper"
+    elbow_at = find_elbow(bodies, chain)
+    first = 2 if elbow_at is None else elbow_at + 1
+    for i in range(first, len(chain)):
+        step = chain[i]
+        if _driven(step) and (i >= _SHORT or not step.hinge.free):
+            end = i
+        elif i - first >= _WRIST_JOINTS:
+            end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
+        elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
+            end, why = i, "its name says that it belongs to the hand"
+        else:
+            continue
+        break
+    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
+        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
+    return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def _is_jaw(chain: Chain, elbow_at: int) -> bool:
+    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line of the wrist's axes, or
+    parallel to one that swings the wrist already.
+    """
+    lines = lines_of(chain)
+    found = measure(lines)
+    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
+    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
+    if sine(along_3, last.axis_3) < 0.7:
+        return False
+    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
+    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
+        return True
+    twists = [
+        line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
+    ]
+    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def without_gripper(chain: Chain) -> Chain:
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
+    and no part of a forearm.
+    """
+    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
+        chain = chain[:-1]
+    return chain
+
+
+def _driven(step: Step) -> bool:
+    return not step.hinge.rotary or step.hinge.drives or not step.hinge.free
+
+
+def _twist(lines: list[Line], elbow_at: int) -> int | None:
+    """The axis next before the elbow, if it runs along the upper arm."""
+    if elbow_at < 1:
+        return None
+    twist, hinge = lines[elbow_at - 1], lines[elbow_at]
+    if elbow_at == 1:
+        return None
+    foot_3 = feet(twist, hinge)[1]
+    before_3 = feet(lines[elbow_at - 2], twist)[0]
+    upper = float(np.linalg.norm(foot_3 - before_3))
+    if upper < 1e-9 or sine(twist.axis_3, unit(foot_3 - before_3)) > _TWIST_SINE:
+        return None
+    return elbow_at - 1 if twist.distance(foot_3) < _TWIST_MISS * upper else None
+
+
+def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | None) -> tuple[Spot, int]:
+    """The shoulder's centre, and how many joints before it are a clavicle's."""
+    swings = list(range(elbow_at if twist_at is None else twist_at))
+    hinge = lines[elbow_at]
+    last = swings[-1] if swings else 0
+    if twist_at is not None and swings:
+        on_twist_3, on_swing_3 = feet(lines[twist_at], lines[last])
+        if len(swings) > 1 and sine(lines[twist_at].axis_3, lines[last].axis_3) < 0.3:
+            on_twist_3 = lines[twist_at].nearest(feet(lines[last - 1], lines[last])[1])
+        point_3, cue, sure = on_twist_3, "where the upper arm's twist axis passes the last axis that swings it", 0.9
+        body, step = chain[twist_at].end, chain[twist_at]
+    elif len(swings) > 1:
+        one_3, other_3 = feet(lines[last - 1], lines[last])
+        point_3, cue, sure = other_3, "where the last two axes that swing the upper arm are nearest to each other", 0.85
+        body, step = chain[last].end, chain[last]
+    else:
+        point_3 = lines[last].nearest(hinge.point_3)
+        cue, sure, body, step = "the point of the only axis nearest to the elbow", 0.6, chain[last].end, chain[last]
+    arm = float(np.linalg.norm(hinge.nearest(point_3) - point_3)) * 2
+    clavicles = 0
+    while clavicles < len(swings) - 1 and lines[clavicles].distance(point_3) > _CLAVICLE * arm:
+        clavicles += 1
+    links = [step.outer_link]
+    for swing in reversed(swings[clavicles:]):
+        if lines[swing].distance(point_3) < _ON * arm:
+            links += [chain[swing].outer_link]
+        else:
+            break
+    if clavicles:
+        cue += f"; {clavicles} joint{'s' * (clavicles > 1)} before it belong to the clavicle"
+    return Spot(point_3, body, tuple(dict.fromkeys(links)), cue, sure), clavicles
+
+
+def _wrist(
+    bodies: Bodies, chain: Chain, lines: list[Line], elbow_at: int, elbow: Spot, shoulder: Spot
+) -> tuple[Spot, int | None]:
+    """The wrist, and the position of the forearm's twist."""
+    upper = float(np.linalg.norm(elbow.point_3 - shoulder.point_3))
+    beyond = list(range(elbow_at + 1, len(chain)))
+    twist_at = None
+    if beyond:
+        # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
+        on_hinge_3, on_axis_3 = feet(lines[elbow_at], lines[beyond[0]])
+        close = float(np.linalg.norm(on_hinge_3 - on_axis_3)) < _TWIST_MISS * upper
+        if close and sine(lines[elbow_at].axis_3, lines[beyond[0]].axis_3) > 0.5:
+            twist_at = beyond[0]
+    swings = [i for i in beyond if i != twist_at]
+    if swings:
+        step, line = chain[swings[0]], lines[swings[0]]
+        if twist_at is not None:
+            point_3 = feet(lines[twist_at], line)[0]
+            cue, sure = "where the forearm's twist axis passes the first axis of the wrist", 0.9
+        elif len(swings) > 1:
+            point_3 = feet(line, lines[swings[1]])[0]
+            cue, sure = "where the wrist's axes are nearest to each other", 0.85
+        else:
+            point_3 = line.nearest(elbow.point_3)
+            cue, sure = "the point of the wrist's axis nearest to the elbow", 0.75
+        links = [step.inner_link]
+        if line.distance(point_3) < _ON * bodies.size:
+            links.append(step.outer_link)
+        return Spot(point_3, step.start, tuple(links), cue, sure), twist_at
+    last = chain[-1]
+    end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper)
+    if twist_at is not None:
+        origin_3 = bodies.position(chain[twist_at].outer_link)
+        outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
+        # Where the twist passes the elbow at a distance, the forearm's direction depends on how far out its end is.
+        farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
+        if outward > _OUT * upper and farther:
+            end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
+        end_3 = lines[twist_at].nearest(end_3)
+    return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
+
+
+def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> tuple[np.ndarray, str, float]:
+    """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
+
+    Args:
+        bodies: the robot.
+        last: the last joint.
+        start_3: where the limb starts.
+        usual: how long it should be about [m].
+    """
+    inside, onward = bodies.links_of[last.end], bodies.onward(last)
+    if onward:
+        bases = [bodies.position(on.outer_link) for on in onward]
+        if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
+            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
+    named = [
+        link
+        for link in inside
+        if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual
+    ]
+    if named:
+        nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
+        return bodies.position(nearest), f"the fixed link '{nearest}', after its name", 0.6
+    if bodies.shapes_of[last.end]:
+        corners = bodies.corners(last.end)
+        out_3 = unit(corners.mean(0) - start_3)
+        reach = float(((corners - start_3) @ out_3).max())
+        if reach > _OUT * usual:
+            return (
+                start_3 + reach * out_3,
+                "the end of the forearm's collision shape, as no joint tells the wrist",
+                0.45,
+            )
+    far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
+    if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
+        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.45
+    centre_3 = bodies.centre(last.end)
+    if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
+        return (
+            start_3 + 2 * (centre_3 - start_3),
+            "twice as far as the centre of mass, as no joint tells the wrist",
+            0.4,
+        )
+    return (
+        start_3 + usual * unit(bodies.position(last.outer_link) - start_3),
+        "a guess, as nothing tells the wrist",
+        0.1,
+    )

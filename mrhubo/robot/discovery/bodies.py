@@ -1,0 +1,303 @@
+"""A robot as rigid bodies and the joints between them, without a root: what hangs together does so from any side.
+
+Links that fixed joints connect are one body. Which link of a URDF is the root is an accident of its file: a pelvis, a
+chest, a foot, a wheelbase. So a body's branches are looked at alike, those towards the root too.
+
+Legend: all poses in the root link's frame with every joint at 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.robot.discovery.lines import Line
+from mrhubo.robot.joint import ROTARY, drive
+from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
+from mrhubo.robot.urdf import Description
+
+_DOMINANT = 2.5
+"""How many times longer than any other branch the one must be in which a limb goes on; else it ends, as a hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """A joint that moves, between two bodies."""
+
+    name: str
+    line: Line
+    rotary: bool
+    bodies: tuple[int, int]
+    """Those of the parent and of the child link."""
+    lower: float | None
+    upper: float | None
+    free: bool
+    """Whether it is driven by itself, mimicking none."""
+    drives: bool
+    """Whether others mimic it."""
+    links: tuple[str, str]
+    """Parent and child link."""
+
+    def other(self, body: int) -> int:
+        """The body on the other side."""
+        return self.bodies[1] if self.bodies[0] == body else self.bodies[0]
+
+    def link_of(self, body: int) -> str:
+        """Its link in a body."""
+        return self.links[0] if self.bodies[0] == body else self.links[1]
+
+    @property
+    def limited(self) -> bool:
+        """Whether its limits mean something: less than a full turn."""
+        return self.lower is not None and self.upper is not None and 0 < self.upper - self.lower < 6.2
+
+
+@dataclass(frozen=True)
+class Step:
+    """A joint of a chain, passed from one body to the next."""
+
+    hinge: Hinge
+    start: int
+    """The body from which it is passed."""
+
+    @property
+    def end(self) -> int:
+        """The body that is reached."""
+        return self.hinge.other(self.start)
+
+    @property
+    def inner_link(self) -> str:
+        """The joint's link on the body's side."""
+        return self.hinge.link_of(self.start)
+
+    @property
+    def outer_link(self) -> str:
+        """The joint's link on the far side."""
+        return self.hinge.link_of(self.end)
+
+    @property
+    def sign(self) -> float:
+        """1 where turning the joint turns the far side about the line's axis, -1 where the root is on the far side."""
+        return 1.0 if self.hinge.bodies[0] == self.start else -1.0
+
+
+Chain = tuple[Step, ...]
+
+
+def lines_of(chain: Chain) -> list[Line]:
+    """The axes of a chain."""
+    return [step.hinge.line for step in chain]
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The bodies of a robot."""
+
+    description: Description
+    pose_44: dict[str, np.ndarray]
+    """Of every link."""
+    body_of: dict[str, int]
+    """By link."""
+    hinges: tuple[Hinge, ...]
+    _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
+    _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
+
+    @cached_property
+    def links_of(self) -> list[list[str]]:
+        """The links of each body, in the file's order."""
+        found: list[list[str]] = [[] for _ in range(max(self.body_of.values()) + 1)]
+        for link, body in self.body_of.items():
+            found[body].append(link)
+        return found
+
+    @cached_property
+    def steps_from(self) -> list[list[Step]]:
+        """The joints at each body, passed from there."""
+        found: list[list[Step]] = [[] for _ in self.links_of]
+        for hinge in self.hinges:
+            for body in hinge.bodies:
+                found[body].append(Step(hinge, body))
+        return found
+
+    @cached_property
+    def shapes_of(self) -> list[list[LinkGeometry]]:
+        """The primitive shapes of each body: those that collide, else those that are seen."""
+        found: list[list[LinkGeometry]] = [[] for _ in self.links_of]
+        for read in (read_collision_geometry, read_geometry):
+            solid = {shape.link for shapes in found for shape in shapes}
+            for shape in read(self.description.parsed):
+                if shape.link not in solid:
+                    found[self.body_of[shape.link]].append(shape)
+        return found
+
+    def position(self, link: str) -> np.ndarray:
+        """A link's origin (3,)."""
+        return self.pose_44[link][:3, 3]
+
+    def in_link(self, link: str, point_3: np.ndarray) -> np.ndarray:
+        """A point in a link's frame."""
+        pose_44 = self.pose_44[link]
+        return pose_44[:3, :3].T @ (point_3 - pose_44[:3, 3])
+
+    def centre(self, body: int) -> np.ndarray | None:
+        """Centre of mass (3,) of a body; None if it has no mass."""
+        found = [
+            (link, self.description.masses[link]) for link in self.links_of[body] if link in self.description.masses
+        ]
+        if not found:
+            return None
+        centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
+        return np.average(centres, axis=0, weights=[mass[0] for _, mass in found])
+
+    def middle(self, body: int) -> np.ndarray:
+        """About where a body is (3,): its centre of mass, else the mean of its corners."""
+        centre_3 = self.centre(body)
+        return self.corners(body).mean(0) if centre_3 is None else centre_3
+
+    def corners(self, body: int) -> np.ndarray:
+        """Points (P, 3) at the outside of a body's shapes, and the origins of its links; of meshes nothing is known."""
+        found = [self.position(link)[None] for link in self.links_of[body]]
+        for shape in self.shapes_of[body]:
+            pose_44 = self.pose_44[shape.link] @ shape.origin_44
+            size = shape.size
+            half_3 = {
+                "box": lambda s=size: np.array(s) / 2,
+                "sphere": lambda s=size: np.full(3, s[0]),
+                "cylinder": lambda s=size: np.array([s[0], s[0], s[1] / 2]),
+                "capsule": lambda s=size: np.array([s[0], s[0], s[1] / 2 + s[0]]),
+            }[shape.kind]()
+            signs_83 = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)
+            found.append(pose_44[:3, 3] + (signs_83 * half_3) @ pose_44[:3, :3].T)
+        return np.concatenate(found)
+
+    def beyond(self, step: Step) -> tuple[set[int], list[Hinge]]:
+        """The bodies and joints of a branch, its first joint among them."""
+        key = (step.start, step.hinge.name)
+        if key not in self._branches:
+            self._branches[key] = self._branch(step)
+        return self._branches[key]
+
+    def _branch(self, step: Step) -> tuple[set[int], list[Hinge]]:
+        bodies, hinges, todo = {step.end}, [step.hinge], [step.end]
+        while todo:
+            body = todo.pop()
+            for further in self.steps_from[body]:
+                if further.hinge is not step.hinge and further.end not in bodies:
+                    bodies.add(further.end)
+                    hinges.append(further.hinge)
+                    todo.append(further.end)
+        return bodies, hinges
+
+    def onward(self, step: Step) -> list[Step]:
+        """The joints at the body that a joint leads to, without itself."""
+        return [further for further in self.steps_from[step.end] if further.hinge is not step.hinge]
+
+    def extent(self, step: Step) -> float:
+        """How far the longest chain reaches beyond a joint, from body to body along joint origins and link ends [m]."""
+        key = (step.start, step.hinge.name)
+        if key not in self._extents:
+            here_3 = self.position(step.outer_link)
+            own = max(float(np.linalg.norm(self.position(link) - here_3)) for link in self.links_of[step.end])
+            further = [
+                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self.extent(on)
+                for on in self.onward(step)
+            ]
+            self._extents[key] = max([own, *further])
+        return self._extents[key]
+
+    def chain(self, step: Step) -> Chain:
+        """The limb that begins with a joint: outwards until it ends, or branches into what is alike (fingers)."""
+        found = [step]
+        while True:
+            onward = [on for on in self.onward(found[-1]) if not self._idle(on)]
+            if not onward:
+                return tuple(found)
+            reach = {on.hinge.name: self._reach(found[-1], on) for on in onward}
+            onward.sort(key=lambda on: (-reach[on.hinge.name], on.hinge.name))
+            longest = reach[onward[0].hinge.name]
+            rest = [on for on in onward[1:] if _DOMINANT * reach[on.hinge.name] > longest]
+            if rest or onward[0] in found:
+                return tuple(found)
+            found.append(onward[0])
+
+    def _reach(self, last: Step, on: Step) -> float:
+        return self.extent(on) + float(np.linalg.norm(self.position(on.outer_link) - self.position(last.outer_link)))
+
+    def _idle(self, step: Step) -> bool:
+        """Whether a branch has no rotary joint driven by itself: a linkage, mimicking fingers, a sliding jaw."""
+        return not any(hinge.free and hinge.rotary for hinge in self.beyond(step)[1])
+
+    def path(self, start: int, end: int) -> Chain:
+        """The joints from one body to another."""
+        came: dict[int, Step] = {}
+        todo, seen = [start], {start}
+        for body in todo:
+            for step in self.steps_from[body]:
+                if step.end not in seen:
+                    seen.add(step.end)
+                    came[step.end] = step
+                    todo.append(step.end)
+        found = []
+        while end != start:
+            if end not in came:
+                return ()
+            found.append(came[end])
+            end = came[end].start
+        return tuple(reversed(found))
+
+    @cached_property
+    def size(self) -> float:
+        """Longest distance between two link origins [m], about that of a box around them."""
+        points = np.stack([self.position(link) for link in self.body_of])
+        return max(float(np.linalg.norm(points.max(0) - points.min(0))), 1e-6)
+
+
+def read_bodies(description: Description) -> Bodies:
+    """The bodies of a robot. Joints whose numbers cannot be used are taken as fixed where they stand."""
+    below: dict[str, list[str]] = {}
+    for joint in description.joints.values():
+        below.setdefault(joint.parent, []).append(joint.name)
+    pose_44, body_of, order = {description.root: np.eye(4)}, {description.root: 0}, [description.root]
+    hinges: list[Hinge] = []
+    sources = _sources(description)
+    for link in order:
+        for name in below.get(link, []):
+            joint = description.joints[name]
+            child_44 = pose_44[link] @ joint.origin_44
+            pose_44[joint.child] = child_44
+            order.append(joint.child)
+            if (
+                joint.kind not in (*ROTARY, "prismatic")
+                or name in description.faults
+                or _stuck(joint.lower, joint.upper)
+            ):
+                body_of[joint.child] = body_of[link]
+                continue
+            body_of[joint.child] = max(body_of.values()) + 1
+            line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
+            hinges.append(Hinge(
+                name, line, joint.rotary, (body_of[link], body_of[joint.child]), joint.lower, joint.upper,
+                joint.mimic is None, name in sources, (link, joint.child),
+            ))  # fmt: skip
+    return Bodies(description, pose_44, body_of, tuple(hinges))
+
+
+def _stuck(lower: float | None, upper: float | None) -> bool:
+    """Whether limits leave a joint no way to move."""
+    return lower is not None and upper is not None and upper - lower < 1e-3
+
+
+def _sources(description: Description) -> set[str]:
+    found = set()
+    for joint in description.joints.values():
+        if joint.mimic is not None:
+            try:
+                found.add(drive(description.joints, joint.name).joint)
+            except UserError:  # told where it matters
+                continue
+    return found

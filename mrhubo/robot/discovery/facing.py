@@ -1,0 +1,278 @@
+"""Where a robot is up, and where it faces: votes of all that knows something about it, none of which is needed.
+
+Up is told by legs and trunk, not by the file's z; a base may lie on its back. Facing is told by what bends one way only
+(knees, elbows, hips), by feet, cameras and the names of sides. Legend: V votes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.robot.discovery import names
+from mrhubo.robot.discovery.arm import Arm
+from mrhubo.robot.discovery.bodies import Bodies, Chain
+from mrhubo.robot.discovery.leg import Leg
+from mrhubo.robot.discovery.lines import cross, unit
+from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
+from mrhubo.robot.discovery.roles import Roles
+
+_BELOW = 0.2
+"""How far below the shoulders a head may be, as a share of the arm: some robots carry their arms high."""
+_UNSURE = 0.3
+"""Up less sure than that tells nothing of necks."""
+_SAME = 0.9986
+"""Cosine of 3 degrees: directions that mean the same one."""
+
+
+@dataclass(frozen=True)
+class Vote:
+    """What one thing says, from -1 (against) to 1 (for), and how much it counts."""
+
+    what: str
+    value: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Heading:
+    """Up, left and forward: unit, at right angles, in the root's frame; and how sure they are, 0..1."""
+
+    up_3: np.ndarray
+    left_3: np.ndarray
+    forward_3: np.ndarray
+    up_sure: float
+    forward_sure: float
+    up_cue: str
+    forward_cue: str
+    swap: bool
+    """Whether the second chain of each pair is the left one."""
+    contradicted: tuple[str, ...]
+    """What speaks against it."""
+
+
+def choose_neck(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Roles:
+    """The roles with the likeliest neck that begins above the shoulders or ends there, or with none."""
+    if not roles.necks:
+        return roles
+    heading = find_heading(bodies, roles.with_neck(()), arms, legs)
+    shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms])) - _BELOW * arms[0].length
+    for neck in roles.necks:
+        top_3 = bodies.middle(neck[-1].end)
+        if _is_named(neck) or heading.up_sure < _UNSURE or float(top_3 @ heading.up_3) > shoulders:
+            return roles.with_neck(neck)
+    return roles.with_neck(())
+
+
+def _is_named(neck: Chain) -> bool:
+    """Whether names say that a chain is a neck."""
+    return any(names.speaks_of(name, "head") for step in neck for name in (step.hinge.name, step.outer_link))
+
+
+def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Heading:
+    """Up by legs, trunk and axes; forward by votes.
+
+    Args:
+        bodies: the robot.
+        roles: its limbs; the first chain of a pair is taken for the left one, until votes say otherwise.
+        arms: both arms, in the order of the pair.
+        legs: both legs in the same order, or none.
+    """
+    normal_3 = _normal(bodies, roles)
+    up_3, up_sure, up_cue = _up(bodies, roles, arms, legs, normal_3)
+    forward_3 = cross(normal_3, up_3)
+    votes = list(_forward_votes(bodies, roles, arms, legs, up_3, forward_3, normal_3))
+    votes = [vote for vote in votes if abs(vote.value) > 0.1]
+    total = sum(vote.weight for vote in votes)
+    score = sum(vote.weight * vote.value for vote in votes)
+    swap = score < 0
+    sign = -1.0 if swap else 1.0
+    fors = [vote for vote in votes if vote.value * sign > 0]
+    against = tuple(vote.what for vote in votes if vote.value * sign < 0)
+    fors.sort(key=lambda vote: -abs(vote.value) * vote.weight)
+    cue = ", ".join(vote.what for vote in fors[:4]) or "nothing tells it; a guess"
+    # Three points of weight all one way are certain; a tie, or nothing, is a guess.
+    sure = float(np.clip(abs(score) / 3.0, 0.0, 1.0) * (abs(score) / max(total, 1e-9)) ** 0.5) if votes else 0.0
+    return Heading(up_3, sign * normal_3, sign * forward_3, up_sure, sure, up_cue, cue, swap, against)
+
+
+def _normal(bodies: Bodies, roles: Roles) -> np.ndarray:
+    """Across the mirror plane: an axis that many joints or frames share, within 3 degrees of what the limbs'
+    points tell, which a few millimetres turn.
+    """
+    normal_3 = roles.arms.normal_3
+    steps = [step for pair in (roles.arms, roles.legs) if pair for chain in pair.chains for step in chain]
+    axes = [step.hinge.line.axis_3 for step in (*steps, *roles.waist, *roles.neck)]
+    axes += [*np.eye(3), *bodies.pose_44[bodies.links_of[roles.chest][0]][:3, :3].T]
+    near = [np.sign(axis_3 @ normal_3) * axis_3 for axis_3 in axes if abs(float(axis_3 @ normal_3)) > _SAME]
+    if not near:
+        return normal_3
+    return unit(
+        max(
+            near,
+            key=lambda axis_3: (
+                round(sum(float(axis_3 @ other) > 1 - 1e-6 for other in near)),
+                float(axis_3 @ normal_3),
+            ),
+        )
+    )
+
+
+def _up(
+    bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg], normal_3: np.ndarray
+) -> tuple[np.ndarray, float, str]:
+    cues: list[tuple[str, np.ndarray, float]] = []
+    shoulders_3 = np.mean([arm.shoulder.point_3 for arm in arms], axis=0)
+    if legs:
+        hips_3 = np.mean([leg.hip.point_3 for leg in legs], axis=0)
+        ankles_3 = np.mean([leg.ankle.point_3 for leg in legs], axis=0)
+        cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", shoulders_3 - hips_3, 2.0)]
+    else:
+        for what, at_3, weight in _below(bodies, roles):
+            near = float(np.linalg.norm(at_3 - shoulders_3)) / (0.3 * arms[0].length)
+            cues.append((what, shoulders_3 - at_3, weight * min(1.0, near)))
+        cues.append(("the file's z", np.array([0.0, 0.0, 1.0]), 1.0))
+        middle_3 = np.mean([reach_middle(arm.chain[arm.clavicles :], arm.wrist.point_3) for arm in arms], axis=0)
+        hangs_3 = (shoulders_3 - middle_3) / arms[0].length
+        cues.append(("how the arms move", hangs_3, 0.7 * min(1.0, 3 * float(np.linalg.norm(hangs_3)))))
+    if roles.neck:
+        top_3 = bodies.middle(roles.neck[-1].end)
+        cues.append(("the head", top_3 - shoulders_3, 2.0 if _is_named(roles.neck) else 0.7))
+    flat = [(what, vector_3 - normal_3 * (normal_3 @ vector_3), weight) for what, vector_3, weight in cues]
+    flat = [(what, unit(vector_3), weight) for what, vector_3, weight in flat if np.linalg.norm(vector_3) > 1e-6]
+    candidates = _directions(bodies, roles, normal_3)
+    best, score = max(
+        (((up_3, sum(w * float(up_3 @ v) for _, v, w in flat) + 0.5 * share) for up_3, share in candidates)),
+        key=lambda found: found[1],
+    )
+    near = [(v, share) for v, share in candidates if float(v @ best) > _SAME]
+    # Of those that mean the same direction, the one that most agree on exactly.
+    best = max(near, key=lambda found: sum(float(found[0] @ other) > 1 - 1e-9 for other, _ in candidates))[0]
+    total = sum(w for _, _, w in flat) or 1.0
+    value = sum(w * float(best @ v) for _, v, w in flat) / total
+    told = [what for what, v, _ in flat if float(best @ v) > 0.5]
+    return unit(best - normal_3 * (normal_3 @ best)), float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+
+
+def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:
+    """What probably lies below the shoulders: what it is, where (3,), and how much that counts."""
+    limbs: set[int] = set()
+    for step in (chain[0] for chain in (*roles.arms.chains, *roles.necks)):
+        limbs |= bodies.beyond(step)[0]
+    rest = [body for body in range(len(bodies.links_of)) if body not in limbs and body != roles.chest]
+    if rest:
+        yield "what carries the chest", np.mean([bodies.middle(body) for body in rest], axis=0), 1.5
+    else:
+        yield "the base", np.zeros(3), 1.0
+        yield "the trunk", bodies.corners(roles.chest).mean(0), 0.5
+
+
+def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Directions in the mirror plane along or across which joints turn, and the root's axes; with their share."""
+    limbs = [step for pair in (roles.arms, roles.legs) if pair for chain in pair.chains for step in chain[:4]]
+    weighed = [(step.hinge.line.axis_3, 1.0) for step in (*limbs, *roles.waist)]
+    weighed += [(step.hinge.line.axis_3, 0.3) for step in roles.neck]
+    weighed += [(axis_3, 1.0) for axis_3 in np.eye(3)]
+    weighed += [(axis_3, 1.0) for axis_3 in bodies.pose_44[bodies.links_of[roles.chest][0]][:3, :3].T]
+    flat = [(unit(v - normal_3 * (normal_3 @ v)), w) for v, w in weighed if abs(float(v @ normal_3)) < 0.05]
+    found = [(v, w) for axis_3, w in flat for v in (axis_3, cross(normal_3, axis_3))]
+    found = [(sign * v, w) for v, w in found for sign in (1.0, -1.0)]
+    if not found:
+        across_3 = unit(cross(normal_3, np.eye(3)[int(np.argmin(np.abs(normal_3)))]))
+        found = [(sign * v, 1.0) for v in (across_3, cross(normal_3, across_3)) for sign in (1.0, -1.0)]
+    total = sum(w for _, w in flat) or 1.0
+    return [(v, sum(w for other, w in found if float(v @ other) > _SAME) / total) for v, _ in found]
+
+
+def _forward_votes(
+    bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg], up_3: np.ndarray, forward_3: np.ndarray,
+    left_3: np.ndarray,
+) -> Iterator[Vote]:  # fmt: skip
+    yield Vote("the names of the sides", names.sides(_paired_names(roles)), 3.0)
+    if legs:
+        knees = [
+            _bend(leg.chain, leg.knee_at, leg.hip.point_3, leg.knee.point_3, leg.ankle.point_3, up_3, forward_3)
+            for leg in legs
+        ]
+        yield Vote("the knees bend backwards", -mean_sign(knees), 2.0)
+        hips = []
+        for leg in legs:
+            thigh = float(np.linalg.norm(leg.knee.point_3 - leg.hip.point_3))
+            to_3 = reach_middle(leg.chain[: leg.knee_at], leg.knee.point_3)
+            hips.append(float((to_3 - leg.hip.point_3) @ forward_3) / thigh * 4)
+        yield Vote("the thighs swing further forward", mean_sign(hips), 0.7)
+        yield Vote("the feet point forward", mean_sign(list(_feet(bodies, legs, forward_3))), 1.0)
+    elbows = [
+        _bend(arm.chain, arm.elbow_at, arm.shoulder.point_3, arm.elbow.point_3, arm.wrist.point_3, up_3, forward_3)
+        for arm in arms
+    ]
+    yield Vote("the elbows bend forward", mean_sign(elbows), 1.0)
+    hands = [
+        float((reach_middle(arm.chain, arm.wrist.point_3) - arm.shoulder.point_3) @ forward_3) / arm.length * 4
+        for arm in arms
+    ]
+    yield Vote("the hands reach further forward", mean_sign(hands), 1.5)
+    cameras = list(_cameras(bodies, roles, arms, forward_3))
+    if cameras:
+        yield Vote("cameras and eyes look forward", mean_sign(cameras), 1.0)
+    if up_3[2] > 0.9:
+        yield Vote("the file's x", float(forward_3[0]), 0.5)
+
+
+def _paired_names(roles: Roles) -> list[tuple[str, str]]:
+    found = []
+    for pair in (roles.arms, roles.legs):
+        if pair is not None:
+            for one, other in zip(*pair.chains, strict=False):
+                found += [(one.hinge.name, other.hinge.name), (one.outer_link, other.outer_link)]
+    return [(one, other) for one, other in found if names.side(one, other)]
+
+
+def _bend(
+    chain: Chain, at: int, start_3: np.ndarray, middle_3: np.ndarray, end_3: np.ndarray, up_3: np.ndarray,
+    forward_3: np.ndarray,
+) -> float:  # fmt: skip
+    """-1..1: how far forward a limb's end goes when its hinge bends, with the upper part hanging."""
+    step = chain[at]
+    if not step.hinge.limited:
+        return 0.0
+    axis_3 = step.sign * step.hinge.line.axis_3
+    upper_3, lower_3 = middle_3 - start_3, end_3 - middle_3
+    straight = straight_angle(axis_3, lower_3, upper_3)
+    lower, upper = usual_range(step.hinge)
+    side = bend_side(lower, upper, straight)
+    moved_3 = unit(cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
+    # Where forward is once the upper part hangs down: turned back from where it points, the short way.
+    down_3, upper_3 = -up_3, unit(upper_3)
+    about_3 = cross(down_3, upper_3)
+    if np.linalg.norm(about_3) > 1e-6:
+        angle = float(np.arctan2(np.linalg.norm(about_3), down_3 @ upper_3))
+        forward_3 = turned(forward_3, unit(about_3), angle)
+    return float(moved_3 @ forward_3) * min(1.0, 2 * abs(side))
+
+
+def _feet(bodies: Bodies, legs: Iterable[Leg], forward_3: np.ndarray) -> Iterator[float]:
+    for leg in legs:
+        along = (bodies.corners(leg.chain[-1].end) - leg.ankle.point_3) @ forward_3
+        length = float(np.linalg.norm(leg.ankle.point_3 - leg.knee.point_3))
+        if along.max() - along.min() > 0.15 * length:
+            yield float(along.max() + along.min()) / float(along.max() - along.min()) * 3
+            continue
+        centre_3 = bodies.centre(leg.chain[-1].end)
+        if centre_3 is not None:
+            yield float((centre_3 - leg.ankle.point_3) @ forward_3) / (0.05 * length)
+
+
+def _cameras(bodies: Bodies, roles: Roles, arms: list[Arm], forward_3: np.ndarray) -> Iterator[float]:
+    scale = 0.1 * arms[0].length
+    if roles.neck:
+        step = roles.neck[-1]
+        inside = bodies.beyond(step)[0]
+        origin_3 = step.hinge.line.point_3
+    else:
+        inside, origin_3 = {roles.chest}, np.mean([arm.shoulder.point_3 for arm in arms], axis=0)
+    for link, body in bodies.body_of.items():
+        if body in inside and names.speaks_of(link, "camera"):
+            yield float((bodies.position(link) - origin_3) @ forward_3) / scale

@@ -1,0 +1,180 @@
+"""Hip, knee, ankle and sole from the axes of a leg.
+
+A knee is the middle one of three parallel lateral axes. The thigh starts on the pitch axis above it, which may lie far
+from where the hip's axes cross.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.robot.discovery.arm import Spot, find_elbow, limb_end
+from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
+from mrhubo.robot.discovery.lines import Line, feet, sine
+from mrhubo.robot.discovery.names import speaks_of
+
+_PARALLEL = 0.2
+"""Sine under which hip, knee and ankle pitch count as parallel, as the joints stand: 11 degrees."""
+_TILTED = 0.6
+"""The same of a hip's pitch, which some robots tilt by up to 30 degrees."""
+_APART = 0.15
+"""How far hip, knee and ankle are at least from each other, as a share of the leg."""
+_ON = 1e-4
+_LEAST = 1e-3
+"""How long thigh and shank are at least, as a share of the robot."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg whose joints have their roles."""
+
+    chain: Chain
+    hip_at: int | None
+    """Position of the hip's pitch in the chain."""
+    knee_at: int
+    ankle_at: int | None
+    hip: Spot
+    knee: Spot
+    ankle: Spot
+    straight: bool
+    """Whether three parallel axes told the knee."""
+
+
+def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
+    """Roles and points of a leg's joints; None if it has no knee."""
+    rotary = tuple(step for step in chain if step.hinge.rotary)
+    lines = lines_of(rotary)
+    places = _three(lines)
+    if places is None:
+        knee_at = find_elbow(bodies, rotary)
+        if knee_at is None:
+            return None
+        hip_at = next((i for i in reversed(range(knee_at)) if _parallel(lines[i], lines[knee_at])), None)
+        ankle_at = knee_at + 1 if knee_at + 1 < len(rotary) else None
+    else:
+        hip_at, knee_at, ankle_at = places
+    across = _across(lines, knee_at, hip_at, ankle_at)
+    aside_3 = across if across is not None else bodies.position(rotary[knee_at].outer_link)
+    knee_3 = lines[knee_at].nearest(aside_3)
+    ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at, knee_3)
+    if hip_at is not None:
+        between = lines[hip_at + 1 : knee_at]
+        crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > _TILTED
+        hip_3 = feet(lines[hip_at], between[-1])[0] if crossing else lines[hip_at].nearest(knee_3)
+        cue, sure = f"the axis of '{rotary[hip_at].hinge.name}' above the knee", 0.9
+    else:
+        hip_3 = lines[max(knee_at - 1, 0)].nearest(knee_3)
+        cue, sure = "the last axis before the knee", 0.5
+    step = rotary[knee_at]
+    links = [step.inner_link]
+    for i in reversed(range(hip_at if hip_at is not None else max(knee_at - 1, 0), knee_at)):
+        if lines[i].distance(hip_3) > _ON * bodies.size:
+            break
+        links.append(rotary[i].outer_link)
+    hip = Spot(hip_3, step.start, tuple(dict.fromkeys(links)), cue, sure)
+    how = "the middle one of three parallel axes" if places else "the axis with the longest stretches on either side"
+    knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
+    if min(math.dist(hip_3, knee_3), math.dist(knee_3, ankle.point_3)) < _LEAST * bodies.size:
+        return None
+    return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
+
+
+def _parallel(one: Line, other: Line) -> bool:
+    return sine(one.axis_3, other.axis_3) < _PARALLEL
+
+
+def _three(lines: list[Line]) -> tuple[int, int, int] | None:
+    """Hip pitch, knee and ankle pitch: three parallel axes far from each other."""
+    best, found = 0.0, None
+    length = (
+        max(one.distance(other.point_3) for one, other in itertools.combinations(lines, 2)) if len(lines) > 2 else 0.0
+    )
+    for j in range(1, len(lines)):
+        # The next parallel axis some way off is the ankle's; toes have one more.
+        shanks = {
+            k: lines[j].distance(lines[k].point_3) for k in range(j + 1, len(lines)) if _parallel(lines[j], lines[k])
+        }
+        k = next((k for k, shank in shanks.items() if shank > _APART * length), None)
+        if k is None:
+            continue
+        shank = shanks[k]
+        thighs = [lines[i].distance(lines[j].point_3) for i in range(j)]
+        above = [
+            i for i in range(j) if thighs[i] > _APART * (thighs[i] + shank) and _tilt(lines[i], lines[j]) < _TILTED
+        ]
+        if not above:
+            continue
+        i = min(above, key=lambda i: (round(_tilt(lines[i], lines[j]), 2), -i))
+        if min(thighs[i], shank) > best:
+            best, found = min(thighs[i], shank), (i, j, k)
+    return found
+
+
+def _tilt(one: Line, other: Line) -> float:
+    return sine(one.axis_3, other.axis_3)
+
+
+def _across(lines: list[Line], knee_at: int, hip_at: int | None, ankle_at: int | None) -> np.ndarray | None:
+    """A point (3,) that tells how far from the middle a leg runs: where an axis that is not lateral meets one that is.
+    None if there is no such axis.
+    """
+    if hip_at is not None:
+        between = [line for line in lines[hip_at + 1 : knee_at] if not _parallel(line, lines[knee_at])]
+        if between:
+            return feet(between[-1], lines[knee_at])[0]
+    if ankle_at is not None:
+        others = [line for line in lines[knee_at + 1 :] if not _parallel(line, lines[ankle_at])]
+        if others:
+            return feet(lines[ankle_at], others[0])[0]
+    before = [line for line in lines[: hip_at or 0] if _tilt(line, lines[knee_at]) > 0.9]
+    return feet(lines[hip_at], before[-1])[0] if before and hip_at is not None else None
+
+
+def _ankle(
+    bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None, knee_3: np.ndarray
+) -> Spot:
+    if ankle_at is None:
+        thigh = lines[knee_at].distance(lines[max(knee_at - 1, 0)].point_3)
+        end_3, how, sure = limb_end(bodies, chain[-1], knee_3, max(thigh, 1e-3 * bodies.size))
+        return Spot(end_3, chain[-1].end, (chain[-1].outer_link,), how.replace("wrist", "ankle"), sure)
+    others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not _parallel(lines[i], lines[ankle_at])]
+    step = chain[knee_at + 1]
+    if others:
+        point_3, cue, sure = (
+            feet(lines[ankle_at], lines[others[0]])[0],
+            "where the ankle's axes are nearest to each other",
+            0.95,
+        )
+    else:
+        point_3, cue, sure = lines[ankle_at].nearest(knee_3), "the ankle axis's point nearest to the knee", 0.8
+    links = [step.inner_link]
+    for i in range(knee_at + 1, len(lines)):
+        if lines[i].distance(point_3) > _ON * bodies.size:
+            break
+        links.append(chain[i].outer_link)
+    return Spot(point_3, step.start, tuple(links), cue, sure)
+
+
+def read_sole(bodies: Bodies, leg: Leg, up_3: np.ndarray) -> Spot | None:
+    """The lowest point below the ankle, on the foot; None if nothing tells it."""
+    foot = leg.chain[-1].end
+    link = leg.chain[-1].outer_link
+    named = [name for name in bodies.links_of[foot] if speaks_of(name, "sole") and name != link]
+    if bodies.shapes_of[foot]:
+        height = float((bodies.corners(foot) @ up_3).min())
+        cue, sure = "the lowest of the foot's shapes", 0.9
+    elif named:
+        height = min(float(bodies.position(name) @ up_3) for name in named)
+        cue, sure = f"the link '{named[0]}', after its name", 0.8
+    else:
+        lowest = min(bodies.links_of[foot], key=lambda name: float(bodies.position(name) @ up_3))
+        height = float(bodies.position(lowest) @ up_3)
+        cue, sure = f"the lowest link '{lowest}' fixed to the foot", 0.5
+    below = float(leg.ankle.point_3 @ up_3) - height
+    if below < 0.02 * float(np.linalg.norm(leg.ankle.point_3 - leg.hip.point_3)):
+        return None
+    return Spot(leg.ankle.point_3 - below * up_3, foot, (link,), cue, sure)

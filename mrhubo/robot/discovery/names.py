@@ -1,0 +1,48 @@
+"""What names say of links and joints. Names only confirm: files call links as they like, in any language."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+_WORDS = {
+    "leg": r"leg|hip|knee|ankle|ankel|thigh|shin|calf|foot|feet|toe|crotch|crus|tibia|femur|sole|shank",
+    "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar",
+    "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|tip",
+    "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
+    "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
+    "head": r"head|neck|skull",
+    "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",
+    "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
+    "tool": r"tool|tcp|ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
+}
+_PATTERNS = {kind: re.compile(text, re.IGNORECASE) for kind, text in _WORDS.items()}
+
+
+def speaks_of(name: str, kind: str) -> bool:
+    """Whether a name has a word of a kind: leg, arm, hand (what moves in it), turn (of a whole limb), ..."""
+    return _PATTERNS[kind].search(name) is not None
+
+
+def share(names: Iterable[str], kind: str) -> float:
+    """Share of the names that speak of a kind."""
+    found = [speaks_of(name, kind) for name in names]
+    return sum(found) / len(found) if found else 0.0
+
+
+def side(name: str, other: str) -> int:
+    """1 if the first of two names that differ in one place is the left one's, -1 if the right one's, 0 if that cannot
+    be told.
+    """
+    name, other = name.lower(), other.lower()
+    start = 0
+    while start < min(len(name), len(other)) and name[start] == other[start]:
+        start += 1
+    ends = name[start : start + 1] + other[start : start + 1]
+    return {"lr": 1, "rl": -1}.get(ends, 0)
+
+
+def sides(names: Iterable[tuple[str, str]]) -> float:
+    """-1..1: mean of `side` over pairs of names."""
+    found = [side(name, other) for name, other in names]
+    return sum(found) / len(found) if found else 0.0

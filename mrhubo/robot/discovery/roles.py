@@ -1,0 +1,229 @@
+"""Which pair of limbs is arms and which legs, and what lies between: chest, pelvis, waist, neck."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.robot.discovery import names
+from mrhubo.robot.discovery.arm import find_elbow, read_arm, without_gripper
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.symmetry import Pair, alike
+
+_PLANE = 0.03
+"""How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
+_TINY = 0.1
+"""The same of the robot's size: fingers of a single arm."""
+_SMALL = 0.25
+"""Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+
+
+@dataclass(frozen=True)
+class Roles:
+    """The limbs and the trunk of a robot."""
+
+    arms: Pair
+    legs: Pair | None
+    waist: Chain
+    """From the pelvis to the chest; without legs, from the root to the chest."""
+    neck: Chain
+    necks: tuple[Chain, ...]
+    """Other chains in the middle that may be the neck, likeliest first."""
+    others: tuple[Pair, ...]
+    """Pairs that are neither."""
+    sure: float
+    """How clear it is which pair is arms, 0..1."""
+
+    def with_neck(self, neck: Chain) -> Roles:
+        """With another neck, or none; what else begins in the middle of a root that is the chest is the waist."""
+        below = next((chain for chain in self.necks if chain is not neck), ())
+        return replace(self, neck=neck, waist=self.waist or (_reversed(below) if self.legs is None else ()))
+
+    @property
+    def chest(self) -> int:
+        """The body that carries both arms."""
+        return self.arms.body
+
+
+def _reversed(chain: Chain) -> Chain:
+    """A chain passed from its other end."""
+    return tuple(Step(step.hinge, step.end) for step in reversed(chain))
+
+
+def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
+    """Arms, legs and trunk.
+
+    Raises:
+        UserError: no pair of arms can be told; says what the robot has.
+    """
+    path = bodies.description.path
+    least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
+    large = [pair for pair in pairs if pair.size > least]
+    armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
+    # Casters have two joints too, but none of them has limits.
+    armed = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])] or armed[:1]
+    if not armed:
+        count = len(bodies.hinges)
+        raise UserError(
+            f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
+            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
+        )
+    legness = {id(pair): _legness(bodies, pair) for pair in armed}
+    if len(armed) == 1:
+        if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
+            joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
+            raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
+        arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
+    else:
+        options = [
+            (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high), i, j)
+            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
+        ]  # fmt: skip
+        options.sort(key=lambda option: -option[0])
+        score, i, j = options[0]
+        if _same(armed[i], armed[j]):
+            different = [option for option in options if not _same(armed[option[1]], armed[option[2]])]
+            if not different:
+                raise UserError(
+                    f"{path}: has two pairs of limbs that are alike, as a four-legged robot has; a humanoid is needed"
+                )
+            score, i, j = different[0]
+        arms, legs = armed[j], armed[i]
+        reverse = next(option[0] for option in options if option[1:] == (j, i))
+        sure = float(np.clip(0.5 + 0.25 * (score - reverse), 0.0, 1.0))
+        if _named_legs(arms):
+            raise UserError(
+                f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
+            )
+    start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
+    waist = bodies.path(start, arms.body)
+    same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
+    used = {chain[0].hinge.name for pair in same for chain in pair.chains}
+    used |= {step.hinge.name for step in waist}
+    necks = _necks(bodies, arms, used)
+    arm = arms.chains[0]
+    if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
+        raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
+    others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
+    return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
+
+
+def _legness(bodies: Bodies, pair: Pair) -> float:
+    """About -2 (arms) to 2 (legs)."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    score = names.share(called, "leg") - names.share(called, "arm")
+    chain = without_gripper(pair.chains[0])
+    end = chain[-1]
+    beyond = [hinge for hinge in bodies.beyond(end)[1] if hinge is not end.hinge]
+    if len(beyond) >= 2:
+        score -= 0.5
+    lines = lines_of(chain)
+    found, knee_at = measure(lines), find_elbow(bodies, chain)
+    if knee_at is not None and knee_at + 1 < len(chain):
+        way = max(found.out_N[-1], 1e-9)
+        shank = sum(
+            found.apart_N[i] for i in range(knee_at, len(chain) - 1)
+            if sine(lines[i].axis_3, lines[i + 1].axis_3) < PARALLEL or found.apart_N[i] > 0.2 * way
+        )  # fmt: skip
+        twisted = sum(found.along_N[knee_at + 1 :])
+        score += 0.7 * (shank / way > 0.2) - 0.7 * (twisted / way > 0.2)
+        lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
+        score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
+    return score
+
+
+def _named_legs(pair: Pair) -> bool:
+    """Whether names speak of legs, and not of arms."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    return names.share(called, "leg") > 0.25 and names.share(called, "arm") == 0
+
+
+def _stands(bodies: Bodies, pair: Pair) -> bool:
+    """Whether a pair of limbs ends beyond all else, in the direction in which it hangs, which is down in the file."""
+    ends_3 = np.mean([measure(lines_of(chain)).nodes_N3[-1] for chain in pair.chains], axis=0)
+    out_3 = unit(ends_3 - pair.mounts_23.mean(0))
+    limbs = set().union(*(bodies.beyond(chain[0])[0] for chain in pair.chains))
+    rest = [body for body in range(len(bodies.links_of)) if body not in limbs]
+    lowest = max(float((bodies.corners(body) @ out_3).max()) for body in rest)
+    return out_3[2] < -0.7 and lowest < float(ends_3 @ out_3)
+
+
+def _same(one: Pair, other: Pair) -> bool:
+    """Whether two pairs have the same limbs: the legs of a four-legged robot."""
+    measures = [measure(lines_of(pair.chains[0])) for pair in (one, other)]
+    count = len(one.chains[0])
+    return one.body == other.body and count == len(other.chains[0]) == alike(*measures)
+
+
+def _hangs_below(low: Pair, high: Pair) -> float:
+    """-1..1: whether the lower pair's limbs hang away from where the upper pair begins."""
+    ends = np.mean([measure(lines_of(chain)).nodes_N3[-1] for chain in low.chains], axis=0)
+    mount_3, other_3 = low.mounts_23.mean(0), high.mounts_23.mean(0)
+    if np.linalg.norm(other_3 - mount_3) < 1e-3 * low.size:
+        return 0.0
+    return float(unit(mount_3 - ends) @ unit(other_3 - mount_3))
+
+
+def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float) -> bool:
+    """Whether a joint's axis is its own mirror image: across the mirror plane, or in it."""
+    line = step.hinge.line
+    across = abs(float(line.axis_3 @ normal_3))
+    if across > 0.97:
+        return True
+    return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
+
+
+def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
+    """The other chains from the chest with axes in the mirror plane, the likeliest neck first."""
+    middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
+    ranked: list[tuple[float, Chain]] = []
+    for step in bodies.steps_from[arms.body]:
+        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(step):
+            continue
+        chain: list[Step] = []
+        todo: list[Step] = [step]
+        while todo:
+            fitting = [
+                s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
+            ]
+            fitting = [s for s in fitting if not _is_sensor(s) and not _has_twin(s, todo, arms.normal_3, middle_3)]
+            fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
+            if not fitting or len(chain) >= 4:
+                break
+            chain.append(fitting[0])
+            todo = bodies.onward(fitting[0])
+        if not chain:
+            continue
+        called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
+        named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
+        # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
+        start_3 = measure(lines_of(tuple(chain))).nodes_N3[0]
+        away = min(chain[0].hinge.line.distance(middle_3), float(np.linalg.norm(start_3 - middle_3)))
+        ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
+    ranked.sort(key=lambda found: -found[0])
+    return tuple(chain for _, chain in ranked)
+
+
+def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray) -> bool:
+    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear."""
+    line = step.hinge.line
+    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
+
+    def miss(other: Line) -> float:
+        one_3, other_3 = feet(image, other)
+        return float(np.linalg.norm(one_3 - other_3)) + float(np.linalg.norm(image.point_3 - line.point_3)) * sine(
+            image.axis_3, other.axis_3
+        )
+
+    own = abs(float((line.point_3 - middle_3) @ normal_3))
+    return any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
+
+
+def _is_sensor(step: Step) -> bool:
+    """A joint without limits above a chest turns a lidar, not a head."""
+    return not step.hinge.limited and step.hinge.lower is None

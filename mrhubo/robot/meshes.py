@@ -1,0 +1,121 @@
+"""The meshes of a URDF's links, for looks: read where their files are, and passed over where they are not.
+
+A file may come from anywhere: its kind, its size and the number of its triangles are bounded, and no further file that
+it names (materials, textures) is opened. Legend: V vertices, F triangles.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yourdfpy
+
+from mrhubo.errors import UserError
+from mrhubo.files.regular import check_regular, read_regular
+
+_KINDS = ("stl", "obj", "ply", "dae")
+_MOST_BYTES, _MOST_TRIANGLES = 50_000_000, 2_000_000
+_MOST_METRES = 1e3
+
+
+@dataclass(frozen=True)
+class LinkMesh:
+    """A mesh of a link, in the link's frame."""
+
+    link: str
+    vertices_V3: np.ndarray
+    """Metres."""
+    faces_F3: np.ndarray
+    """Numbers of vertices."""
+
+
+def read_meshes(urdf: yourdfpy.URDF, path: Path, without: Collection[str] = ()) -> list[LinkMesh]:
+    """The meshes of every link's visual elements, or, where these have none to be read, of its collision elements.
+
+    Args:
+        urdf: what yourdfpy has made of the robot.
+        path: its file: meshes are looked for beside it, and `package://` in the folders above it.
+        without: links whose meshes are not wanted.
+    """
+    found: list[LinkMesh] = []
+    triangles = 0
+    for link in urdf.robot.links:
+        for elements in (link.visuals, link.collisions):
+            meshes = [] if link.name in without else list(_meshes(link.name, elements, path))
+            if meshes:
+                found += meshes
+                triangles += sum(len(mesh.faces_F3) for mesh in meshes)
+                break
+        if triangles > _MOST_TRIANGLES:
+            break
+    return found
+
+
+def _meshes(
+    link: str, elements: list[yourdfpy.urdf.Visual] | list[yourdfpy.urdf.Collision], path: Path
+) -> Iterator[LinkMesh]:
+    for element in elements:
+        mesh = None if element.geometry is None else element.geometry.mesh
+        if mesh is None or (file := find_mesh(str(mesh.filename), path)) is None:
+            continue
+        triangles = _read(file)
+        if triangles is None:
+            continue
+        vertices_V3, faces_F3 = triangles
+        scale = np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, float), (3,))
+        place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
+        vertices_V3 = (vertices_V3 * scale) @ place_44[:3, :3].T + place_44[:3, 3]
+        if np.isfinite(vertices_V3).all() and np.abs(vertices_V3).max() < _MOST_METRES:
+            yield LinkMesh(link, vertices_V3, faces_F3)
+
+
+def find_mesh(name: str, path: Path) -> Path | None:
+    """The file that a URDF names as a mesh; None where it is not to be found.
+
+    Args:
+        name: `meshes/arm.stl`, relative to the URDF, `file://...`, or `package://PACKAGE/...`, which is looked for in
+            the folders above the URDF, with and without the package's name.
+        path: the URDF.
+    """
+    kind, _, rest = name.rpartition("://")
+    places = [path.parent / rest]
+    if kind == "package":
+        inner = rest.partition("/")[2]
+        places = [folder / part for folder in path.absolute().parents for part in (rest, inner) if part]
+    return next((place for place in places if _is_file(place)), None)
+
+
+def _is_file(place: Path) -> bool:
+    try:
+        return place.is_file()
+    except OSError:  # a name that no file can have
+        return False
+
+
+def _read(file: Path) -> tuple[np.ndarray, np.ndarray] | None:
+    """Vertices (V, 3) and triangles (F, 3) of a file; None where it cannot be used."""
+    kind = file.suffix.lower().removeprefix(".")
+    if kind not in _KINDS:
+        return None
+    import trimesh
+
+    log, level = logging.getLogger("trimesh"), logging.getLogger("trimesh").level
+    log.setLevel(logging.CRITICAL)
+    try:
+        if check_regular(file) > _MOST_BYTES:
+            return None
+        loaded = trimesh.load_mesh(io.BytesIO(read_regular(file)), file_type=kind, process=False, skip_materials=True)
+        vertices_V3, faces_F3 = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, int)
+    except UserError:
+        return None
+    except Exception:  # whatever a parser makes of a damaged file: looks are not worth a word
+        return None
+    finally:
+        log.setLevel(level)
+    usable = vertices_V3.ndim == 2 and faces_F3.ndim == 2 and 0 < len(faces_F3) <= _MOST_TRIANGLES
+    return (vertices_V3, faces_F3) if usable and 0 <= faces_F3.min() and faces_F3.max() < len(vertices_V3) else None

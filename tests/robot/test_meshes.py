@@ -1,0 +1,79 @@
+"""Meshes are read where they are, in the link's frame, and passed over wherever anything about them is wrong."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from mrhubo.robot import meshes
+from mrhubo.robot.meshes import find_mesh, read_meshes
+from mrhubo.robot.urdf import describe
+
+LINK = '<robot name="x"><link name="a"><visual><origin xyz="0 0 1" rpy="0 0 1.5707963"/><geometry>{}</geometry></visual></link></robot>'
+
+
+def read(folder: Path, name: str = "meshes/box.stl", scale: str = 'scale="0.001 0.002 0.001"') -> list[meshes.LinkMesh]:
+    path = folder / "my.urdf"
+    path.write_text(LINK.format(f'<mesh filename="{name}" {scale}/>'))
+    return read_meshes(describe(path).parsed, path)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "robot" / "meshes").mkdir(parents=True)
+    for kind in ("stl", "obj", "ply"):
+        trimesh.creation.box((100.0, 200.0, 300.0)).export(tmp_path / "robot" / "meshes" / f"box.{kind}")
+    return tmp_path / "robot"
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply"])
+def test_vertices_are_scaled_and_placed(folder: Path, kind: str) -> None:
+    (mesh,) = read(folder, f"meshes/box.{kind}")
+    assert mesh.link == "a" and len(mesh.faces_F3) == 12
+    # 0.1 x 0.4 x 0.3 m, turned by a quarter about z, then raised by 1 m
+    assert np.allclose(mesh.vertices_V3.min(axis=0), [-0.2, -0.05, 0.85], atol=1e-6)
+    assert np.allclose(mesh.vertices_V3.max(axis=0), [0.2, 0.05, 1.15], atol=1e-6)
+
+
+def test_packages_are_looked_for_above_the_urdf(folder: Path) -> None:
+    place = folder / "meshes" / "box.stl"
+    deep = folder / "urdf" / "more" / "my.urdf"
+    deep.parent.mkdir(parents=True)
+    for name in (
+        "package://robot/meshes/box.stl", "package://any/meshes/box.stl", "../../meshes/box.stl", f"file://{place}",
+    ):  # fmt: skip
+        found = find_mesh(name, deep)
+        assert found is not None and found.samefile(place), name
+    for name in ("package://robot/meshes/none.stl", "", "package://", "a\0b", "x" * 5000, "."):
+        assert find_mesh(name, deep) is None
+
+
+@pytest.mark.parametrize("content", [b"", b"solid x", b"\x00" * 84, b"junk" * 100, b"\xff" * 200])
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "dae"])
+def test_damaged_files_are_passed_over(folder: Path, kind: str, content: bytes) -> None:
+    (folder / f"bad.{kind}").write_bytes(content)
+    assert read(folder, f"bad.{kind}") == []
+
+
+def test_what_is_too_large_or_of_another_kind_is_passed_over(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "box.glb").write_bytes(b"glTF")
+    assert read(folder, "box.glb") == read(folder, "none.stl") == []
+    assert read(folder, scale='scale="1e6 1e6 1e6"') == []
+    monkeypatch.setattr(meshes, "_MOST_BYTES", 10)
+    assert read(folder) == []
+
+
+def test_materials_are_not_opened(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "box.obj").write_text("mtllib looks.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (folder / "looks.mtl").write_text("newmtl a\nmap_Kd picture.png\n")
+    opened: list[str] = []
+    real = io.open
+    monkeypatch.setattr(
+        io, "open", lambda file, *rest, **more: (opened.append(str(file)), real(file, *rest, **more))[1]
+    )
+    assert len(read(folder, "box.obj", "")) == 1
+    assert not any("looks.mtl" in name or "picture" in name for name in opened)
