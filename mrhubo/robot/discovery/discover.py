@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, read_bodies
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step, read_bodies
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
@@ -28,6 +29,7 @@ from mrhubo.robot.discovery.result import (
 )
 from mrhubo.robot.discovery.roles import Roles, find_roles
 from mrhubo.robot.discovery.symmetry import find_pairs
+from mrhubo.robot.joint import drive
 from mrhubo.robot.urdf import Description, describe
 
 SIDES = ("left", "right")
@@ -181,7 +183,18 @@ class _Finder:
     def _joints(self) -> tuple[str, ...]:
         moved = [arm.chain if side in self.hands else arm.chain[: arm.elbow_at + 1] for side, arm in self.arms.items()]
         steps = [step for chain in (*moved, self.roles.neck) for step in chain]
-        return tuple(step.hinge.name for step in steps if step.hinge.rotary and step.hinge.free)
+        found = [hinge.name for step in steps if (hinge := self._driver(step)) is not None and hinge.rotary]
+        return tuple(dict.fromkeys(found))
+
+    def _driver(self, step: Step) -> Hinge | None:
+        """The joint by which one of a limb is driven: itself, or the one that it mimics, as behind a gear."""
+        if step.hinge.free:
+            return step.hinge
+        try:
+            name = drive(self.bodies.description.joints, step.hinge.name).joint
+        except UserError:  # told where it matters
+            return None
+        return next((hinge for hinge in self.bodies.hinges if hinge.name == name), None)
 
     def _held(self, joints: tuple[str, ...]) -> Iterator[tuple[str, str]]:
         for step in self.roles.waist:
@@ -227,8 +240,8 @@ class _Finder:
         found: dict[str, FoundRange] = {}
         asked: list[Question] = []
         for step in (step for chain in (*(arm.chain for arm in self.arms.values()), self.roles.neck) for step in chain):
-            hinge = step.hinge
-            if hinge.rotary and hinge.free and not _limits_meant(hinge.lower, hinge.upper):
+            hinge = self._driver(step)
+            if hinge is not None and hinge.rotary and not _limits_meant(hinge.lower, hinge.upper):
                 found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
         for side, arm in self.arms.items():
             narrowed, question = self._elbow_range(side, arm, found)
@@ -270,7 +283,7 @@ class _Finder:
                 question = Question(f"{side}_elbow", f"{text}robot.ranges if the arm bends backwards", (name,))
         ends = (straight, upper) if above else (lower, straight)
         why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human elbow one way; straight is at {straight:.2f}"
-        return FoundRange(*map(float, ends), why), question
+        return FoundRange(float(ends[0]), float(ends[1]), why), question
 
     def _questions(self) -> Iterator[Question]:
         heading, roles = self.heading, self.roles

@@ -23,6 +23,8 @@ _BELOW = 0.2
 """How far below the shoulders a head may be, as a share of the arm: some robots carry their arms high."""
 _UNSURE = 0.3
 """Up less sure than that tells nothing of necks."""
+_AGREED = 1.5
+"""How much it counts that all joints and frames agree on a direction, against what tells up only roughly."""
 _SAME = 0.9986
 """Cosine of 3 degrees: directions that mean the same one."""
 
@@ -144,7 +146,7 @@ def _up(
     flat = [(what, unit(vector_3), weight) for what, vector_3, weight in flat if np.linalg.norm(vector_3) > 1e-6]
     candidates = _directions(bodies, roles, normal_3)
     best, score = max(
-        (((up_3, sum(w * float(up_3 @ v) for _, v, w in flat) + 0.5 * share) for up_3, share in candidates)),
+        (((up_3, sum(w * float(up_3 @ v) for _, v, w in flat) + _AGREED * share) for up_3, share in candidates)),
         key=lambda found: found[1],
     )
     near = [(v, share) for v, share in candidates if float(v @ best) > _SAME]

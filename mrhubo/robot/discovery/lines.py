@@ -1,8 +1,8 @@
 """Joint axes as lines in space: what lies between them does not depend on the pose of the joints that they carry.
 
-Two neighbouring axes of a chain keep their distance, their angle, and where their common normal meets them, whatever
-the joints do (J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on matrices", 1955).
-So limbs are measured along a chain of such normals, and no pose need be assumed.
+Two neighbouring axes of a chain keep their distance, their angle, and where their common normal meets them,
+whatever the joints do (J. Denavit and R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on
+matrices", 1955). So limbs are measured along a chain of such normals, and no pose need be assumed.
 
 Legend: N axes of a chain, from the body outwards.
 """

@@ -6,7 +6,6 @@ The frame while planning: x forward, y left, z up, the ground at 0, arms hanging
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -146,13 +145,6 @@ def about(point_3: np.ndarray, axis_3: np.ndarray, angle: float) -> np.ndarray:
     return pose_44
 
 
-def mirrored(vector_3: Sequence[float], side: float) -> np.ndarray:
+def mirrored(vector_3: np.ndarray, side: float) -> np.ndarray:
     """A vector of the left side, or its mirror image on the right one (side -1)."""
     return np.array([vector_3[0], side * vector_3[1], vector_3[2]], float)
-
-
-def turn_axis(axis_3: Sequence[float], side: float) -> tuple[np.ndarray, float]:
-    """An axis of the left side, or its mirror image, about which the same motion goes by the sign that comes with it: a
-    mirror turns the sense of turning.
-    """
-    return mirrored(axis_3, side), side

@@ -137,6 +137,18 @@ def test_joints_without_limits_get_a_range(pair) -> None:
     assert (found.ranges["l_yaw"].lower, found.ranges["l_yaw"].upper) == pytest.approx((-math.pi, math.pi))
 
 
+def test_a_joint_behind_a_gear_is_moved_by_what_drives_it(pair) -> None:
+    motor = (
+        '<link name="motor"/><joint name="l_motor" type="revolute"><parent link="l_upper"/><child link="motor"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    yaw = '<joint name="l_yaw" type="revolute">'
+    config = pair((yaw, yaw + '<mimic joint="l_motor" multiplier="-1"/>'), ("</robot>", motor))
+    found = discover(config.urdf)
+    assert "l_motor" in found.joints and "l_yaw" not in found.joints
+    assert "l_yaw" in found.chains["left_arm"]
+
+
 LEGS = """<robot name="walker"><link name="body"/>{}</robot>"""
 
 
