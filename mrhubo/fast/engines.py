@@ -120,4 +120,5 @@ def make_engine(description: Description, form: str | None) -> Engine:
     form = form or here[0]
     if form not in here:
         raise UserError("form='compiled' needs numba: pip install 'mrhubo[fast]'")
-    return CompiledEngine(description) if form == "compiled" else NumpyEngine(description)
+    engine = CompiledEngine(description) if form == "compiled" else NumpyEngine(description)
+    return engine  # pyright: ignore[reportReturnType] (it takes no cached property for a property)
