@@ -7,10 +7,10 @@ numba is installed; ONNX Runtime where it and onnx are. A frame is answered by o
 are medians, and what a busy machine adds is in them.
 
 Rivals, where they can do the robot and are installed (what is left out is said): mink's loop of differential inverse
-kinematics with dense targets and with five (`mink_loop.py` says which), a closed form for arms of seven joints
-(`closed_form.py`), and our optimiser, which tries twelve starts for each frame. Joints, limbs and hands are those of
-arms; joints are compared with the optimiser's, which is fair only where one answer is best. Poses, 60 a second: parts
-of the motions that ship (easy), and a path through poses drawn joint by joint, one a second (wide).
+kinematics with dense targets and with the ends alone (`mink_loop.py` says which), a closed form for arms of seven
+joints (`closed_form.py`), and our optimiser, which tries twelve starts for each frame. Joints, limbs and hands are
+those of arms; joints are compared with the optimiser's, which is fair only where one answer is best. Poses, 60 a
+second: parts of the motions that ship (easy), and a path through poses drawn joint by joint, one a second (wide).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -154,18 +155,12 @@ def rivals(retargeter: Retargeter, forms: Mapping[str, Mapping[str, Answer]]) ->
     best = "compiled" if "compiled" in forms else "numpy"
     found = [Rival(f"{name} ({best})", lambda name=name: forms[best][name], False) for name in OURS]
     missing = []
-    loops = {
-        "mink, dense targets, 1 iteration": {"iterations": 1},
-        "mink, dense targets, 10 iterations": {"iterations": 10},
-        "mink, five targets, 10 iterations": {"iterations": 10, "dense": False},
-    }
     if there("mink", "mujoco", "daqp"):
         try:
-            MinkLoop(body_map, 1)
-            found += [
-                Rival(name, lambda options=options: MinkLoop(body_map, **options).of_directions, True)
-                for name, options in loops.items()
-            ]
+            for which, iterations in (("dense", 1), ("dense", 10), ("ends", 10)):
+                make = partial(MinkLoop, body_map, iterations, which == "dense")
+                name = f"mink, {which}, {make().targets} targets, iterations: {iterations}"
+                found.append(Rival(name, lambda make=make: make().of_directions, True))
         except NoLoop as error:
             missing.append(f"mink's loop is not written for {error}")
     else:

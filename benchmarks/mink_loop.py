@@ -76,6 +76,11 @@ class MinkLoop:
             link: self._configuration.get_transform_frame_to_world(link, "body").translation() for link in links
         }
 
+    @property
+    def targets(self) -> int:
+        """How many targets there are."""
+        return len(self._tasks)
+
     def of_directions(self, direction_D3: np.ndarray) -> np.ndarray:
         """Joint angles (N,) [rad] for a human's directions (D, 3)."""
         mink, places = self._mink, dict(self._rest)

@@ -7,8 +7,9 @@ elbows and knees are hinges, and the rest of a forearm's twist is in the wrist.
 A straight limb does not tell how it is turned about itself. Where the source has a bone's own rotation, that tells;
 else the axis of its elbow or knee is carried along from the last frame in which the limb was bent towards the next.
 
-Points that are missing are not invented: their limb goes on from where it was last seen, as seen from the trunk, to
-where it is seen next, with a confidence of 0.
+Points that are missing in some frames are not invented: their limb goes on from where it was last seen, as seen from
+the trunk, to where it is seen next, with a confidence of 0. An arm's bone that no frame shows is where the body prior
+would have it beside what is seen.
 
 Legend: T frames, J = 21: SMPL's joints 1..21. World: y up, right-handed [m].
 """
@@ -31,6 +32,7 @@ from mrhubo.fast.rotations import (
     shortest_turn,
     turned,
 )
+from mrhubo.motion.completion import Bone, complete
 from mrhubo.motion.gaps import Neighbours, fill_directions, fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.orientations import frame_of, known_frames, turn_of
@@ -53,11 +55,13 @@ class _Limb:
     """Where it points, seen from the carrier, if it is never seen."""
     one_way: bool
     """Whether it hardly turns about itself, so that its hinge's axis is known to some ninety degrees without it."""
+    completed: bool
+    """Whether the body prior tells where it is, if it is never seen: arms are anywhere, most legs stand."""
 
 
 _LIMBS = (
-    _Limb("spine3", ("shoulder", "elbow", "wrist"), (0.0, -1.0, 0.0), False),
-    _Limb("pelvis", ("hip", "knee", "ankle"), (0.0, -1.0, 0.0), True),
+    _Limb("spine3", ("shoulder", "elbow", "wrist"), (0.0, -1.0, 0.0), False, True),
+    _Limb("pelvis", ("hip", "knee", "ankle"), (0.0, -1.0, 0.0), True, False),
 )
 
 
@@ -81,8 +85,10 @@ class BodyPoints:
 class _Build:
     """Rotations in the world of each joint, and how sure each is, while they are made."""
 
-    def __init__(self, body: BodyPoints) -> None:
+    def __init__(self, body: BodyPoints, completed: Mapping[str, np.ndarray] | None = None) -> None:
         self.body, self.notes = body, []
+        self.completed = completed or {}
+        self.unseen: list[Bone] = []
         self.points = {name: point_T3.astype(np.float64) for name, point_T3 in body.points.items()}
         self.frames = len(next(iter(self.points.values())))
         self.world: dict[str, np.ndarray] = {}
@@ -125,13 +131,11 @@ def motion_from_points(
         UserError: neither points nor turns tell how the chest is turned, in any frame.
     """
     build = _Build(body)
-    _trunk(build, what or name)
-    for limb in _LIMBS:
-        for side in SIDES:
-            _limb(build, limb, side)
-    _head(build)
+    local_TJ33 = _assemble(build, what or name)
+    if build.unseen:
+        build = _Build(body, complete(local_TJ33, frame_rate, _given(build), build.unseen))
+        local_TJ33 = _assemble(build, what or name)
     world = build.world
-    local_TJ33 = local_rotations(np.stack([world[joint] for joint in JOINT_NAMES], axis=1))
     sure_TJ = np.stack([build.sure.get(joint, build.sure["spine3"]) for joint in POSED_JOINT_NAMES], axis=1)
     pelvis_T33 = world["pelvis"]
     position_T3 = None
@@ -150,6 +154,24 @@ def motion_from_points(
         notes=(*notes, *build.notes),
         confidence_TJ=None if (sure_TJ == 1).all() else np.clip(sure_TJ.astype(np.float32), 0.0, 1.0),
     )
+
+
+def _assemble(build: _Build, what: str) -> np.ndarray:
+    """Local rotations (T, 21, 3, 3) of all joints."""
+    _trunk(build, what)
+    for limb in _LIMBS:
+        for side in SIDES:
+            _limb(build, limb, side)
+    _head(build)
+    return local_rotations(np.stack([build.world[joint] for joint in JOINT_NAMES], axis=1))
+
+
+def _given(build: _Build) -> list[str]:
+    """Keypoints that a source tells in some frame, of trunk, limbs and head."""
+    hidden = {bone.end for bone in build.unseen}
+    limbs = [f"{side}_{joint}" for limb in _LIMBS for joint in limb.joints for side in SIDES]
+    told = [name for name in limbs if name not in hidden and build.known(name).any()]
+    return [*told, *(["head"] if build.sure["head"].any() else [])]
 
 
 def _trunk(build: _Build, what: str) -> None:
@@ -186,13 +208,18 @@ def _limb(build: _Build, limb: _Limb, side: str) -> None:
             known_T &= norm(seen_T3) > 1e-6
         if known_T.any():
             directions.append(fill_directions(normalize(np.nan_to_num(seen_T3)), known_T))
+        elif end in build.completed:
+            directions.append(build.completed[end])
         else:  # hangs, or goes on in the line of the upper bone
+            if limb.completed:
+                build.unseen.append(Bone(start, end, limb.carrier))
             directions.append(directions[0] if directions else np.tile(limb.hangs, (build.frames, 1)))
         known.append(known_T)
         build.sure[start] = build.surety(known_T, start, end)
         if not known_T.all():
             what = "is never seen" if not known_T.any() else f"is not seen in {_count(~known_T)}"
-            build.notes.append(f"{_words(start)} to {_words(end)} {what}: filled in, confidence 0")
+            how = "completed by the body prior" if end in build.completed else "filled in"
+            build.notes.append(f"{_words(start)} to {_words(end)} {what}: {how}, confidence 0")
     upper_T3, lower_T3 = directions
     own_T3 = build.body.hinges.get(upper)
     own_T3 = None if own_T3 is None else turned(carrier_T33.mT, own_T3.astype(np.float64))

@@ -7,6 +7,7 @@ https://mujoco.readthedocs.io/en/stable/XMLreference.html
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 import warnings
@@ -68,7 +69,7 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
         UserError: MuJoCo is not installed or refuses the model, or there is no joint in it.
     """
     try:
-        import mujoco  # pyright: ignore[reportMissingImports] (an extra)
+        mujoco: Any = importlib.import_module("mujoco")  # an extra, whose types differ between versions
     except ImportError as error:
         raise UserError(
             f"{path}: is a MuJoCo model, and MuJoCo is not installed: pip install 'mrhubo[mjcf]', or name a URDF"

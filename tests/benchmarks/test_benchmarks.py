@@ -30,6 +30,7 @@ SCRIPTS = [
     "confidence",
     "discovery",
     "inference",
+    "missing_points",
     "pair_pictures",
     "pair_quality",
     "pairing",
@@ -221,6 +222,14 @@ def test_inference(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> 
     over = {(row[0], row[1].removesuffix(" (numpy)")): float(row[4]) for row in rows(text, "motion")}
     assert over["wide", "10 steps"] < over["wide", "1 step"] < over["wide", "network"]
     assert "left out: mink: is not installed" in text and "left out: closed form of seven-joint arms: no arm" in text
+
+
+def test_missing_points(run: Run, root: Path, tmp_path: Path) -> None:
+    shutil.copy(root / "data" / "motions" / "wave.npz", tmp_path)
+    text = run("missing_points", "--motions", tmp_path, "--gaps", 1, "--rate", 4)
+    found = {row[0]: [float(cell) for cell in row[1:]] for row in rows(text, "filled in by")}
+    assert len(found) == 9 and found["body prior, nothing away"][1] < 10 < found["hanging"][1]
+    assert found["body prior, wrist away"][0] < 10 and found["forearm in line"][0] == pytest.approx(0, abs=0.1)
 
 
 def test_polish(run: Run, package: Path, tmp_path: Path) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import torch
 from torch import Tensor
 
 from mrhubo import UserError
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton
+from mrhubo.motion import read_motion, resample
 from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.rotation import axis_angle_to_matrix, geodesic_distance, random_axes
 
@@ -97,9 +100,46 @@ def test_points_that_are_never_seen() -> None:
     body = body_of(random_poses(1))
     points = {name: point for name, point in body.points.items() if not name.startswith("left_wrist")}
     motion = motion_from_points(BodyPoints(points, body.turns), "test", 30.0, "a test")
-    assert "left elbow to left wrist is never seen" in " ".join(motion.notes)
+    assert "left elbow to left wrist is never seen: completed by the body prior" in " ".join(motion.notes)
     assert motion.confidence_TJ is not None
     assert not motion.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")].any()
     assert bool(motion.local_TJ33.isfinite().all())
+    others = {name: point for name, point in points.items() if name.endswith(("shoulder", "hip"))}
+    alone = motion_from_points(BodyPoints(others), "test", 30.0, "a test")
+    assert sum("completed by the body prior" in note for note in alone.notes) == 4
+    assert bool(alone.local_TJ33.isfinite().all())
     with pytest.raises(UserError, match="chest"):
         motion_from_points(BodyPoints({"left_hip": body.points["left_hip"]}), "test", 30.0, "a test")
+
+
+def limb_errors(found: Tensor, pose: Tensor, side: str) -> Tensor:
+    """Angles (T, 2) [deg] of upper arm and forearm, seen from the chest."""
+    directions = []
+    for local in (found, pose):
+        point, turn = Skeleton().double().keypoints_and_rotations(local.double())
+        places = [KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("shoulder", "elbow", "wrist")]
+        bones = torch.nn.functional.normalize(point[:, places].diff(dim=1), dim=-1)
+        directions.append(bones @ turn[:, JOINT_NAMES.index("spine3")])
+    return torch.rad2deg(torch.arccos((directions[0] * directions[1]).sum(-1).clamp(-1, 1)))
+
+
+def test_a_forearm_that_is_never_seen_is_nearer_than_one_in_line(root: Path) -> None:
+    """Of people who move, elbows are bent; nothing turns fast between the frames that the prior was asked for."""
+    pose = resample(read_motion(root / "data" / "motions" / "boxing.npz"), 10.0).local_TJ33[:60].double()
+    body = body_of(pose, with_turns=False)
+    hidden = ("left_wrist", "left_thumb", "left_index", "left_middle", "left_pinky")
+    points = {name: point for name, point in body.points.items() if name not in hidden}
+    motion = motion_from_points(BodyPoints(points), "test", 10.0, "a test")
+    upper_T, forearm_T = limb_errors(motion.local_TJ33, pose, "left").unbind(1)
+    in_line = arm_in_line(pose)
+    assert float(forearm_T.mean()) < 0.6 * float(in_line.mean())
+    seen = torch.cat((upper_T, limb_errors(motion.local_TJ33, pose, "right").flatten()))
+    assert float(seen.max()) < 5.0, "what is seen stays as it is, but for the bend of the back that points do not tell"
+
+
+def arm_in_line(pose: Tensor) -> Tensor:
+    """How far (T,) [deg] the left elbow is bent."""
+    point = Skeleton().double().keypoints(pose)
+    places = [KEYPOINT_NAMES.index(f"left_{joint}") for joint in ("shoulder", "elbow", "wrist")]
+    upper_T3, forearm_T3 = torch.nn.functional.normalize(point[:, places].diff(dim=1), dim=-1).unbind(1)
+    return torch.rad2deg(torch.arccos((upper_T3 * forearm_T3).sum(-1).clamp(-1, 1)))

@@ -72,4 +72,4 @@ def _camera(file: Path, arrays: SmplArrays) -> tuple[np.ndarray, np.ndarray]:
     place_S3 = place[frames].astype(np.float64)
     if turn_S133 is None or not np.isfinite(place_S3).all():
         raise UserError(f"{file}: holds NaN, infinite numbers, or what is no rotation")
-    return turn_S133[:, 0].double().numpy(), place_S3
+    return turn_S133[:, 0].astype(np.float64), place_S3
