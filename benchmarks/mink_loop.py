@@ -9,9 +9,11 @@ Legend: D directions, N joints.
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import torch
-from lxml import etree
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.robot import BodyMap
 from mrhubo.robot.keypoints import Axis, Limb
@@ -35,8 +37,7 @@ class MinkLoop:
         Raises:
             NoLoop: a limb does not run from link to link, the chest moves, or a joint is held away from 0.
         """
-        import mink  # pyright: ignore[reportMissingImports]
-        import mujoco  # pyright: ignore[reportMissingImports]
+        mink, mujoco = import_module("mink"), import_module("mujoco")
 
         robot = body_map.robot
         limbs = [limb for limb in body_map.directions if isinstance(limb, Limb)]
