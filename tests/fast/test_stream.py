@@ -136,7 +136,7 @@ def test_who_touches_gives_way_as_in_pytorch(
     stream = FastStream(make_fast(name, "numpy"), rate=10, settings=StreamSettings(avoid_collisions=False))
     shown = np.stack([stream.joints(pose.numpy()) for pose in motion])
     touching = make(name).collision.collides
-    before, after = (float(touching(torch.from_numpy(q)).float().sum()) for q in (shown, wanted))
+    before, after = (float(touching(torch.from_numpy(q).float()).float().sum()) for q in (shown, wanted))
     assert before > 4 * after and before >= 2
 
 
