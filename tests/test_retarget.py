@@ -124,7 +124,7 @@ def test_the_robot_gives_way_unless_told_otherwise(root: Path, tmp_path: Path) -
             ["--robot", "nao", "--motion", "a.npz", "--out", "a.csv", "--joint-order", "none.txt"],
             "none.txt: there is no",
         ),
-        (["--robot", "nobody", "--motion", "a.npz", "--out", "a.csv"], "config 'nobody' does not exist"),
+        (["--robot", "nobody", "--motion", "a.npz", "--out", "a.csv"], "'nobody' is no file"),
         (["--retargeter", "nobody", "--motion", "a.npz", "--out", "a.csv"], "nobody: is no package"),
     ],
 )

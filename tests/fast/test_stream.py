@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +24,7 @@ from mrhubo.fast.engines import FORMS
 from mrhubo.motion import read_motion
 from mrhubo.retargeter import Retargeter
 from mrhubo.streaming import Stream
+from tests.fast.exact import double, in_double
 
 SAME_RAD = 1e-5
 """PyTorch works in float64 in this comparison, but the networks' answers, from which one of the two followed answers
@@ -78,22 +77,6 @@ def irregular(seen: Tensor) -> Frames:
         frames[frame] = None, frames[frame][1]
     frames[22] = broken, frames[22][1]
     return frames
-
-
-def in_double(retargeter: Retargeter) -> Retargeter:
-    """The same in float64; collision shapes are read in float32 before."""
-    assert retargeter.avoidance.collision is retargeter.collision
-    return copy.deepcopy(retargeter).double()
-
-
-@contextmanager
-def double() -> Iterator[None]:
-    """PyTorch works in float64."""
-    torch.set_default_dtype(torch.float64)
-    try:
-        yield
-    finally:
-        torch.set_default_dtype(torch.float32)
 
 
 @pytest.mark.parametrize(

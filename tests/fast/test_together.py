@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -22,6 +21,7 @@ from mrhubo.motion import Motion, resample
 from mrhubo.reference import trajectory
 from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.clip import join_frames
+from tests.fast.exact import double, in_double
 
 RATE = 40.0
 SAME_RAD = 1e-5
@@ -48,10 +48,11 @@ def fast(retargeter: Retargeter, request: pytest.FixtureRequest) -> FastRetarget
 
 def wanted(retargeter: Retargeter, fast: FastRetargeter, motion: Motion) -> np.ndarray:
     """What PyTorch makes of the same answers, in float64."""
-    exact = copy.deepcopy(retargeter).double()
-    target_TD3 = exact.body_map.human_directions(motion.local_TJ33.double())
-    start_TN = torch.from_numpy(fast.predict(motion, 10, avoid_collisions=False)).double()
-    return join_frames(exact.directions, start_TN, target_TD3, motion.frame_rate, exact.avoidance).numpy()
+    exact, start_TN = in_double(retargeter), fast.predict(motion, 10, avoid_collisions=False)
+    with double():
+        target_TD3 = exact.body_map.human_directions(motion.local_TJ33.double())
+        start_TN = torch.from_numpy(start_TN).double()
+        return join_frames(exact.directions, start_TN, target_TD3, motion.frame_rate, exact.avoidance).numpy()
 
 
 def test_a_motion_is_pytorchs(fast: FastRetargeter, retargeter: Retargeter, motion: Motion) -> None:
@@ -110,7 +111,7 @@ def test_windows(make: Callable[[str], Retargeter], motion: Motion, monkeypatch:
         monkeypatch.setattr(module, "AHEAD", 15)
     found = fast(motion).q
     assert np.abs(found - wanted(nao, fast, motion)).max() < SAME_RAD
-    assert 0 < np.abs(found - whole).max() < 0.2
+    assert np.abs(found - whole).max() > 0
 
 
 @pytest.fixture(scope="module")
