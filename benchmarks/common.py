@@ -15,13 +15,18 @@ from mrhubo.runtime.tables import markdown
 
 
 def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list[str]]:
-    """Values of the leading `--name VALUE` arguments (in `defaults`, without the dashes), and the arguments left."""
-    while argv and argv[0].startswith("--"):
-        name = argv[0].removeprefix("--")
-        if name not in defaults or len(argv) == 1:
-            sys.exit(f"{argv[0]}: is unknown or lacks its value; there are --{', --'.join(defaults)}")
-        defaults[name], argv = argv[1], argv[2:]
-    return defaults, argv
+    """Values of the `--name VALUE` arguments (in `defaults`, without the dashes), and the arguments besides."""
+    others = []
+    while argv:
+        word, *argv = argv
+        if not word.startswith("--"):
+            others.append(word)
+            continue
+        name = word.removeprefix("--")
+        if name not in defaults or not argv:
+            sys.exit(f"{word}: is unknown or lacks its value; there are --{', --'.join(defaults)}")
+        defaults[name], *argv = argv
+    return defaults, others
 
 
 def print_header() -> None:

@@ -33,6 +33,8 @@ _STANDING = 2
 _TURN, _TURNED = 0.5, 0.1
 """Radians by which it is turned, and how much of that a direction must turn along: a wrist's point is a little off the
 axis of the forearm's twist."""
+_MOST_NAMED = 24
+"""Joints that a sentence names: all of two arms, a neck and a waist, and not a thousand."""
 _NOTHING = 1e-4
 """Change of a unit direction that counts as none."""
 
@@ -112,11 +114,13 @@ def name_unlisted(body_map: BodyMap) -> None:
     free = [joints[name] for name in between if name not in driven and joints[name].rotary and not joints[name].mimic]
     missing = [joint for joint in free if _turns(body_map, joint)]
     if missing:
-        names = [joint.name for joint in missing]
+        names = [joint.name for joint in missing[:_MOST_NAMED]]
         angles = ", ".join(f"{name}: {robot.held[name]:g}" for name in names)
+        more = f" and {len(missing) - len(names)} more" if len(missing) > len(names) else ""
+        angles += ", ..." if more else ""
         _warn(
-            f"robot.joints: {quoted(names)} would turn body parts of robot.keypoints, and are not listed, so they "
-            f"never move; list them, or say that this is meant: hold: {{{angles}}}"
+            f"robot.joints: {quoted(names)}{more} would turn body parts of robot.keypoints, and are not listed, so "
+            f"they never move; list them, or say that this is meant: hold: {{{angles}}}"
         )
 
 

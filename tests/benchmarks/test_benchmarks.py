@@ -29,6 +29,7 @@ SCRIPTS = [
     "collisions",
     "confidence",
     "discovery",
+    "files",
     "inference",
     "missing_points",
     "pair_pictures",
@@ -300,11 +301,20 @@ def test_stream(run: Run, package: Path, clips: Path) -> None:
     assert all(row[4] == "0" and row[5] == "0.0%" for row in found if row[1] == "stream")
 
 
+def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = importlib.import_module("files")
+    monkeypatch.setattr(files, "_SECONDS", 1)
+    monkeypatch.setattr(files, "numba_is_there", lambda: False)  # it would compile for a minute
+    found = rows(run("files", package, "--rounds", 1), "file")
+    assert [row[3] for row in found] == ["PyTorch", "NumPy"]
+    assert all(float(row[4]) > 0 for row in found)
+
+
 def test_collisions(run: Run, package: Path, clips: Path) -> None:
     text = run("collisions", package, "--motions", clips, "--rate", 10, "--rounds", 2, "--random", 300)
     found = rows(text, "answers of")
     assert [row[:2] for row in found[::2]] == [[name, "no"] for name in ("frames", "whole motions", "streams")]
-    assert all(row[3] == "0" and row[5] == "0.00%" for row in found[3:])
+    assert all(row[4] == "0" and row[5] == "0.00%" for row in found[2:])
     assert [row[1] for row in rows(text, "form")[:2]] == ["stay", "give way"]
 
 

@@ -277,7 +277,9 @@ def _wrist(
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
 
 
-def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> tuple[np.ndarray, str, float]:
+def limb_end(
+    bodies: Bodies, last: Step, start_3: np.ndarray, usual: float, called: str = "wrist"
+) -> tuple[np.ndarray, str, float]:
     """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
 
     Args:
@@ -285,6 +287,7 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         last: the last joint.
         start_3: where the limb starts.
         usual: how long it should be about [m].
+        called: what the end is called.
     """
     inside, onward = bodies.links_of[last.end], bodies.onward(last)
     if onward:
@@ -306,21 +309,21 @@ def limb_end(bodies: Bodies, last: Step, start_3: np.ndarray, usual: float) -> t
         if reach > _OUT * usual:
             return (
                 start_3 + reach * out_3,
-                "the end of the forearm's collision shape, as no joint tells the wrist",
+                f"the end of the limb's collision shape, as no joint tells the {called}",
                 0.45,
             )
     far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
     if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
-        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the wrist", 0.45
+        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the {called}", 0.45
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
         return (
             start_3 + 2 * (centre_3 - start_3),
-            "twice as far as the centre of mass, as no joint tells the wrist",
+            f"twice as far as the centre of mass, as no joint tells the {called}",
             0.4,
         )
     return (
         start_3 + usual * unit(bodies.position(last.outer_link) - start_3),
-        "a guess, as nothing tells the wrist",
+        f"a guess, as nothing tells the {called}",
         0.1,
     )

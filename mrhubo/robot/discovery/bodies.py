@@ -199,16 +199,23 @@ class Bodies:
 
     def extent(self, step: Step) -> float:
         """How far the longest chain reaches beyond a joint, from body to body along joint origins and link ends [m]."""
-        key = (step.start, step.hinge.name)
-        if key not in self._extents:
-            here_3 = self.position(step.outer_link)
-            own = max(float(np.linalg.norm(self.position(link) - here_3)) for link in self.links_of[step.end])
+        if _key(step) in self._extents:
+            return self._extents[_key(step)]
+        pending = [step]  # not a function that calls itself: a file may have thousands of joints in a row
+        while pending:
+            here = pending[-1]
+            onward = self.onward(here)
+            if missing := [on for on in onward if _key(on) not in self._extents]:
+                pending += missing
+                continue
+            pending.pop()
+            here_3 = self.position(here.outer_link)
+            own = max(float(np.linalg.norm(self.position(link) - here_3)) for link in self.links_of[here.end])
             further = [
-                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self.extent(on)
-                for on in self.onward(step)
+                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self._extents[_key(on)] for on in onward
             ]
-            self._extents[key] = max([own, *further])
-        return self._extents[key]
+            self._extents[_key(here)] = max([own, *further])
+        return self._extents[_key(step)]
 
     def chain(self, step: Step) -> Chain:
         """The limb that begins with a joint: outwards until it ends, or branches into what is alike (fingers)."""
@@ -255,6 +262,10 @@ class Bodies:
         """Longest distance between two link origins [m], about that of a box around them."""
         points = np.stack([self.position(link) for link in self.body_of])
         return max(float(np.linalg.norm(points.max(0) - points.min(0))), 1e-6)
+
+
+def _key(step: Step) -> tuple[int, str]:
+    return step.start, step.hinge.name
 
 
 def read_bodies(description: Description) -> Bodies:

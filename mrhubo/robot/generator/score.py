@@ -17,6 +17,9 @@ _UPRIGHT, _POINTING, _ACROSS = 3.0, 10.0, 15.0
 """Degrees by which up and forward, fingers, and a thumb may be off."""
 _ALONG = 5.0
 """Degrees by which a forearm may be off whose wrist no joint tells."""
+_CHAINS = {"left_arm": "left_hand", "right_arm": "right_hand", "neck": "neck"}
+"""The part that a question about a chain's joints names."""
+_ELBOWS = {f"{side}_wrist": f"{side}_elbow" for side in ("left", "right")}
 
 
 def mistakes(found: Discovery, truth: Humanoid, urdf: Path) -> list[str]:
@@ -46,11 +49,11 @@ def _heading(found: Discovery, truth: Humanoid) -> Iterator[str]:
 
 
 def _joints(found: Discovery, truth: Humanoid) -> Iterator[str]:
-    for chain in ("left_arm", "right_arm", "neck"):
+    for chain, part in _CHAINS.items():
         chosen, right = found.chains.get(chain, ()), truth.chains[chain]
         # Without a joint beyond the elbow that turns a hand, nothing is lost by one.
         if set(chosen) != set(right):
-            yield f"{chain.replace('_arm', '_hand')}: {sorted(set(chosen) ^ set(right))}"
+            yield f"{part}: {sorted(set(chosen) ^ set(right))}"
 
 
 def _points(found: Discovery, truth: Humanoid) -> Iterator[str]:
@@ -62,8 +65,8 @@ def _points(found: Discovery, truth: Humanoid) -> Iterator[str]:
             yield f"{name}: not found"
             continue
         point_3 = np.array(found.points[name].root_3)
-        if name.endswith("wrist") and truth.wrist_swings == 0:
-            elbow = name.replace("wrist", "elbow")
+        if name in _ELBOWS and truth.wrist_swings == 0:
+            elbow = _ELBOWS[name]
             off = _degrees(point_3 - np.array(found.points[elbow].root_3), true_3 - points[elbow])
             if off > _ALONG:
                 yield f"{name}: {off:.0f} degrees off, seen from the elbow"
