@@ -9,6 +9,7 @@ Legend: B random poses, D directions, N joints.
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -112,11 +113,11 @@ def name_unlisted(body_map: BodyMap) -> None:
     joints, driven = robot.description.joints, {*robot.driven_joints, *robot.joint_names, *robot.hold}
     between = dict.fromkeys(name for link in links for name in reversed(tree.movable(link)) if name not in carrying)
     free = [joints[name] for name in between if name not in driven and joints[name].rotary and not joints[name].mimic]
-    missing = [joint for joint in free if _turns(body_map, joint)]
+    missing = list(itertools.islice((joint for joint in free if _turns(body_map, joint)), _MOST_NAMED + 1))
     if missing:
         names = [joint.name for joint in missing[:_MOST_NAMED]]
         angles = ", ".join(f"{name}: {robot.held[name]:g}" for name in names)
-        more = f" and {len(missing) - len(names)} more" if len(missing) > len(names) else ""
+        more = " and more" if len(missing) > len(names) else ""
         angles += ", ..." if more else ""
         _warn(
             f"robot.joints: {quoted(names)}{more} would turn body parts of robot.keypoints, and are not listed, so "
