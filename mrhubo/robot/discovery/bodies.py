@@ -13,9 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mrhubo.errors import UserError
 from mrhubo.robot.discovery.lines import Line
-from mrhubo.robot.joint import ROTARY, drive
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import Description
 
@@ -103,6 +101,7 @@ class Bodies:
     """By link."""
     hinges: tuple[Hinge, ...]
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
+    _nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
     _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -219,18 +218,23 @@ class Bodies:
 
     def chain(self, step: Step) -> Chain:
         """The limb that begins with a joint: outwards until it ends, or branches into what is alike (fingers)."""
-        found = [step]
-        while True:
-            onward = [on for on in self.onward(found[-1]) if not self._idle(on)]
-            if not onward:
-                return tuple(found)
-            reach = {on.hinge.name: self._reach(found[-1], on) for on in onward}
+        found: dict[tuple[int, str], Step] = {}
+        on: Step | None = step
+        while on is not None and _key(on) not in found:
+            found[_key(on)] = on
+            on = self._next(on)
+        return tuple(found.values())
+
+    def _next(self, step: Step) -> Step | None:
+        """The joint with which a limb goes on; None where it ends or branches."""
+        key = _key(step)
+        if key not in self._nexts:
+            onward = [on for on in self.onward(step) if not self._idle(on)]
+            reach = {on.hinge.name: self._reach(step, on) for on in onward}
             onward.sort(key=lambda on: (-reach[on.hinge.name], on.hinge.name))
-            longest = reach[onward[0].hinge.name]
-            rest = [on for on in onward[1:] if _DOMINANT * reach[on.hinge.name] > longest]
-            if rest or onward[0] in found:
-                return tuple(found)
-            found.append(onward[0])
+            alike = [on for on in onward[1:] if _DOMINANT * reach[on.hinge.name] > reach[onward[0].hinge.name]]
+            self._nexts[key] = onward[0] if onward and not alike else None
+        return self._nexts[key]
 
     def _reach(self, last: Step, on: Step) -> float:
         return self.extent(on) + float(np.linalg.norm(self.position(on.outer_link) - self.position(last.outer_link)))
@@ -266,49 +270,3 @@ class Bodies:
 
 def _key(step: Step) -> tuple[int, str]:
     return step.start, step.hinge.name
-
-
-def read_bodies(description: Description) -> Bodies:
-    """The bodies of a robot. Joints whose numbers cannot be used are taken as fixed where they stand."""
-    below: dict[str, list[str]] = {}
-    for joint in description.joints.values():
-        below.setdefault(joint.parent, []).append(joint.name)
-    pose_44, body_of, order = {description.root: np.eye(4)}, {description.root: 0}, [description.root]
-    hinges: list[Hinge] = []
-    sources = _sources(description)
-    for link in order:
-        for name in below.get(link, []):
-            joint = description.joints[name]
-            child_44 = pose_44[link] @ joint.origin_44
-            pose_44[joint.child] = child_44
-            order.append(joint.child)
-            if (
-                joint.kind not in (*ROTARY, "prismatic")
-                or name in description.faults
-                or _stuck(joint.lower, joint.upper)
-            ):
-                body_of[joint.child] = body_of[link]
-                continue
-            body_of[joint.child] = max(body_of.values()) + 1
-            line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
-            hinges.append(Hinge(
-                name, line, joint.rotary, (body_of[link], body_of[joint.child]), joint.lower, joint.upper,
-                joint.mimic is None, name in sources, (link, joint.child),
-            ))  # fmt: skip
-    return Bodies(description, pose_44, body_of, tuple(hinges))
-
-
-def _stuck(lower: float | None, upper: float | None) -> bool:
-    """Whether limits leave a joint no way to move."""
-    return lower is not None and upper is not None and upper - lower < 1e-3
-
-
-def _sources(description: Description) -> set[str]:
-    found = set()
-    for joint in description.joints.values():
-        if joint.mimic is not None:
-            try:
-                found.add(drive(description.joints, joint.name).joint)
-            except UserError:  # told where it matters
-                continue
-    return found

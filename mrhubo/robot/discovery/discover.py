@@ -11,12 +11,13 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step, read_bodies
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
 from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
+from mrhubo.robot.discovery.reading import read_bodies
 from mrhubo.robot.discovery.result import (
     Candidate,
     Discovery,
