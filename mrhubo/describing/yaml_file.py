@@ -15,13 +15,12 @@ from typing import Any
 from mrhubo.config import flow_yaml
 from mrhubo.errors import listed, printable
 from mrhubo.robot.discovery import Discovery, FoundEnd
+from mrhubo.robot.entries import DEFAULT_AXES
 from mrhubo.robot.parts import CHEST, PARTS, LimbPart, OrientedPart
 
 _WIDTH = 120
 _FINE = 1e5
 """Parts of a metre or a radian that are written."""
-_DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
-"""What an entry may leave out."""
 _HEAD = """\
 # What `mrhubo describe` found in {source}. Look at {picture}, beside this file, first. Every entry may be changed:
 #   mrhubo describe {file}  # draws the picture anew
@@ -142,7 +141,7 @@ def point_entry(link: str, offset_3: Sequence[float]) -> str | dict[str, Any]:
 def end_entry(end: FoundEnd) -> str | dict[str, Any]:
     """The entry of an oriented part."""
     axes = _axes(end)
-    if all(axes[word] == list(_DEFAULT_AXES.get(word, ())) for word in axes):
+    if all(axes[word] == list(DEFAULT_AXES.get(word, ())) for word in axes):
         return end.link
     return {"link": end.link, **axes}
 

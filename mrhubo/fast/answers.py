@@ -15,8 +15,6 @@ from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.problem import Problem
 
 NO_ROTATION = "a matrix that is no rotation"
-SKEW = 1e-2
-"""How far R^T R may be from the identity, as for `mrhubo.motion.read_poses`."""
 CHUNK = 2_048
 """Frames that are worked on at a time."""
 

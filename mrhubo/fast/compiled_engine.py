@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mrhubo.fast.answers import CHUNK, NO_ROTATION, SKEW, Answers
+from mrhubo.fast.answers import CHUNK, NO_ROTATION, Answers
 from mrhubo.fast.description import Description
 from mrhubo.fast.kept import is_kept, note_kept
 from mrhubo.fast.plain import judging, networks, steps
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.plain.steps import Model
 from mrhubo.fast.poses import NOT_FINITE
+from mrhubo.fast.rotations import SKEW
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.banded import Banded, Solve
 from mrhubo.fast.together.problem import Problem, make_problem

@@ -10,13 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.fast.answers import CHUNK, NO_ROTATION, SKEW, Answers, Engine
+from mrhubo.fast.answers import CHUNK, NO_ROTATION, Answers, Engine
 from mrhubo.fast.compiled_engine import CompiledEngine
 from mrhubo.fast.description import Description
 from mrhubo.fast.kept import numba_is_there
 from mrhubo.fast.plain import collision, human, judging, networks, robot, steps
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.poses import NOT_FINITE
+from mrhubo.fast.rotations import are_crooked
 from mrhubo.fast.together.avoiding import GivingWay, make_giving_way
 from mrhubo.fast.together.banded import halve
 from mrhubo.fast.together.problem import Problem, make_problem
@@ -36,10 +37,7 @@ class NumpyEngine:
         infinite_B = ~np.isfinite(local_BJ33).all(axis=(1, 2, 3))
         if infinite_B.any():
             return int(infinite_B.argmax()), NOT_FINITE
-        off_BJ33 = np.abs(local_BJ33.swapaxes(-1, -2) @ local_BJ33 - np.eye(3, dtype=np.float32))
-        third_BJ3 = human.cross(local_BJ33[..., 0], local_BJ33[..., 1])
-        mirrored_B = ((third_BJ3 * local_BJ33[..., 2]).sum(-1) < 0).any(axis=1)
-        wrong_B = mirrored_B | (off_BJ33 > SKEW).any(axis=(1, 2, 3))
+        wrong_B = are_crooked(local_BJ33).any(axis=1)
         return (int(wrong_B.argmax()), NO_ROTATION) if wrong_B.any() else None
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:

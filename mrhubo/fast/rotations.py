@@ -12,7 +12,7 @@ from mrhubo.fast.plain.judging import quaternions
 
 _SMALL = 1e-6
 """Angle [rad] under which the first order of a rotation is exact to half of a float64's digits."""
-_SKEW = 1e-2
+SKEW = 1e-2
 """How far R^T R may be from the identity: half precision and rounded text still pass."""
 
 
@@ -61,7 +61,7 @@ def are_crooked(matrix_X33: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         skew_X = np.abs(matrix_X33.mT @ matrix_X33 - np.eye(3, dtype=matrix_X33.dtype)).max(axis=(-2, -1))
         third_X3 = cross(matrix_X33[..., 0], matrix_X33[..., 1])
-        return ~((skew_X < _SKEW) & ((third_X3 * matrix_X33[..., 2]).sum(-1) > 0))
+        return ~((skew_X < SKEW) & ((third_X3 * matrix_X33[..., 2]).sum(-1) > 0))
 
 
 def turned(matrix_X33: np.ndarray, vector_X3: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton
 from mrhubo.errors import UserError
+from mrhubo.fast.rotations import SKEW
 from mrhubo.motion.checks import MAX_TURN, Turns, check_frame_rate
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
@@ -29,8 +30,6 @@ _MANY = 50
 _CHUNK = 16_384
 """Frames that are checked and converted at a time."""
 _JOINTS = len(POSED_JOINT_NAMES)
-_SKEW = 1e-2
-"""How far R^T R may be from the identity: half precision and rounded text still pass."""
 NOT_FINITE = "NaN or infinite numbers"
 _FLAT = 1e-4
 """Sine of the angle between the two columns of 6D numbers, under which they leave the third open."""
@@ -134,7 +133,7 @@ def _read_matrices(matrix: Tensor, _: Turns) -> tuple[Tensor, Tensor]:
 def are_crooked(matrix: Tensor) -> Tensor:
     """Which (...) of some matrices (..., 3, 3) are no rotations: not orthonormal, mirrors, or not finite."""
     skew = (matrix.mT @ matrix - torch.eye(3).to(matrix)).abs().amax((-2, -1))
-    return ~((skew < _SKEW) & (torch.linalg.det(matrix) > 0))
+    return ~((skew < SKEW) & (torch.linalg.det(matrix) > 0))
 
 
 def _read_sixd(sixd: Tensor, _: Turns) -> tuple[Tensor, Tensor]:

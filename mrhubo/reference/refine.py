@@ -15,7 +15,7 @@ from torch import Tensor
 
 from mrhubo.fast.together.banded import Banded
 from mrhubo.fast.together.bounded import Bounds, bounded_minimum
-from mrhubo.fast.together.refine import PATIENCE
+from mrhubo.fast.together.refine import DAMPING, EASIER, FLOOR, HARDER, LEAST, MOST, PATIENCE
 from mrhubo.reference.banded import factor
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
@@ -52,7 +52,7 @@ def refine(
     """
     model = _motion_quadratic(problem, q_TN, target_TD3, smoothness)
     cost_C = model.cost_BC.double().sum(0)
-    damping_TC = torch.full_like(model.cost_BC, 1e-3)
+    damping_TC = torch.full_like(model.cost_BC, DAMPING)
     failures_C = torch.zeros_like(cost_C)
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
@@ -65,8 +65,8 @@ def refine(
         moved_C = ((trial_TN - q_TN).abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
         settled_C = better_C & (moved_C < tolerance)
         failures_C = torch.where(better_C, torch.where(settled_C, PATIENCE, 0), failures_C + 1)
-        factor_TC = torch.where(trial.cost_BC > model.cost_BC, 10.0, torch.where(better_C, 0.1, 1.0))
-        damping_TC = (damping_TC * factor_TC).clamp(1e-3, 1e6)
+        factor_TC = torch.where(trial.cost_BC > model.cost_BC, HARDER, torch.where(better_C, EASIER, 1.0))
+        damping_TC = (damping_TC * factor_TC).clamp(LEAST, MOST)
         q_TN = torch.where(better_C[problem.blocks.block_N], trial_TN, q_TN)
         cost_C = torch.where(better_C, trial_cost_C, cost_C)
         model = model.where(better_C, problem.blocks.block_N, trial)
@@ -135,7 +135,7 @@ def _motion_step(
         free_TN &= ~fixed_T[:, None]
     bands, damping_TN = smoothness.hessian(q_TN), damping_TC[:, problem.blocks.block_N]
     diagonal_TN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1) + bands[0]
-    diagonal_TN = diagonal_TN + damping_TN * (diagonal_TN + 0.01)
+    diagonal_TN = diagonal_TN + damping_TN * (diagonal_TN + FLOOR)
     diagonal_TN = torch.where(free_TN, diagonal_TN, torch.ones_like(diagonal_TN))
     couplings = [band * (free_TN[lag:] & free_TN[:-lag]) for lag, band in enumerate(bands[1:], start=1)]
     right_TN = -model.gradient_BN * free_TN

@@ -19,11 +19,12 @@ from mrhubo.errors import InputWarning
 from mrhubo.robot.ancestry import Ancestry
 from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.capsules import SHORT
+from mrhubo.robot.discovery.lines import unit
 from mrhubo.robot.entries import Point
 from mrhubo.robot.joint import Joint
 from mrhubo.robot.keypoints import Limb
 from mrhubo.robot.standing import StandingRobot
-from mrhubo.robot.suggestions import point_entry, unit
+from mrhubo.robot.suggestions import point_entry
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap

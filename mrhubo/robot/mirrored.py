@@ -9,10 +9,11 @@ import numpy as np
 
 from mrhubo.errors import InputWarning
 from mrhubo.robot.ancestry import Ancestry
+from mrhubo.robot.discovery.lines import unit
 from mrhubo.robot.entries import End, Point
 from mrhubo.robot.joint import Joint
 from mrhubo.robot.standing import StandingRobot
-from mrhubo.robot.suggestions import axes_entry, oriented, point_entry, unit
+from mrhubo.robot.suggestions import axes_entry, oriented, point_entry
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap

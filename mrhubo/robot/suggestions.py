@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrhubo.robot.capsules import SHORT
 from mrhubo.robot.entries import DEFAULT_AXES, End, Point
 from mrhubo.robot.keypoints import Keypoints
 from mrhubo.robot.parts import OrientedPart
@@ -62,8 +61,3 @@ def numbers(values: Sequence[float]) -> str:
 def quoted(names: Sequence[str]) -> str:
     """``'a', 'b'``."""
     return ", ".join(f"'{name}'" for name in names)
-
-
-def unit(vector_3: np.ndarray) -> np.ndarray:
-    """A vector (3,) at length 1."""
-    return vector_3 / max(float(np.linalg.norm(vector_3)), SHORT)
