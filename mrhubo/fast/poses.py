@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.fast.plain.human import cross, norm, rodrigues
+from mrhubo.fast.plain.human import cross, norm
+from mrhubo.fast.rotations import axis_angle_to_matrix
 
 NOT_FINITE = "NaN or infinite numbers"
 _JOINTS = 21
 _MOST_TURN = 6 * math.pi
 _FLAT = 1e-4
 """As `mrhubo.motion.poses` has them."""
-_SMALL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -109,4 +109,4 @@ def _of_axis_angle(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     vector = array.reshape(len(array), _JOINTS, 3).astype(np.float64)
     angle = norm(vector)
     _refuse_first(~(angle <= _MOST_TURN), array, "no axis-angle in radians (degrees?)", shape)
-    return rodrigues(vector / np.maximum(angle, _SMALL)[..., None], np.sin(angle), np.cos(angle))
+    return axis_angle_to_matrix(vector)
