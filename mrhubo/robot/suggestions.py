@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mrhubo.config import flow_yaml
 from mrhubo.robot.entries import DEFAULT_AXES, End, Point
 from mrhubo.robot.keypoints import Keypoints
 from mrhubo.robot.parts import OrientedPart
@@ -17,8 +18,8 @@ _NEAR = 5e-4
 def point_entry(name: str, point: Point) -> str:
     """``left_wrist: {link: l_lower, offset: [0, 0, -0.22]}``, or the link alone where that says the same."""
     if max(map(abs, point.offset_3)) < _NEAR:
-        return f"{name}: {point.link}"
-    return f"{name}: {{link: {point.link}, offset: {numbers(point.offset_3)}}}"
+        return f"{name}: {flow_yaml(point.link)}"
+    return f"{name}: {{link: {flow_yaml(point.link)}, offset: {numbers(point.offset_3)}}}"
 
 
 def end_entry(name: str, end: End, words: tuple[str, str]) -> str:
@@ -31,8 +32,9 @@ def axes_entry(name: str, link: str, axes: Mapping[str, Sequence[float]]) -> str
     if all(
         word in DEFAULT_AXES and np.allclose(axis_3, DEFAULT_AXES[word], atol=_NEAR) for word, axis_3 in axes.items()
     ):
-        return f"{name}: {link}"
-    return f"{name}: {{link: {link}, {', '.join(f'{word}: {numbers(axis_3)}' for word, axis_3 in axes.items())}}}"
+        return f"{name}: {flow_yaml(link)}"
+    directions = ", ".join(f"{word}: {numbers(axis_3)}" for word, axis_3 in axes.items())
+    return f"{name}: {{link: {flow_yaml(link)}, {directions}}}"
 
 
 def entry(keypoints: Keypoints, name: str, like: str) -> str:
