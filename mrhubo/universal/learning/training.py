@@ -131,11 +131,12 @@ def train(config: UniversalConfig, report: Reporter = SILENT) -> UniversalNetwor
     """Makes the problems, trains, measures, saves the weights with their card, and returns the network."""
     if config.width % config.attention_heads:
         raise UserError(f"width: {config.width} is no multiple of attention_heads, {config.attention_heads}")
-    lightning.seed_everything(config.seed, verbose=False)
     settings = to_plain(config)
     key = fingerprint({k: v for k, v in settings.items() if k not in ("output", "tracking_dir")})
     with Workspace(config.tracking_dir / "fits", "universal", key) as workspace, quiet_lightning():
-        module = UniversalTraining(config, *load_lessons(config, config.tracking_dir / "universal_problems", report))
+        lessons = load_lessons(config, config.tracking_dir / "universal_problems", report)
+        lightning.seed_everything(config.seed, verbose=False)  # whether problems had to be made or not
+        module = UniversalTraining(config, *lessons)
         name = ", ".join(f"{k}={v}" for k, v in changed_settings(config).items()) or "defaults"
         client = open_client(config.tracking_dir, _EXPERIMENT)
         run, _ = take_up_run(client, _EXPERIMENT, workspace, name, {"git_commit": git_commit(Path(__file__).parent)})
