@@ -30,6 +30,8 @@ _WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
 _BESIDE = 0.025
 """How far a jaw's axis passes the hand's line, as a share of the arm."""
+_MEET = 0.005
+"""How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
 _SHORT = 4
 """Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
@@ -83,26 +85,45 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
     """Position of the elbow's hinge: the axis with the longest stretches of the arm on either side of it. None if the
     chain is too short to have one.
     """
-    found = measure(lines_of(chain))
+    scores = _elbow_scores(bodies, chain)
+    return None if scores is None else int(np.argmax(scores))
+
+
+def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
+    """How long the shorter one of the two stretches beside each axis is [m] (N,), with less weight where joints are
+    missing before it; None if there are too few axes, or all meet in one point.
+    """
     if len(chain) < 2:
         return None
+    found = measure(lines_of(chain))
     gap_N = np.diff(found.out_N, append=found.out_N[-1])
-    end_3 = found.nodes_N3[-1]
-    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(chain[-1])[0]])
-    beyond = float(np.linalg.norm(corners - end_3, axis=-1).max())
-    centre_3 = bodies.centre(chain[-1].end)
-    if centre_3 is not None:
-        beyond = max(beyond, 2 * float(np.linalg.norm(centre_3 - end_3)))
-    gap_N[-1] = _HAND * beyond
+    longest = float(gap_N.max())
+    if longest < _LEAST * bodies.size:
+        return None
+    gap_N[-1] = _HAND * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
     scores = np.zeros(len(chain))
     for i in range(1, len(chain)):
         # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
         after = max(gap_N[i : i + 2])
         scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
-    best = int(np.argmax(scores))
-    if gap_N[best - 1] < 1e-3 * bodies.size:
-        return None
-    return best if scores[best] > 0 else int(np.argmax(gap_N[:-1])) + 1
+    if not scores.any():
+        scores[1:] = gap_N[:-1]
+    return scores
+
+
+def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> float:
+    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; as far as is usual where these
+    tell nothing, as where all shapes are meshes.
+    """
+    line = last.hinge.line
+    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(last)[0]])
+    centre_3 = bodies.centre(last.end)
+    if centre_3 is not None:
+        corners = np.vstack([corners, end_3 + 2 * (centre_3 - end_3)])
+    # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
+    own_3 = bodies.position(last.outer_link)
+    corners = corners[np.linalg.norm(corners - own_3, axis=-1) > _ON * bodies.size]
+    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
 
 
 def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
@@ -168,6 +189,8 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
     before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
     if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
         return True
+    if any(float(np.linalg.norm(np.subtract(*feet(line, last)))) < _MEET * arm for line in before):
+        return False  # two axes that cross are a wrist, wherever the forearm's twist passes them
     twists = [
         line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
     ]
@@ -265,7 +288,7 @@ def _wrist(
             links.append(step.outer_link)
         return Spot(point_3, step.start, tuple(links), cue, sure), twist_at
     last = chain[-1]
-    end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper)
+    end_3, how, sure = limb_end(bodies, last, elbow.point_3, elbow.point_3 - shoulder.point_3)
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
@@ -278,7 +301,7 @@ def _wrist(
 
 
 def limb_end(
-    bodies: Bodies, last: Step, start_3: np.ndarray, usual: float, called: str = "wrist"
+    bodies: Bodies, last: Step, start_3: np.ndarray, usual_3: np.ndarray, called: str = "wrist"
 ) -> tuple[np.ndarray, str, float]:
     """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
 
@@ -286,10 +309,10 @@ def limb_end(
         bodies: the robot.
         last: the last joint.
         start_3: where the limb starts.
-        usual: how long it should be about [m].
+        usual_3: where it should end about, as seen from its start (3,) [m]: as the limb before it goes on.
         called: what the end is called.
     """
-    inside, onward = bodies.links_of[last.end], bodies.onward(last)
+    inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
     if onward:
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
@@ -322,8 +345,4 @@ def limb_end(
             f"twice as far as the centre of mass, as no joint tells the {called}",
             0.4,
         )
-    return (
-        start_3 + usual * unit(bodies.position(last.outer_link) - start_3),
-        f"a guess, as nothing tells the {called}",
-        0.1,
-    )
+    return start_3 + usual_3, f"a guess: as long as the limb before it, and straight, as nothing tells the {called}", 0.1
