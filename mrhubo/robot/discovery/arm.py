@@ -36,6 +36,10 @@ _SHORT = 4
 """Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+_CLOSE = 0.8
+"""Second axis's share of the elbow's stretches from which on it may be the elbow as well."""
+GUESS = 0.45
+"""How sure a choice is between two that are about as good: asked about."""
 _ON = 1e-4
 _LEAST = 1e-3
 """How long upper arm and forearm are at least, as a share of the robot."""
@@ -86,7 +90,10 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
     chain is too short to have one.
     """
     scores = _elbow_scores(bodies, chain)
-    return None if scores is None else int(np.argmax(scores))
+    if scores is None:
+        return None
+    near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
+    return max(near, key=lambda i: (min(i, _BEFORE), scores[i]))  # of those about as good, one with a whole shoulder
 
 
 def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
@@ -139,10 +146,18 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     if twist_at is None:
         point_3 = hinge_3 = hinge.nearest(shoulder.point_3)
         cue, sure = "the hinge's point nearest to the shoulder", 0.85
+        forearm_at = _forearm_twist(lines, elbow_at, math.dist(point_3, shoulder.point_3))
+        if forearm_at is not None:
+            # Along its hinge the elbow lies where the forearm does: the shoulder's axes may cross beside both.
+            point_3 = hinge_3 = feet(hinge, lines[forearm_at])[0]
+            cue = "where the forearm's twist axis is nearest to the hinge"
     else:
         point_3, hinge_3 = feet(lines[twist_at], hinge)
         cue = f"where the hinge of '{chain[elbow_at].hinge.name}' is nearest to the upper arm's twist axis"
         sure = 0.95
+    rival = _rival(bodies, chain, elbow_at)
+    if rival is not None:
+        cue, sure = f"{cue}; '{rival}' may as well be the elbow", GUESS
     step = chain[elbow_at]
     on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < _ON * bodies.size
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
@@ -151,6 +166,21 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
         return None
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
+
+
+def _rival(bodies: Bodies, chain: Chain, elbow_at: int) -> str | None:
+    """The joint that may be the elbow as well, if one has stretches about as long on either side. Beyond an elbow
+    that has a whole shoulder before it, a wrist with a long hand is none.
+    """
+    scores = _elbow_scores(bodies, chain)
+    if scores is None:
+        return None
+    if elbow_at >= _BEFORE:
+        scores[elbow_at + 1 :] = 0.0
+    best = float(scores[elbow_at])
+    scores[elbow_at] = 0.0
+    other = int(np.argmax(scores))
+    return chain[other].hinge.name if scores[other] > _CLOSE * best else None
 
 
 def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
@@ -162,7 +192,8 @@ def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str,
     first = 2 if elbow_at is None else elbow_at + 1
     for i in range(first, len(chain)):
         step = chain[i]
-        if _driven(step) and (i >= _SHORT or not step.hinge.free):
+        # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
+        if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.free):
             end = i
         elif i - first >= _WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
@@ -225,6 +256,16 @@ def _twist(lines: list[Line], elbow_at: int) -> int | None:
     return elbow_at - 1 if twist.distance(foot_3) < _TWIST_MISS * upper else None
 
 
+def _forearm_twist(lines: list[Line], elbow_at: int, upper: float) -> int | None:
+    """Position of the forearm's twist, of an arm whose upper arm is so long [m]; None if it has none."""
+    if elbow_at + 1 >= len(lines):
+        return None
+    # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
+    hinge, axis = lines[elbow_at], lines[elbow_at + 1]
+    close = float(np.linalg.norm(np.subtract(*feet(hinge, axis)))) < _TWIST_MISS * upper
+    return elbow_at + 1 if close and sine(hinge.axis_3, axis.axis_3) > 0.5 else None
+
+
 def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | None) -> tuple[Spot, int]:
     """The shoulder's centre, and how many joints before it are a clavicle's."""
     swings = list(range(elbow_at if twist_at is None else twist_at))
@@ -264,13 +305,7 @@ def _wrist(
     """The wrist, and the position of the forearm's twist."""
     upper = float(np.linalg.norm(elbow.point_3 - shoulder.point_3))
     beyond = list(range(elbow_at + 1, len(chain)))
-    twist_at = None
-    if beyond:
-        # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
-        on_hinge_3, on_axis_3 = feet(lines[elbow_at], lines[beyond[0]])
-        close = float(np.linalg.norm(on_hinge_3 - on_axis_3)) < _TWIST_MISS * upper
-        if close and sine(lines[elbow_at].axis_3, lines[beyond[0]].axis_3) > 0.5:
-            twist_at = beyond[0]
+    twist_at = _forearm_twist(lines, elbow_at, upper)
     swings = [i for i in beyond if i != twist_at]
     if swings:
         step, line = chain[swings[0]], lines[swings[0]]
