@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import GUESS, Arm, Spot
+from mrhubo.robot.discovery.arm import GUESS, Arm, doubted
 from mrhubo.robot.discovery.hand import Hand
 
 _LENGTH = 0.05
@@ -18,6 +18,8 @@ _TURNED = math.cos(math.radians(30))
 _FINGERS = math.cos(math.radians(5))
 """The same of fingers, beyond which the zero pose is no mirror image and tells nothing of thumbs (cosine)."""
 
+_OTHER = "; the other side tells another length"
+
 
 def agreeing_arms(arms: Mapping[str, Arm]) -> dict[str, Arm]:
     """The arms, with points less sure that make one side's upper arm or forearm longer than the other's."""
@@ -25,18 +27,14 @@ def agreeing_arms(arms: Mapping[str, Arm]) -> dict[str, Arm]:
     lower = [math.dist(arm.elbow.point_3, arm.wrist.point_3) for arm in arms.values()]
     found = dict(arms)
     if _differ(upper):
-        found = {side: replace(arm, elbow=_doubted(arm.elbow)) for side, arm in found.items()}
+        found = {side: replace(arm, elbow=doubted(arm.elbow, _OTHER)) for side, arm in found.items()}
     if _differ(lower):
-        found = {side: replace(arm, wrist=_doubted(arm.wrist)) for side, arm in found.items()}
+        found = {side: replace(arm, wrist=doubted(arm.wrist, _OTHER)) for side, arm in found.items()}
     return found
 
 
 def _differ(lengths: list[float]) -> bool:
     return max(lengths) - min(lengths) > _LENGTH * max(lengths)
-
-
-def _doubted(spot: Spot) -> Spot:
-    return replace(spot, confidence=min(spot.confidence, GUESS), cue=f"{spot.cue}; the other side tells another length")
 
 
 def agreeing_hands(hands: Mapping[str, Hand], left_3: np.ndarray) -> dict[str, Hand]:

@@ -8,7 +8,7 @@ upper arm, what comes after forearm and hand.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class Spot:
     """Links in which it may be written down: the carrying one, and others in which it stays as well."""
     cue: str
     confidence: float
+
+
+def doubted(spot: Spot, why: str) -> Spot:
+    """A point that is asked about, and why."""
+    return replace(spot, confidence=min(spot.confidence, GUESS), cue=spot.cue + why)
 
 
 @dataclass(frozen=True)
@@ -155,9 +160,6 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
         point_3, hinge_3 = feet(lines[twist_at], hinge)
         cue = f"where the hinge of '{chain[elbow_at].hinge.name}' is nearest to the upper arm's twist axis"
         sure = 0.95
-    rival = _rival(bodies, chain, elbow_at)
-    if rival is not None:
-        cue, sure = f"{cue}; '{rival}' may as well be the elbow", GUESS
     step = chain[elbow_at]
     on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < _ON * bodies.size
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
@@ -165,6 +167,10 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
         return None
+    rival = _rival(bodies, chain, elbow_at)
+    if rival is not None:
+        why = f"; '{rival}' may as well be the elbow"
+        shoulder, elbow, wrist = (doubted(spot, why) for spot in (shoulder, elbow, wrist))
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
@@ -318,6 +324,8 @@ def _wrist(
         else:
             point_3 = line.nearest(elbow.point_3)
             cue, sure = "the point of the wrist's axis nearest to the elbow", 0.75
+            if not bodies.onward(step) and not speaks_of(step.hinge.name, "turn"):
+                cue, sure = f"{cue}, if it is no gripper's jaw", GUESS
         links = [step.inner_link]
         if line.distance(point_3) < _ON * bodies.size:
             links.append(step.outer_link)
