@@ -388,4 +388,8 @@ def limb_end(
             f"twice as far as the centre of mass, as no joint tells the {called}",
             0.4,
         )
-    return start_3 + usual_3, f"a guess: as long as the limb before it, and straight, as nothing tells the {called}", 0.1
+    return (
+        start_3 + usual_3,
+        f"a guess: as long as the limb before it, and straight, as nothing tells the {called}",
+        0.1,
+    )

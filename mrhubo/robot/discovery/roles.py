@@ -195,7 +195,9 @@ def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
             fitting = [
                 s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
             ]
-            fitting = [s for s in fitting if not _is_sensor(bodies, s) and not _has_twin(s, todo, arms.normal_3, middle_3)]
+            fitting = [
+                s for s in fitting if not _is_sensor(bodies, s) and not _has_twin(s, todo, arms.normal_3, middle_3)
+            ]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
             if not fitting or len(chain) >= 4:
                 break
