@@ -13,31 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.elbow import find_elbow, rival
+from mrhubo.robot.discovery.gripper import without_hand
+from mrhubo.robot.discovery.lines import Line, feet, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
-_HAND = 0.5
-"""How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
-_BEFORE, _FEW = 3, 0.8
-"""Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
-below a clavicle."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
 of its length."""
-_WRIST_JOINTS = 3
-"""Joints beyond an elbow that an arm can have: a twist and two swings."""
-_BESIDE = 0.025
-"""How far a jaw's axis passes the hand's line, as a share of the arm."""
-_MEET = 0.005
-"""How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
-_SHORT = 4
-"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
-_CLOSE = 0.8
-"""Second axis's share of the elbow's stretches from which on it may be the elbow as well."""
 GUESS = 0.45
 """How sure a choice is between two that are about as good: asked about."""
 _ON = 1e-4
@@ -90,57 +77,9 @@ class Arm:
         return upper + float(np.linalg.norm(self.wrist.point_3 - self.elbow.point_3))
 
 
-def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
-    """Position of the elbow's hinge: the axis with the longest stretches of the arm on either side of it. None if the
-    chain is too short to have one.
-    """
-    scores = _elbow_scores(bodies, chain)
-    if scores is None:
-        return None
-    near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
-    return max(near, key=lambda i: (min(i, _BEFORE), scores[i]))  # of those about as good, one with a whole shoulder
-
-
-def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
-    """How long the shorter one of the two stretches beside each axis is [m] (N,), with less weight where joints are
-    missing before it; None if there are too few axes, or all meet in one point.
-    """
-    if len(chain) < 2:
-        return None
-    found = measure(lines_of(chain))
-    gap_N = np.diff(found.out_N, append=found.out_N[-1])
-    longest = float(gap_N.max())
-    if longest < _LEAST * bodies.size:
-        return None
-    gap_N[-1] = _HAND * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
-    scores = np.zeros(len(chain))
-    for i in range(1, len(chain)):
-        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
-        after = max(gap_N[i : i + 2])
-        scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
-    if not scores.any():
-        scores[1:] = gap_N[:-1]
-    return scores
-
-
-def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> float:
-    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; as far as is usual where these
-    tell nothing, as where all shapes are meshes.
-    """
-    line = last.hinge.line
-    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(last)[0]])
-    centre_3 = bodies.centre(last.end)
-    if centre_3 is not None:
-        corners = np.vstack([corners, end_3 + 2 * (centre_3 - end_3)])
-    # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
-    own_3 = bodies.position(last.outer_link)
-    corners = corners[np.linalg.norm(corners - own_3, axis=-1) > _ON * bodies.size]
-    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
-
-
 def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     """Roles and points of an arm's joints; None if it has no elbow."""
-    chain, left_out = _without_hand(bodies, chain)
+    chain, left_out = without_hand(bodies, chain)
     elbow_at = find_elbow(bodies, chain)
     if elbow_at is None:
         return None
@@ -167,84 +106,11 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
         return None
-    rival = _rival(bodies, chain, elbow_at)
-    if rival is not None:
-        why = f"; '{rival}' may as well be the elbow"
+    other = rival(bodies, chain, elbow_at)
+    if other is not None:
+        why = f"; '{other}' may as well be the elbow"
         shoulder, elbow, wrist = (doubted(spot, why) for spot in (shoulder, elbow, wrist))
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
-
-
-def _rival(bodies: Bodies, chain: Chain, elbow_at: int) -> str | None:
-    """The joint that may be the elbow as well, if one has stretches about as long on either side. Beyond an elbow
-    that has a whole shoulder before it, a wrist with a long hand is none.
-    """
-    scores = _elbow_scores(bodies, chain)
-    if scores is None:
-        return None
-    if elbow_at >= _BEFORE:
-        scores[elbow_at + 1 :] = 0.0
-    best = float(scores[elbow_at])
-    scores[elbow_at] = 0.0
-    other = int(np.argmax(scores))
-    return chain[other].hinge.name if scores[other] > _CLOSE * best else None
-
-
-def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
-    """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
-    whole = chain
-    chain = without_gripper(chain)
-    end, why = len(chain), "others mimic it, or it slides: a gripper"
-    elbow_at = find_elbow(bodies, chain)
-    first = 2 if elbow_at is None else elbow_at + 1
-    for i in range(first, len(chain)):
-        step = chain[i]
-        # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
-        if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.free):
-            end = i
-        elif i - first >= _WRIST_JOINTS:
-            end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
-        elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
-            end, why = i, "its name says that it belongs to the hand"
-        else:
-            continue
-        break
-    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
-        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
-    return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
-
-
-def _is_jaw(chain: Chain, elbow_at: int) -> bool:
-    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line of the wrist's axes, or
-    parallel to one that swings the wrist already.
-    """
-    lines = lines_of(chain)
-    found = measure(lines)
-    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
-    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
-    if sine(along_3, last.axis_3) < 0.7:
-        return False
-    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
-    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
-        return True
-    if any(float(np.linalg.norm(np.subtract(*feet(line, last)))) < _MEET * arm for line in before):
-        return False  # two axes that cross are a wrist, wherever the forearm's twist passes them
-    twists = [
-        line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
-    ]
-    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
-
-
-def without_gripper(chain: Chain) -> Chain:
-    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
-    and no part of a forearm.
-    """
-    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
-        chain = chain[:-1]
-    return chain
-
-
-def _driven(step: Step) -> bool:
-    return not step.hinge.rotary or step.hinge.drives or not step.hinge.free
 
 
 def _twist(lines: list[Line], elbow_at: int) -> int | None:

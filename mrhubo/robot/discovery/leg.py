@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import Spot, find_elbow, limb_end
+from mrhubo.robot.discovery.arm import Spot, limb_end
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
+from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.lines import Line, feet, sine
 from mrhubo.robot.discovery.names import speaks_of
 

@@ -9,8 +9,10 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.arm import find_elbow, read_arm, without_gripper
+from mrhubo.robot.discovery.arm import read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.elbow import find_elbow
+from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
