@@ -52,10 +52,12 @@ def whole_model(t, work, q_N, cost_C, gradient_N, hessian_NN):
 
 @njit(**INNER)
 def avoid(t, work, q_N):
-    """Steps away from self-collision, for the goal in `work`; `q_N` are the joint angles before and after [rad]."""
+    """Steps away from self-collision, for the goal in `work`; `q_N` are the joint angles before and after [rad].
+    Returns whether none were needed, as all pairs keep their distance.
+    """
     place(t, work, q_N)
     if not touches(t, work, True):
-        return
+        return True
     joints, cost, damping = len(q_N), np.inf, DAMPING
     for n in range(joints):
         work.trial_N[n] = q_N[n]
@@ -74,7 +76,8 @@ def avoid(t, work, q_N):
         if number:
             damping = min(max(damping * (EASIER if better else HARDER), LEAST), MOST)
         if not going or number == STEPS:
-            return
+            break
         solve(t, work, q_N, 0, joints, damping, 0.0)
         for n in range(joints):
             work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
+    return False

@@ -27,7 +27,7 @@ _KEYS = (
     "kind_K", "slot_K", "of_K", "seen_K", "last_K", "direction_K3", "parent_T", "mirror_T", "rest_K23", "share_K",
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
     "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S", "clear_Y",
-    "net_H6", "layer_G5", "column", "count_5", "number",
+    "net_H6", "layer_G5", "column", "count_6", "number",
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
 )  # fmt: skip
@@ -40,8 +40,8 @@ their first steps. scale_4: good and excessive angle, shaking [degrees], usual p
 and its radius. clear_Y: distance [m] that a pair is to keep. net_H6: first and number of layers, place and number of
 input columns, and of output columns, of each network, the prior's coders last; layer_G5: numbers in and out, where
 weights and biases begin in `number`, and 1 where the weights are among `shorts`, whose scales stand after the biases
-then; column: all columns; count_5: networks of the first stage, of both; whether directions are seen, tanh bounds, nets
-are residual.
+then; column: all columns; count_6: networks of the first stage, of both; whether directions are seen, tanh bounds, nets
+are residual, and every pair is to keep some distance.
 """
 (
     JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
@@ -53,7 +53,7 @@ are residual.
     KIND_K, SLOT_K, OF_K, SEEN_K, LAST_K, DIRECTION_K3, PARENT_T, MIRROR_T, REST_K23, SHARE_K,
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
     BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S, CLEAR_Y,
-    NET_H6, LAYER_G5, COLUMN, COUNT_5, NUMBER,
+    NET_H6, LAYER_G5, COLUMN, COUNT_6, NUMBER,
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
 ) = np.arange(len(_KEYS))  # fmt: skip
 # Numbers of NumPy, as numba compiles a function anew for each of Python's that it is called with.
@@ -61,12 +61,14 @@ PLANE_LOW, PLANE_HIGH, NEEDED_LOW, NEEDED_HIGH = FAR, GAIN, STARTS, FIRST_STEPS 
 """Places in bend_4, and in polish_4."""
 GOOD, EXCESS, SHAKE, USUAL_PHI = np.arange(4)
 """Places in scale_4."""
-FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL = np.arange(5)
-"""Places in count_5."""
+FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL, APART = np.arange(6)
+"""Places in count_6."""
 
 
 _LARGE, _STEPS = 2**16, 32_767
 """Weights of a layer that is large, and the largest number of 16 bits."""
+_ROUNDED = 1e-5
+"""Distance [m] by which no robot moves where its joint angles are rounded to float32."""
 
 
 class Packed(NamedTuple):
@@ -142,10 +144,11 @@ def _nets(d: Description, shorts: list[np.ndarray]) -> dict[str, np.ndarray]:
         add(part, coarse=False)
     for coder in (d.prior.encoder, d.prior.decoder):
         add(_alone(coder), coarse=True)
-    kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual]
+    apart = bool((clearances(d, CLEARANCE) > _ROUNDED).all())
+    kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
         "net_H6": np.array(nets), "layer_G5": np.array(layers), "column": np.concatenate(columns),
-        "count_5": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
+        "count_6": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
         "number": np.concatenate(numbers),
     }  # fmt: skip
 
@@ -163,10 +166,10 @@ def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:
 
 COMPILED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}, "nogil": True}
 """How functions are compiled: sums in any order, division by zero as NumPy has it."""
-EXACT: dict[str, Any] = {**COMPILED, "fastmath": False}
-"""The same for what must see NaN as it is."""
 INNER: dict[str, Any] = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""The same for those that compiled functions alone call."""
+"""The same for those that compiled functions alone call,"""
+INNER_EXACT: dict[str, Any] = {**INNER, "fastmath": False}
+"""and for those of them that must see NaN as it is."""
 
 
 @njit(**INNER)
