@@ -46,6 +46,7 @@ class FastRetargeter:
         """
         self.description = description
         self.engine: Engine = make_engine(description, form)
+        self._collision_known = description.settings.collision_known and bool(len(description.capsules.pair_Y2))
         self._made: dict[str, Any] = {
             "joint_names": self.joint_names, "branch_names": self.branch_names,
             "direction_names": tuple(description.settings.direction_names[d] for d in description.trust.measured),
@@ -190,7 +191,7 @@ class FastRetargeter:
             branch_confidence=trust_TX.reshape(*shape, trust_TX.shape[1]),
             direction_error_deg=found.error_BM.reshape(*shape, found.error_BM.shape[1]),
             phi=found.phi_B.reshape(shape),
-            collision=found.collision_B.reshape(shape),
+            collision=found.collision_B.reshape(shape) if self._collision_known else None,
             frame_rate=frame_rate,
             name=name,
             source=source,
