@@ -1,7 +1,8 @@
 """Which pairs of capsules need a closer look, told by few and cheap distances.
 
 Pairs are in groups, each of one capsule and some of another body. Around these there is a ball, so a group whose
-capsule is far from the ball needs no look at its pairs: for a hand of a dozen capsules, one distance in place of a dozen.
+capsule is far from the ball needs no look at its pairs: for a hand of a dozen capsules, one distance in place of a
+dozen.
 
 Legend: S capsules, Y pairs of them, G balls, Z groups of pairs, B frames, L bodies, X what is near in some frame.
 """
