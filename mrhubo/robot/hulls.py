@@ -94,7 +94,7 @@ def _sides(corners_H3: np.ndarray) -> np.ndarray:
     except (QhullError, ValueError):
         return axes_33
     edges_F23 = corners_H3[hull.simplices[:, 1:]] - corners_H3[hull.simplices[:, :1]]
-    normals_F3, (number_F, areas_F) = hull.equations[:, :3], (np.zeros(len(edges_F23), int), np.zeros(len(edges_F23)))
+    normals_F3 = hull.equations[:, :3]
     _, number_F = np.unique(np.round(normals_F3, 2), axis=0, return_inverse=True)
     areas_F = np.linalg.norm(np.cross(edges_F23[:, 0], edges_F23[:, 1]), axis=1)
     area_S = np.bincount(number_F.ravel(), areas_F)
@@ -108,8 +108,8 @@ def _inside_hull(points_X3: np.ndarray, corners_H3: np.ndarray, half_3: np.ndarr
     try:
         sides_F4 = ConvexHull(corners_H3).equations
     except (QhullError, ValueError):
-        return (np.abs(points_X3) <= half_3).all(axis=1)
-    return (points_X3 @ sides_F4[:, :3].T + sides_F4[:, 3] <= 0).all(axis=1)
+        return np.all(np.abs(points_X3) <= half_3, axis=1)
+    return np.all(points_X3 @ sides_F4[:, :3].T + sides_F4[:, 3] <= 0, axis=1)
 
 
 def _candidates(corners_H3: np.ndarray, half_3: np.ndarray) -> Iterator[LinkGeometry]:
