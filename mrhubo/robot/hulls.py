@@ -21,6 +21,8 @@ _DIRECTIONS = 1_000
 radius, however many vertices there are."""
 _POINTS = 3_000
 """Points that tell how much room is shared: to one or two percent."""
+_MANY, _CELLS = 50_000, 100
+"""Vertices from which on only the outermost are looked at, and cells of the grid along an axis."""
 _AT_ONCE = 2**24
 _SIZES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
 """Of the shape that just holds the hull; at the least, a ball in a cube is much smaller than what holds the cube."""
@@ -47,6 +49,7 @@ def capsules_of(vertices_V3: np.ndarray) -> list[Capsule]:
 
 def extremes(vertices_V3: np.ndarray) -> np.ndarray:
     """The vertices (H, 3) that lie farthest in directions all around."""
+    vertices_V3 = _outermost(vertices_V3) if len(vertices_V3) > _MANY else vertices_V3
     number = np.arange(_DIRECTIONS) + 0.5
     height, turn = 1 - 2 * number / _DIRECTIONS, np.pi * (1 + 5**0.5) * number  # R. Swinbank and R. J. Purser, 2006
     across = np.sqrt(1 - height**2)
@@ -59,6 +62,21 @@ def extremes(vertices_V3: np.ndarray) -> np.ndarray:
         found = along[farthest, np.arange(_DIRECTIONS)]
         chosen, best = np.where(found > best, farthest + first, chosen), np.maximum(found, best)
     return vertices_V3[np.unique(chosen)]
+
+
+def _outermost(vertices_V3: np.ndarray) -> np.ndarray:
+    """Of very many vertices the lowest and the highest in each cell of a grid, seen along each axis: what is left out
+    is at most a cell's width farther out than they are.
+    """
+    low_3, size_3 = vertices_V3.min(axis=0), np.ptp(vertices_V3, axis=0).clip(_THIN)
+    cell_V3 = np.minimum(((vertices_V3 - low_3) / size_3 * _CELLS).astype(np.int64), _CELLS - 1)
+    kept = []
+    for axis in range(3):
+        across_V = cell_V3[:, axis - 1] * _CELLS + cell_V3[:, axis - 2]
+        order_V = np.lexsort((vertices_V3[:, axis], across_V))
+        change = np.flatnonzero(np.diff(across_V[order_V]))
+        kept += [order_V[change], order_V[change + 1], order_V[[0, -1]]]
+    return vertices_V3[np.unique(np.concatenate(kept))]
 
 
 def smallest_box(corners_H3: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
