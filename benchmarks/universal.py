@@ -1,12 +1,14 @@
 """The universal network on robots that it never saw: how much farther limbs are from the human than in each frame's
 optimum for that robot, which the reference retargeter finds from twelve starts.
 
-    python benchmarks/universal.py [--every 40] [--made 1000] [--seeds 500000] [--frames 8] [--urdfs DIR] [--network FILE]
+    python benchmarks/universal.py [--every 40] [--made 1000] [--seeds 500000] [--frames 8] [--urdfs DIR]
+        [--network FILE]
 
 Robots: the shipped ones, every URDF in a folder by its detected mapping, and random humanoids
-(`mrhubo.robot.generator`), which are made by other code than the chains that the network learnt from. Motion: the nine CMU test clips, and the same
-with rotations shared out differently. Beside the network, as many steps of Levenberg-Marquardt from the middle of all
-ranges. With `--every 1`, jumps that the human did not make are counted too, per clip, each frame answered for itself.
+(`mrhubo.robot.generator`), which are made by other code than the chains that the network learnt from. Motion: the nine
+CMU test clips, and the same with rotations shared out differently. Beside the network, as many steps of
+Levenberg-Marquardt from the middle of all ranges. With `--every 1`, jumps that the human did not make are counted too,
+per clip, each frame answered for itself.
 
 Legend: T frames, D directions, N joints.
 """

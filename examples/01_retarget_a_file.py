@@ -28,7 +28,8 @@ def main(package: str, motion_file: str = str(WAVE), out: str = "joint_angles.cs
     print(
         f"confidence: {float(result.confidence.mean()):.2f} on average, {float(result.confidence.min()):.2f} at worst"
     )
-    print(f"the robot touches itself in {int(result.collision.sum())} frames")
+    if result.collision is not None:  # it is None where collision shapes are missing
+        print(f"the robot touches itself in {int(result.collision.sum())} frames")
     result.save(out)
     print(f"written: {out}")
 

@@ -11,9 +11,10 @@ Retargeting with a package needs neither Lightning nor MLflow.
 
 from __future__ import annotations
 
-import importlib
 import os
 from typing import TYPE_CHECKING, Any
+
+from mrhubo.lazy import lazy_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -121,14 +122,13 @@ def load_fast(source: str | os.PathLike[str], form: str | None = None) -> FastRe
     return FastRetargeter.load(folder, form)
 
 
+_lazy = lazy_names(__name__, _HOMES)
+
+
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        value: Any = _version()
-    elif name in _HOMES:
-        value = getattr(importlib.import_module(_HOMES[name]), name)
-    else:
-        raise AttributeError(f"module 'mrhubo' has no attribute '{name}'")
-    globals()[name] = value
+    if name != "__version__":
+        return _lazy(name)
+    globals()[name] = value = _version()
     return value
 
 

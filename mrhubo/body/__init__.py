@@ -6,10 +6,10 @@ Names are imported when they are first asked for: readers of motion need the ske
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mrhubo.body.joints import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.lazy import lazy_names
 
 if TYPE_CHECKING:
     from mrhubo.body.human import build_skeleton, open_prior
@@ -35,22 +35,17 @@ __all__ = [
     "save_skeleton",
 ]
 _HOMES = {
-    "BodyPrior": "prior",
-    "Skeleton": "skeleton",
-    "VPoser": "vposer",
-    "build_skeleton": "human",
-    "inverse_kinematics": "latent_ik",
-    "mirror_pose": "skeleton",
-    "mirror_rotations": "skeleton",
-    "open_prior": "human",
-    "open_skeleton": "official",
-    "save_skeleton": "official",
+    "BodyPrior": ".prior",
+    "Skeleton": ".skeleton",
+    "VPoser": ".vposer",
+    "build_skeleton": ".human",
+    "inverse_kinematics": ".latent_ik",
+    "mirror_pose": ".skeleton",
+    "mirror_rotations": ".skeleton",
+    "open_prior": ".human",
+    "open_skeleton": ".official",
+    "save_skeleton": ".official",
 }
 """Module of each name that needs PyTorch."""
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'mrhubo.body' has no attribute '{name}'")
-    globals()[name] = value = getattr(importlib.import_module(f"mrhubo.body.{_HOMES[name]}"), name)
-    return value
+__getattr__ = lazy_names(__name__, _HOMES)

@@ -24,6 +24,8 @@ from mrhubo.runtime.names import check_name
 
 DEFAULT_FOLDER = Path("conf")
 _LONGEST_NAME = 40
+_MOST_JOINTS = 1_000
+"""Joints that move: known humanoids with all their fingers have 150, and looking takes the square of their number."""
 
 
 @dataclass(frozen=True)
@@ -156,8 +158,14 @@ def _discover(description: Description) -> Discovery:
     """What the links of a robot stand for; where joints cannot be used, and no whole robot is left, they are to blame.
 
     Raises:
-        UserError: no two arms are found.
+        UserError: no two arms are found, or there are too many joints to look.
     """
+    moving = sum(joint.kind != "fixed" for joint in description.joints.values())
+    if moving > _MOST_JOINTS:
+        raise UserError(
+            f"{description.path}: {moving:,} joints move, more than {_MOST_JOINTS:,} among which arms are looked for; "
+            "make those fixed that belong to no humanoid"
+        )
     try:
         found = discover(description)
         if description.faults:

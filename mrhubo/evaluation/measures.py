@@ -76,8 +76,8 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         return float(angles_TD[:, _columns(body_map, region)].mean())  # NaN where there are none
 
     def collision_share(q_TN: Tensor, poses: LinkPoses) -> float:
-        known = shapes.pairs and not shapes.unknown
-        return float(shapes.collides(q_TN, poses).float().mean()) if known else nan
+        touches_T = shapes.touches(q_TN, poses)
+        return nan if touches_T is None else float(touches_T.float().mean())
 
     jerk, human_jerk = (
         float(direction_jerk(d[:, body_map.measured], clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3)

@@ -45,6 +45,14 @@ class Engine(Protocol):
 
     description: Description
 
+    def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Directions (B, D, 3) of poses, float64, and the networks' joint angles (B, N) [rad], float32.
+
+        Raises:
+            UserError: a frame holds no rotations; `shape` says by which axes it is named.
+        """
+        ...
+
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """The first frame that holds no rotations, and what it holds; None: all are good."""
         ...

@@ -96,6 +96,7 @@ def _check_names(d: Description, sizes: dict[str, int]) -> None:
         settings.activation not in _ACTIVATIONS or settings.bound not in ("tanh", "clamp"), "an activation is unknown"
     )
     _refuse(settings.features not in ("directions", "local"), "features are unknown")
+    _refuse(not isinstance(settings.collision_known, bool), "collision_known is neither true nor false")
 
 
 def _are_names(names: Iterable[Any]) -> bool:

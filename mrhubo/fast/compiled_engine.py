@@ -9,17 +9,17 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from mrhubo.fast.answers import CHUNK, NO_ROTATION, Answers
+from mrhubo.fast.answers import NO_ROTATION, Answers
 from mrhubo.fast.description import Description
 from mrhubo.fast.kept import is_kept, note_kept
-from mrhubo.fast.plain import judging, networks, steps
+from mrhubo.fast.plain import steps
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.plain.steps import Model
-from mrhubo.fast.poses import NOT_FINITE
+from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import SKEW
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.banded import Banded, Solve
@@ -29,11 +29,14 @@ if TYPE_CHECKING:
     from mrhubo.fast.compiled.motion_kernels import MotionKernels
 
 FEW = 32
-"""Up to so many frames, the compiled form goes through networks frame by frame; beyond, matrices are quicker."""
+"""Up to so many frames are worked on by one thread: others would have to be woken first."""
+_PARTS = 8
+"""That each thread's share of many frames is divided into."""
+Result = TypeVar("Result")
 
 
 class CompiledEngine:
-    """The compiled form: frames go to threads, which share nothing; products of large matrices stay NumPy's."""
+    """The compiled form: frames go to threads, which share nothing."""
 
     def __init__(self, description: Description) -> None:
         from mrhubo.fast.compiled import kernels, tables
@@ -42,55 +45,68 @@ class CompiledEngine:
         self.description = description
         self._tables = tuple(tables.pack(description))
         self._kernels = kernels.make_kernels()
-        self._steps, self._all, self._without_prior = kernels.STEPS, kernels.ALL, kernels.WITHOUT_PRIOR
+        self._check, self._direct, self._answer = kernels.CHECK, kernels.DIRECT, kernels.ANSWER
         self._activation = ACTIVATIONS[description.settings.activation]
-        self._layers = networks.Activations(self._activate(ACTIVATIONS["gelu"]), self._activate(self._activation))
         self._threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self._pool: ThreadPoolExecutor | None = None
         self._unnoted = True
-        self._nothing = np.zeros((0, 0), np.float32), np.zeros((0, len(description.trust.column_XD)))
+        self._no_shake = np.zeros((0, len(description.trust.column_XD)))
 
-    def _activate(self, kind: int) -> Callable[[np.ndarray], np.ndarray]:
-        def activated(x_X: np.ndarray) -> np.ndarray:
-            found_X = np.empty_like(x_X)
-            self._kernels.activate(kind, x_X.reshape(-1), found_X.reshape(-1))
-            return found_X
-
-        return activated
+    def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """As `Engine.look`."""
+        target_BD3, q_BN = self._room(local_BJ33)
+        refuse(self._look(self._check | self._direct | self._answer, local_BJ33, target_BD3, q_BN), shape)
+        return target_BD3, q_BN
 
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """As `Engine.wrong`."""
-        found = self._kernels.wrong(local_BJ33, SKEW)
-        return None if found < 0 else (found // 2, NO_ROTATION if found % 2 else NOT_FINITE)
+        return self._look(self._check, local_BJ33, *self._room(local_BJ33))
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
-        found_BD3 = np.empty((len(local_BJ33), len(self.description.cost.weight_D), 3))
-        self._shared(
-            len(local_BJ33), lambda rows: self._kernels.directions(self._tables, local_BJ33[rows], found_BD3[rows])
-        )
-        return found_BD3
+        target_BD3, q_BN = self._room(local_BJ33)
+        self._look(self._direct, local_BJ33, target_BD3, q_BN)
+        return target_BD3
 
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""
-        found_BN = np.empty((len(target_BD3), len(self.description.cost.lower_N)), np.float32)
-        if len(target_BD3) <= FEW:
-            self._kernels.networks(self._tables, local_BJ33, target_BD3, found_BN)
-            return found_BN
-        for rows in steps.chunks(len(target_BD3), CHUNK):
-            features_BF = networks.features_of(self.description, local_BJ33[rows], target_BD3[rows])
-            found_BN[rows] = networks.joint_angles(self.description, features_BF, self._layers.gelu)
-        return found_BN
+        q_BN = self._room(local_BJ33)[1]
+        self._look(self._answer, local_BJ33, target_BD3, q_BN)
+        return q_BN
+
+    def _room(self, local_BJ33: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Room for directions, and for joint angles."""
+        frames, cost = len(local_BJ33), self.description.cost
+        return np.empty((frames, len(cost.weight_D), 3)), np.empty((frames, len(cost.lower_N)), np.float32)
+
+    def _look(
+        self, what: int, local_BJ33: np.ndarray, target_BD3: np.ndarray, q_BN: np.ndarray
+    ) -> tuple[int, str] | None:
+        """What of poses is asked for; the first frame that was found to hold no rotations, as `Engine.wrong` has it."""
+        if not local_BJ33.flags.writeable:
+            local_BJ33 = local_BJ33.copy()  # for arrays of another kind, numba compiles anew
+
+        def part(rows: slice) -> tuple[int, int]:
+            local, target, q = local_BJ33[rows], target_BD3[rows], q_BN[rows]
+            return rows.start, look(self._tables, SKEW, what, local, target, q)
+
+        look = self._kernels.look
+        if len(local_BJ33) <= FEW:
+            parts = [(0, look(self._tables, SKEW, what, local_BJ33, target_BD3, q_BN))]
+        else:
+            parts = self._shared(len(local_BJ33), part)
+        for start, found in parts:
+            if found >= 0:
+                return start + found // 2, NO_ROTATION if found % 2 else NOT_FINITE
+        return None
 
     def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool) -> np.ndarray:
         """As `Engine.polish`."""
+        if not polish:
+            return q_BN
         found = Answers.empty(self.description, 0)
         q_BN = q_BN.copy()
-        if polish:
-            self._shared(
-                len(q_BN),
-                lambda rows: self._retarget(self._steps, (polish, avoid), rows, q_BN, target_BD3, None, None, found),
-            )
+        self._retarget(polish, avoid, False, q_BN, target_BD3, self._no_shake, found)
         return q_BN
 
     def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
@@ -169,26 +185,10 @@ class CompiledEngine:
         self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None
     ) -> Answers:
         """As `Engine.answer`."""
-        d, frames = self.description, len(q_BN)
-        found = Answers.empty(d, frames)
+        found = Answers.empty(self.description, len(q_BN))
         found.q_BN[:] = q_BN
-        if frames <= FEW:
-            self._retarget(self._all, (polish, avoid), slice(0, frames), found.q_BN, target_BD3, None, shake_BX, found)
-            return found
-        for chunk in steps.chunks(frames, CHUNK):
-            part = Answers(*(getattr(found, name)[chunk] for name in Answers.__dataclass_fields__))
-            target, shaken = target_BD3[chunk], None if shake_BX is None else shake_BX[chunk]
-            six_BF = np.empty((len(target), 6 * len(d.reading.joint_T)), np.float32)
-
-            def run(what: int, six_BF: np.ndarray, part: Answers = part, target: np.ndarray = target,
-                    shaken: np.ndarray | None = shaken) -> None:  # fmt: skip
-                self._shared(
-                    len(target),
-                    lambda rows: self._retarget(what, (polish, avoid), rows, part.q_BN, target, six_BF, shaken, part),
-                )
-
-            run(self._steps, six_BF)
-            run(self._without_prior, judging.reconstruct(d, six_BF, self._layers.prior))
+        shaken_BX = self._no_shake if shake_BX is None else shake_BX
+        self._retarget(polish, avoid, True, found.q_BN, target_BD3, shaken_BX, found)
         if self._unnoted and "problem" in self.__dict__:
             self._note()
         return found
@@ -204,24 +204,24 @@ class CompiledEngine:
             note_kept(kernel.stats.cache_path for kernel in (*self._kernels, *self._motion_kernels))
 
     def _retarget(
-        self, what: int, steps: tuple[int, bool], rows: slice, q_BN: np.ndarray, target_BD3: np.ndarray,
-        six_BF: np.ndarray | None, shake_BX: np.ndarray | None, into: Answers,
+        self, polish: int, avoid: bool, judge: bool, q_BN: np.ndarray, target_BD3: np.ndarray, shake_BX: np.ndarray,
+        into: Answers,
     ) -> None:  # fmt: skip
-        six, shaken = (
-            none if given is None else given[rows]
-            for none, given in zip(self._nothing, (six_BF, shake_BX), strict=True)
-        )
-        self._kernels.retarget(
-            self._tables, self._activation, *steps, what, target_BD3[rows], q_BN[rows], six, shaken,
-            into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],
-        )  # fmt: skip
+        def part(rows: slice) -> None:
+            self._kernels.retarget(
+                self._tables, self._activation, polish, avoid, judge, target_BD3[rows], q_BN[rows], shake_BX[rows],
+                into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],
+            )  # fmt: skip
 
-    def _shared(self, frames: int, work: Callable[[slice], object]) -> None:
-        """Does the work on all frames, in threads where there are many."""
+        self._shared(len(q_BN), part)
+
+    def _shared(self, frames: int, work: Callable[[slice], Result]) -> list[Result]:
+        """Does the work on all frames, in threads where there are many; each takes one part after the other, as some
+        frames take ten times as long as others.
+        """
         if frames <= FEW or self._threads == 1:
-            work(slice(0, frames))
-            return
+            return [work(slice(0, frames))]
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self._threads, "mrhubo")
-        ends = [round(k * frames / self._threads) for k in range(self._threads + 1)]
-        list(self._pool.map(work, [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]))
+        length = max(FEW, -(-frames // (_PARTS * self._threads)))
+        return list(self._pool.map(work, [slice(first, first + length) for first in range(0, frames, length)]))

@@ -16,7 +16,7 @@ from mrhubo.fast.description import Description
 from mrhubo.fast.kept import numba_is_there
 from mrhubo.fast.plain import collision, human, judging, networks, robot, steps
 from mrhubo.fast.plain.avoidance import Avoidance
-from mrhubo.fast.poses import NOT_FINITE
+from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import are_crooked
 from mrhubo.fast.together.avoiding import GivingWay, make_giving_way
 from mrhubo.fast.together.banded import halve
@@ -31,6 +31,12 @@ class NumpyEngine:
     def __init__(self, description: Description) -> None:
         self.description = description
         self._avoidance = Avoidance(description)
+
+    def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """As `Engine.look`."""
+        refuse(self.wrong(local_BJ33), shape)
+        target_BD3 = self.directions(local_BJ33)
+        return target_BD3, self.network(local_BJ33, target_BD3)
 
     def wrong(self, local_BJ33: np.ndarray) -> tuple[int, str] | None:
         """As `Engine.wrong`."""

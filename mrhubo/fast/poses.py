@@ -53,6 +53,8 @@ def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
         if array.shape[-len(axes) :] == axes:
             shape = array.shape[: -len(axes)]
             array = array.reshape(math.prod(shape), *axes)
+            if read is None and array.dtype == np.float32:
+                return Poses(np.ascontiguousarray(array), shape, frame_rate, name, source)
             with np.errstate(over="ignore"):
                 local_TJ33 = np.ascontiguousarray(array if read is None else read(array, shape), np.float32)
             return Poses(local_TJ33, shape, frame_rate, name, source)

@@ -22,7 +22,7 @@ from mrhubo.fast.answers import Answers, Engine
 from mrhubo.fast.description import Description
 from mrhubo.fast.engines import FORMS, make_engine
 from mrhubo.fast.plain import judging
-from mrhubo.fast.poses import Poses, read_poses, refuse
+from mrhubo.fast.poses import read_poses, refuse
 from mrhubo.fast.together.motion import join_frames
 from mrhubo.robot_motion import FollowingJoint, RobotFacts, RobotMotion
 
@@ -46,6 +46,7 @@ class FastRetargeter:
         """
         self.description = description
         self.engine: Engine = make_engine(description, form)
+        self._collision_known = description.settings.collision_known and bool(len(description.capsules.pair_Y2))
         self._made: dict[str, Any] = {
             "joint_names": self.joint_names, "branch_names": self.branch_names,
             "direction_names": tuple(description.settings.direction_names[d] for d in description.trust.measured),
@@ -106,11 +107,11 @@ class FastRetargeter:
                 negative, or the frame rate not positive, or missing and needed.
         """
         _check(polish)
-        poses, target_TD3 = self._read(motion, frame_rate)
+        poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
         rate = poses.frame_rate
         if together and rate is None:
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
-        q_TN = self.engine.network(poses.local_TJ33, target_TD3)
+        target_TD3, q_TN = self.engine.look(poses.local_TJ33, poses.shape)
         avoid = bool(polish) and avoid_collisions
         if rate is not None and together is not False:
             q_TN = self.engine.polish(q_TN, target_TD3, polish, False)
@@ -121,8 +122,8 @@ class FastRetargeter:
     def predict(self, motion: Any, polish: int = 0, avoid_collisions: bool = True) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
         _check(polish)
-        poses, target_TD3 = self._read(motion)
-        network_TN = self.engine.network(poses.local_TJ33, target_TD3)
+        poses = read_poses(motion, None, self.description.settings.own_rest)
+        target_TD3, network_TN = self.engine.look(poses.local_TJ33, poses.shape)
         q_TN = self.engine.polish(network_TN, target_TD3, polish, avoid_collisions)
         return q_TN.reshape(*poses.shape, q_TN.shape[1])
 
@@ -154,14 +155,10 @@ class FastRetargeter:
 
     def directions(self, motion: Any) -> np.ndarray:
         """Directions (..., D, 3) of human poses, as `imitate` takes them."""
-        poses, found_TD3 = self._read(motion)
-        return found_TD3.reshape(*poses.shape, *found_TD3.shape[1:])
-
-    def _read(self, motion: Any, frame_rate: float | None = None) -> tuple[Poses, np.ndarray]:
-        """Poses that are known to be good, and their directions (T, D, 3)."""
-        poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
+        poses = read_poses(motion, None, self.description.settings.own_rest)
         refuse(self.engine.wrong(poses.local_TJ33), poses.shape)
-        return poses, self.engine.directions(poses.local_TJ33)
+        found_TD3 = self.engine.directions(poses.local_TJ33)
+        return found_TD3.reshape(*poses.shape, *found_TD3.shape[1:])
 
     def _join(
         self, q_TN: np.ndarray, target_TD3: np.ndarray, shape: tuple[int, ...], frame_rate: float, avoid: bool
@@ -194,7 +191,7 @@ class FastRetargeter:
             branch_confidence=trust_TX.reshape(*shape, trust_TX.shape[1]),
             direction_error_deg=found.error_BM.reshape(*shape, found.error_BM.shape[1]),
             phi=found.phi_B.reshape(shape),
-            collision=found.collision_B.reshape(shape),
+            collision=found.collision_B.reshape(shape) if self._collision_known else None,
             frame_rate=frame_rate,
             name=name,
             source=source,

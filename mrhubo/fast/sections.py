@@ -249,6 +249,8 @@ class Settings:
     """Whether the human's rest pose is mrhubo's own."""
     facts: Mapping[str, Any]
     """Who made it, its checksum, and the robot's other joints (`mrhubo.robot_motion.RobotFacts`)."""
+    collision_known: bool = True
+    """Whether no collision shape is missing of what moves: else nobody knows whether the robot touches itself."""
 
 
 SECTIONS: dict[str, type] = {

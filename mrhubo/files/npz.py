@@ -70,7 +70,7 @@ class NpzFile:
         """
         header = self._header(key, "fiu", max_rows)
         if len(header.shape) < 2:
-            raise UserError(f"{self.path}: '{key}' has shape {header.shape}; expected (rows, columns)")
+            raise UserError(f"{self._named(key)} has shape {header.shape}; expected (rows, columns)")
         count, columns = header.shape[0], math.prod(header.shape[1:])
         if header.by_column:
             whole = self.read(key, max_rows=max_rows).reshape(count, columns)
@@ -94,37 +94,41 @@ class NpzFile:
         stored = self._archive.getinfo(f"{key}.npy").file_size
         if stored > max_bytes:
             raise UserError(
-                f"{self.path}: '{key}' has {stored / 2**30:.3g} GiB; at most {max_bytes / 2**30:.3g} are read"
+                f"{self._named(key)} has {stored / 2**30:.3g} GiB; at most {max_bytes / 2**30:.3g} are read"
             )
         with self._reading(key, "it is truncated, altered, or no .npy array") as handle:
             try:
                 return read_member(handle, stored, load)
             except UserError as error:
-                raise UserError(f"{self.path}: '{key}' {error}") from error
+                raise UserError(f"{self._named(key)} {error}") from error
+
+    def _named(self, key: str) -> str:
+        return f"{self.path}: '{shortened(key)}'"
 
     def _header(self, key: str, kinds: str, max_rows: int | None, max_bytes: int = MAX_BYTES) -> _Header:
-        path = self.path
         with self._reading(key, "its header is not one of an .npy array") as handle:
             header = _read_header(handle)
         shape, dtype = header.shape, header.dtype
         if dtype.hasobject:
-            raise UserError(f"{path}: '{key}' holds pickled Python objects, which are never opened; expected numbers")
+            raise UserError(
+                f"{self._named(key)} holds pickled Python objects, which are never opened; expected numbers"
+            )
         if dtype.kind not in kinds:
-            raise UserError(f"{path}: '{key}' has type {shortened(dtype)}; expected {_TYPES[kinds]}")
+            raise UserError(f"{self._named(key)} has type {shortened(dtype)}; expected {_TYPES[kinds]}")
         size = math.prod(shape) * dtype.itemsize
         if size == 0 and kinds != "U":
-            raise UserError(f"{path}: '{key}' is empty: shape {shortened(shape)}")
+            raise UserError(f"{self._named(key)} is empty: shape {shortened(shape)}")
         if (max_rows is not None and shape and shape[0] > max_rows) or size > max_bytes:
             most = f"{max_rows} frames and " if max_rows is not None else ""
             claimed = f"{size / 2**30:.3g} GiB" if size < 2**100 else "more than any disk holds"
             raise UserError(
-                f"{path}: '{key}' claims shape {shortened(shape)}, {claimed}; at most {most}{max_bytes / 2**30:.3g} GiB"
-                " are read"
+                f"{self._named(key)} claims shape {shortened(shape)}, {claimed};"
+                f" at most {most}{max_bytes / 2**30:.3g} GiB are read"
             )
         stored = self._archive.getinfo(f"{key}.npy").file_size
         if size > stored:
             raise UserError(
-                f"{path}: '{key}' claims shape {shape}, {size} bytes, but holds {stored}; the file is damaged"
+                f"{self._named(key)} claims shape {shape}, {size} bytes, but holds {stored}; the file is damaged"
             )
         return header
 
@@ -139,7 +143,7 @@ class NpzFile:
         except UserError:
             raise
         except Exception as error:
-            raise UserError(f"{self.path}: '{key}' cannot be read: {otherwise}") from error
+            raise UserError(f"{self._named(key)} cannot be read: {otherwise}") from error
 
 
 @contextmanager

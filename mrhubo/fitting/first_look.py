@@ -35,7 +35,6 @@ _NARROW = 0.5
 """Radians of range below which a joint is at a limit often, whatever is meant."""
 _BENT, _BACKWARDS = 25.0, 0.05
 """Degrees from which on an elbow is bent, and share of frames in which one may be so the wrong way."""
-_MOST_LINKS = 5
 _NEAR, _TURNED_DEG = 0.2, 30.0
 """How far an entry may be from what the robot's axes tell, and agree with it: a share of the shortest limb, degrees."""
 
@@ -169,14 +168,8 @@ def _turned_elbows(body_map: BodyMap, backwards: Mapping[str, float]) -> list[st
 
 def unknown_collisions(body_map: BodyMap) -> list[str]:
     """A sentence where nobody knows whether the robot touches itself, for want of shapes; else none."""
-    shapes, path = body_map.collision, body_map.robot.urdf
-    start = f"robot.urdf: {path}: whether the robot touches itself is unknown"
-    if shapes.unknown:
-        links = ", ".join(shapes.unknown[:_MOST_LINKS]) + (", ..." if len(shapes.unknown) > _MOST_LINKS else "")
-        return [
-            f"{start}: {len(shapes.unknown)} links that move have meshes for collision, which are not read: {links}"
-        ]
-    return [] if shapes.pairs else [f"{start}: it has no collision shapes that could meet"]
+    why = body_map.collision.why_unknown()
+    return [] if why is None else [why]
 
 
 def _entries_of(body_map: BodyMap) -> dict[str, list[str]]:

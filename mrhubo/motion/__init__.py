@@ -5,9 +5,9 @@ What works with PyTorch is imported when it is first asked for: reading a motion
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from mrhubo.lazy import lazy_names
 from mrhubo.motion.editing import mirror, trim
 from mrhubo.motion.load import find_motions, motion_files, read_folder, read_motion
 from mrhubo.motion.motion import Motion
@@ -41,19 +41,14 @@ __all__ = [
     "write_motion",
 ]
 _HOMES = {
-    "NOT_FINITE": "poses",
-    "MotionLike": "poses",
-    "Poses": "poses",
-    "read_poses": "poses",
-    "refuse_frames": "poses",
-    "reshare": "resharing",
-    "to_tensor": "poses",
+    "NOT_FINITE": ".poses",
+    "MotionLike": ".poses",
+    "Poses": ".poses",
+    "read_poses": ".poses",
+    "refuse_frames": ".poses",
+    "reshare": ".resharing",
+    "to_tensor": ".poses",
 }
 """Module of each name that needs PyTorch."""
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'mrhubo.motion' has no attribute '{name}'")
-    globals()[name] = value = getattr(importlib.import_module(f"mrhubo.motion.{_HOMES[name]}"), name)
-    return value
+__getattr__ = lazy_names(__name__, _HOMES)

@@ -16,7 +16,6 @@ Legend: T frames, J = 21: SMPL's joints 1..21. World: y up, right-handed [m].
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -24,7 +23,7 @@ import numpy as np
 
 from mrhubo.body.joints import JOINT_NAMES, POSED_JOINT_NAMES, REST_K3, SIDES, hinge_axis, local_rotations
 from mrhubo.errors import UserError
-from mrhubo.fast.plain.human import BEND_DEG, bend_axis, cross, norm, normalize
+from mrhubo.fast.plain.human import norm, normalize
 from mrhubo.fast.rotations import (
     axis_angle_to_matrix,
     matrix_to_axis_angle,
@@ -33,15 +32,10 @@ from mrhubo.fast.rotations import (
     turned,
 )
 from mrhubo.motion.completion import Bone, complete
-from mrhubo.motion.gaps import Neighbours, fill_directions, fill_numbers, fill_rotations
+from mrhubo.motion.gaps import fill_directions, fill_numbers, fill_rotations
+from mrhubo.motion.hinges import hinge_axes
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.orientations import frame_of, known_frames, turn_of
-
-BENT = math.radians(12.0)
-"""From which bend on the plane of two limbs tells the axis of the joint between them, whatever the upper limb's own
-turn (as in `mrhubo.robot.bending`)."""
-_BACKWARD = math.radians(30.0)
-"""Knees do not bend backwards: up to this bend, what looks so is a straight leg and a noisy point."""
 
 
 @dataclass(frozen=True)
@@ -226,7 +220,7 @@ def _limb(build: _Build, limb: _Limb, side: str) -> None:
     bone_3 = normalize(build.rest[hinge] - build.rest[upper])
     rest_axis_3 = np.array(hinge_axis(hinge))
     usual_T3 = shortest_turn(np.broadcast_to(bone_3, upper_T3.shape), upper_T3) @ rest_axis_3
-    axis_T3 = _hinge(upper_T3, lower_T3, own_T3, usual_T3, known[0] & known[1], limb.one_way)
+    axis_T3 = hinge_axes(upper_T3, lower_T3, own_T3, usual_T3, known[0] & known[1], limb.one_way)
     at_rest_33 = frame_of(bone_3[None], rest_axis_3[None])[0]
     upper_T33 = frame_of(upper_T3, axis_T3) @ at_rest_33.T
     lower_bone_3 = normalize(build.rest[tip] - build.rest[hinge])
@@ -271,46 +265,6 @@ def _filled(carrier_T33: np.ndarray, part_T33: np.ndarray) -> tuple[np.ndarray, 
     """
     known_T = known_frames(part_T33)
     return carrier_T33 @ fill_rotations(np.nan_to_num(carrier_T33.mT @ part_T33), known_T), known_T
-
-
-def _hinge(
-    upper_T3: np.ndarray,
-    lower_T3: np.ndarray,
-    own_T3: np.ndarray | None,
-    usual_T3: np.ndarray,
-    known_T: np.ndarray,
-    one_way: bool,
-) -> np.ndarray:
-    """The axis (T, 3) of a limb's hinge: by the plane of its bones where it is bent, else by the upper bone's own turn,
-    else as when it was bent last.
-    """
-    cross_T3 = cross(upper_T3, lower_T3)
-    bend_T = np.arctan2(norm(cross_T3), (upper_T3 * lower_T3).sum(-1))
-    plane_T3 = normalize(cross_T3)
-    told_T = known_T & (bend_T > BENT)
-    reference_T3 = usual_T3 if own_T3 is None else own_T3
-    backward_T = one_way & (bend_T < _BACKWARD) & ((plane_T3 * reference_T3).sum(-1) < 0)
-    told_T &= ~backward_T
-    if own_T3 is None:
-        own_T3 = _carried(plane_T3, upper_T3, told_T) if told_T.any() else usual_T3
-    axis_T3 = np.where(backward_T[:, None], own_T3, bend_axis(upper_T3, lower_T3, own_T3, BEND_DEG)[0])
-    across_T3 = axis_T3 - upper_T3 * (upper_T3 * axis_T3).sum(-1, keepdims=True)
-    lost_T = norm(across_T3) < 1e-3
-    return np.where(lost_T[:, None], usual_T3, normalize(across_T3))
-
-
-def _carried(axis_T3: np.ndarray, upper_T3: np.ndarray, told_T: np.ndarray) -> np.ndarray:
-    """Axes (T, 3) at right angles to the upper bones (T, 3), from the last frame that tells one and the next: each is
-    carried along by the shortest turn of the bone, and between the two the axis turns evenly about it.
-    """
-    near = Neighbours.of(told_T)
-    before_T3, after_T3 = (
-        turned(shortest_turn(upper_T3[place_T], upper_T3), axis_T3[place_T])
-        for place_T in (near.before_T, near.after_T)
-    )
-    sine_T = (upper_T3 * cross(before_T3, after_T3)).sum(-1)
-    angle_T = np.arctan2(sine_T, (before_T3 * after_T3).sum(-1)) * near.share_T
-    return turned(axis_angle_to_matrix(upper_T3 * angle_T[:, None]), before_T3)
 
 
 def _count(missing_T: np.ndarray) -> str:

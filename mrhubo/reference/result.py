@@ -43,8 +43,8 @@ class OptimizationResult(Answer):
     """The N joints, by their names in the URDF."""
     direction_error_deg: Tensor
     """Angle (T, D) [deg] between the robot's and the human's limb, hand and head directions."""
-    collision: Tensor
-    """Whether the robot touches itself (T,), by its URDF's collision shapes."""
+    collision: Tensor | None
+    """Whether the robot touches itself (T,), by its URDF's collision shapes; None: shapes of what moves are missing."""
     direction_names: tuple[str, ...] = ()
     """The D directions."""
     frame_rate: float | None = None

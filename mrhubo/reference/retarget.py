@@ -113,8 +113,10 @@ class OptimizationRetargeter(nn.Module):
         q_TN = torch.cat(answers) if answers else local_TJ33.new_zeros(0, len(robot.joint_names))
         links = robot.forward(q_TN)
         error_TD = direction_error(self.body_map, q_TN, local_TJ33, links)
-        found = (q_TN, error_TD, self.body_map.collision.collides(q_TN, links))
-        q, error, collision = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
+        touches_T = self.body_map.collision.touches(q_TN, links)
+        found = (q_TN, error_TD, *(() if touches_T is None else (touches_T,)))
+        q, error, *known = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
+        collision = known[0] if known else None
         return OptimizationResult(
             q, robot.joint_names, error, collision, self.body_map.measured_names, poses.frame_rate,
             *((motion.name, motion.source) if isinstance(motion, Motion) else ("", "")),

@@ -99,6 +99,7 @@ def describe(retargeter: Retargeter) -> Description:
                 "checksum": retargeter.facts.checksum,
                 "others": [asdict(other) for other in retargeter.facts.others],
             },
+            body_map.collision.known,
         ),
     )
 

@@ -40,7 +40,7 @@ def judge(retargeter: Retargeter, q_TN: Tensor, target_TD3: Tensor, shake_TD: Te
         trust_TC.amin(dim=1) if branches else nothing_T,
         torch.rad2deg(angle_between(robot_TD3[:, columns], target_TD3[:, columns])),
         signals.phi.amax(dim=1) if branches else nothing_T,
-        retargeter.collision.collides(q_TN, links),
+        retargeter.collision.touches(q_TN, links),
         trust_TC,
         tuple(branch.name for branch in branches),
         body_map.measured_names,

@@ -31,9 +31,9 @@ class RetargetResult(Answer):
     phi: Tensor
     """Reconstruction error (T,) under the body prior of what the robot reads of the human pose, of the branch where it
     is largest; see `mrhubo.robot.plausibility`."""
-    collision: Tensor
+    collision: Tensor | None
     """Whether the robot touches itself (T,), by its URDF's collision shapes; the networks do not avoid it, and what
-    comes after them does nearly always."""
+    comes after them does nearly always. None: shapes of what moves are missing, so it is not known."""
     branch_confidence: Tensor
     """(T, C), 0..1: the probability that the limbs of each branch of the robot, an arm or the head, point where the
     person's did, to 15 degrees; see `mrhubo.retargeter.confidence`."""
@@ -55,7 +55,9 @@ class RetargetResult(Answer):
     ) -> RetargetResult:
         """The same with other leading axes, for as many frames, and what is known of the motion."""
         tensors = {
-            field: getattr(self, field).unflatten(0, shape) if shape else getattr(self, field)[0] for field in _TENSORS
+            field: tensor.unflatten(0, shape) if shape else tensor[0]
+            for field in _TENSORS
+            if (tensor := getattr(self, field)) is not None
         }
         return dataclasses.replace(self, **tensors, frame_rate=frame_rate, name=name, source=source)
 
@@ -65,5 +67,6 @@ _TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision", "branc
 
 def join_results(parts: Sequence[RetargetResult]) -> RetargetResult:
     """One result of those of a motion's parts, one after the other; without a frame rate."""
-    tensors = {name: torch.cat([getattr(part, name) for part in parts]) for name in _TENSORS}
+    known = [name for name in _TENSORS if getattr(parts[0], name) is not None]
+    tensors = {name: torch.cat([getattr(part, name) for part in parts]) for name in known}
     return dataclasses.replace(parts[0], **tensors, frame_rate=None)

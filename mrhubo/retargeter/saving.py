@@ -27,6 +27,7 @@ from mrhubo.retargeter.integrity import (
 )
 from mrhubo.retargeter.networks import RetargetNetwork
 from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.robot.solid_urdf import urdf_without_meshes
 
 SCHEMA = "mrhubo.retargeter/5"
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
@@ -47,7 +48,10 @@ def write_package(
     folder.mkdir(parents=True, exist_ok=True)
     robot = body_map.robot
     with atomic_path(folder / _URDF) as temporary:
-        shutil.copyfile(config.robot.urdf, temporary)
+        if robot.description.solids.of_meshes:  # their files stay where they are
+            temporary.write_bytes(urdf_without_meshes(robot.description))
+        else:
+            shutil.copyfile(config.robot.urdf, temporary)
     prior.save(folder / _PRIOR)
     save_skeleton(folder / _SKELETON, body_map.skeleton)
     with atomic_path(folder / _CONFIG) as temporary:

@@ -6,6 +6,7 @@ What needs PyTorch is imported where it is needed: most packages are answered wi
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mrhubo.errors import InputWarning
 from mrhubo.fast.description import FILE, Description
 from mrhubo.robot_motion import RobotFacts, RobotMotion
 
@@ -88,6 +90,8 @@ def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     from mrhubo.robot import robot_facts
 
     reference = OptimizationRetargeter(robot)
+    if (why := reference.body_map.collision.why_unknown()) is not None:
+        warnings.warn(why, InputWarning, stacklevel=2)
     return Answerer(
         f"no package: the reference retargeter answers, by optimisation and without any training; robot '{robot.name}',"
         f" {len(robot.joint_names)} joints",

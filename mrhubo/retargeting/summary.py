@@ -27,7 +27,7 @@ class Summary:
     confidence: float
     """Mean over frames."""
     collision: float
-    """Share of frames in which the robot touches itself."""
+    """Share of frames in which the robot touches itself; NaN: shapes of what moves are missing."""
 
     @classmethod
     def of(cls, motion: RobotMotion, limbs: Sequence[str]) -> Summary:
@@ -55,8 +55,10 @@ _HEADS = {
     "confidence": ("confidence", "{:.2f}"),
     "collision": ("touches itself", "{:.1%}"),
 }
+_UNKNOWN = "whether it touches itself is unknown: collision shapes of links that move are missing"
 
 
 def table(summaries: Sequence[Summary]) -> str:
-    """A row a motion; what is known of none has no column."""
-    return "\n".join(aligned("motion", summaries, _HEADS))
+    """A row a motion; what is known of none has no column, and self-collision a sentence."""
+    unknown = [] if any(row.collision == row.collision for row in summaries) else [_UNKNOWN]
+    return "\n".join([*aligned("motion", summaries, _HEADS), *unknown])

@@ -1,12 +1,15 @@
 """Self-collision of a robot: signed distances between the capsules of its links, and how they change with the joints.
 
 The shapes are those of the URDF's collision elements: a sphere and a cylinder with round ends are capsules, and one to
-three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`). Meshes are not read; `uncovered` names the
-links that have nothing else, and `unknown` those of them for which nobody knows whether the robot touches itself.
+three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`), or the hull of a mesh
+(`mrhubo.robot.hulls`). `uncovered` names the links of which a mesh is not there, and `unknown` those of them for which
+nobody knows whether the robot touches itself.
 
 Links that the sampled joints do not move against each other are one body. Two bodies that share a joint cannot be kept
 apart, so they are not compared; nor are two of which some capsules overlap in more than half of all random poses (an
-upper arm and a forearm with an axis of its own between the two, both of which reach around the elbow).
+upper arm and a forearm with an axis of its own between the two, both of which reach around the elbow). Nor are two
+capsules that overlap in the robot's home pose: whoever made it means them to, as a shoulder in the hollow of a trunk
+whose hull is closed (MoveIt's setup assistant leaves out the same, as "collision by default").
 
 Pairs grow with the square of the capsules. So poses are looked at few at a time where there are many pairs, and of more
 than two thousand capsules the links with most are left out.
@@ -27,7 +30,6 @@ from torch import Tensor, nn
 from mrhubo.errors import InputWarning
 from mrhubo.robot.capsules import SHORT, Capsule, capsules, closest_points
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.shapes import read_collision_geometry
 from mrhubo.robot.urdf import link_poses
 
 _SAMPLES = 2_000
@@ -40,6 +42,7 @@ _AT_ONCE = 2**24
 """Most pairs of capsules, over all poses, whose rough distance is in memory; a sixteenth of them with what is exact."""
 _MOST = 2_000
 """Most capsules."""
+_MOST_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -123,15 +126,15 @@ class SelfCollision(nn.Module):
     def _read_capsules(self) -> None:
         urdf = self.robot.description.parsed
         rest = link_poses(urdf, self.robot.configuration(self.robot.home().cpu().numpy()))
-        found: dict[str, list[Capsule]] = {}
-        for shape in read_collision_geometry(urdf):
+        solids, found = self.robot.description.solids, dict[str, list[Capsule]]()
+        for shape in solids.shapes:
             pose_44 = np.linalg.inv(rest[self._body(shape.link)]) @ rest[shape.link] @ shape.origin_44
             found.setdefault(shape.link, []).extend(capsules(shape, pose_44))
         self._leave_out(found)
         unread = self.robot.description.unread_collisions
         solid = (link.name for link in urdf.robot.links if link.collisions or link.name in unread)
-        self.uncovered = tuple(name for name in solid if name not in found)
-        """Links that are not looked at: their collision geometry is of meshes alone, cannot be read, or is too much."""
+        self.uncovered = tuple(name for name in solid if name not in found or name in solids.gaps)
+        """Links of which something is not looked at: a mesh that is not there, what cannot be read, or is too much."""
         joints = [self.robot.description.joints[name] for name in self.robot.driven_joints]
         carrying = {joint.parent for joint in joints}
         moved = {name for name in self.uncovered if self._body(name) != self.robot.description.root}
@@ -177,6 +180,9 @@ class SelfCollision(nn.Module):
             apart_LL[i, j] = apart_LL[j, i] = False
         pair_2P = self._pair_2P.cpu()
         self._keep_pairs(pair_2P[:, apart_LL[body_C[pair_2P[0]], body_C[pair_2P[1]]]])
+        meant_P = torch.ones(self._pair_2P.shape[1], dtype=torch.bool)
+        meant_P[self.near(self.robot.home()[None], 0.0).pair_X.cpu()] = False
+        self._keep_pairs(self._pair_2P.cpu()[:, meant_P])
 
     def _keep_pairs(self, pair_2P: Tensor) -> None:
         """The pairs in their order, how near two centres must be for a closer look, and which pair two capsules are."""
@@ -200,6 +206,23 @@ class SelfCollision(nn.Module):
             close = self._closer(self._place(self._poses(q_BN, None, rows)), 0.0)
             count_P += torch.bincount(close.pair_X, minlength=len(count_P))
         return count_P > _ALWAYS * len(q_BN)
+
+    @property
+    def known(self) -> bool:
+        """Whether it is known if the robot touches itself: of what moves no shape is missing, and some could meet."""
+        return bool(self._pair_2P.shape[1]) and not self.unknown
+
+    def why_unknown(self) -> str | None:
+        """A sentence where it is not known whether the robot touches itself, for want of shapes; else none."""
+        start = f"robot.urdf: {self.robot.urdf}: whether the robot touches itself is unknown"
+        if self.unknown:
+            listed = ", ".join(self.unknown[:_MOST_LISTED]) + (", ..." if len(self.unknown) > _MOST_LISTED else "")
+            return f"{start}: collision meshes of {len(self.unknown)} links are not there, or cannot be read: {listed}"
+        return None if self.known else f"{start}: it has no collision shapes that could meet"
+
+    def touches(self, q_BN: Tensor, poses: LinkPoses | None = None) -> Tensor | None:
+        """`collides`, where that is known; else None."""
+        return self.collides(q_BN, poses) if self.known else None
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:

@@ -1,4 +1,4 @@
-"""The meshes of a URDF's links, for looks: read where their files are, and passed over where they are not.
+"""The meshes of a URDF's links: read where their files are, and passed over where they are not.
 
 A file may come from anywhere: its kind, its size and the number of its triangles are bounded, and no further file that
 it names (materials, textures) is opened. Legend: V vertices, F triangles.
@@ -19,7 +19,9 @@ from mrhubo.errors import UserError
 from mrhubo.files.regular import check_regular, read_regular
 
 _KINDS = ("stl", "obj", "ply", "dae")
-_MOST_BYTES, _MOST_TRIANGLES = 50_000_000, 2_000_000
+_MOST_BYTES = 50_000_000
+MOST_TRIANGLES = 2_000_000
+"""Of one mesh, and of all that a robot has; the last one may go beyond."""
 _MOST_METRES = 1e3
 
 
@@ -51,7 +53,7 @@ def read_meshes(urdf: yourdfpy.URDF, path: Path, without: Collection[str] = ()) 
                 found += meshes
                 triangles += sum(len(mesh.faces_F3) for mesh in meshes)
                 break
-        if triangles > _MOST_TRIANGLES:
+        if triangles > MOST_TRIANGLES:
             break
     return found
 
@@ -61,17 +63,26 @@ def _meshes(
 ) -> Iterator[LinkMesh]:
     for element in elements:
         mesh = None if element.geometry is None else element.geometry.mesh
-        if mesh is None or (file := find_mesh(str(mesh.filename), path)) is None:
+        if mesh is None or (found := read_mesh(str(mesh.filename), path, scale_of(mesh))) is None:
             continue
-        triangles = _read(file)
-        if triangles is None:
-            continue
-        vertices_V3, faces_F3 = triangles
-        scale = np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, float), (3,))
         place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
-        vertices_V3 = (vertices_V3 * scale) @ place_44[:3, :3].T + place_44[:3, 3]
-        if np.isfinite(vertices_V3).all() and np.abs(vertices_V3).max() < _MOST_METRES:
-            yield LinkMesh(link, vertices_V3, faces_F3)
+        yield LinkMesh(link, found[0] @ place_44[:3, :3].T + place_44[:3, 3], found[1])
+
+
+def scale_of(mesh: yourdfpy.urdf.Mesh) -> np.ndarray:
+    """How much larger (3,) a URDF wants a mesh than its file has it."""
+    return np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, float), (3,))
+
+
+def read_mesh(name: str, path: Path, scale_3: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Vertices (V, 3) [m] and triangles (F, 3) of the mesh that the URDF `path` names; None where it cannot be used."""
+    file = find_mesh(name, path)
+    found = None if file is None else _read(file)
+    if found is None:
+        return None
+    vertices_V3 = found[0] * scale_3
+    usable = np.isfinite(vertices_V3).all() and np.abs(vertices_V3).max() < _MOST_METRES
+    return (vertices_V3, found[1]) if usable else None
 
 
 def find_mesh(name: str, path: Path) -> Path | None:
@@ -117,5 +128,5 @@ def _read(file: Path) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     finally:
         log.setLevel(level)
-    usable = vertices_V3.ndim == 2 and faces_F3.ndim == 2 and 0 < len(faces_F3) <= _MOST_TRIANGLES
+    usable = vertices_V3.ndim == 2 and faces_F3.ndim == 2 and 0 < len(faces_F3) <= MOST_TRIANGLES
     return (vertices_V3, faces_F3) if usable and 0 <= faces_F3.min() and faces_F3.max() < len(vertices_V3) else None

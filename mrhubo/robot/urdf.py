@@ -1,6 +1,6 @@
 """A URDF as the few facts that kinematics needs, read by yourdfpy from what `mrhubo.robot.tree` leaves of the file.
 
-Meshes are never loaded. Lengths in metres, angles in radians.
+yourdfpy loads no meshes. Lengths in metres, angles in radians.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from mrhubo.config import fingerprint
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.joint import ROTARY, Joint, Mimic
 from mrhubo.robot.limits import with_soft_limits
+from mrhubo.robot.solid_shapes import SolidShapes, read_solids
 from mrhubo.robot.tree import Tree, read_tree
 
 # It warns at every pose about mimic joints whose source is fixed (NAO's fingers), which is no news to our users.
@@ -48,6 +49,15 @@ class Description:
     """Links with a collision element that cannot be read."""
     masses: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict, repr=False, compare=False)
     """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
+    _read: dict[str, SolidShapes] = field(default_factory=dict, repr=False, compare=False)
+    """What has been read when it was first asked for; the same robot in another form knows it too."""
+
+    @property
+    def solids(self) -> SolidShapes:
+        """The shapes that can bump into each other; meshes are read when first asked for."""
+        if "solids" not in self._read:
+            self._read["solids"] = read_solids(self.parsed, self.path)
+        return self._read["solids"]
 
     @cached_property
     def kinematics(self) -> str:

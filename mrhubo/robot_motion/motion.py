@@ -98,7 +98,7 @@ class RobotMotion:
     phi: np.ndarray | None = None
     """Reconstruction error (...) of the human pose under the body prior."""
     collision: np.ndarray | None = None
-    """Whether the robot touches itself (...), bool."""
+    """Whether the robot touches itself (...), bool; None: not known, for want of collision shapes."""
     root_position: np.ndarray | None = None
     """Place (..., 3) [m] of the base in the world: x forward, y left, z up; None where the base is fixed."""
     root_quaternion_wxyz: np.ndarray | None = None

@@ -151,3 +151,14 @@ def test_what_the_axes_tell_of_a_chest_is_not_doubted(
     described = describe_model("my.urdf")
     build_body_map(load_config(described.file).robot)
     assert not [warning for warning in recwarn.list if "from where they lie on a human" in str(warning.message)]
+
+
+def test_a_robot_of_ten_thousand_joints_is_refused_at_once(tmp_path: Path) -> None:
+    links = "".join(f'<link name="l{i}"/>' for i in range(10_000))
+    joints = "".join(
+        f'<joint name="j{i}" type="continuous"><parent link="l{i - 1}"/><child link="l{i}"/></joint>'
+        for i in range(1, 10_000)
+    )
+    (tmp_path / "long.urdf").write_text(f'<robot name="long">{links}{joints}</robot>')
+    with pytest.raises(UserError, match="9,999 joints move"):
+        describe_model(str(tmp_path / "long.urdf"), tmp_path / "long.yaml")

@@ -139,8 +139,22 @@ def test_directions_in_place_of_poses(make: Callable[[str], Retargeter], array: 
 
 
 def test_both_forms_agree_to_the_bit_but_for_rounding(make: Callable[[str], Retargeter], array: np.ndarray) -> None:
+    """From the same angles: steps may enlarge the rounding of the networks' own."""
     pytest.importorskip("numba")
-    description = make("reachy").describe()
-    one, other = (FastRetargeter(description, form)(array) for form in FORMS)
-    assert np.abs(one.q - other.q).max() < SAME_RAD
-    np.testing.assert_array_equal(one.collision, other.collision)
+    engines = [FastRetargeter(make("reachy").describe(), form).engine for form in FORMS]
+    (target, start), (other_target, other_start) = (engine.look(array, array.shape[:1]) for engine in engines)
+    assert np.abs(target - other_target).max() < 1e-6 and np.abs(start - other_start).max() < SAME_RAD
+    one, other = (engine.answer(start, target, 10, True, None) for engine in engines)
+    assert np.abs(one.q_BN - other.q_BN).max() < SAME_RAD
+    np.testing.assert_array_equal(one.collision_B, other.collision_B)
+
+
+def test_threads_tell_the_first_frame_that_is_wrong(make: Callable[[str], Retargeter], array: np.ndarray) -> None:
+    pytest.importorskip("numba")
+    fast, many = FastRetargeter(make("nao").describe(), "compiled"), np.tile(array, (8, 1, 1, 1))
+    for frame, change, said in ((340, 1.5, "no rotation"), (290, np.nan, "NaN"), (131, 1.5, "no rotation")):
+        many[frame, 4, 0, 0] = change
+        with pytest.raises(UserError, match=f"pose {frame} holds .*{said}"):
+            fast.predict(many)
+    many.flags.writeable = False
+    np.testing.assert_array_equal(fast.predict(many[:44]), fast.predict(array))

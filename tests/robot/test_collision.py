@@ -19,6 +19,7 @@ from mrhubo.errors import InputWarning
 from mrhubo.robot import LinkGeometry, Robot, SelfCollision, build_body_map, collision, read_collision_geometry
 from mrhubo.robot.capsules import capsules, closest_points
 from mrhubo.robot.shapes import Kind
+from mrhubo.robot.solid_shapes import SolidShapes
 from tests.robot import exact_shapes
 
 ROBOTS = ["nao", "coman", "reachy"]
@@ -172,8 +173,8 @@ def test_what_is_reported_is_near_what_is_exact(
     shapes = [
         dataclasses.replace(places[link], kind=kind, size=size) for link in ("torso", "LForeArm", "RForeArm", "Head")
     ]
-    for module in (collision, exact_shapes):
-        monkeypatch.setattr(module, "read_collision_geometry", lambda _: shapes)
+    monkeypatch.setitem(robot.description._read, "solids", SolidShapes(tuple(shapes), (), frozenset()))
+    monkeypatch.setattr(exact_shapes, "read_collision_geometry", lambda _: shapes)
     found = SelfCollision(robot)
     q_BN = robot.sample(150, torch.Generator().manual_seed(0))
     exact = exact_shapes.collides_exactly(robot, found, q_BN)

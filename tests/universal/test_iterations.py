@@ -72,7 +72,6 @@ def test_the_shipped_weights_beat_as_many_steps_from_the_middle() -> None:
     learnt_B = unroll(network, problem).cost_B
     _, middle_B = minimise(problem, problem.bounds.middle_BN, ITERATIONS)
     _, longer_B = minimise(problem, problem.bounds.middle_BN, 4 * ITERATIONS)
-    # Measured: 0.27, 0.37 and 0.30.
     assert float(learnt_B.mean()) < float(longer_B.mean()) - 0.01 < float(middle_B.mean())
     elsewhere = (learnt_B > torch.minimum(longer_B, learnt_B) + 0.01).float().mean()
     assert float(elsewhere) < 0.05

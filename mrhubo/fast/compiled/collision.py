@@ -8,16 +8,22 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.human import add, cross, dot, put, row, turn
 from mrhubo.fast.compiled.tables import (
+    BALL_Z,
+    BODY_G,
     BODY_S,
+    CAPSULE_Z,
+    CENTRE_G3,
     CLEAR_Y,
     COLUMN_A,
     END_S23,
+    FIRST_Z,
     INNER,
     PAIR_Y2,
     PARENT_A,
     RADIUS_S,
     RATIO_A,
     REACH_S,
+    REACH_Z,
     ROTARY_A,
     real,
     size,
@@ -29,7 +35,7 @@ from mrhubo.fast.plain.collision import PARALLEL, SHORT
 
 @njit(**INNER)
 def place_capsules(t, work):
-    """Ends and middles of capsules, where the robot is placed."""
+    """Ends and middles of capsules, and middles of balls, where the robot is placed."""
     ends_S3, count = work.ends_S3, size(t, BODY_S)
     for s in range(count):
         body = whole(t, BODY_S, s)
@@ -39,6 +45,24 @@ def place_capsules(t, work):
         put(ends_S3, 2 * s, one)
         put(ends_S3, 2 * s + 1, two)
         put(ends_S3, 2 * count + s, add(one, two, 1.0))
+    for g in range(size(t, BODY_G)):
+        body = whole(t, BODY_G, g)
+        put(
+            work.centre_G3,
+            g,
+            add(turn(work.rotation_L33, body, vector(t, CENTRE_G3, g)), row(work.position_L3, body), 1.0),
+        )
+
+
+@njit(**INNER)
+def far(t, work, z):
+    """Whether no pair of a group can be nearer than its clearance, nor overlap, where capsules are placed."""
+    middle, g = 2 * size(t, BODY_S) + whole(t, CAPSULE_Z, z), whole(t, BALL_Z, z)
+    apart, reach = 0.0, 2 * real(t, REACH_Z, z)
+    for x in range(3):
+        between = work.ends_S3[middle, x] - 2 * work.centre_G3[g, x]
+        apart += between * between
+    return apart >= reach * reach
 
 
 @njit(**INNER)
@@ -89,10 +113,13 @@ def touches(t, work, clear):
     placed.
     """
     place_capsules(t, work)
-    for y in range(size(t, PAIR_Y2) // 2):
-        margin = real(t, CLEAR_Y, y) if clear else 0.0
-        if apart(t, work, y, margin)[0] < margin:
-            return True
+    for z in range(size(t, BALL_Z)):
+        if far(t, work, z):
+            continue
+        for y in range(whole(t, FIRST_Z, z), whole(t, FIRST_Z, z + 1)):
+            margin = real(t, CLEAR_Y, y) if clear else 0.0
+            if apart(t, work, y, margin)[0] < margin:
+                return True
     return False
 
 

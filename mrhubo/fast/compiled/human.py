@@ -11,6 +11,7 @@ from mrhubo.fast.compiled.tables import (
     BEND_4,
     BEND_Z,
     INNER,
+    INNER_EXACT,
     JOINT_P,
     LOWER_Z,
     NEEDED_HIGH,
@@ -202,4 +203,18 @@ def oblique(local_BJ33, b, j):
     for x in range(3):
         for y in range(x + 1):
             found = max(found, abs(dot(columns[x], columns[y]) - (1.0 if x == y else 0.0)))
+    return found
+
+
+@njit(**INNER_EXACT)
+def flaw(local_BJ33, b, skew):
+    """0: a pose holds rotations; 1: a matrix that is none; 2: a number that is not finite."""
+    found = 0
+    for j in range(local_BJ33.shape[1]):
+        for x in range(3):
+            for y in range(3):
+                if not math.isfinite(local_BJ33[b, j, x, y]):
+                    return 2
+        if oblique(local_BJ33, b, j) > skew:
+            found = 1
     return found

@@ -25,7 +25,7 @@ from mrhubo.fast.compiled.networks import mlp
 from mrhubo.fast.compiled.tables import (
     AXIS_T33,
     COLUMN_XD,
-    COUNT_5,
+    COUNT_6,
     DIRECTION_K3,
     EXCESS,
     GOOD,
@@ -184,29 +184,29 @@ def excess(t, j, local_T33):
 
 
 @njit(**INNER)
-def prior_input(local_T33, out_F):
-    """What the body prior's encoder sees of the turned joints."""
+def prior_input(local_T33, out_BF, k):
+    """What the body prior's encoder sees of the turned joints, into row k."""
     for j in range(len(local_T33)):
         for column in range(2):
             for line in range(3):
                 rest = 1.0 if line == column else 0.0
-                out_F[6 * j + 3 * column + line] = np.float32(local_T33[j, line, column] - rest)
+                out_BF[k, 6 * j + 3 * column + line] = np.float32(local_T33[j, line, column] - rest)
 
 
 @njit(**INNER)
-def reconstruct(t, activation, one_E, two_E, three_E):
-    """The body prior's six numbers for each turned joint, of its input; both stand in `one_E`."""
-    coder = whole(t, COUNT_5, STAGES)
-    mlp(t, coder, activation, 0, one_E, two_E, three_E)
-    mlp(t, coder + 1, activation, 0, one_E, two_E, three_E)
+def reconstruct(t, activation, one_BE, two_BE, three_BE, frames):
+    """The body prior's six numbers for each turned joint, of its input; both stand in `one_BE`."""
+    coder = whole(t, COUNT_6, STAGES)
+    mlp(t, coder, activation, 0, one_BE, two_BE, three_BE, frames)
+    mlp(t, coder + 1, activation, 0, one_BE, two_BE, three_BE, frames)
 
 
 @njit(**INNER)
-def joint_error(local_T33, j, six_F, between_333):
-    """Mean squared error of a joint's six numbers."""
+def joint_error(local_T33, j, six_BF, b, between_333):
+    """Mean squared error of a joint's six numbers, which stand in row b."""
     f = 6 * j
-    first = (np.float64(six_F[f]), np.float64(six_F[f + 1]), np.float64(six_F[f + 2]))
-    second = (np.float64(six_F[f + 3]), np.float64(six_F[f + 4]), np.float64(six_F[f + 5]))
+    first = (np.float64(six_BF[b, f]), np.float64(six_BF[b, f + 1]), np.float64(six_BF[b, f + 2]))
+    second = (np.float64(six_BF[b, f + 3]), np.float64(six_BF[b, f + 4]), np.float64(six_BF[b, f + 5]))
     orthonormal(first, second, between_333, 0)
     found = 0.0
     for i in range(3):

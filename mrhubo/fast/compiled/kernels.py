@@ -3,7 +3,8 @@
 numba keeps what it compiled of a function until the function's own file changes, but not when what it calls does. So
 these functions hold a checksum of all sources, which is a part of the key.
 
-Legend: B frames, D directions, N joints, F numbers that networks see, T turned human joints, X branches.
+Legend: B frames, of arrays to work with those that are worked on together; D directions, N joints, F numbers that
+networks see, E numbers between layers, M of links, T turned human joints, X branches.
 """
 
 from __future__ import annotations
@@ -25,17 +26,19 @@ from mrhubo.fast.kept import checksum
 class Kernels(NamedTuple):
     """Compiled functions."""
 
-    wrong: Callable[..., Any]
-    activate: Callable[..., Any]
-    directions: Callable[..., Any]
-    networks: Callable[..., Any]
+    look: Callable[..., Any]
     follow: Callable[..., Any]
     avoid: Callable[..., Any]
     retarget: Callable[..., Any]
 
 
-STEPS, ALL, WITHOUT_PRIOR = range(3)
-"""What `retarget` does: steps alone; steps and judging; judging alone, with the prior's answer given."""
+CHECK, DIRECT, ANSWER = 1, 2, 4
+"""What `look` does, added up."""
+AT_ONCE = 48
+"""Frames that go through the networks together: their numbers, of which there are fewer than 400 a frame, stay in the
+processor's nearest memory beside the weights that are at work."""
+FEWER_AT_ONCE = 24
+"""The same for the body prior's layers, which are wider."""
 
 
 @cache
@@ -45,49 +48,36 @@ def make_kernels() -> Kernels:
     """
     version = checksum()
 
-    @njit(cache=True, **tables.EXACT)
-    def wrong(local_BJ33, skew):
-        """Twice the number of the first frame that holds no rotations, one more where all is finite; else -1."""
-        _ = version
-        for b in range(len(local_BJ33)):
-            found = -1
-            for j in range(local_BJ33.shape[1]):
-                for x in range(3):
-                    for y in range(3):
-                        if not math.isfinite(local_BJ33[b, j, x, y]):
-                            return 2 * b
-                if humans.oblique(local_BJ33, b, j) > skew:
-                    found = 2 * b + 1
-            if found >= 0:
-                return found
-        return -1
-
     @njit(cache=True, **tables.COMPILED)
-    def activate(kind, x_X, out_X):
-        """An activation of all numbers."""
+    def look(t, skew, what, local_BJ33, target_BD3, out_BN):
+        """Whether poses hold rotations (CHECK), their directions (DIRECT), and the joint angles that the networks give
+        (ANSWER). Returns twice the number of the first frame that holds no rotations, one more where all is finite, as
+        soon as there is one; else -1.
+        """
         _ = version
-        networks.activate(kind, x_X, out_X, len(x_X))
-
-    @njit(cache=True, **tables.COMPILED)
-    def directions(t, local_BJ33, out_BD3):
-        """Directions of poses."""
-        _ = version
-        places_L33 = np.empty((tables.size(t, tables.JOINT_P) + 2, 3, 3))
-        for b in range(len(local_BJ33)):
-            humans.directions(t, local_BJ33, b, places_L33, out_BD3)
-
-    @njit(cache=True, **tables.COMPILED)
-    def network(t, local_BJ33, target_BD3, out_BN):
-        """Joint angles that the networks give."""
-        _ = version
-        widest = networks.widest(t)
-        one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
-        link_M = np.empty(6 * out_BN.shape[1], np.float32)
-        feature_F = np.empty(tables.size(t, tables.CENTER_F), np.float32)
+        nets = tables.whole(t, tables.COUNT_6, tables.STAGES)
+        frames, widest = len(local_BJ33), networks.widest(t, nets)
+        at_once = min(AT_ONCE, frames) if what & ANSWER else 1
+        one_BE = np.empty((at_once, widest), np.float32)
+        two_BE, three_BE = np.empty_like(one_BE), np.empty_like(one_BE)
+        link_BM = np.empty((at_once, 6 * out_BN.shape[1]), np.float32)
+        feature_BF = np.empty((at_once, tables.size(t, tables.CENTER_F)), np.float32)
         unit_I3 = np.empty((tables.size(t, tables.INPUT_I), 3))
-        for b in range(len(target_BD3)):
-            networks.features(t, local_BJ33, target_BD3, b, unit_I3, feature_F)
-            networks.joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b)
+        places_L33 = np.empty((tables.size(t, tables.JOINT_P) + 2, 3, 3))
+        for first in range(0, frames, max(at_once, 1)):
+            count = min(at_once, frames - first)
+            for k in range(count):
+                b = first + k
+                flaw = humans.flaw(local_BJ33, b, skew) if what & CHECK else 0
+                if flaw:
+                    return 2 * b + flaw % 2
+                if what & DIRECT:
+                    humans.directions(t, local_BJ33, b, places_L33, target_BD3)
+                if what & ANSWER:
+                    networks.features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k)
+            if what & ANSWER:
+                networks.joint_angles(t, feature_BF, link_BM, one_BE, two_BE, three_BE, out_BN, first, count)
+        return -1
 
     @njit(cache=True, **tables.COMPILED)
     def follow(t, target_BD3, pull_B, lower_BN, upper_BN, q_BN, cost_BC):
@@ -112,56 +102,59 @@ def make_kernels() -> Kernels:
 
     @njit(cache=True, **tables.COMPILED)
     def retarget(
-        t, activation, polish, avoid, what, target_BD3, q_BN, six_BF, shake_BX, error_BM, phi_B, collision_B, trust_BX
+        t, activation, polish, avoid, judge, target_BD3, q_BN, shake_BX, error_BM, phi_B, collision_B, trust_BX
     ):  # fmt: skip
         """Makes steps from `q_BN`, where the answers will stand, and if `avoid` away from self-collision; and says how
-        good they are. `six_BF`: the numbers of poses as the robot reads them (STEPS), or of their reconstructions
-        (WITHOUT_PRIOR).
+        good they are, if `judge`.
         """
         _ = version
         work = robots.make_work(t)
-        turned, widest = tables.size(t, tables.PARENT_T), networks.widest(t)
-        one_E, two_E, three_E = np.empty(widest, np.float32), np.empty(widest, np.float32), np.empty(widest, np.float32)
-        turn_T33, local_T33 = np.empty((turned + 1, 3, 3)), np.empty((turned, 3, 3))
-        between_333 = np.empty((3, 3, 3))
+        frames, turned = len(target_BD3), tables.size(t, tables.PARENT_T)
+        nets = tables.whole(t, tables.COUNT_6, tables.STAGES) + 2
+        at_once = min(FEWER_AT_ONCE, frames) if judge else 1
+        one_BE = np.empty((at_once, networks.widest(t, nets) if judge else 1), np.float32)
+        two_BE, three_BE = np.empty_like(one_BE), np.empty_like(one_BE)
+        turn_T33, local_BT33 = np.empty((turned + 1, 3, 3)), np.empty((at_once, turned, 3, 3))
+        between_333, free_B = np.empty((3, 3, 3)), np.empty(at_once, np.bool_)
         angle_D, error_T, excess_T = np.empty(target_BD3.shape[1]), np.empty(turned), np.empty(turned)
         joints, measured, branches = q_BN.shape[1], error_BM.shape[1], trust_BX.shape[1]
         q_N = np.empty(joints)
-        for b in range(len(target_BD3)):
-            for n in range(joints):
-                q_N[n] = q_BN[b, n]
-            if polish and what != WITHOUT_PRIOR:
-                steps.polish(t, work, target_BD3, b, q_N, polish)
-                if avoid:
-                    avoidance.avoid(t, work, q_N)
-                for n in range(joints):
-                    q_BN[b, n] = q_N[n]
-                    q_N[n] = q_BN[b, n]
-            judging.read_pose(t, target_BD3, b, turn_T33, between_333, local_T33)
-            if what == STEPS:
-                judging.prior_input(local_T33, one_E)
-                for f in range(six_BF.shape[1]):
-                    six_BF[b, f] = one_E[f]
+        for first in range(0, frames, max(at_once, 1)):
+            count = min(at_once, frames - first)
+            for k in range(count):
+                b, free = first + k, False
+                if polish:
+                    for n in range(joints):
+                        q_N[n] = q_BN[b, n]
+                    steps.polish(t, work, target_BD3, b, q_N, polish)
+                    if avoid:
+                        free = avoidance.avoid(t, work, q_N)
+                    for n in range(joints):
+                        q_BN[b, n] = q_N[n]
+                free_B[k] = free and tables.whole(t, tables.COUNT_6, tables.APART)
+                if judge:
+                    judging.read_pose(t, target_BD3, b, turn_T33, between_333, local_BT33[k])
+                    judging.prior_input(local_BT33[k], one_BE, k)
+            if not judge:
                 continue
-            robots.place(t, work, q_N)
-            judging.robot_angles(t, work, target_BD3, b, angle_D)
-            for m in range(measured):
-                error_BM[b, m] = math.degrees(angle_D[tables.whole(t, tables.MEASURED, m)])
-            collision_B[b] = collision.touches(t, work, False)
-            if what == ALL:
-                judging.prior_input(local_T33, one_E)
-                judging.reconstruct(t, activation, one_E, two_E, three_E)
-            else:
-                for f in range(six_BF.shape[1]):
-                    one_E[f] = six_BF[b, f]
-            for j in range(turned):
-                error_T[j] = judging.joint_error(local_T33, j, one_E, between_333)
-                excess_T[j] = judging.excess(t, j, local_T33)
-            phi_B[b] = 0.0
-            for x in range(branches):
-                miss, phi, over = judging.branch_signals(t, angle_D, error_T, excess_T, x)
-                moving = len(shake_BX) > 0
-                trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
-                phi_B[b] = max(phi_B[b], phi)
+            judging.reconstruct(t, activation, one_BE, two_BE, three_BE, count)
+            for k in range(count):
+                b = first + k
+                for n in range(joints):
+                    q_N[n] = q_BN[b, n]
+                robots.place(t, work, q_N)
+                judging.robot_angles(t, work, target_BD3, b, angle_D)
+                for m in range(measured):
+                    error_BM[b, m] = math.degrees(angle_D[tables.whole(t, tables.MEASURED, m)])
+                collision_B[b] = not free_B[k] and collision.touches(t, work, False)
+                for j in range(turned):
+                    error_T[j] = judging.joint_error(local_BT33[k], j, one_BE, k, between_333)
+                    excess_T[j] = judging.excess(t, j, local_BT33[k])
+                phi_B[b] = 0.0
+                for x in range(branches):
+                    miss, phi, over = judging.branch_signals(t, angle_D, error_T, excess_T, x)
+                    moving = len(shake_BX) > 0
+                    trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
+                    phi_B[b] = max(phi_B[b], phi)
 
-    return Kernels(wrong, activate, directions, network, follow, avoid, retarget)
+    return Kernels(look, follow, avoid, retarget)

@@ -1,4 +1,4 @@
-"""As `mrhubo.fast.plain.networks`, for one frame."""
+"""As `mrhubo.fast.plain.networks`, for some frames at a time, so that weights are read once for all of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mrhubo.fast.compiled.tables import (
     BEND_W,
     CENTER_F,
     COLUMN,
-    COUNT_5,
+    COUNT_6,
     FIRST_O,
     FIRST_STAGE,
     INNER,
@@ -64,155 +64,185 @@ ACTIVATIONS = {"gelu": GELU, "silu": SILU, "leaky_relu": LEAKY, "tanh": TANH}
 
 
 @njit(**INNER)
-def activate(kind, x_E, out_E, count):
-    """An activation of the first numbers; GELU and SiLU are written so that several are worked out at a time."""
-    if kind == GELU:
-        for e in range(count):
-            z = min(max(x_E[e] * _ROOT, -_END), _END)
-            s = z * z
-            top = ((((_T5 * s + _T4) * s + _T3) * s + _T2) * s + _T1) * s + _T0
-            bottom = ((((_B5 * s + _B4) * s + _B3) * s + _B2) * s + _B1) * s + _ONE
-            out_E[e] = (z * top / bottom + _ONE) * x_E[e] * _HALF
-    elif kind == SILU:
-        for e in range(count):
-            z = min(max(x_E[e] * _HALF, -_TANH_END), _TANH_END)
-            s = z * z
-            top = ((((_P5 * s + _P4) * s + _P3) * s + _P2) * s + _P1) * s + _P0
-            bottom = (((_Q4 * s + _Q3) * s + _Q2) * s + _Q1) * s + _ONE
-            out_E[e] = (z * top / bottom + _ONE) * x_E[e] * _HALF
-    elif kind == LEAKY:
-        for e in range(count):
-            out_E[e] = max(x_E[e], np.float32(0.01) * x_E[e])
-    else:
-        for e in range(count):
-            out_E[e] = np.float32(math.tanh(x_E[e]))
+def activate(kind, x_BE, out_BE, frames, count):
+    """An activation of the first numbers of frames. GELU and SiLU are written so that several are done at once."""
+    for b in range(frames):
+        if kind == GELU:
+            for e in range(count):
+                z = min(max(x_BE[b, e] * _ROOT, -_END), _END)
+                s = z * z
+                top = ((((_T5 * s + _T4) * s + _T3) * s + _T2) * s + _T1) * s + _T0
+                bottom = ((((_B5 * s + _B4) * s + _B3) * s + _B2) * s + _B1) * s + _ONE
+                out_BE[b, e] = (z * top / bottom + _ONE) * x_BE[b, e] * _HALF
+        elif kind == SILU:
+            for e in range(count):
+                z = min(max(x_BE[b, e] * _HALF, -_TANH_END), _TANH_END)
+                s = z * z
+                top = ((((_P5 * s + _P4) * s + _P3) * s + _P2) * s + _P1) * s + _P0
+                bottom = (((_Q4 * s + _Q3) * s + _Q2) * s + _Q1) * s + _ONE
+                out_BE[b, e] = (z * top / bottom + _ONE) * x_BE[b, e] * _HALF
+        elif kind == LEAKY:
+            for e in range(count):
+                out_BE[b, e] = max(x_BE[b, e], np.float32(0.01) * x_BE[b, e])
+        else:
+            for e in range(count):
+                out_BE[b, e] = np.float32(math.tanh(x_BE[b, e]))
 
 
 @njit(**INNER)
-def affine(t, layer, x_I, out_O):
+def affine(t, layer, x_BI, out_BO, frames):
     """A layer: weights x + biases."""
     inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
     number, begin = t[2], t[0][2 * NUMBER]
     weights, biases = whole(t, LAYER_G5, 5 * layer + 2), begin + whole(t, LAYER_G5, 5 * layer + 3)
     # A view tells that places are not negative, without which numba is five times slower.
     if whole(t, LAYER_G5, 5 * layer + 4):
-        _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_I, out_O)
-        for o in range(outputs):
-            out_O[o] = out_O[o] * number[biases + outputs + o] + number[biases + o]
+        _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
+        for b in range(frames):
+            for o in range(outputs):
+                out_BO[b, o] = out_BO[b, o] * number[biases + outputs + o] + number[biases + o]
         return
     weights += begin
-    _products(number[weights : weights + outputs * inputs].reshape(outputs, inputs), x_I, out_O)
-    for o in range(outputs):
-        out_O[o] += number[biases + o]
+    _products(number[weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
+    for b in range(frames):
+        for o in range(outputs):
+            out_BO[b, o] += number[biases + o]
 
 
 @njit(**INNER)
-def _products(weight_OI, x_I, out_O):
-    """Four rows at a time use each number of x four times."""
+def _products(weight_OI, x_BI, out_BO, frames):
+    """Four rows and three frames at a time: each number that is read is used several times, and twelve sums are as many
+    as the processor has room for.
+    """
     outputs, inputs = weight_OI.shape
-    done = outputs - outputs % 4
-    for o in range(0, done, 4):
-        a, b, c, d = _ZERO, _ZERO, _ZERO, _ZERO
-        for i in range(inputs):
-            a += np.float32(weight_OI[o, i]) * x_I[i]
-            b += np.float32(weight_OI[o + 1, i]) * x_I[i]
-            c += np.float32(weight_OI[o + 2, i]) * x_I[i]
-            d += np.float32(weight_OI[o + 3, i]) * x_I[i]
-        out_O[o], out_O[o + 1], out_O[o + 2], out_O[o + 3] = a, b, c, d
-    for o in range(done, outputs):
-        a = _ZERO
-        for i in range(inputs):
-            a += np.float32(weight_OI[o, i]) * x_I[i]
-        out_O[o] = a
+    rows, several = outputs - outputs % 4, frames - frames % 3
+    for o in range(0, rows, 4):
+        for b in range(0, several, 3):
+            a0, a1, a2, b0, b1, b2 = _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
+            c0, c1, c2, d0, d1, d2 = _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
+            for i in range(inputs):
+                x, y, z = x_BI[b, i], x_BI[b + 1, i], x_BI[b + 2, i]
+                w = np.float32(weight_OI[o, i])
+                a0, a1, a2 = a0 + w * x, a1 + w * y, a2 + w * z
+                w = np.float32(weight_OI[o + 1, i])
+                b0, b1, b2 = b0 + w * x, b1 + w * y, b2 + w * z
+                w = np.float32(weight_OI[o + 2, i])
+                c0, c1, c2 = c0 + w * x, c1 + w * y, c2 + w * z
+                w = np.float32(weight_OI[o + 3, i])
+                d0, d1, d2 = d0 + w * x, d1 + w * y, d2 + w * z
+            out_BO[b, o], out_BO[b, o + 1], out_BO[b, o + 2], out_BO[b, o + 3] = a0, b0, c0, d0
+            out_BO[b + 1, o], out_BO[b + 1, o + 1], out_BO[b + 1, o + 2], out_BO[b + 1, o + 3] = a1, b1, c1, d1
+            out_BO[b + 2, o], out_BO[b + 2, o + 1], out_BO[b + 2, o + 2], out_BO[b + 2, o + 3] = a2, b2, c2, d2
+        for b in range(several, frames):
+            a0, b0, c0, d0 = _ZERO, _ZERO, _ZERO, _ZERO
+            for i in range(inputs):
+                a0 += np.float32(weight_OI[o, i]) * x_BI[b, i]
+                b0 += np.float32(weight_OI[o + 1, i]) * x_BI[b, i]
+                c0 += np.float32(weight_OI[o + 2, i]) * x_BI[b, i]
+                d0 += np.float32(weight_OI[o + 3, i]) * x_BI[b, i]
+            out_BO[b, o], out_BO[b, o + 1], out_BO[b, o + 2], out_BO[b, o + 3] = a0, b0, c0, d0
+    for o in range(rows, outputs):
+        for b in range(frames):
+            a0 = _ZERO
+            for i in range(inputs):
+                a0 += np.float32(weight_OI[o, i]) * x_BI[b, i]
+            out_BO[b, o] = a0
 
 
 @njit(**INNER)
-def mlp(t, net, kind, residual, one_E, two_E, three_E):
-    """A network of what stands in `one_E`, with these activations; the output stands in `one_E` again. Hidden layers
+def mlp(t, net, kind, residual, one_BE, two_BE, three_BE, frames):
+    """A network of what stands in `one_BE`, with these activations; the output stands in `one_BE` again. Hidden layers
     after the first are added to what came in where it is residual.
     """
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
     width = whole(t, LAYER_G5, 5 * first + 1)
-    affine(t, first, one_E, three_E)
-    for e in range(width):
-        one_E[e] = three_E[e]
+    affine(t, first, one_BE, three_BE, frames)
+    for b in range(frames):
+        for e in range(width):
+            one_BE[b, e] = three_BE[b, e]
     for layer in range(first + 1, first + layers):
         before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
-        activate(kind, one_E, two_E, before)
-        affine(t, layer, two_E, three_E)
+        activate(kind, one_BE, two_BE, frames, before)
+        affine(t, layer, two_BE, three_BE, frames)
         adds = residual and layer < first + layers - 1
-        for e in range(width):
-            one_E[e] = one_E[e] + three_E[e] if adds else three_E[e]
+        for b in range(frames):
+            for e in range(width):
+                one_BE[b, e] = one_BE[b, e] + three_BE[b, e] if adds else three_BE[b, e]
 
 
 @njit(**INNER)
-def joint_angles(t, feature_F, link_M, one_E, two_E, three_E, out_BN, b):
-    """Joint angles [rad], inside the limits, of what the networks see (F,)."""
-    first_stage = whole(t, COUNT_5, FIRST_STAGE)
-    for net in range(whole(t, COUNT_5, STAGES)):
+def joint_angles(t, feature_BF, link_BM, one_BE, two_BE, three_BE, out_BN, first, frames):
+    """Joint angles [rad], inside the limits, of what the networks see (B, F), from a first frame of the output on."""
+    first_stage = whole(t, COUNT_6, FIRST_STAGE)
+    for net in range(whole(t, COUNT_6, STAGES)):
         inputs, outputs = whole(t, NET_H6, 6 * net + 3), whole(t, NET_H6, 6 * net + 5)
         last = net >= first_stage
         for i in range(inputs):
             c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 2) + i)
-            one_E[i] = link_M[c] if last and first_stage else feature_F[c]
-        mlp(t, net, GELU, whole(t, COUNT_5, RESIDUAL), one_E, two_E, three_E)
+            for b in range(frames):
+                one_BE[b, i] = link_BM[b, c] if last and first_stage else feature_BF[b, c]
+        mlp(t, net, GELU, whole(t, COUNT_6, RESIDUAL), one_BE, two_BE, three_BE, frames)
         for o in range(outputs):
             c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 4) + o)
-            if last:
-                out_BN[b, c] = one_E[o]
-            else:
-                link_M[c] = one_E[o]
-    for n in range(out_BN.shape[1]):
-        low, high, raw = np.float32(real(t, LOWER_N, n)), np.float32(real(t, UPPER_N, n)), out_BN[b, n]
-        if whole(t, COUNT_5, TANH_BOUND):
-            raw = np.float32(math.tanh(raw))
-        angle = (high + low) * _HALF + (high - low) * _HALF * raw
-        if math.isnan(angle):
-            angle = np.float32(0)
-        out_BN[b, n] = min(max(angle, low), high)
+            for b in range(frames):
+                if last:
+                    out_BN[first + b, c] = one_BE[b, o]
+                else:
+                    link_BM[b, c] = one_BE[b, o]
+    for b in range(first, first + frames):
+        for n in range(out_BN.shape[1]):
+            low, high, raw = np.float32(real(t, LOWER_N, n)), np.float32(real(t, UPPER_N, n)), out_BN[b, n]
+            if whole(t, COUNT_6, TANH_BOUND):
+                raw = np.float32(math.tanh(raw))
+            angle = (high + low) * _HALF + (high - low) * _HALF * raw
+            if math.isnan(angle):
+                angle = np.float32(0)
+            out_BN[b, n] = min(max(angle, low), high)
 
 
 @njit(**INNER)
-def features(t, local_BJ33, target_BD3, b, unit_I3, feature_F):
-    """What the networks see of a pose and its directions. `unit_I3`: room for the directions in full length."""
+def features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k):
+    """What the networks see of a pose and its directions, into row k. `unit_I3`: room for directions in full length."""
     inputs = size(t, INPUT_I)
-    if whole(t, COUNT_5, SEES_DIRECTIONS):
+    if whole(t, COUNT_6, SEES_DIRECTIONS):
         for i in range(inputs):
             own = row3(target_BD3, b, whole(t, INPUT_I, i))
             put(unit_I3, i, own)
-            feature_F[3 * i], feature_F[3 * i + 1], feature_F[3 * i + 2] = own
+            feature_BF[k, 3 * i], feature_BF[k, 3 * i + 1], feature_BF[k, 3 * i + 2] = own
         at = 3 * inputs
         for w in range(size(t, BEND_W)):
             upper, lower = row(unit_I3, whole(t, UPPER_W, w)), row(unit_I3, whole(t, LOWER_W, w))
             own, plane = row(unit_I3, whole(t, BEND_W, w)), unit(cross(upper, lower))
             own = add(own, plane, max(1 - math.sqrt(dot(own, own)), 0.0))
             put(unit_I3, whole(t, BEND_W, w), own)
-            feature_F[at], feature_F[at + 1], feature_F[at + 2] = own
+            feature_BF[k, at], feature_BF[k, at + 1], feature_BF[k, at + 2] = own
             at += 3
         for o in range(size(t, FIRST_O)):
-            feature_F[at] = dot(row(unit_I3, whole(t, FIRST_O, o)), row(unit_I3, whole(t, SECOND_O, o)))
+            feature_BF[k, at] = dot(row(unit_I3, whole(t, FIRST_O, o)), row(unit_I3, whole(t, SECOND_O, o)))
             at += 1
         for m in range(size(t, LIMB_M)):
             along, axis = row(unit_I3, whole(t, LIMB_M, m)), row(unit_I3, whole(t, AXIS_M, m))
             seen = row(unit_I3, whole(t, SEEN_M, m))
             axis = unit(add(axis, along, -dot(along, axis)))
-            feature_F[at], feature_F[at + 1] = dot(seen, along), dot(seen, axis)
-            feature_F[at + 2] = dot(seen, cross(along, axis))
+            feature_BF[k, at], feature_BF[k, at + 1] = dot(seen, along), dot(seen, axis)
+            feature_BF[k, at + 2] = dot(seen, cross(along, axis))
             at += 3
     else:
         for i in range(inputs):
             chosen = whole(t, INPUT_I, i)
             for column in range(2):
                 for line in range(3):
-                    feature_F[6 * i + 3 * column + line] = local_BJ33[b, chosen, line, column]
+                    feature_BF[k, 6 * i + 3 * column + line] = local_BJ33[b, chosen, line, column]
     for f in range(size(t, CENTER_F)):
-        feature_F[f] = (feature_F[f] - single(t, CENTER_F, f)) * single(t, SCALE_F, f)
+        feature_BF[k, f] = (feature_BF[k, f] - single(t, CENTER_F, f)) * single(t, SCALE_F, f)
 
 
 @njit(**INNER)
-def widest(t):
-    """The most numbers between layers."""
+def widest(t, nets):
+    """The most numbers between layers of the first networks."""
     found = 0
-    for g in range(size(t, LAYER_G5) // 5):
-        found = max(found, whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1))
+    for net in range(nets):
+        first = whole(t, NET_H6, 6 * net)
+        for g in range(first, first + whole(t, NET_H6, 6 * net + 1)):
+            found = max(found, whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1))
     return found

@@ -13,6 +13,7 @@ from mrhubo.fast.compiled.tables import (
     ACROSS_A33,
     AXIS_A3,
     BLOCK_N,
+    BODY_G,
     BODY_S,
     COLUMN_A,
     COLUMN_Q,
@@ -86,6 +87,8 @@ class Work(NamedTuple):
     begin_N: np.ndarray
     ends_S3: np.ndarray
     """Both ends of each capsule, then twice the middle of each."""
+    centre_G3: np.ndarray
+    """Middles of the balls."""
     contact_N: np.ndarray
 
 
@@ -107,7 +110,7 @@ def make_work(t):
         np.zeros((joints, joints)), np.empty(blocks), np.empty(joints), np.zeros((joints, joints)), np.empty(joints),
         np.empty(blocks), np.empty((joints, joints)), np.empty(joints), np.empty(blocks), lower_N, upper_N,
         np.empty(blocks), np.empty(blocks), np.empty(joints), np.empty(joints),
-        np.empty((3 * size(t, BODY_S), 3)), np.empty(joints),
+        np.empty((3 * size(t, BODY_S), 3)), np.empty((size(t, BODY_G), 3)), np.empty(joints),
     )  # fmt: skip
 
 

@@ -13,7 +13,8 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.avoidance import CLEARANCE
-from mrhubo.fast.plain.collision import clearances, reaches
+from mrhubo.fast.plain.broad_phase import make_groups, reaches
+from mrhubo.fast.plain.collision import clearances
 from mrhubo.fast.plain.human import skew
 from mrhubo.fast.sections import SECTIONS, Layers, Part
 
@@ -27,7 +28,8 @@ _KEYS = (
     "kind_K", "slot_K", "of_K", "seen_K", "last_K", "direction_K3", "parent_T", "mirror_T", "rest_K23", "share_K",
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
     "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S", "clear_Y",
-    "net_H6", "layer_G5", "column", "count_5", "number",
+    "first_Z", "capsule_Z", "ball_Z", "reach_Z", "body_G", "centre_G3",
+    "net_H6", "layer_G5", "column", "count_6", "number",
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
 )  # fmt: skip
@@ -37,11 +39,13 @@ bend_4: ends of the bend axes' ranges [rad]. A joint's turn by the angle t is or
 twice, across = origin [axis]x and twice = origin [axis]x^2. The joints of block c are order_N[first_C[c] : first_C[c +
 1]], its directions likewise. polish_4: squares of the angles [rad^2] that are far, and that are a gain; starts, and
 their first steps. scale_4: good and excessive angle, shaking [degrees], usual phi. reach_S: half of a capsule's length
-and its radius. clear_Y: distance [m] that a pair is to keep. net_H6: first and number of layers, place and number of
-input columns, and of output columns, of each network, the prior's coders last; layer_G5: numbers in and out, where
-weights and biases begin in `number`, and 1 where the weights are among `shorts`, whose scales stand after the biases
-then; column: all columns; count_5: networks of the first stage, of both; whether directions are seen, tanh bounds, nets
-are residual.
+and its radius. clear_Y: distance [m] that a pair is to keep. Pairs stand group by group
+(`mrhubo.fast.plain.broad_phase`). reach_Z: how far [m] a group's capsule and ball must be apart so that no pair is
+nearer than that. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
+network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in `number`, and 1 where
+the weights are among `shorts`, whose scales stand after the biases then; column: all columns; count_6: networks of the
+first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
+distance.
 """
 (
     JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
@@ -53,7 +57,8 @@ are residual.
     KIND_K, SLOT_K, OF_K, SEEN_K, LAST_K, DIRECTION_K3, PARENT_T, MIRROR_T, REST_K23, SHARE_K,
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
     BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S, CLEAR_Y,
-    NET_H6, LAYER_G5, COLUMN, COUNT_5, NUMBER,
+    FIRST_Z, CAPSULE_Z, BALL_Z, REACH_Z, BODY_G, CENTRE_G3,
+    NET_H6, LAYER_G5, COLUMN, COUNT_6, NUMBER,
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
 ) = np.arange(len(_KEYS))  # fmt: skip
 # Numbers of NumPy, as numba compiles a function anew for each of Python's that it is called with.
@@ -61,12 +66,14 @@ PLANE_LOW, PLANE_HIGH, NEEDED_LOW, NEEDED_HIGH = FAR, GAIN, STARTS, FIRST_STEPS 
 """Places in bend_4, and in polish_4."""
 GOOD, EXCESS, SHAKE, USUAL_PHI = np.arange(4)
 """Places in scale_4."""
-FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL = np.arange(5)
-"""Places in count_5."""
+FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL, APART = np.arange(6)
+"""Places in count_6."""
 
 
 _LARGE, _STEPS = 2**16, 32_767
 """Weights of a layer that is large, and the largest number of 16 bits."""
+_ROUNDED = 1e-5
+"""Distance [m] by which no robot moves where its joint angles are rounded to float32."""
 
 
 class Packed(NamedTuple):
@@ -107,6 +114,8 @@ def pack(description: Description) -> Packed:
 def _derived(d: Description) -> dict[str, np.ndarray]:
     """What is worked out of a description's arrays."""
     constants, capsules, k = d.settings.constants, d.capsules, d.kinematics
+    groups, reach_S, clear_Y = make_groups(capsules), reaches(capsules), clearances(d, CLEARANCE)
+    reach_Z = reach_S[groups.capsule_Z] + groups.radius_G[groups.ball_Z] + groups.most(np.maximum(clear_Y, 0.0))
     origin_A33, across_A33 = k.origin_A34[..., :3], skew(k.axis_A3)
     orders, firsts = [], []
     for own_XC in (d.cost.joints_NC, d.cost.directions_DC):
@@ -119,7 +128,9 @@ def _derived(d: Description) -> dict[str, np.ndarray]:
         "position_A3": k.origin_A34[..., 3], "origin_A33": origin_A33, "across_A33": origin_A33 @ across_A33,
         "twice_A33": origin_A33 @ across_A33 @ across_A33, "order_N": orders[0], "first_C": firsts[0],
         "order_D": orders[1], "first_D": firsts[1], "bend_4": np.radians(ends), "polish_4": np.array(polish),
-        "scale_4": np.array(scale), "reach_S": reaches(capsules), "clear_Y": clearances(d, CLEARANCE),
+        "scale_4": np.array(scale), "reach_S": reach_S, "clear_Y": clear_Y[groups.order_Y],
+        "pair_Y2": capsules.pair_Y2[groups.order_Y], "first_Z": groups.first_Z, "capsule_Z": groups.capsule_Z,
+        "ball_Z": groups.ball_Z, "reach_Z": reach_Z, "body_G": groups.body_G, "centre_G3": groups.centre_G3,
     }  # fmt: skip
 
 
@@ -142,10 +153,11 @@ def _nets(d: Description, shorts: list[np.ndarray]) -> dict[str, np.ndarray]:
         add(part, coarse=False)
     for coder in (d.prior.encoder, d.prior.decoder):
         add(_alone(coder), coarse=True)
-    kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual]
+    apart = bool((clearances(d, CLEARANCE) > _ROUNDED).all())
+    kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
         "net_H6": np.array(nets), "layer_G5": np.array(layers), "column": np.concatenate(columns),
-        "count_5": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
+        "count_6": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
         "number": np.concatenate(numbers),
     }  # fmt: skip
 
@@ -163,10 +175,10 @@ def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:
 
 COMPILED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}, "nogil": True}
 """How functions are compiled: sums in any order, division by zero as NumPy has it."""
-EXACT: dict[str, Any] = {**COMPILED, "fastmath": False}
-"""The same for what must see NaN as it is."""
 INNER: dict[str, Any] = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""The same for those that compiled functions alone call."""
+"""The same for those that compiled functions alone call,"""
+INNER_EXACT: dict[str, Any] = {**INNER, "fastmath": False}
+"""and for those of them that must see NaN as it is."""
 
 
 @njit(**INNER)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrhubo.fast.description import Description
+from mrhubo.fast.plain.broad_phase import reaches
 from mrhubo.fast.plain.human import cross, norm
 from mrhubo.fast.plain.robot import Placed, place
 from mrhubo.fast.sections import Capsules, Kinematics
@@ -35,11 +36,6 @@ class Near:
     """The nearest point on the first capsule's axis [m],"""
     apart_X3: np.ndarray
     """and from the second's to it."""
-
-
-def reaches(capsules: Capsules) -> np.ndarray:
-    """Radii (S,) of the spheres around capsules [m]."""
-    return norm(capsules.end_S23[:, 1] - capsules.end_S23[:, 0]) / 2 + capsules.radius_S
 
 
 def near(

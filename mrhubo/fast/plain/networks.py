@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -59,14 +58,6 @@ def silu(x_X: np.ndarray) -> np.ndarray:
         return x_X / (np.float32(1) + np.exp(-x_X))
 
 
-@dataclass(frozen=True)
-class Activations:
-    """How activations of the networks and of the body prior are worked out."""
-
-    gelu: Activation
-    prior: Activation
-
-
 ACTIVATIONS: dict[str, Activation] = {
     "silu": silu,
     "leaky_relu": lambda x_X: np.where(x_X > 0, x_X, np.float32(0.01) * x_X),
@@ -75,12 +66,12 @@ ACTIVATIONS: dict[str, Activation] = {
 """Of the body prior, by name."""
 
 
-def joint_angles(description: Description, features_BF: np.ndarray, act: Activation = gelu) -> np.ndarray:
-    """Joint angles (B, N) [rad], inside the limits, of what the networks see (B, F); all float32. `act`: GELU."""
+def joint_angles(description: Description, features_BF: np.ndarray) -> np.ndarray:
+    """Joint angles (B, N) [rad], inside the limits, of what the networks see (B, F); all float32."""
     residual, cost = description.settings.residual, description.cost
     raw_BN = features_BF
     for stage in (description.pre, description.post):
-        raw_BN = _branched(stage, raw_BN, residual, act) if stage else raw_BN
+        raw_BN = _branched(stage, raw_BN, residual) if stage else raw_BN
     lower_N, upper_N = cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32)
     middle_N, half_N = (upper_N + lower_N) / 2, (upper_N - lower_N) / 2
     angles_BN = middle_N + half_N * (np.tanh(raw_BN) if description.settings.bound == "tanh" else raw_BN)
@@ -109,13 +100,13 @@ def features_of(description: Description, local_BJ33: np.ndarray, direction_BD3:
     return (np.concatenate(flat, axis=1) - f.center_F) * f.scale_F
 
 
-def _branched(stage: tuple[Part, ...], x_BI: np.ndarray, residual: bool, act: Activation) -> np.ndarray:
+def _branched(stage: tuple[Part, ...], x_BI: np.ndarray, residual: bool) -> np.ndarray:
     found = np.empty((len(x_BI), sum(len(part.output) for part in stage)), np.float32)
     for part in stage:
         (weight, bias), *others = part.layers
         x = x_BI[:, part.input] @ weight.T + bias
         for number, (weight, bias) in enumerate(others):
-            y = act(x) @ weight.T
+            y = gelu(x) @ weight.T
             y += bias
             x = x + y if residual and number < len(others) - 1 else y
         found[:, part.output] = x

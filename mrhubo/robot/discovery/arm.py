@@ -8,32 +8,25 @@ upper arm, what comes after forearm and hand.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.elbow import find_elbow, rival
+from mrhubo.robot.discovery.gripper import without_hand
+from mrhubo.robot.discovery.lines import Line, feet, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
-_HAND = 0.5
-"""How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
-_BEFORE, _FEW = 3, 0.8
-"""Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
-below a clavicle."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
 of its length."""
-_WRIST_JOINTS = 3
-"""Joints beyond an elbow that an arm can have: a twist and two swings."""
-_BESIDE = 0.025
-"""How far a jaw's axis passes the hand's line, as a share of the arm."""
-_SHORT = 4
-"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+GUESS = 0.45
+"""How sure a choice is between two that are about as good: asked about."""
 _ON = 1e-4
 _LEAST = 1e-3
 """How long upper arm and forearm are at least, as a share of the robot."""
@@ -49,6 +42,11 @@ class Spot:
     """Links in which it may be written down: the carrying one, and others in which it stays as well."""
     cue: str
     confidence: float
+
+
+def doubted(spot: Spot, why: str) -> Spot:
+    """A point that is asked about, and why."""
+    return replace(spot, confidence=min(spot.confidence, GUESS), cue=spot.cue + why)
 
 
 @dataclass(frozen=True)
@@ -79,35 +77,9 @@ class Arm:
         return upper + float(np.linalg.norm(self.wrist.point_3 - self.elbow.point_3))
 
 
-def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
-    """Position of the elbow's hinge: the axis with the longest stretches of the arm on either side of it. None if the
-    chain is too short to have one.
-    """
-    found = measure(lines_of(chain))
-    if len(chain) < 2:
-        return None
-    gap_N = np.diff(found.out_N, append=found.out_N[-1])
-    end_3 = found.nodes_N3[-1]
-    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(chain[-1])[0]])
-    beyond = float(np.linalg.norm(corners - end_3, axis=-1).max())
-    centre_3 = bodies.centre(chain[-1].end)
-    if centre_3 is not None:
-        beyond = max(beyond, 2 * float(np.linalg.norm(centre_3 - end_3)))
-    gap_N[-1] = _HAND * beyond
-    scores = np.zeros(len(chain))
-    for i in range(1, len(chain)):
-        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
-        after = max(gap_N[i : i + 2])
-        scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
-    best = int(np.argmax(scores))
-    if gap_N[best - 1] < 1e-3 * bodies.size:
-        return None
-    return best if scores[best] > 0 else int(np.argmax(gap_N[:-1])) + 1
-
-
 def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     """Roles and points of an arm's joints; None if it has no elbow."""
-    chain, left_out = _without_hand(bodies, chain)
+    chain, left_out = without_hand(bodies, chain)
     elbow_at = find_elbow(bodies, chain)
     if elbow_at is None:
         return None
@@ -118,6 +90,11 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     if twist_at is None:
         point_3 = hinge_3 = hinge.nearest(shoulder.point_3)
         cue, sure = "the hinge's point nearest to the shoulder", 0.85
+        forearm_at = _forearm_twist(lines, elbow_at, math.dist(point_3, shoulder.point_3))
+        if forearm_at is not None:
+            # Along its hinge the elbow lies where the forearm does: the shoulder's axes may cross beside both.
+            point_3 = hinge_3 = feet(hinge, lines[forearm_at])[0]
+            cue = "where the forearm's twist axis is nearest to the hinge"
     else:
         point_3, hinge_3 = feet(lines[twist_at], hinge)
         cue = f"where the hinge of '{chain[elbow_at].hinge.name}' is nearest to the upper arm's twist axis"
@@ -129,62 +106,11 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
         return None
+    other = rival(bodies, chain, elbow_at)
+    if other is not None:
+        why = f"; '{other}' may as well be the elbow"
+        shoulder, elbow, wrist = (doubted(spot, why) for spot in (shoulder, elbow, wrist))
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
-
-
-def _without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
-    """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
-    whole = chain
-    chain = without_gripper(chain)
-    end, why = len(chain), "others mimic it, or it slides: a gripper"
-    elbow_at = find_elbow(bodies, chain)
-    first = 2 if elbow_at is None else elbow_at + 1
-    for i in range(first, len(chain)):
-        step = chain[i]
-        if _driven(step) and (i >= _SHORT or not step.hinge.free):
-            end = i
-        elif i - first >= _WRIST_JOINTS:
-            end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
-        elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
-            end, why = i, "its name says that it belongs to the hand"
-        else:
-            continue
-        break
-    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
-        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
-    return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
-
-
-def _is_jaw(chain: Chain, elbow_at: int) -> bool:
-    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line of the wrist's axes, or
-    parallel to one that swings the wrist already.
-    """
-    lines = lines_of(chain)
-    found = measure(lines)
-    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
-    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
-    if sine(along_3, last.axis_3) < 0.7:
-        return False
-    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
-    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
-        return True
-    twists = [
-        line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
-    ]
-    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
-
-
-def without_gripper(chain: Chain) -> Chain:
-    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
-    and no part of a forearm.
-    """
-    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
-        chain = chain[:-1]
-    return chain
-
-
-def _driven(step: Step) -> bool:
-    return not step.hinge.rotary or step.hinge.drives or not step.hinge.free
 
 
 def _twist(lines: list[Line], elbow_at: int) -> int | None:
@@ -200,6 +126,16 @@ def _twist(lines: list[Line], elbow_at: int) -> int | None:
     if upper < 1e-9 or sine(twist.axis_3, unit(foot_3 - before_3)) > _TWIST_SINE:
         return None
     return elbow_at - 1 if twist.distance(foot_3) < _TWIST_MISS * upper else None
+
+
+def _forearm_twist(lines: list[Line], elbow_at: int, upper: float) -> int | None:
+    """Position of the forearm's twist, of an arm whose upper arm is so long [m]; None if it has none."""
+    if elbow_at + 1 >= len(lines):
+        return None
+    # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
+    hinge, axis = lines[elbow_at], lines[elbow_at + 1]
+    close = float(np.linalg.norm(np.subtract(*feet(hinge, axis)))) < _TWIST_MISS * upper
+    return elbow_at + 1 if close and sine(hinge.axis_3, axis.axis_3) > 0.5 else None
 
 
 def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | None) -> tuple[Spot, int]:
@@ -241,13 +177,7 @@ def _wrist(
     """The wrist, and the position of the forearm's twist."""
     upper = float(np.linalg.norm(elbow.point_3 - shoulder.point_3))
     beyond = list(range(elbow_at + 1, len(chain)))
-    twist_at = None
-    if beyond:
-        # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
-        on_hinge_3, on_axis_3 = feet(lines[elbow_at], lines[beyond[0]])
-        close = float(np.linalg.norm(on_hinge_3 - on_axis_3)) < _TWIST_MISS * upper
-        if close and sine(lines[elbow_at].axis_3, lines[beyond[0]].axis_3) > 0.5:
-            twist_at = beyond[0]
+    twist_at = _forearm_twist(lines, elbow_at, upper)
     swings = [i for i in beyond if i != twist_at]
     if swings:
         step, line = chain[swings[0]], lines[swings[0]]
@@ -260,12 +190,14 @@ def _wrist(
         else:
             point_3 = line.nearest(elbow.point_3)
             cue, sure = "the point of the wrist's axis nearest to the elbow", 0.75
+            if not bodies.onward(step) and not speaks_of(step.hinge.name, "turn"):
+                cue, sure = f"{cue}, if it is no gripper's jaw", GUESS
         links = [step.inner_link]
         if line.distance(point_3) < _ON * bodies.size:
             links.append(step.outer_link)
         return Spot(point_3, step.start, tuple(links), cue, sure), twist_at
     last = chain[-1]
-    end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper)
+    end_3, how, sure = limb_end(bodies, last, elbow.point_3, elbow.point_3 - shoulder.point_3)
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
@@ -278,7 +210,7 @@ def _wrist(
 
 
 def limb_end(
-    bodies: Bodies, last: Step, start_3: np.ndarray, usual: float, called: str = "wrist"
+    bodies: Bodies, last: Step, start_3: np.ndarray, usual_3: np.ndarray, called: str = "wrist"
 ) -> tuple[np.ndarray, str, float]:
     """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
 
@@ -286,10 +218,10 @@ def limb_end(
         bodies: the robot.
         last: the last joint.
         start_3: where the limb starts.
-        usual: how long it should be about [m].
+        usual_3: where it should end about, as seen from its start (3,) [m]: as the limb before it goes on.
         called: what the end is called.
     """
-    inside, onward = bodies.links_of[last.end], bodies.onward(last)
+    inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
     if onward:
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
@@ -323,7 +255,7 @@ def limb_end(
             0.4,
         )
     return (
-        start_3 + usual * unit(bodies.position(last.outer_link) - start_3),
-        f"a guess, as nothing tells the {called}",
+        start_3 + usual_3,
+        f"a guess: as long as the limb before it, and straight, as nothing tells the {called}",
         0.1,
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
+from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands
 from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
@@ -71,16 +72,17 @@ class _Finder:
         roles = choose_neck(bodies, roles, arms, legs)
         self.bodies, self.roles = bodies, roles
         self.heading: Heading = find_heading(bodies, roles, arms, legs)
-        self.arms: dict[str, Arm] = dict(zip(SIDES, arms[::-1] if self.heading.swap else arms, strict=True))
+        self.arms = agreeing_arms(dict(zip(SIDES, arms[::-1] if self.heading.swap else arms, strict=True)))
         across_3 = roles.legs.normal_3 if roles.legs else self.heading.left_3
         if float(across_3 @ self.heading.left_3) < 0:
             legs = legs[::-1]
         self.legs: dict[str, Leg] = dict(zip(SIDES, legs, strict=False))
-        self.hands: dict[str, Hand] = {}
+        hands: dict[str, Hand] = {}
         for sign, (side, arm) in zip((1.0, -1.0), self.arms.items(), strict=True):
             hand = read_hand(bodies, arm, sign, self.heading.left_3, self.heading.forward_3)
             if hand is not None:
-                self.hands[side] = hand
+                hands[side] = hand
+        self.hands = agreeing_hands(hands, self.heading.left_3)
 
     def found(self) -> Discovery:
         """The result."""

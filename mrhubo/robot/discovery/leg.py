@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import Spot, find_elbow, limb_end
+from mrhubo.robot.discovery.arm import Spot, limb_end
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
+from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.lines import Line, feet, sine
 from mrhubo.robot.discovery.names import speaks_of
 
@@ -138,8 +139,8 @@ def _ankle(
     bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None, knee_3: np.ndarray
 ) -> Spot:
     if ankle_at is None:
-        thigh = lines[knee_at].distance(lines[max(knee_at - 1, 0)].point_3)
-        end_3, how, sure = limb_end(bodies, chain[-1], knee_3, max(thigh, 1e-3 * bodies.size), "ankle")
+        thigh_3 = knee_3 - lines[max(knee_at - 1, 0)].nearest(knee_3)
+        end_3, how, sure = limb_end(bodies, chain[-1], knee_3, thigh_3, "ankle")
         return Spot(end_3, chain[-1].end, (chain[-1].outer_link,), how, sure)
     others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not _parallel(lines[i], lines[ankle_at])]
     step = chain[knee_at + 1]

@@ -9,8 +9,10 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.arm import find_elbow, read_arm, without_gripper
+from mrhubo.robot.discovery.arm import read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.elbow import find_elbow
+from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
@@ -20,6 +22,8 @@ _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+_CASTER = 2
+"""Joints of a caster: it swivels and rolls."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +68,9 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
     large = [pair for pair in pairs if pair.size > least]
     armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
-    # Casters have two joints too, but none of them has limits.
-    armed = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])] or armed[:1]
+    # Casters have two joints too, but none of them has limits; nor has any joint of some files.
+    limited = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])]
+    armed = limited or [pair for pair in armed if len(pair.chains[0]) > _CASTER]
     if not armed:
         count = len(bodies.hinges)
         raise UserError(
@@ -99,6 +104,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
+    if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
+        legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
     same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
@@ -182,7 +189,7 @@ def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
     middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
     ranked: list[tuple[float, Chain]] = []
     for step in bodies.steps_from[arms.body]:
-        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(step):
+        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(bodies, step):
             continue
         chain: list[Step] = []
         todo: list[Step] = [step]
@@ -190,7 +197,9 @@ def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
             fitting = [
                 s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
             ]
-            fitting = [s for s in fitting if not _is_sensor(s) and not _has_twin(s, todo, arms.normal_3, middle_3)]
+            fitting = [
+                s for s in fitting if not _is_sensor(bodies, s) and not _has_twin(s, todo, arms.normal_3, middle_3)
+            ]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
             if not fitting or len(chain) >= 4:
                 break
@@ -224,6 +233,6 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
     return any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
 
 
-def _is_sensor(step: Step) -> bool:
-    """A joint without limits above a chest turns a lidar, not a head."""
-    return not step.hinge.limited and step.hinge.lower is None
+def _is_sensor(bodies: Bodies, step: Step) -> bool:
+    """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all."""
+    return any(hinge.limited for hinge in bodies.hinges) and not step.hinge.limited and step.hinge.lower is None

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError
+from mrhubo.files.npz import open_npz
 from mrhubo.motion import Motion, find_motions, read_folder, read_motion, write_motion
 from mrhubo.motion.readers import amass
 from mrhubo.rotation import axis_angle_to_matrix
@@ -346,6 +347,13 @@ def test_headers_that_lie(tmp_path: Path, shape: tuple, descr: str, message: str
 def test_headers_that_are_none(tmp_path: Path, header: bytes) -> None:
     with pytest.raises(UserError, match="'pose_body' cannot be read"):
         read_motion(_archive(tmp_path / "bad.npz", {"pose_body.npy": _member(header)}))
+
+
+def test_a_name_of_an_array_is_said_on_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"'pos\\n_body'") as caught:
+        with open_npz(_archive(tmp_path / "a.npz", {"pos\n_body.npy": b"no array"})) as archive:
+            archive.read("pos\n_body")
+    assert "\n" not in str(caught.value)
 
 
 def test_missing_files_and_a_bare_array(tmp_path: Path) -> None:

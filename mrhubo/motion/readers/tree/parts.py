@@ -18,8 +18,8 @@ from mrhubo.body.joints import SIDES, hinge_axis
 from mrhubo.fast.plain.human import cross, norm, normalize
 from mrhubo.fast.plain.judging import quaternions
 from mrhubo.fast.rotations import axis_angle_to_matrix, shortest_turn, turned
+from mrhubo.motion.hinges import BENT
 from mrhubo.motion.orientations import frame_of, known_frames, rest_points, turn_of
-from mrhubo.motion.positions import BENT
 from mrhubo.motion.readers.tree.hands import hand_axes
 from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.reference import Reference

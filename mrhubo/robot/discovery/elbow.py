@@ -1,0 +1,81 @@
+"""The elbow: the axis of an arm with long stretches on both sides, upper arm and forearm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.lines import measure
+
+_HAND = 0.5
+"""How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
+_CLOSE = 0.8
+"""Second axis's share of the elbow's stretches from which on it may be the elbow as well."""
+_BEFORE, _FEW = 3, 0.8
+"""Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
+below a clavicle."""
+_ON = 1e-4
+_LEAST = 1e-3
+"""How long upper arm and forearm are at least, as a share of the robot."""
+
+
+def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
+    """Position of the elbow's hinge: the axis with the longest stretches of the arm on either side of it. None if the
+    chain is too short to have one.
+    """
+    scores = _elbow_scores(bodies, chain)
+    if scores is None:
+        return None
+    near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
+    return max(near, key=lambda i: (min(i, _BEFORE), scores[i]))  # of those about as good, one with a whole shoulder
+
+
+def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
+    """How long the shorter one of the two stretches beside each axis is [m] (N,), with less weight where joints are
+    missing before it; None if there are too few axes, or all meet in one point.
+    """
+    if len(chain) < 2:
+        return None
+    found = measure(lines_of(chain))
+    gap_N = np.diff(found.out_N, append=found.out_N[-1])
+    longest = float(gap_N.max())
+    if longest < _LEAST * bodies.size:
+        return None
+    gap_N[-1] = _HAND * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
+    scores = np.zeros(len(chain))
+    for i in range(1, len(chain)):
+        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
+        after = max(gap_N[i : i + 2])
+        scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
+    if not scores.any():
+        scores[1:] = gap_N[:-1]
+    return scores
+
+
+def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> float:
+    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; as far as is usual where these
+    tell nothing, as where all shapes are meshes.
+    """
+    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(last)[0]])
+    centre_3 = bodies.centre(last.end)
+    if centre_3 is not None:
+        corners = np.vstack([corners, end_3 + 2 * (centre_3 - end_3)])
+    # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
+    own_3 = bodies.position(last.outer_link)
+    corners = corners[np.linalg.norm(corners - own_3, axis=-1) > _ON * bodies.size]
+    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
+
+
+def rival(bodies: Bodies, chain: Chain, elbow_at: int) -> str | None:
+    """The joint that may be the elbow as well, if one has stretches about as long on either side. Beyond an elbow
+    that has a whole shoulder before it, a wrist with a long hand is none.
+    """
+    scores = _elbow_scores(bodies, chain)
+    if scores is None:
+        return None
+    if elbow_at >= _BEFORE:
+        scores[elbow_at + 1 :] = 0.0
+    best = float(scores[elbow_at])
+    scores[elbow_at] = 0.0
+    other = int(np.argmax(scores))
+    return chain[other].hinge.name if scores[other] > _CLOSE * best else None

@@ -1,0 +1,77 @@
+"""Where an arm ends and a hand begins: jaws, joints that slide, mimic or are mimicked, more than a wrist can have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.elbow import find_elbow
+from mrhubo.robot.discovery.lines import feet, measure, sine, unit
+from mrhubo.robot.discovery.names import speaks_of
+
+_WRIST_JOINTS = 3
+"""Joints beyond an elbow that an arm can have: a twist and two swings."""
+_BESIDE = 0.025
+"""How far a jaw's axis passes the hand's line, as a share of the arm."""
+_MEET = 0.005
+"""How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
+_SHORT = 4
+"""Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
+
+
+def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
+    """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
+    whole = chain
+    chain = without_gripper(chain)
+    end, why = len(chain), "others mimic it, or it slides: a gripper"
+    elbow_at = find_elbow(bodies, chain)
+    first = 2 if elbow_at is None else elbow_at + 1
+    for i in range(first, len(chain)):
+        step = chain[i]
+        # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
+        if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.free):
+            end = i
+        elif i - first >= _WRIST_JOINTS:
+            end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
+        elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
+            end, why = i, "its name says that it belongs to the hand"
+        else:
+            continue
+        break
+    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
+        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
+    return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
+
+
+def _is_jaw(chain: Chain, elbow_at: int) -> bool:
+    """Whether the last joint of an arm is a jaw by where its axis lies: beside the line of the wrist's axes, or
+    parallel to one that swings the wrist already.
+    """
+    lines = lines_of(chain)
+    found = measure(lines)
+    arm, last, hinge = found.out_N[-1], lines[-1], lines[elbow_at]
+    along_3 = unit(found.nodes_N3[-1] - found.nodes_N3[elbow_at])
+    if sine(along_3, last.axis_3) < 0.7:
+        return False
+    before = [line for line in lines[elbow_at + 1 : -1] if sine(along_3, line.axis_3) > 0.7]
+    if any(sine(line.axis_3, last.axis_3) < 0.1 for line in before):
+        return True
+    if any(float(np.linalg.norm(np.subtract(*feet(line, last)))) < _MEET * arm for line in before):
+        return False  # two axes that cross are a wrist, wherever the forearm's twist passes them
+    twists = [
+        line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
+    ]
+    return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def without_gripper(chain: Chain) -> Chain:
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
+    and no part of a forearm.
+    """
+    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
+        chain = chain[:-1]
+    return chain
+
+
+def _driven(step: Step) -> bool:
+    return not step.hinge.rotary or step.hinge.drives or not step.hinge.free

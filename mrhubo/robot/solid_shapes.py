@@ -1,0 +1,80 @@
+"""What of a robot can bump into what: the primitive shapes of its collision elements, and capsules in place of meshes.
+
+A mesh is looked for where the URDF names it, beside it and in the folders above (`mrhubo.robot.meshes`). Where it is
+not there, or cannot be read, the link has a gap, and nobody knows whether it touches anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yourdfpy
+
+from mrhubo.robot.capsules import Capsule
+from mrhubo.robot.hulls import capsules_of
+from mrhubo.robot.meshes import MOST_TRIANGLES, read_mesh, scale_of
+from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry
+
+_MOST_MESHES = 300
+"""Different meshes of one robot: a few hundredths of a second each."""
+
+
+@dataclass(frozen=True)
+class SolidShapes:
+    """The shapes of a robot's links."""
+
+    shapes: tuple[LinkGeometry, ...]
+    """Primitive shapes, and what stands for meshes."""
+    of_meshes: tuple[LinkGeometry, ...]
+    """Those of them that stand for meshes: capsules and balls."""
+    gaps: frozenset[str]
+    """Links with a mesh that is not there, cannot be read, or is too much."""
+
+
+def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
+    """The shapes of every link's collision elements.
+
+    Args:
+        urdf: what yourdfpy has made of the robot.
+        path: its file.
+    """
+    known: dict[tuple[str, tuple[float, ...]], list[Capsule]] = {}
+    found: list[LinkGeometry] = []
+    gaps: set[str] = set()
+    triangles = 0
+    for link in urdf.robot.links:
+        for element in link.collisions:
+            mesh = None if element.geometry is None else element.geometry.mesh
+            if mesh is None:
+                continue
+            scale_3 = scale_of(mesh)
+            key = str(mesh.filename), tuple(scale_3.tolist())
+            if key not in known:
+                known[key] = []
+                enough = len(known) > _MOST_MESHES or triangles > MOST_TRIANGLES
+                read = None if enough else read_mesh(key[0], path, scale_3)
+                if read is not None:
+                    triangles += len(read[1])
+                    known[key] = capsules_of(read[0][np.unique(read[1])])
+            if not known[key]:
+                gaps.add(link.name)
+            place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
+            found += [_geometry(link.name, capsule, place_44) for capsule in known[key]]
+    return SolidShapes((*read_collision_geometry(urdf), *found), tuple(found), frozenset(gaps))
+
+
+def _geometry(link: str, capsule: Capsule, place_44: np.ndarray) -> LinkGeometry:
+    """A capsule, given in the frame at a place in the link, as a shape of the link."""
+    start_3, end_3 = (place_44[:3, :3] @ end + place_44[:3, 3] for end in capsule[:2])
+    length, pose_44 = float(np.linalg.norm(end_3 - start_3)), np.eye(4)
+    pose_44[:3, 3] = (start_3 + end_3) / 2
+    if length < 1e-9:
+        return LinkGeometry(link, "sphere", (capsule[2],), pose_44, ROBOT_COLOR)
+    x, y, z = (end_3 - start_3) / length
+    yaw, pitch = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)
+    turn_33 = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+    tilt_33 = np.array([[np.cos(pitch), 0.0, np.sin(pitch)], [0.0, 1.0, 0.0], [-np.sin(pitch), 0.0, np.cos(pitch)]])
+    pose_44[:3, :3] = turn_33 @ tilt_33
+    return LinkGeometry(link, "capsule", (capsule[2], length), pose_44, ROBOT_COLOR)

@@ -1,0 +1,158 @@
+"""Thousands of accidents a reader: `python -m tests.fuzz --accidents 10000`.
+
+The suite tries some dozens on each reader; this tries as many as one likes, prints a row a reader, and names the seed of each that went wrong:
+an exception that is not a `UserError`, a message of more than one line, numbers that are not finite, too much time or memory.
+`--reader NAME --first SEED --accidents 1` repeats one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import mrhubo
+from mrhubo import UserError
+from mrhubo.body.skeleton import KEYPOINT_NAMES, Skeleton
+from mrhubo.motion.readers.keypoint_sets import SETS
+from mrhubo.robot_motion import FORMATS, read_robot_motion, write_robot_motion
+from tests.files.bounded import bounded
+from tests.motion.bvh_writer import Style, write_bvh
+from tests.motion.damage import altered_words, damaged_by, read_or_refused
+from tests.motion.readers import estimator_files, test_amc, test_soma_and_points
+from tests.robot_motion.motions import plain
+
+_MOTION = Path(__file__).resolve().parents[1] / "data/motions/wave.npz"
+_FRAMES = 4
+_SECONDS, _MEGABYTES = 10.0, 400.0
+"""What a file of some frames may take at most."""
+
+
+def _bvh(style: Style) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        whole = mrhubo.read_motion(_MOTION)
+        assert whole.root_rotation_T33 is not None and whole.root_position_T3 is not None
+        short = dataclasses.replace(
+            whole, local_TJ33=whole.local_TJ33[:_FRAMES], root_rotation_T33=whole.root_rotation_T33[:_FRAMES],
+            root_position_T3=whole.root_position_T3[:_FRAMES],
+        )  # fmt: skip
+        path.write_text(write_bvh(short, style))
+
+    return write
+
+
+def _amc(path: Path) -> None:
+    path.with_name("07.asf").write_text(test_amc.asf())
+    path.write_text(test_amc.amc([{"lradius": [2.0 * i]} for i in range(_FRAMES)]))
+
+
+def _asf(path: Path) -> None:
+    path.with_name("07_01.amc").write_text(test_amc.amc([{"lradius": [2.0 * i]} for i in range(_FRAMES)]))
+    path.write_text(test_amc.asf())
+
+
+def _points() -> np.ndarray:
+    local = mrhubo.read_motion(_MOTION).local_TJ33[:_FRAMES]
+    found = dict(zip(KEYPOINT_NAMES, Skeleton().keypoints_and_rotations(local)[0].unbind(1), strict=True))
+    head = found["head"].numpy()
+    return np.stack([found[n].numpy() if n in found else head for n in SETS["COCO"]], axis=1)
+
+
+def _points_json(path: Path) -> None:
+    path.write_text(json.dumps({"names": SETS["COCO"], "fps": 30, "keypoints": _points().round(3).tolist()}, indent=0))
+
+
+def _robot_motion(kind: str) -> Callable[[Path], None]:
+    return lambda path: write_robot_motion(plain(), path, kind)
+
+
+def _estimator(name: str) -> Callable[[Path], None]:
+    writer = estimator_files.WRITERS[name]
+    return lambda path: writer.write(path, {1: estimator_files.made_up(_FRAMES, camera=writer.camera)})
+
+
+READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
+    "amass": ("damaged.npz", lambda path: path.write_bytes(_MOTION.read_bytes())),
+    "bvh": ("damaged.bvh", _bvh(Style())),
+    "bvh, positions": ("damaged.bvh", _bvh(Style(names="nameless", axes="random", positions=True, doubled=True))),
+    "amc": ("07_01.amc", _amc),
+    "asf": ("07.asf", _asf),
+    "points.json": ("damaged.json", _points_json),
+    "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
+    **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
+    **{name: ("damaged", write) for name, write in test_soma_and_points.WRITERS.items()},
+    **{f"robot's {name}": (f"damaged{row.ending}", _robot_motion(name)) for name, row in FORMATS.items() if row.ending},
+}
+"""The name of a file and what writes a good one, a reader."""
+
+
+def _read_robot_motion(path: Path) -> None:
+    try:
+        found = read_robot_motion(path, plain().joint_names, 30.0)
+    except UserError as error:
+        assert str(path) in str(error) and "\n" not in str(error)
+    else:
+        assert np.isfinite(found.q).all()
+
+
+def _read(name: str, path: Path) -> None:
+    if name.startswith("robot's "):
+        _read_robot_motion(path)
+    elif name == "asf":
+        read_or_refused(path.with_name("07_01.amc"), names=("07_01", "07.asf"))
+    else:
+        read_or_refused(path)
+
+
+def fuzz(name: str, first: int, accidents: int, folder: Path) -> tuple[float, list[str]]:
+    """The longest time [s] that one of the accidents of seeds first, first + 1, ... took, and what went wrong."""
+    file, write = READERS[name]
+    path = folder / file
+    write(path)
+    good, text = path.read_bytes(), not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv"}
+    slowest, wrong = 0.0, []
+    for seed in range(first, first + accidents):
+        alter = text and seed % 2
+        path.write_bytes(altered_words(seed, good) if alter else damaged_by(seed, good, good))
+        start = time.monotonic()
+        try:
+            if seed % 20 == 0:  # counting memory makes a reader some ten times slower
+                with bounded(_MEGABYTES, _SECONDS * 3):
+                    _read(name, path)
+            else:
+                _read(name, path)
+                slowest = max(slowest, time.monotonic() - start)
+                assert time.monotonic() - start < _SECONDS, "too slow"
+        except Exception as error:
+            wrong.append(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
+    return slowest, wrong
+
+
+def main() -> int:
+    """The table; 1 where something went wrong."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--accidents", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--reader", choices=READERS, action="append")
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    failed = 0
+    print(f"{'reader':24} {'accidents':>9} {'wrong':>6} {'slowest [s]':>12}")
+    for name in given.reader or READERS:
+        with tempfile.TemporaryDirectory() as folder:
+            slowest, wrong = fuzz(name, given.first, given.accidents, Path(folder))
+        failed += len(wrong)
+        print(f"{name:24} {given.accidents:9,} {len(wrong):6} {slowest:12.2f}", *wrong[:10], sep="\n  ", flush=True)
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

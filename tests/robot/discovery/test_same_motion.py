@@ -1,0 +1,75 @@
+"""A robot moves the same, however its file is written: names, order, signs of axes, where it lies, and its size."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.config import load_config
+from mrhubo.describing.yaml_file import keypoint_entries
+from mrhubo.reference import OptimizationRetargeter
+from mrhubo.robot import Robot
+from mrhubo.robot.discovery import discover
+from mrhubo.robot.generator.variants import variant
+from mrhubo.robot.urdf import Description, describe
+from mrhubo.runtime.locations import project_root
+
+FORMS = {
+    "renamed": {"rename": True},
+    "reordered": {"reorder": True},
+    "axes negated": {"negate": True},
+    "y up": {"turn": (math.pi / 2, 0.0, 0.0)},
+    "turned": {"turn": (0.4, 2.0, -1.0)},
+    "scaled": {"scale": 3.0},
+}  # fmt: skip
+SAME = 1e-3
+"""Radians."""
+
+
+def motion_of(description: Description, poses_TJ33: Tensor) -> dict[str, np.ndarray]:
+    """Angles (T,) of each joint, of the mapping that is detected."""
+    found = discover(description)
+    ranges = {joint: [limits.lower, limits.upper] for joint, limits in found.ranges.items()}
+    robot = Robot.from_urdf(description, found.joints, keypoint_entries(found), found.key_links, ranges)
+    q_TN = OptimizationRetargeter(robot).retarget(poses_TJ33, 24.0).q_TN
+    return dict(zip(robot.joint_names, q_TN.T.numpy(), strict=True))
+
+
+def make_pose(**axis_angles: Tensor) -> Tensor:
+    """Local rotations (T, 21, 3, 3) from axis-angles (T, 3) [rad] by joint name; the other joints at rest."""
+    whole = torch.zeros(len(next(iter(axis_angles.values()))), len(POSED_JOINT_NAMES), 3)
+    for name, value in axis_angles.items():
+        whole[:, POSED_JOINT_NAMES.index(name)] = value
+    return rotation.axis_angle_to_matrix(whole)
+
+
+@pytest.mark.parametrize("robot", ["nao", "coman", "reachy"])
+def test_same_motion_however_the_file_is_written(robot: str, tmp_path: Path) -> None:
+    bend_T = torch.linspace(0.3, 1.2, 4)
+    zero_T = torch.zeros(4)
+    poses_TJ33 = make_pose(
+        left_shoulder=torch.stack((zero_T, 0.2 * bend_T, bend_T - 1.4), 1),
+        left_elbow=torch.stack((zero_T, -bend_T, zero_T), 1),
+        right_shoulder=torch.stack((zero_T, -0.4 * bend_T, 1.2 - bend_T), 1),
+        right_elbow=torch.stack((zero_T, 0.8 * bend_T, zero_T), 1),
+    )
+    original = describe(load_config(project_root() / f"conf/{robot}.yaml").robot.urdf)
+    expected = motion_of(original, poses_TJ33)
+    for form, changes in FORMS.items():
+        file = tmp_path / "robot.urdf"
+        text, names = variant(original.path, seed=1, **changes)
+        file.write_text(text)
+        description = describe(file)
+        moved = motion_of(description, poses_TJ33)
+        assert {names.get(joint, joint) for joint in expected} == set(moved), form
+        for joint, angle_T in expected.items():
+            new = names.get(joint, joint)
+            sign = float(np.sign(original.joints[joint].axis_3 @ description.joints[new].axis_3))
+            assert np.abs(sign * moved[new] - angle_T).max() < SAME, f"{form}: '{joint}'"

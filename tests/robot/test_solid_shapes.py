@@ -1,0 +1,89 @@
+"""Collision meshes that are there count, others leave a gap, and a package's URDF needs none of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+import trimesh
+
+from mrhubo.robot import SelfCollision, solid_shapes
+from mrhubo.robot.model import Robot
+from mrhubo.robot.solid_urdf import urdf_without_meshes
+from mrhubo.robot.urdf import describe
+
+MESH = "<collision><origin xyz='{x} 0 0' rpy='0 1.2 0.3'/><geometry><mesh filename='{name}.stl' scale='0.001 0.001 0.001'/></geometry></collision>"
+LIMIT = "<limit lower='-3' upper='3' effort='1' velocity='1'/><axis xyz='0 0 1'/>"
+
+
+def folded(folder: Path, name: str = "rod", more: str = "") -> Robot:
+    """A trunk, an upper arm, and a forearm that can reach the trunk; trunk and forearm are meshes."""
+    path = folder / "toy.urdf"
+    path.write_text(
+        f"""<robot name="toy"><link name="trunk">{MESH.format(x=0, name="box")}</link><link name="upper"/>
+        <link name="fore">{MESH.format(x=0.2, name=name)}{more}</link>
+        <joint name="shoulder" type="revolute"><parent link="trunk"/><child link="upper"/>{LIMIT}</joint>
+        <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.3 0 0"/>{LIMIT}
+        </joint></robot>"""
+    )
+    return Robot(path, ["shoulder", "elbow"])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    trimesh.creation.box((100.0, 150.0, 200.0)).export(tmp_path / "box.stl")
+    trimesh.creation.cylinder(30.0, 100.0).export(tmp_path / "rod.stl")
+    return tmp_path
+
+
+STRAIGHT, FOLDED = [0.5, 0.0], [0.5, 2.9]
+
+
+def test_meshes_touch(folder: Path) -> None:
+    shapes = SelfCollision(folded(folder))
+    assert shapes.known and shapes.why_unknown() is None and not shapes.uncovered
+    assert shapes.collides(torch.tensor([STRAIGHT, FOLDED])).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("content", [None, b"", b"junk" * 50])
+def test_a_mesh_that_is_not_there_leaves_a_gap(folder: Path, content: bytes | None) -> None:
+    if content is not None:
+        (folder / "bad.stl").write_bytes(content)
+    shapes = SelfCollision(folded(folder, "bad"))
+    assert shapes.unknown == ("fore",) and not shapes.known
+    assert shapes.touches(torch.tensor([FOLDED])) is None and "fore" in str(shapes.why_unknown())
+    beside = "<collision><origin xyz='0.2 0 0'/><geometry><sphere radius='0.03'/></geometry></collision>"
+    assert SelfCollision(folded(folder, "bad", beside)).unknown == ("fore",)  # a part of a link is not the link
+
+
+def test_no_more_than_so_many_meshes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solid_shapes, "_MOST_MESHES", 1)
+    assert SelfCollision(folded(folder)).unknown == ("fore",)
+    assert SelfCollision(folded(folder, "box")).known  # the same mesh again is no other
+
+
+def test_a_packages_urdf_needs_no_meshes(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    robot = folded(folder)
+    alone = tmp_path_factory.mktemp("package") / "robot.urdf"
+    alone.write_bytes(urdf_without_meshes(robot.description))
+    other = Robot(alone, robot.joint_names)
+    assert other.description.kinematics == robot.description.kinematics and not other.description.solids.gaps
+    q_BN = robot.sample(500, torch.Generator().manual_seed(0))
+    one, two = (SelfCollision(each).near(q_BN, 0.05) for each in (robot, other))
+    assert torch.equal(one.row_X, two.row_X) and torch.allclose(one.distance_X, two.distance_X, atol=1e-6)
+
+
+def test_a_gap_stays_one_in_a_packages_urdf(folder: Path) -> None:
+    robot = folded(folder, "none")
+    alone = folder / "other" / "robot.urdf"
+    alone.parent.mkdir()
+    alone.write_bytes(urdf_without_meshes(robot.description))
+    assert describe(alone).solids.gaps == {"fore"}
+
+
+def test_what_overlaps_at_home_is_meant_to(folder: Path) -> None:
+    """A ball around the whole arm touches the trunk wherever it is, and is not looked at; the forearm's own mesh is."""
+    around = "<collision><origin xyz='-0.2 0 0'/><geometry><sphere radius='0.1'/></geometry></collision>"
+    shapes = SelfCollision(folded(folder, more=around))
+    assert not bool(shapes.collides(shapes.robot.home()[None]))
