@@ -114,11 +114,13 @@ class OptimizationRetargeter(nn.Module):
         links = robot.forward(q_TN)
         error_TD = direction_error(self.body_map, q_TN, local_TJ33, links)
         touches_T = self.body_map.collision.touches(q_TN, links)
-        found = (q_TN, error_TD, *(() if touches_T is None else (touches_T,)))
-        q, error, *known = (tensor.unflatten(0, shape) if shape else tensor[0] for tensor in found)
-        collision = known[0] if known else None
+
+        def shaped(tensor: Tensor) -> Tensor:
+            return tensor.unflatten(0, shape) if shape else tensor[0]
+
         return OptimizationResult(
-            q, robot.joint_names, error, collision, self.body_map.measured_names, poses.frame_rate,
+            shaped(q_TN), robot.joint_names, shaped(error_TD), None if touches_T is None else shaped(touches_T),
+            self.body_map.measured_names, poses.frame_rate,
             *((motion.name, motion.source) if isinstance(motion, Motion) else ("", "")),
             robot_facts(robot, "the optimiser of mrhubo", robot.description.kinematics),
         )  # fmt: skip

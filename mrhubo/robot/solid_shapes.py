@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import yourdfpy
 
+from mrhubo.fast.rotations import shortest_turn
 from mrhubo.robot.capsules import Capsule
 from mrhubo.robot.hulls import capsules_of
 from mrhubo.robot.meshes import MOST_TRIANGLES, read_mesh, scale_of
@@ -72,9 +73,7 @@ def _geometry(link: str, capsule: Capsule, place_44: np.ndarray) -> LinkGeometry
     pose_44[:3, 3] = (start_3 + end_3) / 2
     if length < 1e-9:
         return LinkGeometry(link, "sphere", (capsule[2],), pose_44, ROBOT_COLOR)
-    x, y, z = (end_3 - start_3) / length
-    yaw, pitch = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)
-    turn_33 = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
-    tilt_33 = np.array([[np.cos(pitch), 0.0, np.sin(pitch)], [0.0, 1.0, 0.0], [-np.sin(pitch), 0.0, np.cos(pitch)]])
-    pose_44[:3, :3] = turn_33 @ tilt_33
+    along_3 = (end_3 - start_3) / length
+    # A capsule's ends are alike, and upwards is never opposite to z, where no shortest turn is told.
+    pose_44[:3, :3] = shortest_turn(np.array([0.0, 0.0, 1.0]), along_3 if along_3[2] >= 0 else -along_3)
     return LinkGeometry(link, "capsule", (capsule[2], length), pose_44, ROBOT_COLOR)

@@ -53,8 +53,9 @@ def damaged_by(seed: int, content: bytes, other: bytes) -> bytes:
     return bytes(changed)
 
 
-_WORDS = (b"nan", b"inf", b"-1", b"0", b"1e308", b"-9e999", b"99999999999999999999", b"1e-320", b"0x10", b"", b"\xff\xfe", b"\0", b"None", b"{", b"}",
-          b"[", b'"', b"id", b"end", b"MOTION", b"1,5", b"\xe2\x88\x921")  # fmt: skip
+_WORDS = (b"nan", b"inf", b"-1", b"0", b"1e308", b"-9e999", b"99999999999999999999", b"1e-320", b"0x10", b"",
+          b"\xff\xfe", b"\0", b"None", b"{", b"}", b"[", b'"', b"id", b"end", b"MOTION", b"1,5",
+          b"\xe2\x88\x921")  # fmt: skip
 """What stands in broken text where a number or a name belongs."""
 
 

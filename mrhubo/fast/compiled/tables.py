@@ -95,8 +95,8 @@ def pack(description: Description) -> Packed:
     for name in SECTIONS:
         section = getattr(description, name)
         found |= {field.name: getattr(section, field.name) for field in fields(section)}
-    shorts = [np.zeros(0, np.int16)]
-    found |= {**_derived(description), **_nets(description, shorts)}
+    shorts, clear_Y = [np.zeros(0, np.int16)], clearances(description, CLEARANCE)
+    found |= {**_derived(description, clear_Y), **_nets(description, shorts, bool((clear_Y > _ROUNDED).all()))}
     integers: list[np.ndarray] = [np.zeros(2 * len(_KEYS), np.int64)]
     floats, singles = [np.zeros(0)], [np.zeros(0, np.float32)]
     for place, key in enumerate(_KEYS):
@@ -111,10 +111,10 @@ def pack(description: Description) -> Packed:
     )
 
 
-def _derived(d: Description) -> dict[str, np.ndarray]:
+def _derived(d: Description, clear_Y: np.ndarray) -> dict[str, np.ndarray]:
     """What is worked out of a description's arrays."""
     constants, capsules, k = d.settings.constants, d.capsules, d.kinematics
-    groups, reach_S, clear_Y = make_groups(capsules), reaches(capsules), clearances(d, CLEARANCE)
+    groups, reach_S = make_groups(capsules), reaches(capsules)
     reach_Z = reach_S[groups.capsule_Z] + groups.radius_G[groups.ball_Z] + groups.most(np.maximum(clear_Y, 0.0))
     origin_A33, across_A33 = k.origin_A34[..., :3], skew(k.axis_A3)
     orders, firsts = [], []
@@ -134,7 +134,7 @@ def _derived(d: Description) -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
-def _nets(d: Description, shorts: list[np.ndarray]) -> dict[str, np.ndarray]:
+def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np.ndarray]:
     nets, layers, columns, numbers = [], [], [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
 
     def add(part: Part, coarse: bool) -> None:
@@ -153,7 +153,6 @@ def _nets(d: Description, shorts: list[np.ndarray]) -> dict[str, np.ndarray]:
         add(part, coarse=False)
     for coder in (d.prior.encoder, d.prior.decoder):
         add(_alone(coder), coarse=True)
-    apart = bool((clearances(d, CLEARANCE) > _ROUNDED).all())
     kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
         "net_H6": np.array(nets), "layer_G5": np.array(layers), "column": np.concatenate(columns),

@@ -4,7 +4,7 @@ Pairs are in groups, each of one capsule and some of another body. Around these 
 capsule is far from the ball needs no look at its pairs: for a hand of a dozen capsules, one distance in place of a
 dozen.
 
-Legend: S capsules, Y pairs of them, G balls, Z groups of pairs, B frames, L bodies, X what is near in some frame.
+Legend: S capsules, Y pairs of them, G balls, Z groups of pairs, L bodies.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def make_groups(capsules: Capsules) -> Groups:
     balls = [_ball(capsules, np.flatnonzero(body_S == body)) for body in range(int(body_S.max(initial=-1)) + 1)]
     radius_L = np.array([radius for _, radius in balls])
     body_Y2 = body_S[pair_Y2]
-    inner_Y = np.where(radius_L[body_Y2[:, 1]] < radius_L[body_Y2[:, 0]], 1, 0) if len(balls) else body_Y2[:, 0]
+    inner_Y = (radius_L[body_Y2[:, 1]] < radius_L[body_Y2[:, 0]]).astype(int)
     row_Y = np.arange(len(pair_Y2))
     ball_Y, capsule_Y = body_Y2[row_Y, inner_Y], pair_Y2[row_Y, 1 - inner_Y]
     order_Y = np.lexsort((capsule_Y, ball_Y))

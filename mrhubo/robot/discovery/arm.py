@@ -15,7 +15,7 @@ import numpy as np
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow, rival
 from mrhubo.robot.discovery.gripper import without_hand
-from mrhubo.robot.discovery.lines import Line, feet, sine, unit
+from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
@@ -27,9 +27,6 @@ _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 GUESS = 0.45
 """How sure a choice is between two that are about as good: asked about."""
-_ON = 1e-4
-_LEAST = 1e-3
-"""How long upper arm and forearm are at least, as a share of the robot."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +97,11 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
         cue = f"where the hinge of '{chain[elbow_at].hinge.name}' is nearest to the upper arm's twist axis"
         sure = 0.95
     step = chain[elbow_at]
-    on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < _ON * bodies.size
+    on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < ON * bodies.size
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
     elbow = Spot(point_3, step.start, links, cue, sure)
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
-    if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < _LEAST * bodies.size:
+    if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < LEAST * bodies.size:
         return None
     other = rival(bodies, chain, elbow_at)
     if other is not None:
@@ -162,7 +159,7 @@ def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | No
         clavicles += 1
     links = [step.outer_link]
     for swing in reversed(swings[clavicles:]):
-        if lines[swing].distance(point_3) < _ON * arm:
+        if lines[swing].distance(point_3) < ON * arm:
             links += [chain[swing].outer_link]
         else:
             break
@@ -193,7 +190,7 @@ def _wrist(
             if not bodies.onward(step) and not speaks_of(step.hinge.name, "turn"):
                 cue, sure = f"{cue}, if it is no gripper's jaw", GUESS
         links = [step.inner_link]
-        if line.distance(point_3) < _ON * bodies.size:
+        if line.distance(point_3) < ON * bodies.size:
             links.append(step.outer_link)
         return Spot(point_3, step.start, tuple(links), cue, sure), twist_at
     last = chain[-1]

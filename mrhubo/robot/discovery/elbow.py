@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import measure
+from mrhubo.robot.discovery.lines import LEAST, ON, measure
 
 _HAND = 0.5
 """How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
@@ -14,9 +14,6 @@ _CLOSE = 0.8
 _BEFORE, _FEW = 3, 0.8
 """Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
 below a clavicle."""
-_ON = 1e-4
-_LEAST = 1e-3
-"""How long upper arm and forearm are at least, as a share of the robot."""
 
 
 def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
@@ -39,7 +36,7 @@ def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
     found = measure(lines_of(chain))
     gap_N = np.diff(found.out_N, append=found.out_N[-1])
     longest = float(gap_N.max())
-    if longest < _LEAST * bodies.size:
+    if longest < LEAST * bodies.size:
         return None
     gap_N[-1] = _HAND * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
     scores = np.zeros(len(chain))
@@ -62,7 +59,7 @@ def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> floa
         corners = np.vstack([corners, end_3 + 2 * (centre_3 - end_3)])
     # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
     own_3 = bodies.position(last.outer_link)
-    corners = corners[np.linalg.norm(corners - own_3, axis=-1) > _ON * bodies.size]
+    corners = corners[np.linalg.norm(corners - own_3, axis=-1) > ON * bodies.size]
     return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from mrhubo.robot.discovery.arm import Spot, limb_end
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
-from mrhubo.robot.discovery.lines import Line, feet, sine
+from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine
 from mrhubo.robot.discovery.names import speaks_of
 
 _PARALLEL = 0.2
@@ -24,9 +24,6 @@ _TILTED = 0.6
 """The same of a hip's pitch, which some robots tilt by up to 30 degrees."""
 _APART = 0.15
 """How far hip, knee and ankle are at least from each other, as a share of the leg."""
-_ON = 1e-4
-_LEAST = 1e-3
-"""How long thigh and shank are at least, as a share of the robot."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +70,13 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     step = rotary[knee_at]
     links = [step.inner_link]
     for i in reversed(range(hip_at if hip_at is not None else max(knee_at - 1, 0), knee_at)):
-        if lines[i].distance(hip_3) > _ON * bodies.size:
+        if lines[i].distance(hip_3) > ON * bodies.size:
             break
         links.append(rotary[i].outer_link)
     hip = Spot(hip_3, step.start, tuple(dict.fromkeys(links)), cue, sure)
     how = "the middle one of three parallel axes" if places else "the axis with the longest stretches on either side"
     knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
-    if min(math.dist(hip_3, knee_3), math.dist(knee_3, ankle.point_3)) < _LEAST * bodies.size:
+    if min(math.dist(hip_3, knee_3), math.dist(knee_3, ankle.point_3)) < LEAST * bodies.size:
         return None
     return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
 
@@ -154,7 +151,7 @@ def _ankle(
         point_3, cue, sure = lines[ankle_at].nearest(knee_3), "the ankle axis's point nearest to the knee", 0.8
     links = [step.inner_link]
     for i in range(knee_at + 1, len(lines)):
-        if lines[i].distance(point_3) > _ON * bodies.size:
+        if lines[i].distance(point_3) > ON * bodies.size:
             break
         links.append(chain[i].outer_link)
     return Spot(point_3, step.start, tuple(links), cue, sure)

@@ -17,6 +17,10 @@ import numpy as np
 
 PARALLEL = 0.09
 """Sine under which two axes count as parallel: 5 degrees."""
+ON = 1e-4
+"""How near a point is to an axis that it lies on, as a share of the robot or the limb."""
+LEAST = 1e-3
+"""How long each half of a limb is at least, upper arm or forearm, thigh or shank, as a share of the robot."""
 
 
 @dataclass(frozen=True, eq=False)
