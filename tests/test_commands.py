@@ -222,7 +222,7 @@ NEEDED = {
     "baseline": 1,
     "reproduce": 0,
     "prior": 1,
-    "universal": 1,
+    "universal": 0,
 }
 """How many things each command cannot do without."""
 

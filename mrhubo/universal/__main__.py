@@ -1,4 +1,4 @@
-"""`python -m mrhubo.universal --config conf/universal.yaml`: trains the universal network."""
+"""`mrhubo universal --config conf/universal.yaml`: trains the universal network."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ DESCRIPTION = "Trains the universal network on random chains of joints."
 
 def build_parser() -> CommandParser[UniversalConfig]:
     """The command's arguments."""
-    parser = CommandParser("mrhubo.universal", DESCRIPTION, UniversalConfig)
+    parser = CommandParser("mrhubo universal", DESCRIPTION, UniversalConfig)
     parser.add_argument("--quiet", action="store_true", help="no progress line")
     return parser
 

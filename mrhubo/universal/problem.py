@@ -91,12 +91,12 @@ def choose(first: Place, *others: Place) -> Place:
     for other in others:
         better_B = other.model.cost_B < first.model.cost_B
 
-        def pick(a: Tensor, b: Tensor, better_B: Tensor = better_B) -> Tensor:
-            return torch.where(better_B.view(-1, *[1] * (a.ndim - 1)), b, a)
-
-        model, local = (
-            type(one)(*(pick(getattr(one, field.name), getattr(two, field.name)) for field in fields(one)))
-            for one, two in ((first.model, other.model), (first.local, other.local))
-        )
-        first = Place(first.problem, pick(first.q_BN, other.q_BN), local, model)
+        q_BN = torch.where(better_B[:, None], other.q_BN, first.q_BN)
+        local, model = _merged(better_B, first.local, other.local), _merged(better_B, first.model, other.model)
+        first = Place(first.problem, q_BN, local, model)
     return first
+
+
+def _merged(better_B: Tensor, one: Kind, two: Kind) -> Kind:
+    pairs = [(getattr(one, field.name), getattr(two, field.name)) for field in fields(one)]
+    return type(one)(*(torch.where(better_B.view(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))

@@ -67,8 +67,11 @@ def _of(skeleton: Skeleton, local_HJ33: Tensor, parts: list[BodyPart]) -> Tensor
         if isinstance(part, LimbPart):
             start, end = keypoint_indices([part.start, part.end])
             rests = [normalize(skeleton.rest_K3[end] - skeleton.rest_K3[start], dim=0)]
+        elif isinstance(part, OrientedPart):
+            rests = [torch.tensor(rest) for rest in part.rest]
         else:
-            rests = [torch.tensor(rest) for rest in (part.rest if isinstance(part, OrientedPart) else [part.rest])]
+            assert isinstance(part, BendPart)
+            rests = [torch.tensor(part.rest)]
         for word, rest_3 in enumerate(rests):
             slot = slot_of(part, word, part.hangs_on in names)
             found_HS3[:, slot] = (view_H33.mT @ turns_HX33[:, number] @ rest_3.to(turns_HX33)[..., None])[..., 0]

@@ -49,7 +49,15 @@ def test_equal_seeds_equal_weights_also_when_interrupted(tmp_path: Path, monkeyp
         with pytest.raises(KeyboardInterrupt):
             training.train(settings)
     assert not settings.output.exists()
+    steps: list[int] = []
+
+    def told(self: training.UniversalTraining, rows_B: torch.Tensor, batch: int) -> torch.Tensor:
+        steps.append(self.trainer.global_step)
+        return whole(self, rows_B, batch)
+
+    monkeypatch.setattr(training.UniversalTraining, "training_step", told)
     training.train(settings)
+    assert steps == [2, 3], "it goes on from the checkpoint"
     two, _ = read_tensors(settings.output)
     assert all(torch.equal(one[name], two[name]) for name in one)
 
