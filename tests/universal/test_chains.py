@@ -69,7 +69,7 @@ def chain_of(body_map: BodyMap, branch: RobotBranch, count: int) -> Chains:
     robot, joints = body_map.robot, [body_map.robot.joint_names[n] for n in branch.joints_X.tolist()]
     poses = robot.forward(torch.zeros(1, len(robot.joint_names)))
     view_33 = body_map.shared.view_robot(poses).views[0][0]
-    flip_3, axial_3 = branch._mirror_3, branch._axial_3
+    flip_3, axial_3 = branch.mirror_3, branch.axial_3
     order = sorted(joints, key=lambda name: len(robot.description.joints_above(robot.description.joints[name].child)))
     assert order == joints, "the config lists them from the body outwards"
 
@@ -97,7 +97,7 @@ def chain_of(body_map: BodyMap, branch: RobotBranch, count: int) -> Chains:
                 where[slot] = ((rotation_33 @ offset_3 + position_3) @ view_33) * flip_3
                 bodies[row, slot] = carried(point.link)
         else:
-            ends[slot] = (link(direction.link)[0] @ direction.axis_3 @ view_33) * branch._flip_S3[slot]
+            ends[slot] = (link(direction.link)[0] @ direction.axis_3 @ view_33) * branch.flip_S3[slot]
             bodies[1, slot] = carried(direction.link)
     filled_S = torch.tensor([float(slot in branch.places) for slot in range(5)])
     ends[filled_S == 0] = torch.tensor([1.0, 0.0, 0.0])

@@ -1,13 +1,6 @@
 """How the universal network is trained: `python -m mrhubo.universal --config conf/universal.yaml`.
 
-Per problem, with hypotheses q_k after the first iteration, their distances d_k to the best known answer, r = softmax(
--d / 0.1), e(q) = sqrt(cost(q) + 0.001), which is about an angle, and r' = softmax(-e / 0.05) of the second iteration:
-
-    L = 0.3 sum_k r_k (d_k + e(q_k)) + sum_k r'_k e(q'_k) + 0.1 mean_k e(q'_k) + mean_k e(q''_k)
-
-q', q'' are the network's answers in the second and third iteration. What the network sees is taken as given (no second
-derivatives); the cost's gradient is exact and runs back through all iterations that went on with the network's answer
-(M. Andrychowicz et al., "Learning to learn by gradient descent by gradient descent", 2016).
+The loss is that of `loss`, on random chains.
 
 Legend: B problems, N joints, K hypotheses.
 """
@@ -34,7 +27,8 @@ from mrhubo.runtime.runs import ending, take_up_run
 from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
 from mrhubo.runtime.workspace import Workspace
-from mrhubo.universal.iterations import Trace, unroll
+from mrhubo.universal.iterations import unroll
+from mrhubo.universal.learning.loss import loss
 from mrhubo.universal.learning.problems import Lessons, load_lessons
 from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.weights import save_network
@@ -59,7 +53,7 @@ class UniversalTraining(lightning.LightningModule):
     def training_step(self, rows_B: Tensor, _: int) -> Tensor:
         """One batch of problems, by their numbers (B,)."""
         lessons = self.learnt.rows(rows_B)
-        value = loss(unroll(self.network, lessons.problem), lessons)
+        value = loss(unroll(self.network, lessons.problem), lessons.q_BN, lessons.chains.present_BN)
         if (self.trainer.global_step + 1) % 50 == 0:
             self.log("train/loss", value.detach())
         return value
@@ -81,17 +75,6 @@ class UniversalTraining(lightning.LightningModule):
         )
         schedule = cosine_schedule(optimizer, settings.steps)
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
-
-
-def loss(trace: Trace, lessons: Lessons) -> Tensor:
-    """The loss above."""
-    away_BKN = (trace.first_BKN - lessons.q_BN[:, None]) * lessons.chains.present_BN[:, None]
-    distance_BK = (away_BKN.square().sum(-1) + 0.01).sqrt()
-    first_BK, second_BK, third_BK = ((cost_BK.clamp_min(0.0) + 1e-3).sqrt() for cost_BK in trace.learnt)
-    near_BK = torch.softmax(-distance_BK.detach() / 0.1, dim=1)
-    good_BK = torch.softmax(-second_BK.detach() / 0.05, dim=1)
-    found_B = 0.3 * (near_BK * (distance_BK + first_BK)).sum(1) + (good_BK * second_BK).sum(1)
-    return (found_B + 0.1 * second_BK.mean(1) + third_BK.mean(1)).mean()
 
 
 @torch.no_grad()
