@@ -6,6 +6,7 @@ from mrhubo.retargeter.networks import JointNetwork, RetargetNetwork
 from mrhubo.retargeter.package import POLISH, Retargeter
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.universal import UniversalJoints
+from mrhubo.retargeter.without_training import untrained
 
 __all__ = [
     "POLISH",
@@ -17,4 +18,5 @@ __all__ = [
     "UniversalJoints",
     "build_network",
     "join_results",
+    "untrained",
 ]

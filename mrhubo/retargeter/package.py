@@ -59,7 +59,7 @@ class Retargeter(nn.Module):
         network: JointNetwork,
         body_map: BodyMap,
         prior: BodyPrior,
-        config: Config,
+        config: Config | None,
         phi_threshold: float,
         confidence: ConfidenceModel = STANDARD,
     ) -> None:
@@ -254,7 +254,13 @@ class Retargeter(nn.Module):
         return self.polisher(q_TN, target_TD3, polish)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
-        """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
+        """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header.
+
+        Raises:
+            UserError: the retargeter was made without a config.
+        """
+        if self.config is None:
+            raise UserError(f"{folder}: {self.origin} is not saved; a fit with model.start=universal makes a package")
         settings = {"phi_threshold": repr(self.phi_threshold), "confidence": self.confidence.to_json(), **provenance}
         write_package(folder, self.network, self.body_map, self.prior, self.config, settings)
         self.origin, self.checksum = f"package {folder.resolve().name}", package_checksum(folder)
