@@ -2,7 +2,7 @@
 optimum for that robot, which the reference retargeter finds from twelve starts.
 
     python benchmarks/universal.py [--every 40] [--made 1000] [--seeds 500000] [--frames 8] [--urdfs DIR]
-        [--network FILE]
+        [--network FILE] [--robots nao,coman,reachy] [--clips FOLDER]
 
 Robots: the shipped ones, every URDF in a folder by its detected mapping, and random humanoids
 (`mrhubo.robot.generator`), which are made by other code than the chains that the network learnt from. Motion: the nine
@@ -15,6 +15,7 @@ Legend: T frames, D directions, N joints.
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 import time
@@ -45,16 +46,17 @@ Answer = Callable[[Tensor], Tensor]
 
 def main(argv: list[str]) -> None:
     """Prints the tables."""
-    options, argv = read_options(argv, every="40", made="1000", seeds="500000", frames="8", urdfs=MORE, network="")
+    options, argv = read_options(argv, every="40", made="1000", seeds="500000", frames="8", urdfs=MORE, network="",
+                                 robots=",".join(SHIPPED), clips=CLIPS)  # fmt: skip
     if argv:
         sys.exit(f"{argv[0]}: is unknown")
     warnings.simplefilter("ignore")
     print_header()
     network = open_network(Path(options["network"]) if options["network"] else None)
     every = int(options["every"])
-    motions = [m for m in read_folder(project_root() / CLIPS) if m.name not in EvaluationConfig().validation]
+    motions = [m for m in read_folder(project_root() / options["clips"]) if m.name not in EvaluationConfig().validation]
     kinds = {"as they are": motions, "re-shared": [reshare(m, seed) for seed, m in enumerate(motions)]}
-    robots = [*SHIPPED, *sorted(map(str, (project_root() / options["urdfs"]).glob("*.urdf")))]
+    robots = [*options["robots"].split(","), *sorted(map(str, (project_root() / options["urdfs"]).glob("*.urdf")))]
     rows = []
     for name in robots:
         body_map = BodyMap.of(Robot.from_config(name) if name in SHIPPED else open_robot(name))
@@ -64,7 +66,7 @@ def main(argv: list[str]) -> None:
             worst = max(float(f["network"].max()) for f in found)
             jumps = [f"{means[f'{which} jumps']:.1f}" for which in ("optimum", "network")] if every == 1 else ["", ""]
             rows.append([Path(name).stem, str(len(body_map.robot.joint_names)), kind, f"{means['optimum']:.2f}",
-                         *(f"{means[key]:.3f}" for key in _COLUMNS), f"{worst:.1f}", *jumps])  # fmt: skip
+                         *(_number(means[key]) for key in _COLUMNS), f"{worst:.1f}", *jumps])  # fmt: skip
             print(" ".join(rows[-1]), file=sys.stderr)
     print_table(["robot", "joints", "clips", "optimum [deg]", *_COLUMNS.values(), "worst frame", "jumps of optima",
                  "jumps"], rows)  # fmt: skip
@@ -72,6 +74,10 @@ def main(argv: list[str]) -> None:
     first = int(options["seeds"])
     made(network, range(first, first + int(options["made"])), torch.cat([m.local_TJ33 for m in motions]),
          int(options["frames"]))  # fmt: skip
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else ""
 
 
 _COLUMNS = {

@@ -86,7 +86,7 @@ def train(
         torch.manual_seed(settings.seed)
         network = build_network(prepared.config, prepared.body_map)
     data = PairData(prepared, network.features, report, ranks)
-    module = _module(network, prepared.config)
+    module = build_module(network, prepared.config)
     saver = Checkpoints(checkpoints, "val/link_cm")
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
     progress = TrainingProgress(settings.max_steps, _SHOWN, report)
@@ -109,7 +109,8 @@ def train(
     )
 
 
-def _module(network: JointNetwork, config: Config) -> RetargetModule | TuningModule:
+def build_module(network: JointNetwork, config: Config) -> RetargetModule | TuningModule:
+    """Loss and optimiser for a network."""
     if isinstance(network, UniversalJoints):
         return TuningModule(network, config.trainer)
     assert isinstance(network, RetargetNetwork)

@@ -30,8 +30,8 @@ class TuningModule(lightning.LightningModule):
         self.network, self.settings = network, settings
         network.optimiser.network.requires_grad_(True)
 
-    def losses(self, features_BF: Tensor, q_BN: Tensor) -> dict[str, Tensor]:
-        """`loss` of directions (B, F) and the joint angles that go with them (B, N)."""
+    def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor) -> dict[str, Tensor]:  # noqa: ARG002
+        """`loss` of directions (B, F) and the joint angles that go with them (B, N); links tell it nothing more."""
         optimiser = self.network.optimiser
         branches = optimiser.branches
         problem = branches.ask(features_BF.unflatten(1, (-1, 3)))
@@ -40,7 +40,7 @@ class TuningModule(lightning.LightningModule):
 
     def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
         """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""
-        losses = self.losses(batch[0], batch[2])
+        losses = self.losses(*batch)
         if (self.trainer.global_step + 1) % LOG_EVERY == 0:
             self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         return losses["loss"]

@@ -26,22 +26,23 @@ def test_it_learns_from_pairs(root: Path) -> None:
     generator = torch.Generator().manual_seed(0)
     q_BN = body_map.robot.sample(64, generator)
     features_BF = body_map.robot_directions(body_map.robot.forward(q_BN)).flatten(1)
+    links_BM6 = q_BN.new_zeros(len(q_BN), 0, 6)
     module = TuningModule(network, config.trainer)
     learnt = {name for name, weights in module.named_parameters() if weights.requires_grad}
     assert learnt and all(name.startswith("network.optimiser.network.") for name in learnt)
-    whole = float(module.losses(features_BF, q_BN)["loss"].detach())
+    whole = float(module.losses(features_BF, links_BM6, q_BN)["loss"].detach())
     with torch.no_grad():
         for name, weights in module.named_parameters():
             if name in learnt:
                 weights += 0.05 * torch.randn(weights.shape, generator=generator)
-    spoilt = float(module.losses(features_BF, q_BN)["loss"].detach())
+    spoilt = float(module.losses(features_BF, links_BM6, q_BN)["loss"].detach())
     made = module.configure_optimizers()
     for _ in range(30):
         made["optimizer"].zero_grad()
-        module.losses(features_BF, q_BN)["loss"].backward()
+        module.losses(features_BF, links_BM6, q_BN)["loss"].backward()
         made["optimizer"].step()
         made["lr_scheduler"]["scheduler"].step()
-    tuned = float(module.losses(features_BF, q_BN)["loss"].detach())
+    tuned = float(module.losses(features_BF, links_BM6, q_BN)["loss"].detach())
     assert whole < spoilt and tuned < spoilt - 0.5 * (spoilt - whole), (whole, spoilt, tuned)
 
 
