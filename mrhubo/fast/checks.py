@@ -121,9 +121,9 @@ def _check_stages(d: Description, sizes: dict[str, int]) -> None:
 
 def _check_universal(u: Universal, sizes: dict[str, int]) -> None:
     for name, array, most in (
-        ("block_E", u.block_E, sizes["C"]), ("slot_E5", u.slot_E5 + 1, sizes["D"] + 1), ("view_E", u.view_E, sizes["V"]),
-        ("joint_N", u.joint_N, sizes["A"]), ("axial_E3", u.axial_E3 + 1, 3), ("flip_E53", u.flip_E53 + 1, 3),
-        ("sense_N", u.sense_N + 1, 3), ("size_2", u.size_2 - 1, _LARGEST),
+        ("block_E", u.block_E, sizes["C"]), ("slot_E5", u.slot_E5 + 1, sizes["D"] + 1),
+        ("view_E", u.view_E, sizes["V"]), ("joint_N", u.joint_N, sizes["A"]), ("axial_E3", u.axial_E3 + 1, 3),
+        ("flip_E53", u.flip_E53 + 1, 3), ("sense_N", u.sense_N + 1, 3), ("size_2", u.size_2 - 1, _LARGEST),
     ):  # fmt: skip
         outside = (array < 0) | (array >= most)
         _refuse(bool(outside.any()), f"universal.{name} names what is not there")

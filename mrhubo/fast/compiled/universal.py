@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.human import add, dot, row, row3, turn_back
+from mrhubo.fast.compiled.human import add, dot, put, row, row3, turn_back
 from mrhubo.fast.compiled.robot import place, quadratic
 from mrhubo.fast.compiled.steps import minimise
 from mrhubo.fast.compiled.tables import (
@@ -30,7 +30,7 @@ from mrhubo.fast.compiled.tables import (
     size,
     whole,
 )
-from mrhubo.fast.compiled.universal_network import OUTPUTS, answer, exponential, make_room
+from mrhubo.fast.compiled.universal_network import OUTPUTS, answer, exponential
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.steps import FLOOR
 from mrhubo.fast.plain.universal import DAMPINGS, FINAL, FINAL_DAMPINGS, KEPT, REACH, STEPS
@@ -38,7 +38,7 @@ from mrhubo.fast.sections import Universal
 
 _SEEN = len(DAMPINGS)
 _MOST = max(KEPT)
-_FINAL = len(FINAL_DAMPINGS)
+_FINAL, _TURNS = len(FINAL_DAMPINGS), 1 + len(KEPT) + FINAL
 
 
 class Lookup(NamedTuple):
@@ -76,8 +76,8 @@ class Tried(NamedTuple):
     q_KN: np.ndarray
     cost_KC: np.ndarray
     kept_KN: np.ndarray
-    step_KPN: np.ndarray
-    """Of each hypothesis that is kept: damped steps."""
+    step_PN: np.ndarray
+    """Damped steps of the one that is at work."""
     best_N: np.ndarray
     best_C: np.ndarray
     held_N: np.ndarray
@@ -85,6 +85,7 @@ class Tried(NamedTuple):
     fixed_N: np.ndarray
     other_N: np.ndarray
     other_C: np.ndarray
+    miss_S3: np.ndarray
 
 
 @njit(**INNER)
@@ -93,8 +94,9 @@ def make_tried(t, u):
     joints, blocks, most = size(t, BLOCK_N), size(t, FIRST_C) - 1, max(u.hypotheses, _MOST)
     return Tried(
         np.empty((most, joints)), np.empty((most, blocks)), np.empty((_MOST, joints)),
-        np.zeros((_MOST, _SEEN, joints)), np.empty(joints), np.empty(blocks), np.empty(joints, np.bool_),
+        np.zeros((_SEEN, joints)), np.empty(joints), np.empty(blocks), np.empty(joints, np.bool_),
         np.empty(joints), np.empty(joints), np.empty(joints), np.empty(blocks),
+        np.empty((5, 3)),
     )  # fmt: skip
 
 
@@ -188,92 +190,82 @@ def step(t, work, tried, q_N, c, damping, step_N):
 
 
 @njit(**INNER)
-def _branch_features(t, u, work, room, k, c, first):
-    seen_XF, x, at = room.seen_XF, k * (size(t, FIRST_C) - 1) + c, 30
+def _features(t, u, work, tried, room, q_N, c, first):
+    """Features of a block and its joints, whose steps stand in `tried` and whose model in `work`."""
+    seen_XF, miss_S3 = room.seen_XF, tried.miss_S3
     for s in range(5):
         d = u.slot_CS[c, s]
         weight = work.weight_D[d] if d >= 0 else 0.0
-        there = weight > 0
-        own = turn_back(work.view_V33, whole(t, SEEN_D, d), row(work.direction_D3, d)) if there else (0.0, 0.0, 0.0)
-        goal = row(work.goal_D3, d) if there else (0.0, 0.0, 0.0)
-        flip = row3(u.flip_CS3, c, s)
-        seen_XF[x, 3 * s], seen_XF[x, 3 * s + 1] = own[0] * flip[0], own[1] * flip[1]
-        seen_XF[x, 3 * s + 2] = own[2] * flip[2]
-        seen_XF[x, 15 + 3 * s], seen_XF[x, 15 + 3 * s + 1] = goal[0] * flip[0], goal[1] * flip[1]
-        seen_XF[x, 15 + 3 * s + 2] = goal[2] * flip[2]
-        seen_XF[x, at + s] = math.sqrt(weight)
-    seen_XF[x, 35] = math.log(work.cost_C[c] + 1e-4) / 5
-    seen_XF[x, 36] = 1.0 if first else 0.0
-
-
-@njit(**INNER)
-def _joint_features(t, u, work, tried, room, q_N, k, c):
-    """Features of a block's joints as `k`th hypothesis, whose steps stand in `tried` and whose model in `work`."""
-    feature_TF, joints = room.feature_TF, len(q_N)
-    first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
-    for i in range(first, last):
-        n, row_t = whole(t, ORDER_N, i), k * joints + i
-        sense, axial = u.sense_N[n], row(u.axial_C3, c)
+        own, goal = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if weight > 0:
+            own = turn_back(work.view_V33, whole(t, SEEN_D, d), row(work.direction_D3, d))
+            goal = row(work.goal_D3, d)
+        put(miss_S3, s, add(own, goal, -1.0))
+        for j in range(3):
+            seen_XF[c, 3 * s + j] = own[j] * u.flip_CS3[c, s, j]
+            seen_XF[c, 15 + 3 * s + j] = goal[j] * u.flip_CS3[c, s, j]
+        seen_XF[c, 30 + s] = math.sqrt(weight)
+    seen_XF[c, 35] = math.log(work.cost_C[c] + 1e-4) / 5
+    seen_XF[c, 36] = 1.0 if first else 0.0
+    begin, end = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
+    for i in range(begin, end):
+        n = whole(t, ORDER_N, i)
+        line_F, sense = room.feature_TF[i], u.sense_N[n]
         axis = turn_back(work.view_V33, u.view_C[c], row(work.axis_A3, u.joint_N[n]))
         for j in range(3):
-            feature_TF[row_t, j] = axis[j] * axial[j] * sense
+            line_F[j] = axis[j] * u.axial_C3[c, j] * sense
         for s in range(5):
             d = u.slot_CS[c, s]
-            at, pull = 3 + 3 * s, 0.0
-            if d < 0:
-                continue
-            view, root = whole(t, SEEN_D, d), math.sqrt(work.weight_D[d]) * sense
-            own = turn_back(work.view_V33, view, row3(work.jacobian_DN3, d, n))
-            miss = add(turn_back(work.view_V33, view, row(work.direction_D3, d)), row(work.goal_D3, d), -1.0)
-            flip, pull = row3(u.flip_CS3, c, s), dot(own, miss) * work.weight_D[d] * sense
-            for j in range(3):
-                feature_TF[row_t, at + j] = own[j] * flip[j] * root
-            feature_TF[row_t, 18 + s] = pull
-        gradient, diagonal, q = work.gradient_N[n] * sense, work.hessian_NN[n, n], q_N[n]
-        lower, upper = real(t, LOWER_N, n), real(t, UPPER_N, n)
-        up, down, half = upper - q, q - lower, (upper - lower) / 2
-        away = (q - real(t, MIDDLE_N, n)) * sense
-        frozen = (down <= 0 and work.gradient_N[n] > 0) or (up <= 0 and work.gradient_N[n] < 0)
-        if sense < 0:
-            up, down = down, up
-        for p in range(_SEEN):
-            moved = tried.step_KPN[k, p, n] * sense
-            feature_TF[row_t, 23 + p] = min(max(moved, -1.5), 1.5)
-            feature_TF[row_t, 26 + p] = math.asinh(10 * moved)
-        feature_TF[row_t, 29], feature_TF[row_t, 30] = math.asinh(30 * gradient), math.sqrt(max(diagonal, 0.0))
-        feature_TF[row_t, 31], feature_TF[row_t, 32], feature_TF[row_t, 33] = diagonal, min(up, 3.0), min(down, 3.0)
-        feature_TF[row_t, 34], feature_TF[row_t, 35] = math.exp(up / -0.1), math.exp(down / -0.1)
-        feature_TF[row_t, 36], feature_TF[row_t, 37] = math.exp(up / -0.5), math.exp(down / -0.5)
-        feature_TF[row_t, 38], feature_TF[row_t, 39], feature_TF[row_t, 40] = away / half, min(half, 3.0), 1.0
-        feature_TF[row_t, 41], feature_TF[row_t, 42] = 0.0 if frozen else 1.0, min(max(away, -3.0), 3.0)
-        feature_TF[row_t, 43] = 1.0 / (last - first)
+            if d >= 0:
+                root = seen_XF[c, 30 + s] * sense
+                own = turn_back(work.view_V33, whole(t, SEEN_D, d), row3(work.jacobian_DN3, d, n))
+                for j in range(3):
+                    line_F[3 + 3 * s + j] = own[j] * u.flip_CS3[c, s, j] * root
+                line_F[18 + s] = dot(own, row(miss_S3, s)) * work.weight_D[d] * sense
+        _joint_features(t, work, tried, line_F, q_N[n], n, sense)
+        line_F[43] = 1.0 / (end - begin)
 
 
 @njit(**INNER)
-def _look(t, u, work, tried, room, q_N, k, first):
-    """All that the network is to see of the `k`th hypothesis."""
-    quadratic(t, work, q_N, work.cost_C, work.gradient_N, work.hessian_NN)
-    for c in range(len(work.cost_C)):
-        if u.known_C[c]:
-            for p in range(_SEEN):
-                step(t, work, tried, q_N, c, DAMPINGS[p], tried.step_KPN[k, p])
-            _branch_features(t, u, work, room, k, c, first)
-            _joint_features(t, u, work, tried, room, q_N, k, c)
+def _asinh(x):
+    return math.copysign(math.log(abs(x) + math.sqrt(x * x + 1)), x)
 
 
 @njit(**INNER)
-def _move(t, u, tried, room, q_N, k, place_t, at, out_N):
+def _joint_features(t, work, tried, line_F, q, n, sense):
+    gradient, diagonal = work.gradient_N[n], work.hessian_NN[n, n]
+    lower, upper = real(t, LOWER_N, n), real(t, UPPER_N, n)
+    up, down, half = upper - q, q - lower, (upper - lower) / 2
+    frozen = (down <= 0 and gradient > 0) or (up <= 0 and gradient < 0)
+    if sense < 0:
+        up, down = down, up
+    for p in range(_SEEN):
+        moved = tried.step_PN[p, n] * sense
+        line_F[23 + p] = min(max(moved, -1.5), 1.5)
+        line_F[26 + p] = _asinh(10 * moved)
+    line_F[29], line_F[30], line_F[31] = _asinh(30 * gradient * sense), math.sqrt(max(diagonal, 0.0)), diagonal
+    line_F[32], line_F[33] = min(up, 3.0), min(down, 3.0)
+    near_up, near_down = math.exp(-2 * up), math.exp(-2 * down)
+    line_F[34], line_F[35] = near_up**5, near_down**5
+    line_F[36], line_F[37] = near_up, near_down
+    away = (q - real(t, MIDDLE_N, n)) * sense
+    line_F[38], line_F[39], line_F[40] = away / half, min(half, 3.0), 1.0
+    line_F[41], line_F[42] = 0.0 if frozen else 1.0, min(max(away, -3.0), 3.0)
+
+
+@njit(**INNER)
+def _move(t, u, tried, room, q_N, at, out_N):
     """The network's next angles from `q_N`, by outputs from a column on, into `out_N`."""
-    joints, out_TO = len(q_N), room.out_TO
-    for i in range(joints):
-        n, line = whole(t, ORDER_N, i), place_t * joints + i
-        most = max(out_TO[line, at], out_TO[line, at + 1], out_TO[line, at + 2])
+    out_TO = room.out_TO
+    for i in range(len(q_N)):
+        n = whole(t, ORDER_N, i)
+        most = max(max(out_TO[i, at], out_TO[i, at + 1]), out_TO[i, at + 2])
         total, moved = 0.0, 0.0
         for p in range(_SEEN):
-            share = exponential(out_TO[line, at + p] - most)
+            share = exponential(out_TO[i, at + p] - most)
             total += share
-            moved += share * tried.step_KPN[k, p, n]
-        moved = moved / total + REACH * math.tanh(out_TO[line, at + 3]) * u.sense_N[n]
+            moved += share * tried.step_PN[p, n]
+        moved = moved / total + REACH * math.tanh(out_TO[i, at + 3]) * u.sense_N[n]
         out_N[n] = min(max(q_N[n] + moved, real(t, LOWER_N, n)), real(t, UPPER_N, n))
 
 
@@ -299,12 +291,11 @@ def _keep(t, tried, count, keep):
 
 
 @njit(**INNER)
-def _choose(t, work, tried, k):
-    """Of the `k`th hypothesis and `other_N`, which costs less goes on, block by block."""
-    cost(t, work, tried.q_KN[k], tried.cost_KC[k])
+def _take(t, work, tried, k, always):
+    """`other_N` becomes the `k`th hypothesis where it costs less, block by block; or always."""
     cost(t, work, tried.other_N, tried.other_C)
     for c in range(len(tried.other_C)):
-        if tried.other_C[c] < tried.cost_KC[k, c]:
+        if always or tried.other_C[c] < tried.cost_KC[k, c]:
             tried.cost_KC[k, c] = tried.other_C[c]
             for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
                 n = whole(t, ORDER_N, x)
@@ -313,42 +304,42 @@ def _choose(t, work, tried, k):
 
 @njit(**INNER)
 def unroll(t, u, w, work, tried, room, q_N):
-    """Five iterations for the goal in `work`; the answer stands in `q_N`."""
-    joints, blocks = len(q_N), len(work.cost_C)
+    """Five iterations for the goal in `work`; the answer stands in `q_N`.
+
+    One after the other in a loop, as each place that calls a function is compiled by itself.
+    """
+    joints, blocks, count, unknown = len(q_N), len(work.cost_C), 1, False
     for n in range(joints):
         q_N[n] = tried.best_N[n] = tried.kept_KN[0, n] = (real(t, LOWER_N, n) + real(t, UPPER_N, n)) / 2
-    _look(t, u, work, tried, room, tried.kept_KN[0], 0, True)
-    for c in range(blocks):
-        tried.best_C[c] = work.cost_C[c]
-    answer(t, w, room, 1, True)
-    count = u.hypotheses
-    for k in range(count):
-        _move(t, u, tried, room, tried.kept_KN[0], 0, 0, OUTPUTS * k, tried.q_KN[k])
-        cost(t, work, tried.q_KN[k], tried.cost_KC[k])
-    for keep in KEPT:
-        _keep(t, tried, count, min(keep, count))
-        count = min(keep, count)
+    for turn in range(_TURNS + 1):
+        first, final = turn == 0, turn > len(KEPT)
+        if not first:
+            keep = 1 if final else KEPT[turn - 1]
+            _keep(t, tried, count, min(keep, count))
+            count = min(keep, count)
+            if turn == _TURNS:
+                break
         for k in range(count):
-            _look(t, u, work, tried, room, tried.kept_KN[k], k, False)
-        answer(t, w, room, count, False)
-        for k in range(count):
-            _move(t, u, tried, room, tried.kept_KN[k], k, k, 0, tried.q_KN[k])
-            for n in range(joints):
-                tried.other_N[n] = tried.kept_KN[k, n] + tried.step_KPN[k, 0, n]
-            _choose(t, work, tried, k)
-    for _ in range(FINAL):
-        _keep(t, tried, count, 1)
-        count = 1
-        quadratic(t, work, tried.kept_KN[0], work.cost_C, work.gradient_N, work.hessian_NN)
-        for c in range(blocks):
-            step(t, work, tried, tried.kept_KN[0], c, FINAL_DAMPINGS[0], tried.step_KPN[0, 0])
-            step(t, work, tried, tried.kept_KN[0], c, FINAL_DAMPINGS[1], tried.step_KPN[0, 1])
-        for n in range(joints):
-            tried.q_KN[0, n] = tried.kept_KN[0, n] + tried.step_KPN[0, 0, n]
-            tried.other_N[n] = tried.kept_KN[0, n] + tried.step_KPN[0, 1, n]
-        _choose(t, work, tried, 0)
-    _keep(t, tried, count, 1)
-    unknown = False
+            kept_N = tried.kept_KN[k]
+            quadratic(t, work, kept_N, work.cost_C, work.gradient_N, work.hessian_NN)
+            for c in range(blocks):
+                if first:
+                    tried.best_C[c] = work.cost_C[c]
+                for p in range(_FINAL if final else _SEEN):
+                    step(t, work, tried, kept_N, c, FINAL_DAMPINGS[p] if final else DAMPINGS[p], tried.step_PN[p])
+                if not final:
+                    _features(t, u, work, tried, room, kept_N, c, first)
+            if not final:
+                answer(t, w, room, first)
+            for way in range(u.hypotheses if first else 2):
+                if first or not (final or way):
+                    _move(t, u, tried, room, kept_N, OUTPUTS * way, tried.other_N)
+                else:
+                    for n in range(joints):
+                        tried.other_N[n] = kept_N[n] + tried.step_PN[way if final else 0, n]
+                _take(t, work, tried, way if first else k, first or way == 0)
+        if first:
+            count = u.hypotheses
     for n in range(joints):
         if u.known_C[whole(t, BLOCK_N, n)]:
             q_N[n] = tried.best_N[n]

@@ -14,9 +14,6 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import robot, steps, tables, universal, universal_network
 from mrhubo.fast.kept import checksum
-from mrhubo.fast.plain.universal import KEPT
-
-_MOST = max(KEPT)
 
 
 @cache
@@ -28,10 +25,9 @@ def make_universal_kernel() -> Callable[..., Any]:
     def unroll(t, u, w, target_BD3, out_BN):
         """Joint angles (B, N) [rad], inside the limits, for human directions (B, D, 3)."""
         _ = version
-        joints, blocks = out_BN.shape[1], tables.size(t, tables.FIRST_C) - 1
+        joints = out_BN.shape[1]
         work, tried = robot.make_work(t), universal.make_tried(t, u)
-        outputs = universal_network.OUTPUTS * u.hypotheses
-        room = universal_network.make_room(w, joints, blocks, _MOST, outputs)
+        room = universal_network.make_room(t, w, joints, universal_network.OUTPUTS * u.hypotheses)
         q_N = np.empty(joints)
         for b in range(len(target_BD3)):
             steps.aim(t, work, target_BD3, b)
