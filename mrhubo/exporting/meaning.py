@@ -32,6 +32,21 @@ DIRECTIONS = (
 )
 
 
+def describe_networks(retargeter: Retargeter) -> Description:
+    """The arrays of a retargeter with networks of its own.
+
+    Raises:
+        UserError: it has none.
+    """
+    description = retargeter.describe()
+    if description.universal is not None:
+        raise UserError(
+            "the universal network is an optimiser on the robot's geometry, and no file of layers; without PyTorch"
+            " mrhubo.load_fast runs it"
+        )
+    return description
+
+
 def meaning(description: Description, inputs: str) -> dict[str, str]:
     """Names, limits, units, rate and the definition of input and output."""
     settings, cost = description.settings, description.cost

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.exporting import standalone
-from mrhubo.exporting.meaning import compared, meaning
+from mrhubo.exporting.meaning import compared, describe_networks, meaning
 from mrhubo.files.atomic import atomic_path
 from mrhubo.retargeter import Retargeter
 
@@ -30,7 +30,7 @@ def write_numpy(retargeter: Retargeter, path: Path) -> float:
     """
     if path.suffix != ".py" or not path.stem.isidentifier():
         raise UserError(f"{path}: the name must be one of a Python module, such as nao.py")
-    description = retargeter.describe()
+    description = describe_networks(retargeter)
     arrays = {name: array for name, array in description.arrays().items() if name.startswith(_KEPT)}
     arrays["meaning"] = np.array(json.dumps(meaning(description, "poses")))
     arrays["settings"] = np.array(description.metadata()["settings"])

@@ -15,7 +15,7 @@ import numpy as np
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.exporting.meaning import compared, meaning
+from mrhubo.exporting.meaning import compared, describe_networks, meaning
 from mrhubo.fast.description import Description
 from mrhubo.fast.sections import Part
 from mrhubo.files.atomic import atomic_path
@@ -46,7 +46,7 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
         raise UserError("an ONNX file needs the package onnx: pip install 'mrhubo[onnx]'") from error
     if inputs not in INPUTS:
         raise UserError(f"inputs must be one of {', '.join(INPUTS)}, found {inputs!r}")
-    description = retargeter.describe()
+    description = describe_networks(retargeter)
     if inputs == "directions" and description.settings.features != "directions":
         raise UserError("these networks see rotations, not directions (model.input_frame: local); export --input poses")
     model = _model(onnx, description, inputs)

@@ -13,7 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mrhubo.fast.description import Description
-    from mrhubo.fast.sections import Layers, Part
+    from mrhubo.fast.sections import Layers, Part, Universal
 
 _JOINTS = 21
 _ACTIVATIONS = ("silu", "leaky_relu", "tanh")
@@ -25,6 +25,8 @@ _CONSTANTS = (
 _INPUTS = ("bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M")
 _MOST = 1e6
 """No constant is larger."""
+_LARGEST = 1024
+"""Nor is a size of the universal network."""
 
 
 def check(d: Description) -> None:
@@ -40,7 +42,7 @@ def check(d: Description) -> None:
         "U": len(cost.pool_UN), "K": len(reading.kind_K), "T": len(reading.joint_T), "X": len(trust.column_XD),
         "I": len(d.features.input_I), "W": len(d.features.bend_W), "O": len(d.features.first_O),
         "M": len(d.features.limb_M), "F": len(d.features.center_F), "S": len(capsules.body_S),
-        "Y": len(capsules.pair_Y2),
+        "Y": len(capsules.pair_Y2), "E": 0 if d.universal is None else len(d.universal.block_E),
     }  # fmt: skip
     for name, array in d.arrays().items():
         axes = name.rpartition("_")[2] if "_" in name else ""
@@ -80,7 +82,11 @@ def check(d: Description) -> None:
     _refuse(set(_CONSTANTS) != set(d.settings.constants), "constants are others")
     _refuse(not all(abs(float(x)) < _MOST for x in d.settings.constants.values()), "a constant is no number")
     _check_names(d, sizes)
-    _check_networks(d, sizes)
+    if d.universal is not None:
+        _check_universal(d.universal, sizes)
+    else:
+        _check_stages(d, sizes)
+    _check_prior(d, sizes)
 
 
 def _refuse(wrong: bool, what: str) -> None:
@@ -103,14 +109,40 @@ def _are_names(names: Iterable[Any]) -> bool:
     return all(isinstance(name, str) for name in names)
 
 
-def _check_networks(d: Description, sizes: dict[str, int]) -> None:
+def _check_stages(d: Description, sizes: dict[str, int]) -> None:
     more = sizes["W"] * 3 + sizes["O"] + sizes["M"] * 3
     features = sizes["I"] * 3 + more if d.settings.features == "directions" else sizes["I"] * 6
     _refuse(sizes["F"] != features, "features are others than there are numbers for")
-    links, numbers = 6 * sizes["N"], 6 * sizes["T"]
+    links = 6 * sizes["N"]
     if d.pre:
         _check_stage("pre", d.pre, features, links)
     _check_stage("post", d.post, links if d.pre else features, sizes["N"])
+
+
+def _check_universal(u: Universal, sizes: dict[str, int]) -> None:
+    for name, array, most in (
+        ("block_E", u.block_E, sizes["C"]), ("slot_E5", u.slot_E5 + 1, sizes["D"] + 1), ("view_E", u.view_E, sizes["V"]),
+        ("joint_N", u.joint_N, sizes["A"]), ("axial_E3", u.axial_E3 + 1, 3), ("flip_E53", u.flip_E53 + 1, 3),
+        ("sense_N", u.sense_N + 1, 3), ("size_2", u.size_2 - 1, _LARGEST),
+    ):  # fmt: skip
+        outside = (array < 0) | (array >= most)
+        _refuse(bool(outside.any()), f"universal.{name} names what is not there")
+    _refuse(len(set(u.block_E.tolist())) != len(u.block_E), "universal.block_E names a block twice")
+    (heads, hypotheses), width = u.size_2.tolist(), len(u.weights["joint.bias"])
+    _refuse(not 1 <= width <= _LARGEST or bool(width % heads), "the universal network's sizes are no network's")
+    pairs = {"mix": (3 * width, width), "mixed": (width, width), "up": (2 * width, width), "down": (width, 2 * width)}
+    layers = {f"layers.{i}.{name}": shape for i in range(2) for name, shape in pairs.items()}
+    layers |= {"joint": (width, 44), "first": (4 * hypotheses, width), "later": (4, width)}
+    norms = ["norm", *(f"layers.{i}.norm{k}" for i in range(2) for k in (1, 2))]
+    shapes = {f"{name}.weight": shape for name, shape in layers.items()} | {"branch.weight": (width, 37)}
+    shapes |= {f"{name}.bias": shape[:1] for name, shape in layers.items()}
+    shapes |= {f"{name}.{kind}": (width,) for name in norms for kind in ("weight", "bias")}
+    found = {name: array.shape for name, array in u.weights.items() if array.dtype == np.float32}
+    _refuse(found != shapes or len(found) != len(u.weights), "the universal network has other layers than are needed")
+
+
+def _check_prior(d: Description, sizes: dict[str, int]) -> None:
+    numbers = 6 * sizes["T"]
     latent = len(d.prior.encoder[-1][1]) if d.prior.encoder else 0
     _check_layers("prior", d.prior.encoder, numbers, latent)
     _check_layers("prior", d.prior.decoder, latent, numbers)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -51,10 +51,22 @@ class CompiledEngine:
         self._pool: ThreadPoolExecutor | None = None
         self._unnoted = True
         self._no_shake = np.zeros((0, len(description.trust.column_XD)))
+        self._unroll: Callable[[np.ndarray, np.ndarray], object] | None = None
+        if (universal := description.universal) is not None:
+            from mrhubo.fast.compiled.universal import look_up
+            from mrhubo.fast.compiled.universal_kernels import make_universal_kernel
+            from mrhubo.fast.compiled.universal_network import lay_out
+
+            self._universal_kernel = make_universal_kernel()
+            given = (self._tables, look_up(description, universal), lay_out(universal))
+            self._unroll = partial(self._universal_kernel, *given)
 
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
         target_BD3, q_BN = self._room(local_BJ33)
+        if self._unroll is not None:
+            refuse(self._look(self._check | self._direct, local_BJ33, target_BD3, q_BN), shape)
+            return target_BD3, self.network(local_BJ33, target_BD3)
         refuse(self._look(self._check | self._direct | self._answer, local_BJ33, target_BD3, q_BN), shape)
         return target_BD3, q_BN
 
@@ -71,6 +83,10 @@ class CompiledEngine:
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""
         q_BN = self._room(local_BJ33)[1]
+        if (unroll := self._unroll) is not None:
+            target_BD3 = np.ascontiguousarray(target_BD3)
+            self._shared(len(q_BN), lambda rows: unroll(target_BD3[rows], q_BN[rows]))
+            return q_BN
         self._look(self._answer, local_BJ33, target_BD3, q_BN)
         return q_BN
 
@@ -196,12 +212,14 @@ class CompiledEngine:
     def _note(self) -> None:
         """Notes that all that motions need is compiled, once it is."""
         self._unnoted = False
-        if not is_kept():
+        if not is_kept(self._unroll is not None):
             nobody_0N, nothing_0D3 = np.zeros((0, len(self.description.cost.lower_N))), np.zeros((0, 1, 3))
             self.giving_way.problem.quadratic(nobody_0N, nothing_0D3)
             self.giving_way.close(nobody_0N)
             self.avoid(nobody_0N, nothing_0D3)
-            note_kept(kernel.stats.cache_path for kernel in (*self._kernels, *self._motion_kernels))
+            kernels = [*self._kernels, *self._motion_kernels]
+            kernels += [] if self._unroll is None else [self._universal_kernel]
+            note_kept((kernel.stats.cache_path for kernel in kernels), self._unroll is not None)
 
     def _retarget(
         self, polish: int, avoid: bool, judge: bool, q_BN: np.ndarray, target_BD3: np.ndarray, shake_BX: np.ndarray,

@@ -29,6 +29,7 @@ from mrhubo.fast.sections import (
     Reading,
     Settings,
     Trust,
+    Universal,
 )
 from mrhubo.files.arrays import read_arrays
 from mrhubo.files.atomic import checksum_file
@@ -59,6 +60,8 @@ class Description:
     trust: Trust
     capsules: Capsules
     settings: Settings
+    universal: Universal | None = None
+    """In place of `pre` and `post`, which are then none."""
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every array, by a name that `Description.of` reads."""
@@ -72,6 +75,9 @@ class Description:
                 found |= _of_layers(f"{stage}.{number}", part.layers)
         for coder in ("encoder", "decoder"):
             found |= _of_layers(f"prior.{coder}", getattr(self.prior, coder))
+        if self.universal is not None:
+            found |= {f"universal.{name}": getattr(self.universal, name) for name in _UNIVERSAL}
+            found |= {f"{_WEIGHTS}{name}": array for name, array in self.universal.weights.items()}
         return found
 
     def metadata(self) -> dict[str, str]:
@@ -91,7 +97,8 @@ class Description:
         sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in SECTIONS.items()}
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
-        return cls(prior=prior, settings=Settings(**{**told, **names}), **sections, **stages)
+        universal = _universal(arrays) if "universal.block_E" in arrays else None
+        return cls(prior=prior, settings=Settings(**{**told, **names}), universal=universal, **sections, **stages)
 
     @classmethod
     def read(cls, path: Path) -> Description:
@@ -116,10 +123,17 @@ class Description:
 
 
 Kind = TypeVar("Kind")
+_WEIGHTS = "universal.weights."
+_UNIVERSAL = [field.name for field in fields(Universal) if field.name != "weights"]
 
 
 def _section(kind: type[Kind], name: str, arrays: Mapping[str, np.ndarray]) -> Kind:
     return kind(**{field.name: arrays[f"{name}.{field.name}"] for field in fields(kind)})  # pyright: ignore
+
+
+def _universal(arrays: Mapping[str, np.ndarray]) -> Universal:
+    weights = {name.removeprefix(_WEIGHTS): array for name, array in arrays.items() if name.startswith(_WEIGHTS)}
+    return Universal(weights=weights, **{name: arrays[f"universal.{name}"] for name in _UNIVERSAL})
 
 
 def _of_layers(name: str, layers: Layers) -> dict[str, np.ndarray]:

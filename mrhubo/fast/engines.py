@@ -14,7 +14,7 @@ from mrhubo.fast.answers import CHUNK, NO_ROTATION, Answers, Engine
 from mrhubo.fast.compiled_engine import CompiledEngine
 from mrhubo.fast.description import Description
 from mrhubo.fast.kept import numba_is_there
-from mrhubo.fast.plain import collision, human, judging, networks, robot, steps
+from mrhubo.fast.plain import collision, human, judging, networks, robot, steps, universal
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import are_crooked
@@ -31,6 +31,7 @@ class NumpyEngine:
     def __init__(self, description: Description) -> None:
         self.description = description
         self._avoidance = Avoidance(description)
+        self._branches = description.universal and universal.Branches(description, description.universal)
 
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
@@ -52,6 +53,8 @@ class NumpyEngine:
 
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""
+        if self._branches is not None:
+            return universal.joint_angles(self._branches, target_BD3)
         return networks.joint_angles(self.description, networks.features_of(self.description, local_BJ33, target_BD3))
 
     def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool) -> np.ndarray:

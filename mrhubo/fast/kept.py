@@ -39,24 +39,24 @@ def numba_is_there() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
-def is_kept() -> bool:
-    """Whether the compiled form starts without compiling."""
+def is_kept(universal: bool = False) -> bool:
+    """Whether the compiled form starts without compiling, that of the universal network or that of others."""
     try:
-        files = json.loads(_note().read_text())
+        files = json.loads(_note(universal).read_text())
         return bool(files) and all(os.path.isfile(file) for file in files)
     except (OSError, ValueError, TypeError, importlib.metadata.PackageNotFoundError):
         return False
 
 
-def note_kept(folders: Iterable[str]) -> None:
+def note_kept(folders: Iterable[str], universal: bool = False) -> None:
     """Notes that all has been compiled, and kept in numba's folders; where nothing can be written, nothing is noted."""
     files = [str(file) for folder in sorted(set(folders)) for file in sorted(Path(folder).glob("*kernels.*.nbi"))]
     with contextlib.suppress(UserError, importlib.metadata.PackageNotFoundError):
-        with atomic_path(_note()) as half:
+        with atomic_path(_note(universal)) as half:
             half.write_text(json.dumps(files))
 
 
-def _note() -> Path:
-    told = (checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
+def _note(universal: bool) -> Path:
+    told = (universal, checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
     cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(cache) / "mrhubo" / f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"

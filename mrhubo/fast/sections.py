@@ -86,6 +86,32 @@ class Part:
 
 
 @dataclass(frozen=True)
+class Universal:
+    """The network that is the same for every robot, and its branches here, E of them (`mrhubo.universal`); in place of
+    networks of the robot's own.
+    """
+
+    block_E: np.ndarray
+    """The block of joints that each branch is,"""
+    slot_E5: np.ndarray
+    """its direction in each slot, -1 where it has none,"""
+    view_E: np.ndarray
+    """which of the V parts sees its joints' axes,"""
+    axial_E3: np.ndarray
+    """the signs of these axes,"""
+    flip_E53: np.ndarray
+    """and those of directions."""
+    joint_N: np.ndarray
+    """The driven joint that each joint of q itself is,"""
+    sense_N: np.ndarray
+    """and -1 where its canonical sense of turn is the other one, else 1."""
+    size_2: np.ndarray
+    """Heads and hypotheses of the network."""
+    weights: Mapping[str, np.ndarray]
+    """Of its layers, float32, by the names of `mrhubo.universal.network`."""
+
+
+@dataclass(frozen=True)
 class Kinematics:
     """The robot's joints and directions, and how these turn with those (`mrhubo.reference.jacobian`).
 

@@ -45,8 +45,10 @@ from mrhubo.retargeter.describing_robot import (
     single,
     whole,
 )
+from mrhubo.retargeter.describing_universal import describe_universal
 from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures
 from mrhubo.retargeter.networks import Branched, ResidualMLP, RetargetNetwork
+from mrhubo.retargeter.universal import AllDirections, UniversalJoints
 from mrhubo.robot import BodyMap
 from mrhubo.robot.parts import BendPart, LimbPart, OrientedPart
 
@@ -62,10 +64,8 @@ def describe(retargeter: Retargeter) -> Description:
         UserError: its body prior is one that the arrays do not hold.
     """
     network, body_map = retargeter.network, retargeter.body_map
-    if not isinstance(network, RetargetNetwork):
-        raise UserError("the universal network has no form without PyTorch yet; `mrhubo.load` reads its packages")
-    features, first, last = network.features, network.pre, network.post
-    parts = [part for stage in (first, last) if isinstance(stage, Branched) for part in stage.parts]
+    stages = (network.pre, network.post) if isinstance(network, RetargetNetwork) else (None, None)
+    parts = [part for stage in stages if isinstance(stage, Branched) for part in stage.parts]
     constants = {
         **BEND_DEG,
         "far_rad": polish.FAR_RAD, "gain_rad": polish.GAIN_RAD, "first_steps": polish.FIRST_STEPS,
@@ -76,9 +76,8 @@ def describe(retargeter: Retargeter) -> Description:
     reading, prior, bodies = _reading(body_map), retargeter.prior, Bodies(body_map.robot)
     return Description(
         _human(body_map),
-        _features(features),
-        _parts(first) if isinstance(first, Branched) else (),
-        _parts(last) if isinstance(last, Branched) else (),
+        _features(network.features),
+        *(_parts(stage) if isinstance(stage, Branched) else () for stage in stages),
         describe_kinematics(retargeter.directions, bodies),
         describe_cost(retargeter.directions, retargeter.polisher),
         reading,
@@ -90,9 +89,9 @@ def describe(retargeter: Retargeter) -> Description:
             body_map.robot.joint_names,
             body_map.direction_names,
             tuple(branch.name for branch in retargeter.branches),
-            "directions" if isinstance(features, DirectionFeatures) else "local",
+            "directions" if network.directed else "local",
             network.limited.kind,
-            isinstance(parts[0], ResidualMLP),
+            any(isinstance(part, ResidualMLP) for part in parts[:1]),
             prior.activation,
             {name: float(value) for name, value in constants.items()},
             is_ours(body_map.skeleton),
@@ -103,6 +102,7 @@ def describe(retargeter: Retargeter) -> Description:
             },
             body_map.collision.known,
         ),
+        describe_universal(network, bodies) if isinstance(network, UniversalJoints) else None,
     )
 
 
@@ -131,9 +131,10 @@ def _features(features: PoseFeatures) -> Features:
         names = ("columns_I", "bend_X", "upper_X", "lower_X", "first_P", "second_P", "limb_V", "axis_V", "seen_V")
         places = [whole(features.get_buffer(f"_{name}")) for name in names]
         numbers = [single(features.center_F), single(features.scale_F)]
-    else:
-        places = [whole(features.get_buffer("_rows")), *[np.zeros(0, np.int64)] * 8]
-        numbers = [np.full(features.size, value, np.float32) for value in (0.0, 1.0)]
+    else:  # nothing that is worked out; the universal network takes the directions as they are
+        rows = np.zeros(0, np.int64) if isinstance(features, AllDirections) else whole(features.get_buffer("_rows"))
+        places = [rows, *[np.zeros(0, np.int64)] * 8]
+        numbers = [np.full(6 * len(rows), value, np.float32) for value in (0.0, 1.0)]
     return Features(**{field.name: array for field, array in zip(fields(Features), [*places, *numbers], strict=True)})
 
 

@@ -35,7 +35,6 @@ from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.retargeter.parts import pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
-from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
 from mrhubo.robot_motion import RobotFacts
 
@@ -272,13 +271,13 @@ class Retargeter(nn.Module):
         """All that an answer needs as plain arrays, for `mrhubo.fast`.
 
         Raises:
-            UserError: its body prior is VPoser, with which only PyTorch works, or its network is the universal one.
+            UserError: its body prior is VPoser, with which only PyTorch works.
         """
         return describe(self)
 
     def save_description(self, folder: Path) -> Path | None:
         """Writes `describe` into a folder; None for a retargeter that has no such arrays."""
-        if isinstance(self.prior, VPoser) or isinstance(self.network, UniversalJoints):
+        if isinstance(self.prior, VPoser):
             return None
         description = self.describe()
         tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}

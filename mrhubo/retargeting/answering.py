@@ -59,7 +59,8 @@ def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) ->
     folder = mrhubo.package_folder(source)
     arrays = Description.read(folder) if (folder / FILE).is_file() else None
     if arrays is not None and arrays.settings.own_rest:
-        return _of_description(folder, arrays, avoid_collisions)
+        said = _describe(folder, arrays.settings.robot, arrays.settings.joint_names)
+        return _of_description(said, arrays, avoid_collisions)
     retargeter = mrhubo.load(folder)
     described = _describe(folder, retargeter.body_map.robot.name, retargeter.joint_names)
     return _of_retargeter(described, retargeter, avoid_collisions)
@@ -75,14 +76,14 @@ def _of_retargeter(described: str, retargeter: Retargeter, avoid_collisions: boo
     )
 
 
-def _of_description(folder: Path, description: Description, avoid_collisions: bool) -> Answerer:
-    """A package without PyTorch."""
+def _of_description(said: str, description: Description, avoid_collisions: bool) -> Answerer:
+    """Without PyTorch."""
     from mrhubo.retargeting.forms import Forms
 
     forms, names = Forms(description, avoid_collisions), description.settings.direction_names
     measured = [d for d in description.trust.measured if description.kinematics.limb_D[d]]
     return Answerer(
-        _describe(folder, description.settings.robot, forms.fast.joint_names),
+        said,
         forms,
         forms.fast.joint_names,
         forms.fast.facts,
@@ -94,8 +95,14 @@ def of_universal(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     """The network that is the same for every robot, and steps of optimisation, each motion as a whole; no training."""
     from mrhubo.retargeter import untrained
 
-    described = f"no package: the universal network answers, without any training; {_sized(robot)}"
-    return _of_retargeter(described, untrained(robot), avoid_collisions)
+    retargeter = untrained(robot)
+    if (why := retargeter.collision.why_unknown()) is not None:
+        warnings.warn(why, InputWarning, stacklevel=2)
+    said = f"no package: the universal network answers, without any training; {_sized(robot)}"
+    description = retargeter.describe()
+    if not description.settings.own_rest:
+        return _of_retargeter(said, retargeter, avoid_collisions)
+    return _of_description(said, description, avoid_collisions)
 
 
 def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:

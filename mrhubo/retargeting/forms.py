@@ -27,7 +27,7 @@ class Forms:
         self._left = float("inf")
         """Time [s] that NumPy may still take."""
         if numba_is_there():
-            self._left = _START_S if is_kept() else _COMPILE_S
+            self._left = _START_S if is_kept(description.universal is not None) else _COMPILE_S
 
     def __call__(self, motion: Motion) -> RobotMotion:
         """The answer to a motion as a whole."""

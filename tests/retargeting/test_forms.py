@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,8 +28,8 @@ def answers(monkeypatch: pytest.MonkeyPatch, numba: bool, is_kept: bool, minutes
     """Who answers motions of 60 frames a second, one letter each."""
     monkeypatch.setattr(forms, "FastRetargeter", Stub)
     monkeypatch.setattr(forms, "numba_is_there", lambda: numba)
-    monkeypatch.setattr(forms, "is_kept", lambda: is_kept)
-    form = Forms(None)  # pyright: ignore[reportArgumentType]
+    monkeypatch.setattr(forms, "is_kept", lambda universal: is_kept)
+    form = Forms(SimpleNamespace(universal=None))  # pyright: ignore[reportArgumentType]
     still = [Motion.of(name="", local_TJ33=np.zeros((int(3600 * m), 1)), frame_rate=60.0) for m in minutes]
     return "".join(str(form(motion))[0] for motion in still)
 
@@ -62,3 +63,13 @@ def test_what_is_kept_is_noted_and_forgotten_with_its_files(tmp_path: Path, monk
         note.write_text("[1")
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
         assert not kept.is_kept()
+
+
+def test_the_universal_network_is_compiled_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "kernels.some.nbi").touch()
+    kept.note_kept([str(tmp_path)])
+    assert kept.is_kept() and not kept.is_kept(universal=True)
+    kept.note_kept([str(tmp_path)], universal=True)
+    assert kept.is_kept(universal=True)

@@ -67,16 +67,33 @@ def _quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarra
     kinematics, cost, human = description.kinematics, description.cost, description.human
     placed = place(kinematics, q_BN)
     jacobian_D3NB = jacobian(kinematics, placed, len(cost.lower_N))
+    unit_D3B, weight_DB = goals(cost, target_BD3)
+    miss_D3B = placed.direction_D3B - unseen(human.seen_D, placed.view_V33B, unit_D3B)
+    return model_of(cost, q_BN, jacobian_D3NB, miss_D3B, weight_DB)
+
+
+def goals(cost: Cost, target_BD3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Human directions of length 1 (D, 3, B), and how much each counts (D, B)."""
     target_D3B = np.ascontiguousarray(np.moveaxis(target_BD3, 0, -1))
     length_DB = np.sqrt(np.einsum("dib,dib->db", target_D3B, target_D3B))
     length_DB = np.where(cost.partial_D[:, None] > 0, length_DB, 1.0)
-    unit_D3B = target_D3B / np.maximum(length_DB, SHORTEST)[:, None]
-    miss_D3B = placed.direction_D3B - unseen(human.seen_D, placed.view_V33B, unit_D3B)
-    weight_DB = cost.weight_D[:, None] * length_DB
+    return target_D3B / np.maximum(length_DB, SHORTEST)[:, None], cost.weight_D[:, None] * length_DB
+
+
+def costs_of(cost: Cost, q_BN: np.ndarray, miss_D3B: np.ndarray, weight_DB: np.ndarray) -> np.ndarray:
+    """What each block costs (B, C), by differences of directions in any axes."""
     from_middle_BN = q_BN - cost.middle_N
     cost_BC = (np.einsum("dib,dib->db", miss_D3B, miss_D3B) * weight_DB).T @ cost.directions_DC
-    cost_BC += (from_middle_BN * from_middle_BN * cost.ridge_N) @ cost.joints_NC
-    gradient_BN, hessian_BNN = from_middle_BN * cost.ridge_N, np.zeros((*q_BN.shape, q_BN.shape[1]))
+    return cost_BC + (from_middle_BN * from_middle_BN * cost.ridge_N) @ cost.joints_NC
+
+
+def model_of(
+    cost: Cost, q_BN: np.ndarray, jacobian_D3NB: np.ndarray, miss_D3B: np.ndarray, weight_DB: np.ndarray
+) -> Model:
+    """The model by differences of directions and their Jacobian, both in the same axes."""
+    cost_BC = costs_of(cost, q_BN, miss_D3B, weight_DB)
+    gradient_BN = (q_BN - cost.middle_N) * cost.ridge_N
+    hessian_BNN = np.zeros((*q_BN.shape, q_BN.shape[1]))
     for block in range(cost_BC.shape[1]):
         own_D, own_N = np.flatnonzero(cost.block_D == block), np.flatnonzero(cost.block_N == block)
         rows_RN3B = jacobian_D3NB.swapaxes(1, 2)[own_D[:, None], own_N]

@@ -1,0 +1,43 @@
+"""The function that Python calls for the universal network; kept on disk as those of `mrhubo.fast.compiled.kernels`.
+
+Legend: B frames, D directions, N joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import njit  # pyright: ignore[reportMissingImports]
+
+from mrhubo.fast.compiled import robot, steps, tables, universal, universal_network
+from mrhubo.fast.kept import checksum
+from mrhubo.fast.plain.universal import KEPT
+
+_MOST = max(KEPT)
+
+
+@cache
+def make_universal_kernel() -> Callable[..., Any]:
+    """The function, the same for all robots."""
+    version = checksum()
+
+    @njit(cache=True, **tables.COMPILED)
+    def unroll(t, u, w, target_BD3, out_BN):
+        """Joint angles (B, N) [rad], inside the limits, for human directions (B, D, 3)."""
+        _ = version
+        joints, blocks = out_BN.shape[1], tables.size(t, tables.FIRST_C) - 1
+        work, tried = robot.make_work(t), universal.make_tried(t, u)
+        outputs = universal_network.OUTPUTS * u.hypotheses
+        room = universal_network.make_room(w, joints, blocks, _MOST, outputs)
+        q_N = np.empty(joints)
+        for b in range(len(target_BD3)):
+            steps.aim(t, work, target_BD3, b)
+            universal.unroll(t, u, w, work, tried, room, q_N)
+            for n in range(joints):
+                low, high = np.float32(tables.real(t, tables.LOWER_N, n)), np.float32(tables.real(t, tables.UPPER_N, n))
+                out_BN[b, n] = min(max(np.float32(q_N[n]), low), high)
+
+    return unroll
