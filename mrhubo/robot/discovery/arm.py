@@ -15,7 +15,7 @@ import numpy as np
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow, rival
 from mrhubo.robot.discovery.gripper import without_hand
-from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine, unit
+from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
@@ -25,6 +25,8 @@ _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 of its length."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+_FINGER = 0.4
+"""How far fingers reach at most, as a share of the arm along its axes."""
 GUESS = 0.45
 """How sure a choice is between two that are about as good: asked about."""
 
@@ -76,6 +78,7 @@ class Arm:
 
 def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     """Roles and points of an arm's joints; None if it has no elbow."""
+    branches = long_branches(bodies, chain, _FINGER)
     chain, left_out = without_hand(bodies, chain)
     elbow_at = find_elbow(bodies, chain)
     if elbow_at is None:
@@ -107,7 +110,21 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     if other is not None:
         why = f"; '{other}' may as well be the elbow"
         shoulder, elbow, wrist = (doubted(spot, why) for spot in (shoulder, elbow, wrist))
+    if branches:
+        shoulder, elbow, wrist = (doubted(spot, branches) for spot in (shoulder, elbow, wrist))
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
+
+
+def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
+    """What is to be said of a limb that ends in branches longer than a share of it, one of which may be its rest, while
+    another is a linkage; nothing if none is as long.
+    """
+    way = float(measure(lines_of(chain)).out_N[-1])
+    onward = bodies.limbs(chain[-1])
+    if not any(bodies.extent(on) > share * way for on in onward):
+        return ""
+    among = " and ".join(f"'{on.hinge.name}'" for on in onward)
+    return f"; the limb was taken to end where {among} begin, one of which may go on with it"
 
 
 def _twist(lines: list[Line], elbow_at: int) -> int | None:

@@ -8,17 +8,21 @@ Legend: all poses in the root link's frame with every joint at 0.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from mrhubo.robot.discovery.lines import Line
+from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
+from mrhubo.robot.discovery.names import speaks_of
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import Description
 
 _DOMINANT = 2.5
 """How many times longer than any other branch the one must be in which a limb goes on; else it ends, as a hand."""
+_NO_FARTHER = 1.1
+"""How much farther out than the joint that it drives a linkage may begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +104,10 @@ class Bodies:
     body_of: dict[str, int]
     """By link."""
     hinges: tuple[Hinge, ...]
+    degrees: bool = False
+    """Whether the file's limits are in degrees; those of the hinges are in radians all the same."""
+    gains: Mapping[str, float] = field(default_factory=dict)
+    """By hinge: how much farther a limb turns than its joint, where a second hinge follows; 1 for all others."""
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
     _nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
     _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
@@ -152,6 +160,10 @@ class Bodies:
             return None
         centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
         return np.average(centres, axis=0, weights=[mass[0] for _, mass in found])
+
+    def weight(self, body: int) -> float:
+        """Mass of a body [kg]; 0 if the file gives none."""
+        return sum(self.description.masses[link][0] for link in self.links_of[body] if link in self.description.masses)
 
     def middle(self, body: int) -> np.ndarray:
         """About where a body is (3,): its centre of mass, else the mean of its corners."""
@@ -229,12 +241,40 @@ class Bodies:
         """The joint with which a limb goes on; None where it ends or branches."""
         key = _key(step)
         if key not in self._nexts:
-            onward = [on for on in self.onward(step) if not self._idle(on)]
+            onward = self.limbs(step)
             reach = {on.hinge.name: self._reach(step, on) for on in onward}
             onward.sort(key=lambda on: (-reach[on.hinge.name], on.hinge.name))
             alike = [on for on in onward[1:] if _DOMINANT * reach[on.hinge.name] > reach[onward[0].hinge.name]]
             self._nexts[key] = onward[0] if onward and not alike else None
         return self._nexts[key]
+
+    def limbs(self, step: Step) -> list[Step]:
+        """The joints at the body that a joint leads to with which a limb may go on: no linkages, no sliding jaws."""
+        onward = [on for on in self.onward(step) if not self._idle(on)]
+        return [on for on in onward if not any(self._drives(on, other, step) for other in onward if other is not on)]
+
+    def _drives(self, rod: Step, other: Step, before: Step) -> bool:
+        """Whether a branch looks like a linkage that drives another one, from a loop that a URDF has to cut: it moves
+        in the plane in which that one's joint turns, and begins no farther out, while that one goes on in other planes
+        too, as a forearm or a foot does. Fingers begin farther out than a thumb. Names betray it as well.
+        """
+        if not other.hinge.rotary:
+            return False
+        if all(speaks_of(hinge.name, "rod") or speaks_of(hinge.links[1], "rod") for hinge in self.beyond(rod)[1]):
+            return not any(speaks_of(hinge.links[1], "rod") for hinge in self.beyond(other)[1])
+        axis_3, start_3 = other.hinge.line.axis_3, before.hinge.line.point_3
+        far = [float(np.linalg.norm(step.hinge.line.point_3 - start_3)) for step in (rod, other)]
+        return far[0] < _NO_FARTHER * far[1] and self._in_plane(rod, axis_3) and not self._in_plane(other, axis_3)
+
+    def _in_plane(self, step: Step, axis_3: np.ndarray) -> bool:
+        """Whether all joints of a branch turn about a direction, or slide across it."""
+        hinges = self.beyond(step)[1]
+        return all(
+            sine(hinge.line.axis_3, axis_3) < PARALLEL
+            if hinge.rotary
+            else abs(float(hinge.line.axis_3 @ axis_3)) < PARALLEL
+            for hinge in hinges
+        )
 
     def _reach(self, last: Step, on: Step) -> float:
         return self.extent(on) + float(np.linalg.norm(self.position(on.outer_link) - self.position(last.outer_link)))

@@ -32,6 +32,7 @@ from mrhubo.robot.discovery.result import (
 from mrhubo.robot.discovery.roles import Roles, find_roles
 from mrhubo.robot.discovery.symmetry import find_pairs
 from mrhubo.robot.joint import drive
+from mrhubo.robot.limits import beyond_turns
 from mrhubo.robot.urdf import Description, describe
 
 SIDES = ("left", "right")
@@ -244,7 +245,11 @@ class _Finder:
         asked: list[Question] = []
         for step in (step for chain in (*(arm.chain for arm in self.arms.values()), self.roles.neck) for step in chain):
             hinge = self._driver(step)
-            if hinge is not None and hinge.rotary and not _limits_meant(hinge.lower, hinge.upper):
+            if hinge is None or not hinge.rotary:
+                continue
+            if self.bodies.degrees and hinge.lower is not None and hinge.upper is not None:
+                found[hinge.name] = FoundRange(hinge.lower, hinge.upper, "the URDF's limits, which are in degrees")
+            if not _limits_meant(hinge.lower, hinge.upper):
                 found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
         for side, arm in self.arms.items():
             narrowed, question = self._elbow_range(side, arm, found)
@@ -266,7 +271,7 @@ class _Finder:
             lower, upper = float(step.hinge.lower or 0.0), float(step.hinge.upper or 0.0)
         axis_3 = step.sign * step.hinge.line.axis_3
         upper_3, fore_3 = arm.elbow.point_3 - arm.shoulder.point_3, arm.wrist.point_3 - arm.elbow.point_3
-        straight = straight_angle(axis_3, fore_3, upper_3)
+        straight = straight_angle(axis_3, fore_3, upper_3) / self.bodies.gains.get(name, 1.0)
         straight = min(
             (straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper)
         )
@@ -308,6 +313,13 @@ class _Finder:
                 yield Question(f"{side}_hand", f"{hand.doubt}; taken: {hand.cue}", (hand.link,))
 
     def _notes(self) -> Iterator[str]:
+        if self.bodies.degrees:
+            joint = next(j for j in self.bodies.description.joints.values() if j.kind == "revolute" and beyond_turns(j))
+            yield (
+                f"the limits of most joints, as {joint.lower:g} .. {joint.upper:g} of '{joint.name}', can only be "
+                "degrees, where a URDF has radians; robot.ranges holds them in radians, and nothing else need be done "
+                "here, but other programs need a URDF with every limit times 0.0174533"
+            )
         for what in self.heading.contradicted:
             yield f"against where the robot was found to face speaks: {what}"
 

@@ -25,6 +25,10 @@ _UNSURE = 0.3
 """Up less sure than that tells nothing of necks."""
 _AGREED = 1.5
 """How much it counts that all joints and frames agree on a direction, against what tells up only roughly."""
+_TRUNK = 0.6
+"""How long a trunk is, as a share of the arm, that tells more than the legs."""
+_AGAINST, _HEAVY, _DOUBTED = 0.3, 2.0, 0.45
+"""Cosine under which a cue speaks against where up is, how much one has to count, and how sure up is then at most."""
 _SAME = 0.9986
 """Cosine of 3 degrees: directions that mean the same one."""
 
@@ -130,7 +134,10 @@ def _up(
     if legs:
         hips_3 = np.mean([leg.hip.point_3 for leg in legs], axis=0)
         ankles_3 = np.mean([leg.ankle.point_3 for leg in legs], axis=0)
-        cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", shoulders_3 - hips_3, 2.0)]
+        # A long trunk tells where the chest is up whatever the legs do, which may sit, or end in a loop.
+        trunk_3 = shoulders_3 - hips_3
+        long = min(1.0, float(np.linalg.norm(trunk_3)) / (_TRUNK * arms[0].length))
+        cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", trunk_3, 2.0 + 2.0 * long)]
     else:
         for what, at_3, weight in _below(bodies, roles):
             near = float(np.linalg.norm(at_3 - shoulders_3)) / (0.3 * arms[0].length)
@@ -155,7 +162,11 @@ def _up(
     total = sum(w for _, _, w in flat) or 1.0
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]
-    return unit(best - normal_3 * (normal_3 @ best)), float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+    against = [what for what, v, w in flat if float(best @ v) < _AGAINST and w >= _HEAVY]
+    sure, cue = float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+    if against:
+        sure, cue = min(sure, _DOUBTED), f"{cue}; against {' and '.join(against)}"
+    return unit(best - normal_3 * (normal_3 @ best)), sure, cue
 
 
 def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:

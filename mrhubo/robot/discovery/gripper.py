@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.elbow import find_elbow
+from mrhubo.robot.discovery.elbow import WRIST_JOINTS, find_elbow
 from mrhubo.robot.discovery.lines import feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
-_WRIST_JOINTS = 3
-"""Joints beyond an elbow that an arm can have: a twist and two swings."""
 _BESIDE = 0.025
 """How far a jaw's axis passes the hand's line, as a share of the arm."""
 _MEET = 0.005
@@ -31,7 +29,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
         # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
         if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.free):
             end = i
-        elif i - first >= _WRIST_JOINTS:
+        elif i - first >= WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
         elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
             end, why = i, "its name says that it belongs to the hand"

@@ -9,11 +9,11 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.arm import read_arm
+from mrhubo.robot.discovery.arm import GUESS, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
-from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.lines import ON, PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
 _PLANE = 0.03
@@ -22,6 +22,10 @@ _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+_LIGHT = 0.25
+"""Share of its head's weight that a jaw has at most."""
+_LEG = 3
+"""Joints of a leg at the least: with fewer, it may be a wing."""
 _CASTER = 2
 """Joints of a caster: it swivels and rolls."""
 
@@ -106,10 +110,14 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             )
     if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
         legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
+    if legs is not None and len(legs.chains[0]) < _LEG:
+        sure = min(sure, GUESS)
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
     same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
     used = {chain[0].hinge.name for pair in same for chain in pair.chains}
+    if legs is None and any(names.speaks_of(step.hinge.name, "head") for step in waist):
+        waist = ()  # the root is the head
     used |= {step.hinge.name for step in waist}
     necks = _necks(bodies, arms, used)
     arm = arms.chains[0]
@@ -192,19 +200,20 @@ def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
         if step.hinge.name in used or not step.hinge.rotary or _is_sensor(bodies, step):
             continue
         chain: list[Step] = []
-        todo: list[Step] = [step]
+        todo, beside = [step], bodies.steps_from[arms.body]
         while todo:
             fitting = [
                 s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
             ]
-            fitting = [
-                s for s in fitting if not _is_sensor(bodies, s) and not _has_twin(s, todo, arms.normal_3, middle_3)
-            ]
+            twins = [s for s in beside if _has_twin(s, beside, arms.normal_3, middle_3, ON * bodies.size)]
+            fitting = [s for s in fitting if not _is_sensor(bodies, s) and s not in twins]
+            paired = bool(twins)
+            fitting = [s for s in fitting if not (chain and _in_face(bodies, s, paired))]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
             if not fitting or len(chain) >= 4:
                 break
             chain.append(fitting[0])
-            todo = bodies.onward(fitting[0])
+            todo = beside = bodies.onward(fitting[0])
         if not chain:
             continue
         called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
@@ -217,8 +226,10 @@ def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
     return tuple(chain for _, chain in ranked)
 
 
-def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray) -> bool:
-    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear."""
+def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray, least: float) -> bool:
+    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear. None is of one that
+    lies nearer to the middle than `least` [m].
+    """
     line = step.hinge.line
     flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
     image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
@@ -230,9 +241,30 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
         )
 
     own = abs(float((line.point_3 - middle_3) @ normal_3))
-    return any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
+    return own > least and any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
+
+
+def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
+    """Whether a joint above a neck's is one of the face, as a jaw's or an eye's: by its name, or as a single one beside
+    pairs, or as one that carries little of the head's weight.
+    """
+    if speaks_of_face(step):
+        return True
+    inside, hinges = bodies.beyond(step)
+    if paired and len(hinges) == 1:
+        return True
+    weights = [sum(map(bodies.weight, part)) for part in (inside, {step.start})]
+    return len(hinges) == 1 and 0 < weights[0] < _LIGHT * weights[1]
+
+
+def speaks_of_face(step: Step) -> bool:
+    """Whether a joint's name, or its link's, is that of a part of a face."""
+    return any(names.speaks_of(name, "face") for name in (step.hinge.name, step.outer_link))
 
 
 def _is_sensor(bodies: Bodies, step: Step) -> bool:
     """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all."""
-    return any(hinge.limited for hinge in bodies.hinges) and not step.hinge.limited and step.hinge.lower is None
+    if any(names.speaks_of(name, "sensor") for name in (step.hinge.name, step.outer_link)):
+        return True
+    limited = any(hinge.limited for hinge in bodies.hinges if hinge.rotary)
+    return limited and not step.hinge.limited and step.hinge.lower is None

@@ -86,5 +86,7 @@ def _swapped(role: str) -> str:
 
 def _translated(role: str, language: str) -> str:
     words = _WORDS[language].split()
-    known = dict(zip(words[::2], words[1::2], strict=True)) | dict(zip(("left", "right"), _SIDES[language], strict=True))
+    known = dict(zip(words[::2], words[1::2], strict=True)) | dict(
+        zip(("left", "right"), _SIDES[language], strict=True)
+    )
     return "_".join(known.get(word, word) for word in role.split("_"))

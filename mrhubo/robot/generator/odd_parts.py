@@ -66,7 +66,7 @@ def two_hinges(chance: Chance, plan: Plan, places: Places) -> Angles:
     for name in SIDES:
         joint = plan.joint(f"{name}_elbow")
         half_3 = 0.012 * places.scale * Z
-        role = f"{name}_elbow_second"
+        role = f"{name}_second_hinge"
         plan.insert_after(f"{name}_elbow", role, joint.point_3 - half_3, joint.axis_3, (joint.lower, joint.upper))
         plan.change(f"{name}_elbow", point_3=joint.point_3 + half_3)
         plan.change(role, mimics=(f"{name}_elbow", 1.0))
@@ -153,7 +153,9 @@ def clavicles(chance: Chance, plan: Plan, places: Places) -> Angles:
 
 
 def face(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Brows, lids, eyes, lips and a jaw, and a tree of cameras."""
+    """Brows, lids, eyes, lips and a jaw, and a tree of cameras, of a robot that has a neck."""
+    if places.head == places.chest:
+        return {}
     scale = places.scale
     high_3 = _top(plan, places)
     for name, side in SIDES.items():
@@ -217,9 +219,7 @@ def one_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
 def without_limits(plan: Plan) -> Plan:
     """No joint that turns has limits."""
     turning = ("revolute", "continuous")
-    joints = [
-        replace(j, kind="continuous", lower=None, upper=None) if j.kind in turning else j for j in plan.joints
-    ]
+    joints = [replace(j, kind="continuous", lower=None, upper=None) if j.kind in turning else j for j in plan.joints]
     return replace(plan, joints=joints)
 
 
