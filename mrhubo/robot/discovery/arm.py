@@ -23,6 +23,8 @@ _OUT = 1 / 3
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
 of its length."""
+_ACROSS = 0.7
+"""Sine of the angle between a twist axis and the elbow's hinge at the least: 45 degrees."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
 _FINGER = 0.4
@@ -132,7 +134,7 @@ def _twist(lines: list[Line], elbow_at: int) -> int | None:
     if elbow_at < 1:
         return None
     twist, hinge = lines[elbow_at - 1], lines[elbow_at]
-    if elbow_at == 1:
+    if elbow_at == 1 or sine(twist.axis_3, hinge.axis_3) < _ACROSS:
         return None
     foot_3 = feet(twist, hinge)[1]
     before_3 = feet(lines[elbow_at - 2], twist)[0]

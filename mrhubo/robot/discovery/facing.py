@@ -25,6 +25,9 @@ _UNSURE = 0.3
 """Up less sure than that tells nothing of necks."""
 _AGREED = 1.5
 """How much it counts that all joints and frames agree on a direction, against what tells up only roughly."""
+_NAMES = "the names of the sides"
+_OPPOSED = 0.3
+"""How much all other votes must speak against the names of the sides to make them doubtful."""
 _TRUNK = 0.6
 """How long a trunk is, as a share of the arm, that tells more than the legs."""
 _AGAINST, _HEAVY, _DOUBTED = 0.3, 2.0, 0.45
@@ -101,7 +104,17 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
     cue = ", ".join(vote.what for vote in fors[:4]) or "nothing tells it; a guess"
     # Three points of weight all one way are certain; a tie, or nothing, is a guess.
     sure = float(np.clip(abs(score) / 3.0, 0.0, 1.0) * (abs(score) / max(total, 1e-9)) ** 0.5) if votes else 0.0
+    if total and _names_alone(votes, sign):
+        sure = min(sure, _DOUBTED)
     return Heading(up_3, sign * normal_3, sign * forward_3, up_sure, sure, up_cue, cue, swap, against)
+
+
+def _names_alone(votes: list[Vote], sign: float) -> bool:
+    """Whether all else, taken together, speaks against the names of the sides: they may be those that somebody sees who
+    stands before the robot.
+    """
+    others = sum(vote.weight * vote.value for vote in votes if vote.what != _NAMES)
+    return any(vote.what == _NAMES and vote.value * sign > 0 for vote in votes) and others * sign < -_OPPOSED
 
 
 def _normal(bodies: Bodies, roles: Roles) -> np.ndarray:
@@ -203,7 +216,7 @@ def _forward_votes(
     bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg], up_3: np.ndarray, forward_3: np.ndarray,
     left_3: np.ndarray,
 ) -> Iterator[Vote]:  # fmt: skip
-    yield Vote("the names of the sides", names.sides(_paired_names(roles)), 3.0)
+    yield Vote(_NAMES, names.sides(_paired_names(roles)), 3.0)
     if legs:
         knees = [
             _bend(leg.chain, leg.knee_at, leg.hip.point_3, leg.knee.point_3, leg.ankle.point_3, up_3, forward_3)

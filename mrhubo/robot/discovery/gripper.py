@@ -20,7 +20,7 @@ _SHORT = 4
 def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
     """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
     whole = chain
-    chain = without_gripper(chain)
+    chain = without_gripper(bodies, chain)
     end, why = len(chain), "others mimic it, or it slides: a gripper"
     elbow_at = find_elbow(bodies, chain)
     first = 2 if elbow_at is None else elbow_at + 1
@@ -62,11 +62,12 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
 
 
-def without_gripper(chain: Chain) -> Chain:
-    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
-    and no part of a forearm.
+def without_gripper(bodies: Bodies, chain: Chain) -> Chain:
+    """A limb without the joints beyond its elbow that slide, mimic, or are mimicked: they are a gripper, and no part of
+    a forearm. An elbow may be driven by a motor elsewhere, and may drive a bar beside it.
     """
-    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
+    elbow_at = find_elbow(bodies, chain)
+    while len(chain) > 2 and _driven(chain[-1]) and (elbow_at is None or len(chain) - 1 > elbow_at):
         chain = chain[:-1]
     return chain
 

@@ -33,7 +33,11 @@ def read_bodies(description: Description) -> Bodies:
         if mimic is None or first is None or first.bodies[1] != step.start or not first.rotary:
             continue
         axis_3 = first.line.axis_3
-        if sine(axis_3, step.hinge.line.axis_3) < PARALLEL and bodies.extent(step) > _LIMB * bodies.size:
+        further = bodies.beyond(step)[1]
+        limb = bodies.extent(step) > _LIMB * bodies.size or any(
+            hinge.rotary and sine(axis_3, hinge.line.axis_3) > PARALLEL for hinge in further
+        )
+        if limb and sine(axis_3, step.hinge.line.axis_3) < PARALLEL:
             along = float(np.sign(axis_3 @ step.hinge.line.axis_3))
             gains[first.name] = gains.get(first.name, 1.0) + along * mimic.multiplier
             seconds.add(step.hinge.name)

@@ -24,6 +24,8 @@ _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
 _LIGHT = 0.25
 """Share of its head's weight that a jaw has at most."""
+_ARM = 4
+"""Joints of an arm with a whole shoulder."""
 _LEG = 3
 """Joints of a leg at the least: with fewer, it may be a wing."""
 _CASTER = 2
@@ -89,7 +91,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     else:
         options = [
-            (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high), i, j)
+            (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high) + 2.0 * _whole_arm(high), i, j)
             for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
         ]  # fmt: skip
         options.sort(key=lambda option: -option[0])
@@ -110,7 +112,9 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             )
     if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
         legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
-    if legs is not None and len(legs.chains[0]) < _LEG:
+    # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings.
+    spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
+    if (legs is not None and len(legs.chains[0]) < _LEG) or any(pair.size > arms.size for pair in spare):
         sure = min(sure, GUESS)
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
@@ -131,7 +135,7 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
     """About -2 (arms) to 2 (legs)."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     score = names.share(called, "leg") - names.share(called, "arm")
-    chain = without_gripper(pair.chains[0])
+    chain = without_gripper(bodies, pair.chains[0])
     end = chain[-1]
     beyond = [hinge for hinge in bodies.beyond(end)[1] if hinge is not end.hinge]
     if len(beyond) >= 2:
@@ -149,6 +153,11 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
         lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
         score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
     return score
+
+
+def _whole_arm(pair: Pair) -> float:
+    """0..1: whether a pair has as many joints as arms: a whole shoulder and an elbow."""
+    return min(len(pair.chains[0]) / _ARM, 1.0)
 
 
 def _named_legs(pair: Pair) -> bool:

@@ -39,11 +39,13 @@ def rods(chance: Chance, plan: Plan, places: Places) -> Angles:
             joint = _joint(plan, f"{name}_{hinge}")
             if joint is None:
                 continue
-            before = [other for other in plan.joints if other.child == joint.parent]
-            length = float(np.linalg.norm(joint.point_3 - before[0].point_3)) * 0.9
+            carrier = joint.parent
+            before = joint
+            while (length := 0.9 * float(np.linalg.norm(joint.point_3 - before.point_3))) < 0.05 * places.scale:
+                carrier, before = before.parent, next(j for j in plan.joints if j.child == before.parent)
             aside_3 = 0.04 * places.scale * X
             start_3 = joint.point_3 + length * Z
-            crank = plan.join(f"{name}_{hinge[:1]}_crank", joint.parent, start_3, joint.axis_3, (-1.5, 1.5))
+            crank = plan.join(f"{name}_{hinge[:1]}_crank", carrier, start_3, joint.axis_3, (-1.5, 1.5))
             rod = plan.join(f"{name}_{hinge[:1]}_rod", crank, start_3 + aside_3, joint.axis_3, (-1.5, 1.5))
             plan.fix(f"{name}_{hinge[:1]}_rod_end", rod, joint.point_3 + aside_3)
     return {}
