@@ -5,7 +5,9 @@ random humanoids, and on other URDF files.
 
 The shipped robots' hand-written configs are the measure of theirs. A random humanoid counts as right when its joints,
 points (2 cm on an arm of half a metre), up, forward and hands are; where something is wrong, it counts whether a
-question asks about it. `strange` are random humanoids of the kinds that strangers have. Of other files only what was found is printed, as nobody wrote down what is true of them.
+question asks about it. The strange ones are random humanoids too, each with something that only some robots have, and
+some of them are to be refused. Of other files only what was found is printed, as nobody wrote down what is true of
+them.
 """
 
 from __future__ import annotations
@@ -25,8 +27,8 @@ from mrhubo.errors import UserError
 from mrhubo.robot import read_keypoints
 from mrhubo.robot.discovery import Discovery, discover
 from mrhubo.robot.generator import humanoid
-from mrhubo.robot.generator.strange import STRANGE
 from mrhubo.robot.generator.score import asked, mistakes
+from mrhubo.robot.generator.strange import STRANGE
 from mrhubo.robot.generator.variants import variant
 from mrhubo.robot.urdf import describe
 from mrhubo.runtime.locations import project_root

@@ -250,8 +250,31 @@ class Bodies:
 
     def limbs(self, step: Step) -> list[Step]:
         """The joints at the body that a joint leads to with which a limb may go on: no linkages, no sliding jaws."""
-        onward = [on for on in self.onward(step) if not self._idle(on)]
+        onward = self.onward(step)
+        motors = self._motors(onward)
+        onward = [on for on in onward if on not in motors and (on in motors.values() or not self._idle(on))]
         return [on for on in onward if not any(self._drives(on, other, step) for other in onward if other is not on)]
+
+    def _motors(self, onward: list[Step]) -> dict[Step, Step]:
+        """Of joints at one body, the motors that carry nothing, each with the limb that mimics it."""
+        found: dict[Step, Step] = {}
+        driven = [joint.mimic.joint for joint in self.description.joints.values() if joint.mimic is not None]
+        for on in onward:
+            mimic = self.description.joints[on.hinge.name].mimic
+            motor = next((other for other in onward if mimic is not None and other.hinge.name == mimic.joint), None)
+            if (
+                motor is not None
+                and driven.count(motor.hinge.name) == 1
+                and self._idle(on)
+                and self._span(on) > _DOMINANT * self._span(motor)
+            ):
+                found[motor] = on
+        return found
+
+    def _span(self, step: Step) -> float:
+        """How far from its joint a branch reaches, by links and shapes [m]."""
+        corners = np.concatenate([self.corners(body) for body in self.beyond(step)[0]])
+        return float(np.linalg.norm(corners - self.position(step.outer_link), axis=-1).max())
 
     def _drives(self, rod: Step, other: Step, before: Step) -> bool:
         """Whether a branch looks like a linkage that drives another one, from a loop that a URDF has to cut: it moves

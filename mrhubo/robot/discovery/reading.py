@@ -1,4 +1,4 @@
-"""From a URDF to bodies and hinges: joints that move nothing are taken for fixed ones, limits in degrees for radians."""
+"""From a URDF to bodies and hinges: joints that move nothing are taken for fixed ones, degrees are made radians."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from mrhubo.robot.joint import ROTARY, drive
 from mrhubo.robot.limits import in_degrees
 from mrhubo.robot.urdf import Description
 
-
 _LIMB = 0.1
-"""How far beyond the second of two hinges that turn as one a limb reaches, as a share of the robot: a finger does not."""
+"""How far a limb reaches beyond the second of two hinges that turn as one, as a share of the robot; no finger does."""
 
 
 def read_bodies(description: Description) -> Bodies:

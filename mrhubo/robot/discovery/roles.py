@@ -18,6 +18,8 @@ from mrhubo.robot.discovery.symmetry import Pair, alike
 
 _PLANE = 0.03
 """How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
+_LATERAL = 0.97
+"""Cosine of an axis's angle to what runs across the mirror plane, from which on it is its own mirror image."""
 _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
@@ -196,7 +198,7 @@ def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float
     """Whether a joint's axis is its own mirror image: across the mirror plane, or in it."""
     line = step.hinge.line
     across = abs(float(line.axis_3 @ normal_3))
-    if across > 0.97:
+    if across > _LATERAL:
         return True
     return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
 
@@ -250,7 +252,9 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
         )
 
     own = abs(float((line.point_3 - middle_3) @ normal_3))
-    return own > least and any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
+    # A lateral axis is its own mirror image wherever its frame lies: a twin's is the same one.
+    near = least if abs(float(line.axis_3 @ normal_3)) > _LATERAL else 0.5 * own
+    return own > least and any(other is not step and miss(other.hinge.line) < near for other in others)
 
 
 def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:

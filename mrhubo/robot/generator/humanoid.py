@@ -10,8 +10,8 @@ import numpy as np
 from mrhubo.robot.generator.hands import HandShape, hand
 from mrhubo.robot.generator.limbs import SIDES, ArmShape, Chance, LegShape, arm, leg, neck, trunk, zero_pose
 from mrhubo.robot.generator.naming import STYLES
-from mrhubo.robot.generator.plan import Plan, X, Y, Z, about
 from mrhubo.robot.generator.odd_parts import Places
+from mrhubo.robot.generator.plan import Plan, X, Y, Z, about
 from mrhubo.robot.generator.strange import STRANGE, Strange
 from mrhubo.robot.generator.text import write
 

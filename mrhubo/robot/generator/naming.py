@@ -17,14 +17,18 @@ _SIDES = {
     "japanese": ("hidari", "migi"),
 }
 _WORDS = {
-    "french": "shoulder epaule elbow coude forearm avantbras wrist poignet hand main finger doigt thumb pouce hip hanche "
-    "knee genou ankle cheville neck cou head tete waist taille twist torsion pelvis bassin wheel roue",
-    "german": "shoulder schulter elbow ellbogen forearm unterarm wrist handgelenk hand hand finger finger thumb daumen "
-    "hip huefte knee knie ankle knoechel neck hals head kopf waist taille twist drehung pelvis becken wheel rad",
-    "spanish": "shoulder hombro elbow codo forearm antebrazo wrist muneca hand mano finger dedo thumb pulgar hip cadera "
-    "knee rodilla ankle tobillo neck cuello head cabeza waist cintura twist giro pelvis pelvis wheel rueda",
+    "french": "shoulder epaule elbow coude forearm avantbras wrist poignet hand main finger doigt thumb pouce "
+    "hip hanche knee genou ankle cheville neck cou head tete waist taille twist torsion pelvis bassin "
+    "wheel roue",
+    "german": "shoulder schulter elbow ellbogen forearm unterarm wrist handgelenk hand hand finger finger thumb "
+    "daumen hip huefte knee knie ankle knoechel neck hals head kopf waist taille twist drehung pelvis "
+    "becken wheel rad",
+    "spanish": "shoulder hombro elbow codo forearm antebrazo wrist muneca hand mano finger dedo thumb pulgar hip "
+    "cadera knee rodilla ankle tobillo neck cuello head cabeza waist cintura twist giro pelvis pelvis "
+    "wheel rueda",
     "japanese": "shoulder kata elbow hiji forearm zenwan wrist tekubi hand te finger yubi thumb oyayubi hip koshi "
-    "knee hiza ankle ashikubi neck kubi head atama waist koshi twist hineri pelvis kotsuban wheel sharin",
+    "knee hiza ankle ashikubi neck kubi head atama waist koshi twist hineri pelvis kotsuban wheel "
+    "sharin",
 }
 """English words and those of the language, in turn."""
 
