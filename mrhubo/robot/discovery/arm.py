@@ -20,6 +20,9 @@ from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
+_SHORT = 0.6
+"""How long a forearm is usually at least, as a share of the upper arm: shorter ones are asked about where no joint tells
+the wrist."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
 of its length."""
@@ -219,9 +222,13 @@ def _wrist(
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
         # Where the twist passes the elbow at a distance, the forearm's direction depends on how far out its end is.
         farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
-        if outward > _OUT * upper and farther:
+        # A hand that is fixed beyond a twist near the elbow tells more of the forearm's length.
+        fixed_hand = sure > GUESS and math.dist(end_3, elbow.point_3) > _SHORT * upper > outward
+        if outward > _OUT * upper and farther and not fixed_hand:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
+        if math.dist(end_3, elbow.point_3) < _SHORT * upper:
+            sure, how = min(sure, GUESS), f"{how}, which makes a short forearm"
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
 
 

@@ -30,6 +30,12 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
     return max(near, key=lambda i: (min(i, _BEFORE), len(chain) - i - 1 <= WRIST_JOINTS, scores[i]))
 
 
+def elbow_reach(bodies: Bodies, chain: Chain) -> float:
+    """How long the shorter one of upper arm and forearm is about [m], whichever joint is the elbow; 0 without one."""
+    scores = _elbow_scores(bodies, chain)
+    return 0.0 if scores is None else float(scores.max())
+
+
 def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
     """How long the shorter one of the two stretches beside each axis is [m] (N,), with less weight where joints are
     missing before it; None if there are too few axes, or all meet in one point.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.elbow import WRIST_JOINTS, find_elbow
+from mrhubo.robot.discovery.elbow import WRIST_JOINTS, elbow_reach, find_elbow
 from mrhubo.robot.discovery.lines import feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
@@ -13,6 +13,8 @@ _BESIDE = 0.025
 """How far a jaw's axis passes the hand's line, as a share of the arm."""
 _MEET = 0.005
 """How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
+_LONGER = 1.5
+"""How many times longer the shorter one of upper arm and forearm must be with a driven joint than without it."""
 _SHORT = 4
 """Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 
@@ -63,13 +65,17 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
 
 
 def without_gripper(bodies: Bodies, chain: Chain) -> Chain:
-    """A limb without the joints beyond its elbow that slide, mimic, or are mimicked: they are a gripper, and no part of
-    a forearm. An elbow may be driven by a motor elsewhere, and may drive a bar beside it.
+    """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
+    and no part of a forearm. But an elbow may be driven by a motor elsewhere, or drive a bar beside it: then what is left
+    without it has no stretches as long on both sides of a joint.
     """
-    elbow_at = find_elbow(bodies, chain)
-    while len(chain) > 2 and _driven(chain[-1]) and (elbow_at is None or len(chain) - 1 > elbow_at):
-        chain = chain[:-1]
-    return chain
+    kept = chain
+    while len(kept) > 2 and _driven(kept[-1]):
+        kept = kept[:-1]
+    for end in range(len(kept), len(chain)):
+        if chain[end].hinge.rotary and elbow_reach(bodies, chain[: end + 1]) > _LONGER * elbow_reach(bodies, kept):
+            kept = chain[: end + 1]
+    return kept
 
 
 def _driven(step: Step) -> bool:
