@@ -20,9 +20,9 @@ from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
-_SHORT = 0.6
-"""How long a forearm is usually at least, as a share of the upper arm: shorter ones are asked about where no joint tells
-the wrist."""
+_SHORT, _NAMED = 0.6, 0.5
+"""How long a forearm is usually at least, as a share of the upper arm, and one whose twist is called a wrist's: shorter
+ones are asked about where no joint that swings tells the wrist."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
 of its length."""
@@ -227,7 +227,9 @@ def _wrist(
         if outward > _OUT * upper and farther and not fixed_hand:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
-        if math.dist(end_3, elbow.point_3) < _SHORT * upper:
+        step = chain[twist_at]
+        named = any(speaks_of(name, "wrist") for name in (step.hinge.name, step.outer_link))
+        if math.dist(end_3, elbow.point_3) < (_NAMED if named else _SHORT) * upper:
             sure, how = min(sure, GUESS), f"{how}, which makes a short forearm"
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
 
