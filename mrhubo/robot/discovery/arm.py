@@ -15,6 +15,7 @@ import numpy as np
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow, rival
 from mrhubo.robot.discovery.gripper import without_hand
+from mrhubo.robot.discovery.limbs import ways_on
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
@@ -125,7 +126,7 @@ def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
     another is a linkage; nothing if none is as long.
     """
     way = float(measure(lines_of(chain)).out_N[-1])
-    onward = bodies.limbs(chain[-1])
+    onward = ways_on(bodies, chain[-1])
     if not any(bodies.extent(on) > share * way for on in onward):
         return ""
     among = " and ".join(f"'{on.hinge.name}'" for on in onward)

@@ -14,15 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
-from mrhubo.robot.discovery.names import speaks_of
+from mrhubo.robot.discovery.lines import Line
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import Description
-
-_DOMINANT = 2.5
-"""How many times longer than any other branch the one must be in which a limb goes on; else it ends, as a hand."""
-_NO_FARTHER = 1.1
-"""How much farther out than the joint that it drives a linkage may begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +103,7 @@ class Bodies:
     gains: Mapping[str, float] = field(default_factory=dict)
     """By hinge: how much farther a limb turns than its joint, where a second hinge follows; 1 for all others."""
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
-    _nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
+    nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
     _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -210,101 +204,24 @@ class Bodies:
 
     def extent(self, step: Step) -> float:
         """How far the longest chain reaches beyond a joint, from body to body along joint origins and link ends [m]."""
-        if _key(step) in self._extents:
-            return self._extents[_key(step)]
+        if key_of(step) in self._extents:
+            return self._extents[key_of(step)]
         pending = [step]  # not a function that calls itself: a file may have thousands of joints in a row
         while pending:
             here = pending[-1]
             onward = self.onward(here)
-            if missing := [on for on in onward if _key(on) not in self._extents]:
+            if missing := [on for on in onward if key_of(on) not in self._extents]:
                 pending += missing
                 continue
             pending.pop()
             here_3 = self.position(here.outer_link)
             own = max(float(np.linalg.norm(self.position(link) - here_3)) for link in self.links_of[here.end])
             further = [
-                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self._extents[_key(on)] for on in onward
+                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self._extents[key_of(on)]
+                for on in onward
             ]
-            self._extents[_key(here)] = max([own, *further])
-        return self._extents[_key(step)]
-
-    def chain(self, step: Step) -> Chain:
-        """The limb that begins with a joint: outwards until it ends, or branches into what is alike (fingers)."""
-        found: dict[tuple[int, str], Step] = {}
-        on: Step | None = step
-        while on is not None and _key(on) not in found:
-            found[_key(on)] = on
-            on = self._next(on)
-        return tuple(found.values())
-
-    def _next(self, step: Step) -> Step | None:
-        """The joint with which a limb goes on; None where it ends or branches."""
-        key = _key(step)
-        if key not in self._nexts:
-            onward = self.limbs(step)
-            reach = {on.hinge.name: self._reach(step, on) for on in onward}
-            onward.sort(key=lambda on: (-reach[on.hinge.name], on.hinge.name))
-            alike = [on for on in onward[1:] if _DOMINANT * reach[on.hinge.name] > reach[onward[0].hinge.name]]
-            self._nexts[key] = onward[0] if onward and not alike else None
-        return self._nexts[key]
-
-    def limbs(self, step: Step) -> list[Step]:
-        """The joints at the body that a joint leads to with which a limb may go on: no linkages, no sliding jaws."""
-        onward = self.onward(step)
-        motors = self._motors(onward)
-        onward = [on for on in onward if on not in motors and (on in motors.values() or not self._idle(on))]
-        return [on for on in onward if not any(self._drives(on, other, step) for other in onward if other is not on)]
-
-    def _motors(self, onward: list[Step]) -> dict[Step, Step]:
-        """Of joints at one body, the motors that carry nothing, each with the limb that mimics it."""
-        found: dict[Step, Step] = {}
-        driven = [joint.mimic.joint for joint in self.description.joints.values() if joint.mimic is not None]
-        for on in onward:
-            mimic = self.description.joints[on.hinge.name].mimic
-            motor = next((other for other in onward if mimic is not None and other.hinge.name == mimic.joint), None)
-            if (
-                motor is not None
-                and driven.count(motor.hinge.name) == 1
-                and self._idle(on)
-                and self._span(on) > _DOMINANT * self._span(motor)
-            ):
-                found[motor] = on
-        return found
-
-    def _span(self, step: Step) -> float:
-        """How far from its joint a branch reaches, by links and shapes [m]."""
-        corners = np.concatenate([self.corners(body) for body in self.beyond(step)[0]])
-        return float(np.linalg.norm(corners - self.position(step.outer_link), axis=-1).max())
-
-    def _drives(self, rod: Step, other: Step, before: Step) -> bool:
-        """Whether a branch looks like a linkage that drives another one, from a loop that a URDF has to cut: it moves
-        in the plane in which that one's joint turns, and begins no farther out, while that one goes on in other planes
-        too, as a forearm or a foot does. Fingers begin farther out than a thumb. Names betray it as well.
-        """
-        if not other.hinge.rotary:
-            return False
-        if all(speaks_of(hinge.name, "rod") or speaks_of(hinge.links[1], "rod") for hinge in self.beyond(rod)[1]):
-            return not any(speaks_of(hinge.links[1], "rod") for hinge in self.beyond(other)[1])
-        axis_3, start_3 = other.hinge.line.axis_3, before.hinge.line.point_3
-        far = [float(np.linalg.norm(step.hinge.line.point_3 - start_3)) for step in (rod, other)]
-        return far[0] < _NO_FARTHER * far[1] and self._in_plane(rod, axis_3) and not self._in_plane(other, axis_3)
-
-    def _in_plane(self, step: Step, axis_3: np.ndarray) -> bool:
-        """Whether all joints of a branch turn about a direction, or slide across it."""
-        hinges = self.beyond(step)[1]
-        return all(
-            sine(hinge.line.axis_3, axis_3) < PARALLEL
-            if hinge.rotary
-            else abs(float(hinge.line.axis_3 @ axis_3)) < PARALLEL
-            for hinge in hinges
-        )
-
-    def _reach(self, last: Step, on: Step) -> float:
-        return self.extent(on) + float(np.linalg.norm(self.position(on.outer_link) - self.position(last.outer_link)))
-
-    def _idle(self, step: Step) -> bool:
-        """Whether a branch has no rotary joint driven by itself: a linkage, mimicking fingers, a sliding jaw."""
-        return not any(hinge.free and hinge.rotary for hinge in self.beyond(step)[1])
+            self._extents[key_of(here)] = max([own, *further])
+        return self._extents[key_of(step)]
 
     def path(self, start: int, end: int) -> Chain:
         """The joints from one body to another."""
@@ -331,5 +248,6 @@ class Bodies:
         return max(float(np.linalg.norm(points.max(0) - points.min(0))), 1e-6)
 
 
-def _key(step: Step) -> tuple[int, str]:
+def key_of(step: Step) -> tuple[int, str]:
+    """By which a step is remembered."""
     return step.start, step.hinge.name

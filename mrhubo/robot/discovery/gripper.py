@@ -66,8 +66,8 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
 
 def without_gripper(bodies: Bodies, chain: Chain) -> Chain:
     """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
-    and no part of a forearm. But an elbow may be driven by a motor elsewhere, or drive a bar beside it: then what is left
-    without it has no stretches as long on both sides of a joint.
+    and no part of a forearm. But an elbow may be driven by a motor elsewhere, or drive a bar beside it: then what is
+    left without it has no stretches as long on both sides of a joint.
     """
     kept = chain
     while len(kept) > 2 and _driven(kept[-1]):

@@ -13,19 +13,14 @@ from mrhubo.robot.discovery.arm import GUESS, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
-from mrhubo.robot.discovery.lines import ON, PARALLEL, Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
+from mrhubo.robot.discovery.necks import find_necks
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
-_PLANE = 0.03
-"""How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
-_LATERAL = 0.97
-"""Cosine of an axis's angle to what runs across the mirror plane, from which on it is its own mirror image."""
 _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
-_LIGHT = 0.25
-"""Share of its head's weight that a jaw has at most."""
 _ARM = 4
 """Joints of an arm with a whole shoulder."""
 _LEG = 3
@@ -84,12 +79,15 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         raise UserError(
             f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
+            f"{_following(bodies)}"
         )
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
-            raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
+            raise UserError(
+                f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found{_following(bodies)}"
+            )
         arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     else:
         options = [
@@ -125,12 +123,27 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if legs is None and any(names.speaks_of(step.hinge.name, "head") for step in waist):
         waist = ()  # the root is the head
     used |= {step.hinge.name for step in waist}
-    necks = _necks(bodies, arms, used)
+    necks = find_necks(bodies, arms, used)
     arm = arms.chains[0]
     if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
         raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
     others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
+
+
+def _following(bodies: Bodies) -> str:
+    """The end of a sentence on a joint that mimics one of another limb, which hides its own; else nothing."""
+    root = bodies.body_of[bodies.description.root]
+    for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
+        mimic = bodies.description.joints[hinge.name].mimic
+        source = next((other for other in bodies.hinges if mimic is not None and other.name == mimic.joint), None)
+        above = {root, *(step.end for step in bodies.path(root, hinge.bodies[0]))}
+        if source is not None and source.bodies[0] not in above:
+            return (
+                f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
+                "take the <mimic> elements of such joints out of the URDF"
+            )
+    return ""
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:
@@ -192,92 +205,3 @@ def _hangs_below(low: Pair, high: Pair) -> float:
     if np.linalg.norm(other_3 - mount_3) < 1e-3 * low.size:
         return 0.0
     return float(unit(mount_3 - ends) @ unit(other_3 - mount_3))
-
-
-def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float) -> bool:
-    """Whether a joint's axis is its own mirror image: across the mirror plane, or in it."""
-    line = step.hinge.line
-    across = abs(float(line.axis_3 @ normal_3))
-    if across > _LATERAL:
-        return True
-    return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
-
-
-def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
-    """The other chains from the chest with axes in the mirror plane, the likeliest neck first."""
-    middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
-    ranked: list[tuple[float, Chain]] = []
-    for step in bodies.steps_from[arms.body]:
-        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(bodies, step):
-            continue
-        chain: list[Step] = []
-        todo, beside = [step], bodies.steps_from[arms.body]
-        while todo:
-            fitting = [
-                s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
-            ]
-            twins = [s for s in beside if _has_twin(s, beside, arms.normal_3, middle_3, ON * bodies.size)]
-            fitting = [s for s in fitting if not _is_sensor(bodies, s) and s not in twins]
-            paired = bool(twins)
-            fitting = [s for s in fitting if not (chain and _in_face(bodies, s, paired))]
-            fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
-            if not fitting or len(chain) >= 4:
-                break
-            chain.append(fitting[0])
-            todo = beside = bodies.onward(fitting[0])
-        if not chain:
-            continue
-        called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
-        named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
-        # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
-        start_3 = measure(lines_of(tuple(chain))).nodes_N3[0]
-        away = min(chain[0].hinge.line.distance(middle_3), float(np.linalg.norm(start_3 - middle_3)))
-        ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
-    ranked.sort(key=lambda found: -found[0])
-    return tuple(chain for _, chain in ranked)
-
-
-def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray, least: float) -> bool:
-    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear. None is of one that
-    lies nearer to the middle than `least` [m].
-    """
-    line = step.hinge.line
-    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
-    image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
-
-    def miss(other: Line) -> float:
-        one_3, other_3 = feet(image, other)
-        return float(np.linalg.norm(one_3 - other_3)) + float(np.linalg.norm(image.point_3 - line.point_3)) * sine(
-            image.axis_3, other.axis_3
-        )
-
-    own = abs(float((line.point_3 - middle_3) @ normal_3))
-    # A lateral axis is its own mirror image wherever its frame lies: a twin's is the same one.
-    near = least if abs(float(line.axis_3 @ normal_3)) > _LATERAL else 0.5 * own
-    return own > least and any(other is not step and miss(other.hinge.line) < near for other in others)
-
-
-def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
-    """Whether a joint above a neck's is one of the face, as a jaw's or an eye's: by its name, or as a single one beside
-    pairs, or as one that carries little of the head's weight.
-    """
-    if speaks_of_face(step):
-        return True
-    inside, hinges = bodies.beyond(step)
-    if paired and len(hinges) == 1:
-        return True
-    weights = [sum(map(bodies.weight, part)) for part in (inside, {step.start})]
-    return len(hinges) == 1 and 0 < weights[0] < _LIGHT * weights[1]
-
-
-def speaks_of_face(step: Step) -> bool:
-    """Whether a joint's name, or its link's, is that of a part of a face."""
-    return any(names.speaks_of(name, "face") for name in (step.hinge.name, step.outer_link))
-
-
-def _is_sensor(bodies: Bodies, step: Step) -> bool:
-    """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all."""
-    if any(names.speaks_of(name, "sensor") for name in (step.hinge.name, step.outer_link)):
-        return True
-    limited = any(hinge.limited for hinge in bodies.hinges if hinge.rotary)
-    return limited and not step.hinge.limited and step.hinge.lower is None
