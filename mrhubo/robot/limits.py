@@ -149,9 +149,8 @@ def held_angle(joint: Joint, wanted: float | None) -> float:
     Raises:
         UserError: what is wanted lies outside the limits, or is in degrees.
     """
-    continuous = joint.kind == "continuous"
-    if joint.rotary and _usable(joint) is None:
-        continuous = True  # limits that cannot be meant keep it from nothing
+    # Limits that cannot be meant keep it from nothing.
+    continuous = joint.kind == "continuous" or (joint.rotary and _too_wide(joint.lower or 0.0, joint.upper or 0.0))
     lower = -math.inf if joint.lower is None or continuous else joint.lower
     upper = math.inf if joint.upper is None or continuous else joint.upper
     if wanted is None:
