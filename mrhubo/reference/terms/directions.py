@@ -25,7 +25,9 @@ class DirectionTerm(Term):
     def __init__(self, kinematics: DirectionJacobian) -> None:
         super().__init__()
         self.kinematics = kinematics
-        weights = [direction.part.weight for direction in kinematics.body_map.directions]
+        parts = kinematics.body_map.keypoints.parts
+        of = {name: w for p in parts for name, w in zip(p.direction_names, p.direction_weights, strict=True)}
+        weights = [of[direction.name] for direction in kinematics.body_map.directions]
         partial = [float(i in kinematics.body_map.shared.bend_columns) for i in range(len(weights))]
         self.register_buffer("partial_D", torch.tensor(partial).to(kinematics.robot.lower_N), persistent=False)
         self.register_buffer("weight_D", torch.tensor(weights).to(kinematics.robot.lower_N), persistent=False)
