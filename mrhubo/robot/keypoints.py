@@ -99,7 +99,7 @@ def _is_alone(part: OrientedPart, ends: Mapping[str, End]) -> bool:
 
 def _same(one: Point | End | None, other: Point | End | None) -> bool:
     if isinstance(one, End) and isinstance(other, End):
-        return one.link == other.link and bool(torch.equal(one.axes_23, other.axes_23))
+        return one.link == other.link and one.sole == other.sole and bool(torch.equal(one.axes_23, other.axes_23))
     return one == other
 
 
@@ -136,7 +136,11 @@ def read_keypoints(entries: Mapping[str, Any], table: Sequence[BodyPart] = PARTS
             raise UserError(
                 f"robot.keypoints.{limb.end}: needs '{limb.start}' too; a limb is a direction between the two"
             )
-    ends = {name: read_end(name, entries[name], part.words) for name, part in oriented.items() if name in entries}
+    ends = {
+        name: read_end(name, entries[name], part.words, bool(part.stands))
+        for name, part in oriented.items()
+        if name in entries
+    }
     carriers = {limb.name: limb.end for limb in limbs}
     for name in ends:
         point = carriers.get(oriented[name].hangs_on or "")

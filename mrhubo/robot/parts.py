@@ -209,7 +209,7 @@ def _foot(side: str) -> OrientedPart:
         name=f"{side}_foot", joint=ankle, region="foot", hangs_on=f"{side}_shin", seen_from="pelvis",
         words=("forward", "up"), rest=(_FORWARD, _UP), turned_by=(ankle,), inputs=(ankle,), weight=0.5,
         first_weight=_HEADING_WEIGHT, points=tuple(f"{side}_{point}" for point in ("foot", "toe", "heel")),
-        stands=(f"{side}_heel", f"{side}_foot"),
+        stands=(f"{side}_heel", f"{side}_toe"),
     )  # fmt: skip
 
 
