@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from mrhubo.config import PriorConfig, load_config
+from mrhubo.config import SHIPPED_UNIVERSAL, PriorConfig, UniversalConfig, load_config
 from mrhubo.robot import build_body_map, read_keypoints
 from mrhubo.robot.parts import PARTS, OrientedPart
 
 ROOT = Path(__file__).resolve().parent.parent
-ROBOTS = sorted(path for path in (ROOT / "conf").glob("*.yaml") if path.stem != "prior")
+ROBOTS = sorted(path for path in (ROOT / "conf").glob("*.yaml") if path.stem not in ("prior", "universal"))
 WHOLE = "-whole-body"
 
 
@@ -48,6 +48,11 @@ def test_a_whole_body_holds_the_upper_body_that_ships(path: Path) -> None:
         upper = load_config(arms).robot
         assert set(upper.joints) <= set(whole.joints) and set(upper.key_links) <= set(whole.key_links)
         assert upper.keypoints.items() <= whole.keypoints.items() and upper.ranges == whole.ranges
+
+
+def test_universal() -> None:
+    config = load_config(ROOT / "conf" / "universal.yaml", schema=UniversalConfig)
+    assert config.tracking_dir == ROOT / "mlruns" and config.output == SHIPPED_UNIVERSAL
 
 
 def test_prior() -> None:

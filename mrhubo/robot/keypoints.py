@@ -74,6 +74,11 @@ class Keypoints:
         both += [(ends[left], ends[right]) for left, right in PAIRED_KEYPOINTS.values() if {left, right} <= ends.keys()]
         return tuple(both)
 
+    @property
+    def standing(self) -> tuple[OrientedPart, ...]:
+        """The parts that stand on the floor."""
+        return tuple(part for part in self.parts if isinstance(part, OrientedPart) and part.stands)
+
     def _row(self, name: str) -> BodyPart:
         return next(part for part in self.parts if part.name == name)
 

@@ -53,8 +53,7 @@ class Sole:
 def find_soles(body_map: BodyMap) -> tuple[Sole, ...]:
     """The soles of the parts that stand on the floor, in the table's order."""
     ends, description = body_map.keypoints.ends, body_map.robot.description
-    standing = [part for part in body_map.keypoints.parts if isinstance(part, OrientedPart) and part.stands]
-    return tuple(_sole(part, ends[part.name], description) for part in standing)
+    return tuple(_sole(part, ends[part.name], description) for part in body_map.keypoints.standing)
 
 
 def _sole(part: OrientedPart, end: End, description: Description) -> Sole:
