@@ -92,7 +92,7 @@ def _questions(found: Discovery) -> Iterator[str]:
     for note in found.notes:
         yield from _comments(0, f"Note: {note}")
     for question in found.questions:
-        among = f" Candidates: {listed(question.candidates)}." if question.candidates else ""
+        among = f"; candidates: {listed(question.candidates)}" if question.candidates else ""
         yield from _comments(0, f"To answer: {question.about}: {question.text}{among}")
 
 
