@@ -36,7 +36,7 @@ class HumanSteps:
     contacts: FootContacts
     frame_rate: float
     place_TP3: np.ndarray
-    """The person's own points, unscaled."""
+    """The person's own points, where the skeleton's are with the root's way made to fit."""
 
 
 def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | None:
