@@ -22,6 +22,12 @@ WANDERED_M = 0.06
 """How far a planted point may be from where it was planted; then it is planted anew: a shuffling foot never lifts."""
 RAMP_S = 0.1
 """How long [s] it takes until a contact counts in full, and before it ends, no more: a heel strike takes as long."""
+_SCALE_ROUNDS, _SCALES = 4, (0.6, 1.6)
+"""A child's legs, and a giant's, against those of readers' skeletons, and more."""
+_STILL = 0.1
+"""Speed [m/s] of a root that tells nothing of its scale."""
+_TOLD = 0.05
+"""To what the scale can be told: where a person's legs are known, it comes out 4% too small or large, as feet roll."""
 _BAND_M = 0.04
 """Heights of points on one floor."""
 _GATHERED = 0.5
@@ -69,6 +75,28 @@ def find_contacts(place_TP3: np.ndarray, frame_rate: float, floor: float | None 
             share = np.minimum(np.minimum(since, until) / RAMP_S, 1.0)
             weight_TP[start:end, point] = share**2 * (3 - 2 * share)
     return FootContacts(planted_TP, phase_TP, weight_TP, floor)
+
+
+def root_scale(from_root_TP3: np.ndarray, root_T3: np.ndarray, frame_rate: float) -> float:
+    """By what a root's way has to be multiplied so that it belongs to the legs that points hang on: then planted points
+    keep still. 1 where the way is right within what can be told, or tells nothing.
+
+    Args:
+        from_root_TP3: places (T, P, 3) [m] of points of soles from the root, along the world's axes.
+        root_T3: the root's (T, 3) [m].
+        frame_rate: frames per second.
+    """
+    if len(root_T3) < 2:
+        return 1.0
+    leg_TP3, way_T13 = (np.gradient(x, 1 / frame_rate, axis=0) for x in (from_root_TP3, root_T3[:, None]))
+    scale = 1.0
+    for _ in range(_SCALE_ROUNDS):
+        weight_TP1 = find_contacts(from_root_TP3 + scale * root_T3[:, None], frame_rate).weight_TP[..., None]
+        still = _STILL**2 * weight_TP1.sum()
+        whole = float((weight_TP1 * way_T13**2).sum() + still)
+        scale = (float(still - (weight_TP1 * way_T13 * leg_TP3).sum()) / whole) if whole else 1.0
+        scale = float(np.clip(scale, *_SCALES))
+    return 1.0 + float(np.sign(scale - 1) * max(abs(scale - 1) - _TOLD, 0.0))
 
 
 def speeds(place_TP3: np.ndarray, frame_rate: float) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrhubo.motion.contacts import PLANTED_M, RAMP_S, WANDERED_M, find_contacts, find_floor, speeds
+from mrhubo.motion.contacts import PLANTED_M, RAMP_S, WANDERED_M, find_contacts, find_floor, root_scale, speeds
 
 STEP_S, STRIDE_M = 0.6, 0.7
 
@@ -80,6 +80,18 @@ def test_the_floor_is_below_what_is_stood_on_too() -> None:
     height_TP[:3] = -0.5  # a glitch is no floor
     assert find_floor(height_TP, speed_TP) == pytest.approx(0.0, abs=0.005)
     assert find_floor(height_TP, speed_TP + 5) == pytest.approx(-0.5, abs=0.51), "nobody stands: the lowest tells"
+
+
+@pytest.mark.parametrize("person", [0.8, 0.97, 1.0, 1.03, 1.2])
+@pytest.mark.parametrize("rate", [24.0, 60.0])
+def test_a_roots_way_is_made_to_fit_the_legs(person: float, rate: float) -> None:
+    place_TP3 = walk(rate)
+    root_T3 = np.stack((0 * place_TP3[:, 0, 0], 0.9 + 0 * place_TP3[:, 0, 0], place_TP3[..., 2].mean(axis=1)), axis=1)
+    found = root_scale(place_TP3 - root_T3[:, None], person * root_T3, rate)
+    assert found * person == pytest.approx(1.0, abs=0.07), "5%, and what is left where the root sways"
+    assert found == 1.0 or abs(person - 1) > 0.05
+    still = np.zeros((50, 1, 3))
+    assert root_scale(still, person * root_T3[:1].repeat(50, axis=0), rate) == 1.0
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mrhubo.config import load_config
-from mrhubo.errors import UserError
+from mrhubo.errors import InputWarning, UserError
+from mrhubo.reference.standing import Legs
 from mrhubo.robot import BodyMap, build_body_map, read_keypoints
 from mrhubo.robot.soles import find_soles
 from tests.reference.walkers import SOLE, entries, walker
@@ -38,6 +39,8 @@ def test_an_entry_overrides_and_origins_are_the_last_resort(tmp_path: Path) -> N
     left, right = find_soles(again)
     assert not left.known and right.known
     np.testing.assert_allclose(left.balls_K4, [[0, 0, 0, 0]])
+    with pytest.warns(InputWarning, match=r"left_foot: no shape of 'l_foot' tells .* sole: \[0.05, 0.12, 0.035\]"):
+        Legs(again)
 
 
 @pytest.mark.parametrize("name", ["nao", "coman"])

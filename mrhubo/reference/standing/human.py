@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from mrhubo.motion.contacts import FootContacts, find_contacts
+from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
@@ -32,11 +32,11 @@ class HumanSteps:
     turn_T33: Tensor
     """Human axes of what carries the legs, in the world."""
     path_T3: Tensor
-    """The root on the person's path, scaled by the length of the legs."""
+    """The root on the person's path, made to fit the skeleton's legs, and scaled to the robot's."""
     contacts: FootContacts
     frame_rate: float
     place_TP3: np.ndarray
-    """The person's own points, unscaled."""
+    """The person's own points, where the skeleton's are with the root's way made to fit."""
 
 
 def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | None:
@@ -62,7 +62,9 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | N
         refuse_frames(wrong_T, what)
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
     root_T33, root_T3 = root_T33.to(points_TK3), root_T3.to(points_TK3)
-    world_TK3 = points_TK3 @ root_T33.mT + root_T3[:, None]
+    turned_TK3 = points_TK3 @ root_T33.mT
+    soles_TP3, way_T3 = (x.double().cpu().numpy() for x in (turned_TK3[:, legs.contacts], root_T3))
+    world_TK3 = turned_TK3 + root_scale(soles_TP3, way_T3, motion.frame_rate) * root_T3[:, None]
     place_TP3 = world_TK3[:, legs.contacts].double().cpu().numpy()
     contacts = find_contacts(place_TP3, motion.frame_rate)
     path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])

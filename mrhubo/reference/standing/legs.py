@@ -9,6 +9,7 @@ joints.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, keypoint_indices
+from mrhubo.errors import InputWarning
 from mrhubo.frames import human_to_world
 from mrhubo.robot import BodyMap, LinkPoses
 from mrhubo.robot.parts import LimbPart
@@ -43,12 +45,21 @@ class Legs(nn.Module):
     radius_K: Tensor
 
     def __init__(self, body_map: BodyMap) -> None:
-        """Looks links and lengths up."""
+        """Looks links and lengths up; warns of feet whose soles nothing tells."""
         super().__init__()
         self.body_map, self.soles = body_map, find_soles(body_map)
         self.has_feet = bool(self.soles)
         if not self.has_feet:
             return
+        for sole in (sole for sole in self.soles if not sole.known):
+            name, link = sole.part.name, sole.link
+            warnings.warn(
+                f"robot.keypoints.{name}: no shape of '{link}' tells where its sole is, so the origin of its frame is "
+                f"taken; say how far it reaches backwards, forwards and down [m]: {name}: {{link: {link}, sole: "
+                "[0.05, 0.12, 0.035]}",
+                InputWarning,
+                stacklevel=3,
+            )
         keypoints, robot = body_map.keypoints, body_map.robot
         self.carrier = self.soles[0].part.seen_from or ""
         self.link = keypoints.ends[self.carrier].link
