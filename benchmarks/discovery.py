@@ -1,11 +1,13 @@
 """How often detection of a humanoid's mapping is right: on the shipped robots, however their files are written, on
 random humanoids, and on other URDF files.
 
-    python benchmarks/discovery.py [--seeds 0-1000] [--urdfs FOLDER]
+    python benchmarks/discovery.py [--seeds 0-1000] [--strange 0-100] [--urdfs FOLDER]
 
 The shipped robots' hand-written configs are the measure of theirs. A random humanoid counts as right when its joints,
 points (2 cm on an arm of half a metre), up, forward and hands are; where something is wrong, it counts whether a
-question asks about it. Of other files only what was found is printed, as nobody wrote down what is true of them.
+question asks about it. The strange ones are random humanoids too, each with something that only some robots have, and
+some of them are to be refused. Of other files only what was found is printed, as nobody wrote down what is true of
+them.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from mrhubo.robot import read_keypoints
 from mrhubo.robot.discovery import Discovery, discover
 from mrhubo.robot.generator import humanoid
 from mrhubo.robot.generator.score import asked, mistakes
+from mrhubo.robot.generator.strange import STRANGE
 from mrhubo.robot.generator.variants import variant
 from mrhubo.robot.urdf import describe
 from mrhubo.runtime.locations import project_root
@@ -41,18 +44,25 @@ FORMS = {
     },
 }  # fmt: skip
 
+_MOST_TOLD = 200
+
 
 def main(argv: list[str]) -> None:
     """Prints the tables."""
-    options, argv = read_options(argv, seeds="0-1000", urdfs="")
+    options, argv = read_options(argv, seeds="0-1000", strange="0-100", urdfs="")
     if argv:
         sys.exit(f"{argv[0]}: is unknown")
     print_header()
     shipped()
-    first, _, last = options["seeds"].partition("-")
-    made(range(int(first), int(last)))
+    made("random humanoids", [(seed, None) for seed in _range(options["seeds"])])
+    made("strange humanoids", [(seed, kind) for kind in STRANGE for seed in _range(options["strange"])])
     if options["urdfs"]:
         others(Path(options["urdfs"]))
+
+
+def _range(text: str) -> range:
+    first, _, last = text.partition("-")
+    return range(int(first), int(last))
 
 
 def shipped() -> None:
@@ -103,7 +113,7 @@ def position(description, link: str, offset_3: np.ndarray) -> np.ndarray:
     return pose_44[:3, :3] @ offset_3 + pose_44[:3, 3]
 
 
-def made(seeds: range) -> None:
+def made(title: str, seeds: list[tuple[int, str | None]]) -> None:
     """Random humanoids: how many are right, and of what kind those are that are not."""
     groups: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
     faults: collections.Counter[str] = collections.Counter()
@@ -111,24 +121,24 @@ def made(seeds: range) -> None:
     seconds = 0.0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "made.urdf"
-        for seed in seeds:
-            truth = humanoid(seed)
+        for seed, kind in seeds:
+            truth = humanoid(seed, kind)
             path.write_text(truth.urdf)
             start = time.perf_counter()
             try:
                 found = discover(path)
             except UserError:
-                wrong, told = ["refused"], True
+                wrong, told = ["refused"] if truth.mappable else [], True
             else:
-                wrong = mistakes(found, truth, path)
+                wrong = mistakes(found, truth, path) if truth.mappable else ["two arms: not refused"]
                 told = not wrong or asked(found, wrong)
             seconds += time.perf_counter() - start
             outcome = "right" if not wrong else "asks" if told else "wrong"
-            for group in ("all", *truth.told):
+            for group in ("all", *(truth.told if kind is None else [kind])):
                 groups[group][outcome] += 1
             faults.update({phrase.split(":")[0].removeprefix("left_").removeprefix("right_") for phrase in wrong})
             if outcome == "wrong":
-                silent.append(f"{seed}: {'; '.join(wrong)[:160]}")
+                silent.append(f"{seed}{f', {kind}' if kind else ''}: {'; '.join(wrong)[:160]}")
     rows = [
         [
             group,
@@ -137,9 +147,9 @@ def made(seeds: range) -> None:
         ]
         for group, counts in sorted(groups.items())
     ]
-    print_table(["random humanoids", "count", "right [%]", "wrong, asks [%]", "wrong, silent [%]"], rows)
+    print_table([title, "count", "right [%]", "wrong, asks [%]", "wrong, silent [%]"], rows)
     print(f"\n{1000 * seconds / max(len(seeds), 1):.0f} ms each; wrong parts: {dict(faults.most_common())}")
-    for line in silent[:20]:
+    for line in silent[:_MOST_TOLD]:
         print(f"silent {line}")
     print()
 

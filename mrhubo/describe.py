@@ -47,10 +47,12 @@ def main(argv: list[str]) -> int:
     if is_config(word):
         return _draw_config(word, out, options.force)
     from mrhubo.describing.run import describe_model
+    from mrhubo.robot.unsure import needed_answers
 
     described = describe_model(word, out, options.force)
     status = tell(described)
-    print(f"next:     look at the picture, then  mrhubo fit {described.file}")
+    answer = ", answer what is not decided" if needed_answers(described.doubts) else ""
+    print(f"next:     look at the picture{answer}, then  mrhubo fit {described.file}")
     return status
 
 

@@ -17,6 +17,7 @@ DESCRIPTION = (
 )
 
 _METHODS = ("universal", "reference")
+"""The default, and that for robots that stand on feet."""
 
 
 def build_parser() -> CommandParser[None]:
@@ -27,7 +28,10 @@ def build_parser() -> CommandParser[None]:
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
     robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
-    method = "with --robot: `universal`, the network for every robot (default), or `reference`, the optimiser alone"
+    method = (
+        "with --robot: `universal`, the network for every robot (default), or `reference`, the optimiser alone, which"
+        " tells too where a robot with feet goes (default for those)"
+    )
     parser.add_argument("--method", metavar="METHOD", help=method)
     parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help="motion files, and folders of them")
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
@@ -57,7 +61,7 @@ def main(argv: list[str]) -> int:
     from mrhubo.motion import ReadOptions
     from mrhubo.retargeting import Request, find_files, plan_places, retarget_files, table
 
-    method = _method(options.method, options.retargeter)
+    _check_method(options.method, options.retargeter)
     files = find_files([Path(name) for name in options.motion])
     places = plan_places(options.out, options.format, files)
     bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
@@ -69,7 +73,7 @@ def main(argv: list[str]) -> int:
         mirrored=options.mirror,
         joint_order=None if options.joint_order is None else read_joint_order(Path(options.joint_order)),
     )
-    answerer = _answerer(options.retargeter, options.robot, method, options.avoid_collisions)
+    answerer = _answerer(options.retargeter, options.robot, options.method, options.avoid_collisions)
     print(answerer.described)
     outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
     if outcome.summaries:
@@ -85,25 +89,26 @@ def main(argv: list[str]) -> int:
     return print_error(f"{len(sentences)} of {len(files)} motions could not be retargeted: {names}")
 
 
-def _method(method: str | None, package: str | None) -> str:
+def _check_method(method: str | None, package: str | None) -> None:
     if method is None:
-        return _METHODS[0]
+        return
     if method not in _METHODS:
         raise UserError(f"command line: --method: {unknown_name('method', method, _METHODS)}")
     if package is not None:
         raise UserError("command line: --method goes with --robot alone; a package answers by the networks it has")
-    return method
 
 
-def _answerer(package: str | None, robot: str | None, method: str, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
+def _answerer(package: str | None, name: str | None, method: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
     from mrhubo.retargeting import of_package, of_reference, of_universal
 
     if package is not None:
         return of_package(package, avoid_collisions)
     from mrhubo.describing.run import open_robot
 
-    of_robot = {"universal": of_universal, "reference": of_reference}[method]
-    return of_robot(open_robot(str(robot)), avoid_collisions)
+    robot = open_robot(str(name))
+    stands = robot.keypoints is not None and bool(robot.keypoints.standing)
+    of_robot = {"universal": of_universal, "reference": of_reference}[method or _METHODS[stands]]
+    return of_robot(robot, avoid_collisions)
 
 
 if __name__ == "__main__":

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 import mrhubo
+from mrhubo import rotation
 from mrhubo.errors import UserError
-from mrhubo.motion import mirror, read_motion, resample
+from mrhubo.motion import mirror, read_motion, resample, write_motion
 from mrhubo.retarget import main
 from mrhubo.robot_motion import read_robot_motion
 from tests.chain import cut_motion, new_package
 from tests.motion.bvh_writer import Style, write_bvh
+from tests.reference.standing.steppers import squat
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +94,24 @@ def test_a_robot_without_a_package_is_answered(
     found = read_robot_motion(tmp_path / "out" / "wave.npz")
     assert found.robot.made_by == maker and (found.confidence is None) == bool(method) and len(found) == 4
     assert said in capsys.readouterr().out
+
+
+def test_a_whole_bodys_base_is_written(tmp_path: Path) -> None:
+    motion = squat(frames=6)
+    turns_TJ3 = rotation.matrix_to_axis_angle(motion.local_TJ33).flatten(1).numpy()
+    place_T3 = motion.arrays.root_position_T3
+    write_motion(tmp_path / "squat.npz", turns_TJ3, 0 * place_T3, place_T3, 24.0, "squats")
+    given = ["--robot", "nao-whole-body", "--motion", str(tmp_path / "squat.npz"), "--no-avoid-collisions", "--quiet"]
+    assert main([*given, "--out", str(tmp_path / "robot.npz")]) == 0
+    assert main([*given, "--out", str(tmp_path / "qpos.npz"), "--format", "mujoco"]) == 0
+    found, qpos = read_robot_motion(tmp_path / "robot.npz"), np.load(tmp_path / "qpos.npz")["qpos"]
+    assert found.root_position is not None and found.root_quaternion_wxyz is not None
+    assert qpos.shape == (6, 7 + len(found.joint_names))
+    np.testing.assert_allclose(qpos[:, :3], found.root_position, atol=1e-6)
+    np.testing.assert_allclose(qpos[:, 3:7], found.root_quaternion_wxyz, atol=1e-6)
+    # NAO's base lies 0.33 m under its torso, where its feet are when it stands.
+    assert abs(found.root_position[:, 2]).max() < 0.15
+    np.testing.assert_allclose(found.root_quaternion_wxyz, np.tile([1, 0, 0, 0], (6, 1)), atol=1e-5)
 
 
 def test_a_bad_file_among_several_is_told_at_the_end(

@@ -46,7 +46,7 @@ class HandEntry:
 
 @dataclass
 class FrameEntry:
-    """A chest or head fixed to a link; where neither direction is given, write the link alone."""
+    """A chest, pelvis, head or foot fixed to a link; where nothing else is given, write the link alone."""
 
     link: str
     """The link."""
@@ -54,6 +54,9 @@ class FrameEntry:
     """Where it looks, in the link's frame; default [1, 0, 0]."""
     up: WrittenVector | None = left_out()
     """Where its top is, in the link's frame; default [0, 0, 1]."""
+    sole: WrittenVector | None = left_out()
+    """Of a foot, how far its sole reaches from the link's origin backwards, forwards and down, m; default: as its
+    shapes tell."""
 
 
 @dataclass

@@ -16,7 +16,8 @@ from mrhubo.config import flow_yaml
 from mrhubo.errors import listed, printable
 from mrhubo.robot.discovery import Discovery, FoundEnd
 from mrhubo.robot.entries import DEFAULT_AXES
-from mrhubo.robot.parts import CHEST, PARTS, LimbPart, OrientedPart
+from mrhubo.robot.keypoints import entry_names
+from mrhubo.robot.parts import CHEST, UPPER_BODY
 
 _WIDTH = 120
 _FINE = 1e5
@@ -60,7 +61,7 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
 
 def unsure(found: Discovery) -> dict[str, str]:
     """The entries of the config that are guesses, and what was asked about each."""
-    ours, theirs = set(entry_names()), {*found.points, *found.ends, *found.chains}
+    ours, theirs = set(entry_names(UPPER_BODY)), {*found.points, *found.ends, *found.chains}
     chains = {chain for chain, joints in found.chains.items() if set(joints) & set(found.joints)}
     doubts: dict[str, list[str]] = {}
     for question in found.questions:
@@ -74,7 +75,7 @@ def keypoint_entries(found: Discovery) -> dict[str, Any]:
     """What was found, as `robot.keypoints` of a config."""
     ends = {name: end_entry(end) for name, end in found.ends.items()}
     entries = {name: point_entry(point.link, point.offset_3) for name, point in found.points.items()} | ends
-    return {name: entries[name] for name in entry_names() if name in entries}
+    return {name: entries[name] for name in entry_names(UPPER_BODY) if name in entries}
 
 
 def relative(path: Path, file: Path) -> str:
@@ -84,17 +85,6 @@ def relative(path: Path, file: Path) -> str:
     return str(path) if shared == Path(shared.anchor) else os.path.relpath(path, folder)
 
 
-def entry_names() -> list[str]:
-    """The entries that `robot.keypoints` can have, in the order of the table."""
-    names: list[str] = []
-    for part in PARTS:
-        if isinstance(part, LimbPart):
-            names += [part.start, part.end]
-        elif isinstance(part, OrientedPart):
-            names.append(part.name)
-    return list(dict.fromkeys(names))
-
-
 def _questions(found: Discovery) -> Iterator[str]:
     if not found.questions and not found.notes:
         return
@@ -102,7 +92,7 @@ def _questions(found: Discovery) -> Iterator[str]:
     for note in found.notes:
         yield from _comments(0, f"Note: {note}")
     for question in found.questions:
-        among = f" Candidates: {listed(question.candidates)}." if question.candidates else ""
+        among = f"; candidates: {listed(question.candidates)}" if question.candidates else ""
         yield from _comments(0, f"To answer: {question.about}: {question.text}{among}")
 
 

@@ -14,6 +14,8 @@ Legend: B frames of their own, T frames of a motion, D directions, N joints.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor, nn
 
@@ -22,19 +24,20 @@ from mrhubo.fast.together.avoiding import SWEEPS, TOLERANCE
 from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed
-from mrhubo.reference.terms import SelfCollisionTerm, Smoothness
+from mrhubo.reference.terms import SelfCollisionTerm, Smoothness, Term
 from mrhubo.robot import BodyMap
 
 
 class Avoidance(nn.Module):
     """The cost above for one robot, and steps on it; deterministic, each frame's answer is the same in any batch."""
 
-    def __init__(self, body_map: BodyMap) -> None:
+    def __init__(self, body_map: BodyMap, more: Sequence[Term] = ()) -> None:
+        """`more` are terms besides directions, posture and distances; targets below then hold theirs too."""
         super().__init__()
         self.collision = body_map.collision
         clear_P = self.collision.clearance(CLEARANCE)
         self.contact = SelfCollisionTerm(self.collision, CLEARANCE, WEIGHT, clear_P)
-        self.problem = DirectionProblem(body_map, [self.contact])
+        self.problem = DirectionProblem(body_map, [*more, self.contact])
 
     def close(self, q_BN: Tensor) -> Tensor:
         """Which frames (B,) have a pair nearer than its clearance, at joint angles (B, N) [rad]."""

@@ -55,6 +55,11 @@ class OptimizationResult(Answer):
     """What the motion was read from, in words."""
     robot: RobotFacts = field(default_factory=RobotFacts)
     """What is known of the robot, and of who answered."""
+    root_position: Tensor | None = None
+    """Place (T, 3) [m] of the robot's base in the world: x forward, y left, z up, the floor at z = 0; None where the
+    robot has no feet, or the motion tells no root."""
+    root_quaternion_wxyz: Tensor | None = None
+    """Rotation (T, 4) of the base in the world, a unit quaternion, w first; None where there is no place."""
 
 
 def _without_torch(value: Any) -> Any:

@@ -27,6 +27,7 @@ from mrhubo.reference.metrics import angle_between, at_limit_share, direction_er
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import speed_bound
+from mrhubo.reference.standing import HumanSteps, Legs, Stand, Standing, flatten, read_steps
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.terms import REFERENCE_RATE, Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, pick, smooth_motion
@@ -77,6 +78,8 @@ class OptimizationRetargeter(nn.Module):
         self._pool = StartPool(self.problem, starts, seed)
         self._free: CollisionFreeProblem | None = None
         self._avoidance: Avoidance | None = None
+        self._legs = Legs(self.body_map)
+        self._standing = Standing(self._legs) if self._legs.has_feet else None
 
     if TYPE_CHECKING:
 
@@ -90,7 +93,8 @@ class OptimizationRetargeter(nn.Module):
     def forward(
         self, motion: MotionLike, frame_rate: float | None = None, avoid_collisions: bool = False
     ) -> OptimizationResult:
-        """Joint angles of a human motion.
+        """Joint angles of a human motion, and where the base of a robot with feet goes, if the motion tells of its root
+        (`mrhubo.reference.standing`): then planted feet stand flat and stay where they are.
 
         Args:
             motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
@@ -106,9 +110,11 @@ class OptimizationRetargeter(nn.Module):
         """
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
+        steps = read_steps(motion, local_TJ33, self._legs) if isinstance(motion, Motion) else None
+        stand = None if steps is None else self._stand(local_TJ33, steps, avoid_collisions)
         clips = local_TJ33.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [local_TJ33]
         options = (poses.frame_rate, avoid_collisions)
-        answers = [self._solve(clip_TJ33, *options) for clip_TJ33 in clips if len(clip_TJ33)]
+        answers = [stand.q_TN] if stand else [self._solve(clip_TJ33, *options) for clip_TJ33 in clips if len(clip_TJ33)]
         robot = self.body_map.robot
         q_TN = torch.cat(answers) if answers else local_TJ33.new_zeros(0, len(robot.joint_names))
         links = robot.forward(q_TN)
@@ -123,6 +129,7 @@ class OptimizationRetargeter(nn.Module):
             self.body_map.measured_names, poses.frame_rate,
             *((motion.name, motion.source) if isinstance(motion, Motion) else ("", "")),
             robot_facts(robot, "the optimiser of mrhubo", robot.description.kinematics),
+            *((None, None) if stand is None else (stand.position_T3, stand.quaternion_T4)),
         )  # fmt: skip
 
     def _solve(self, local_TJ33: Tensor, frame_rate: float | None, avoid_collisions: bool) -> Tensor:
@@ -131,6 +138,14 @@ class OptimizationRetargeter(nn.Module):
             return self.retarget(local_TJ33, frame_rate, avoid_collisions).q_TN
         q_TN = self.solve_frames(local_TJ33)[0]
         return self.avoidance(q_TN, self._targets(local_TJ33)) if avoid_collisions else q_TN
+
+    def _stand(self, local_TJ33: Tensor, steps: HumanSteps, avoid_collisions: bool) -> Stand:
+        """One motion on the floor."""
+        assert self._standing is not None, "who has no feet has no steps"
+        target_TD3 = flatten(self._targets(local_TJ33), steps, self._legs)
+        rate = steps.frame_rate
+        q_TN = self._motion(target_TD3, self._candidates(target_TD3), rate)
+        return self._standing(q_TN, target_TD3, steps, self._smoothness(rate), avoid_collisions)
 
     @property
     def avoidance(self) -> Avoidance:

@@ -96,7 +96,7 @@ def _check_shared(body_map: BodyMap) -> None:
             )
     seen_from = {part.name: part.seen_from for part in body_map.keypoints.parts}
     for (name, end), (other, same) in itertools.combinations(ends.items(), 2):
-        if end.link != same.link:
+        if end.link != same.link or seen_from[name] is seen_from[other] is None:  # a trunk without a waist
             continue
         if seen_from[other] != name and seen_from[name] != other:
             raise UserError(

@@ -27,6 +27,8 @@ from mrhubo.config import (
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.urdf import Description
 
+_LONGEST_SOLE = 2.0
+"""No robot's sole reaches farther [m]; other units than metres are."""
 DEFAULT_AXES = {"forward": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
 
 
@@ -44,6 +46,8 @@ class End:
 
     link: str
     axes_23: Tensor
+    sole: tuple[float, float, float] | None = None
+    """Of a foot, how far its sole reaches from the link's origin backwards, forwards and down [m], where told."""
 
 
 def read_vector(key: str, value: Any) -> tuple[float, float, float]:
@@ -67,9 +71,9 @@ def read_point(key: str, value: Any) -> Point:
     return Point(entry.link, _offset(entry.offset))
 
 
-def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
+def read_end(key: str, value: Any, words: tuple[str, str], stands: bool = False) -> End:
     """An oriented body part, from the entry of body part `key`: {link: NAME, words[0]: [x, y, z], words[1]: [x, y, z]};
-    forward and up default to x and z.
+    forward and up default to x and z. What stands on the floor may have a `sole` too.
 
     Raises:
         UserError: the entry is of another form, or its directions are one.
@@ -79,7 +83,7 @@ def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
     given = {} if isinstance(entry, str) else {f.name: getattr(entry, f.name) for f in dataclasses.fields(entry)}
     given = {word: numbers for word, numbers in given.items() if numbers is not None}
     for word in given:
-        if word not in ("link", *words):
+        if word not in ("link", *words, *(["sole"] if stands else [])):
             raise UserError(f"{key}: has no '{word}'; it is {form}")
     axes = []
     for word in words:
@@ -91,7 +95,14 @@ def read_end(key: str, value: Any, words: tuple[str, str]) -> End:
         raise UserError(f"{key}: {words[0]} and {words[1]} must be two different directions")
     first = first / first.norm()
     second = second - (first @ second) * first
-    return End(entry if isinstance(entry, str) else entry.link, torch.stack((first, second / second.norm())))
+    sole = read_vector(f"{key}.sole", given["sole"]) if "sole" in given else None
+    if sole is not None and (sole[0] + sole[1] <= 0 or max(map(abs, sole)) > _LONGEST_SOLE):
+        raise UserError(
+            f"{key}.sole: is how far the sole reaches backwards, forwards and down from the link's origin, in metres, "
+            f"for instance [0.05, 0.12, 0.035]; found {list(sole)}"
+        )
+    axes_23 = torch.stack((first, second / second.norm()))
+    return End(entry if isinstance(entry, str) else entry.link, axes_23, sole)
 
 
 def read_mean(key: str, value: Any) -> tuple[dict[str, float], tuple[float, float, float]]:

@@ -74,6 +74,11 @@ class Keypoints:
         both += [(ends[left], ends[right]) for left, right in PAIRED_KEYPOINTS.values() if {left, right} <= ends.keys()]
         return tuple(both)
 
+    @property
+    def standing(self) -> tuple[OrientedPart, ...]:
+        """The parts that stand on the floor."""
+        return tuple(part for part in self.parts if isinstance(part, OrientedPart) and part.stands)
+
     def _row(self, name: str) -> BodyPart:
         return next(part for part in self.parts if part.name == name)
 
@@ -91,10 +96,27 @@ class Keypoints:
         return tuple(found)
 
 
+def _is_alone(part: OrientedPart, ends: Mapping[str, End]) -> bool:
+    """Whether nothing turns a part that a robot has: what carries it is missing, or is the same link."""
+    carrier = ends.get(part.hangs_on or "")
+    return part.by_itself and (carrier is None or carrier.link == ends[part.name].link)
+
+
 def _same(one: Point | End | None, other: Point | End | None) -> bool:
     if isinstance(one, End) and isinstance(other, End):
-        return one.link == other.link and bool(torch.equal(one.axes_23, other.axes_23))
+        return one.link == other.link and one.sole == other.sole and bool(torch.equal(one.axes_23, other.axes_23))
     return one == other
+
+
+def entry_names(table: Sequence[BodyPart] = PARTS) -> tuple[str, ...]:
+    """The entries that `robot.keypoints` can have of some parts, in the order of the table."""
+    names: list[str] = []
+    for part in table:
+        if isinstance(part, LimbPart):
+            names += [part.start, part.end]
+        elif isinstance(part, OrientedPart):
+            names.append(part.name)
+    return tuple(dict.fromkeys(names))
 
 
 def read_keypoints(entries: Mapping[str, Any], table: Sequence[BodyPart] = PARTS) -> Keypoints:
@@ -119,7 +141,11 @@ def read_keypoints(entries: Mapping[str, Any], table: Sequence[BodyPart] = PARTS
             raise UserError(
                 f"robot.keypoints.{limb.end}: needs '{limb.start}' too; a limb is a direction between the two"
             )
-    ends = {name: read_end(name, entries[name], part.words) for name, part in oriented.items() if name in entries}
+    ends = {
+        name: read_end(name, entries[name], part.words, bool(part.stands))
+        for name, part in oriented.items()
+        if name in entries
+    }
     carriers = {limb.name: limb.end for limb in limbs}
     for name in ends:
         point = carriers.get(oriented[name].hangs_on or "")
@@ -127,7 +153,7 @@ def read_keypoints(entries: Mapping[str, Any], table: Sequence[BodyPart] = PARTS
             raise UserError(f"robot.keypoints.{name}: needs '{point}' too")
     there = {limb.name for limb in limbs if limb.end in points} | ends.keys()
     parts = tuple(
-        part
+        part.alone if isinstance(part, OrientedPart) and _is_alone(part, ends) else part
         for part in table
         if part.name in there or (isinstance(part, BendPart) and {part.hangs_on, part.bent} <= there)
     )

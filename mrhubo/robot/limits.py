@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
@@ -90,9 +90,20 @@ def joint_range(path: Path, joint: Joint, narrower: list[float] | None) -> tuple
                 "radians; correct them, or give the joint a range in rad in robot.ranges"
             )
         return lower, upper
-    if narrower[0] < lower - 1e-9 or narrower[1] > upper + 1e-9:
+    if not _too_wide(lower, upper) and (narrower[0] < lower - 1e-9 or narrower[1] > upper + 1e-9):
         raise UserError(f"robot.ranges.{joint.name}: {list(narrower)} leaves {joint.limited_by} {lower} .. {upper}")
     return narrower[0], narrower[1]
+
+
+def in_degrees(joints: Iterable[Joint]) -> bool:
+    """Whether the limits of most joints that turn can only be degrees."""
+    limited = [joint for joint in joints if joint.kind == "revolute" and (joint.lower or 0.0) < (joint.upper or 0.0)]
+    return 2 * sum(map(beyond_turns, limited)) > len(limited) > 0
+
+
+def beyond_turns(joint: Joint) -> bool:
+    """Whether limits lie beyond two turns, and are not so large that they mean none."""
+    return _MOST < max(abs(joint.lower or 0.0), abs(joint.upper or 0.0)) < _NO_LIMIT
 
 
 def _too_wide(lower: float, upper: float) -> bool:
@@ -138,7 +149,8 @@ def held_angle(joint: Joint, wanted: float | None) -> float:
     Raises:
         UserError: what is wanted lies outside the limits, or is in degrees.
     """
-    continuous = joint.kind == "continuous"
+    # Limits that cannot be meant keep it from nothing.
+    continuous = joint.kind == "continuous" or (joint.rotary and _too_wide(joint.lower or 0.0, joint.upper or 0.0))
     lower = -math.inf if joint.lower is None or continuous else joint.lower
     upper = math.inf if joint.upper is None or continuous else joint.upper
     if wanted is None:

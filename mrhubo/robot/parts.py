@@ -2,7 +2,8 @@
 
 A limb runs from one point to another and has one direction; an oriented part (a hand, the head) is fixed to one link
 and has two; a bend axis says about which axis a limb bends. Directions are seen from the part that carries them: those
-of arms and head from the chest, so that neither the way a base faces nor a bent back matters.
+of arms and head from the chest, those of legs and of the chest itself from the pelvis, so that neither the way a base
+faces nor a bent back matters. A robot without a pelvis entry has a chest that carries itself: arms and head alone.
 
 A row says everything about a part: no other module knows one by its name. Rows stand in the order of the directions,
 and a part after the one that it hangs on.
@@ -10,6 +11,7 @@ and a part after the one that it hangs on.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -50,6 +52,11 @@ class BodyPart:
         raise NotImplementedError
 
     @property
+    def direction_weights(self) -> tuple[float, ...]:
+        """The weight of each."""
+        return (self.weight,) * len(self.direction_names)
+
+    @property
     def outer_points(self) -> tuple[str, ...]:
         """The human keypoints that it carries itself."""
         raise NotImplementedError
@@ -87,11 +94,29 @@ class OrientedPart(BodyPart):
     """The human joints that share its turn in equal parts, from the inner one outwards; `joint` is the last."""
     points: tuple[str, ...] = ()
     """The human keypoints that turn with it."""
+    stands: tuple[str, ...] = ()
+    """The human keypoints of its sole, the rear one and the front one; none for what does not stand on the floor."""
+    first_weight: float | None = None
+    """Weight of the first direction, where it is not `weight`."""
+    by_itself: bool = False
+    """Whether a robot may have it without the part that carries it, or on the same link: then it has no directions of
+    its own, and others are seen from it all the same."""
+
+    @property
+    def alone(self) -> OrientedPart:
+        """The same part where nothing on the robot carries it and turns it."""
+        return dataclasses.replace(self, hangs_on=None, seen_from=None, inputs=(), turned_by=(), points=())
 
     @property
     def direction_names(self) -> tuple[str, ...]:
         """The part's name with each of the words; none if nothing sees it."""
         return tuple(f"{self.name}_{word}" for word in self.words) if self.seen_from else ()
+
+    @property
+    def direction_weights(self) -> tuple[float, ...]:
+        """The weights of both."""
+        first = self.weight if self.first_weight is None else self.first_weight
+        return (first, self.weight)[: len(self.direction_names)]
 
     @property
     def outer_points(self) -> tuple[str, ...]:
@@ -138,6 +163,9 @@ def _columns(first: Tensor, second: Tensor) -> Tensor:
 
 _BEND_WEIGHT = 2e-3
 """Of a bend axis, small against a limb's 1: it decides where limbs leave the choice, and does not turn them away."""
+_HEADING_WEIGHT = 0.1
+"""Of where a foot points, against a limb's 1. Thigh, shin and foot ask for seven angles, and most robots' legs have six
+joints: what is missing is taken from here, and not from the limbs or from how flat the sole is."""
 
 
 def _arm(side: str, elbow_axis: Vector) -> tuple[LimbPart, BendPart, LimbPart]:
@@ -162,21 +190,61 @@ def _hand(side: str, outward: Vector) -> OrientedPart:
     )  # fmt: skip
 
 
-CHEST = OrientedPart(name="chest", joint="spine3", region="trunk", words=("forward", "up"), rest=(_FORWARD, _UP))
+def _leg(side: str) -> tuple[LimbPart, BendPart, LimbPart]:
+    hip, knee, ankle = (f"{side}_{joint}" for joint in ("hip", "knee", "ankle"))
+    thigh, shin = f"{side}_thigh", f"{side}_shin"
+    return (
+        LimbPart(name=thigh, joint=hip, region="leg", hangs_on="pelvis", seen_from="pelvis", start=hip, end=knee,
+                 inputs=(hip,)),
+        BendPart(name=f"{side}_knee_axis", joint=hip, region="bend", hangs_on=thigh, seen_from="pelvis", bent=shin,
+                 rest=_LEFT, inputs=(hip,), weight=_BEND_WEIGHT),
+        LimbPart(name=shin, joint=knee, region="leg", hangs_on=thigh, seen_from="pelvis", start=knee, end=ankle,
+                 inputs=(knee,)),
+    )  # fmt: skip
+
+
+def _foot(side: str) -> OrientedPart:
+    ankle = f"{side}_ankle"
+    return OrientedPart(
+        name=f"{side}_foot", joint=ankle, region="foot", hangs_on=f"{side}_shin", seen_from="pelvis",
+        words=("forward", "up"), rest=(_FORWARD, _UP), turned_by=(ankle,), inputs=(ankle,), weight=0.5,
+        first_weight=_HEADING_WEIGHT, points=tuple(f"{side}_{point}" for point in ("foot", "toe", "heel")),
+        stands=(f"{side}_heel", f"{side}_toe"),
+    )  # fmt: skip
+
+
+PELVIS = OrientedPart(
+    name="pelvis", joint="pelvis", region="trunk", words=("forward", "up"), rest=(_FORWARD, _UP), by_itself=True
+)
+CHEST = OrientedPart(
+    name="chest", joint="spine3", region="trunk", hangs_on="pelvis", seen_from="pelvis", words=("forward", "up"),
+    rest=(_FORWARD, _UP), turned_by=("spine1", "spine2", "spine3"), inputs=("spine1", "spine2", "spine3"),
+    points=("neck", "left_shoulder", "right_shoulder"), by_itself=True,
+)  # fmt: skip
 HEAD = OrientedPart(
     name="head", joint="head", region="head", hangs_on="chest", seen_from="chest", words=("forward", "up"),
     rest=(_FORWARD, _UP), turned_by=("neck", "head"), inputs=("neck", "head"), points=("left_eye", "right_eye"),
 )  # fmt: skip
 
 PARTS: tuple[BodyPart, ...] = (
+    PELVIS,
     CHEST,
     *_arm("left", _DOWN),
     *_arm("right", _UP),
     _hand("left", _LEFT),
     _hand("right", _RIGHT),
     HEAD,
+    *_leg("left"),
+    *_leg("right"),
+    _foot("left"),
+    _foot("right"),
 )
 """The table."""
+UPPER_BODY: tuple[BodyPart, ...] = (
+    CHEST.alone,
+    *(part for part in PARTS if part.seen_from == CHEST.name),
+)
+"""What hangs on a chest that carries itself: what packages answer, and what a robot is described by."""
 
 
 def points_beyond(part: BodyPart, table: Sequence[BodyPart] = PARTS) -> tuple[str, ...]:

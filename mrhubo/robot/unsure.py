@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 
 from mrhubo.config import RobotConfig
 from mrhubo.errors import InputWarning, UserError
@@ -16,10 +17,7 @@ def check_unsure(config: RobotConfig) -> None:
     Raises:
         UserError: names the entries.
     """
-    carriers = {part.hangs_on for part in PARTS} | {part.seen_from for part in PARTS}
-    leaves = {part.name for part in PARTS} - carriers
-    needed = [name for name in config.unsure if name not in leaves]
-    if needed:
+    if needed := needed_answers(config.unsure):
         raise UserError(
             f"robot.unsure: {_quoted(needed)} could not be decided when the robot was described; look at the "
             "picture and at these entries, correct what is wrong, and take their names out of the list"
@@ -31,6 +29,13 @@ def check_unsure(config: RobotConfig) -> None:
             InputWarning,
             stacklevel=2,
         )
+
+
+def needed_answers(unsure: Iterable[str]) -> list[str]:
+    """Those of the guesses on which other parts hang: a fit refuses them."""
+    carriers = {part.hangs_on for part in PARTS} | {part.seen_from for part in PARTS}
+    leaves = {part.name for part in PARTS} - carriers
+    return [name for name in unsure if name not in leaves]
 
 
 def _quoted(names: list[str]) -> str:

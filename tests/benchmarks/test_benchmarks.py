@@ -31,6 +31,7 @@ SCRIPTS = [
     "discovery",
     "files",
     "inference",
+    "many_robots",
     "missing_points",
     "pair_pictures",
     "pair_quality",
@@ -182,6 +183,13 @@ def test_reference(run: Run, clips: Path) -> None:
     text = run("reference", "--robots", "nao", *two_clips(clips))
     assert "## nao, 2 clips, " in text
     assert [row[0] for row in rows(text, "output")] == ["q", "q_cf, from q"]
+
+
+def test_many_robots(run: Run, tmp_path: Path) -> None:
+    picture, motion = tmp_path / "many.png", "data/motions/wave.npz"
+    text = run("many_robots", "--robots", "nao", "--urdfs", tmp_path, "--motion", motion, "--out", picture)
+    ((name, *numbers),) = rows(text, "robot")
+    assert name == "nao" and abs(float(numbers[1]) - float(numbers[2])) < 1 and picture.stat().st_size > 1000
 
 
 def test_universal(run: Run, clips: Path, tmp_path: Path) -> None:

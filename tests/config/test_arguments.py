@@ -131,7 +131,10 @@ def test_values() -> None:
         (["a", "x=1", "b"], "command line: the config is given twice, 'a' and 'b'; one is read"),
         (["gone.yaml"], "config file 'gone.yaml' does not exist; "),
         (["nap"], "config 'nap' does not exist; nearest: 'nao'"),
-        (["atlas"], "config 'atlas' does not exist; available: coman, nao, paper/coman, "),
+        (
+            ["atlas"],
+            "config 'atlas' does not exist; available: coman, coman-whole-body, g1-whole-body, nao, nao-whole-body, ",
+        ),
         (["no/mine.yaml"], "config file 'no/mine.yaml' does not exist, nor does its folder"),
         (["gone/conf/nao"], "config 'gone/conf/nao' does not exist"),
         (["steps"], "command line: 'steps' is a key: write steps=VALUE"),

@@ -1,12 +1,11 @@
 """Legs, feet, a pelvis and a waist are rows of the table of body parts and nothing more: a robot that has them is solved.
 
-The shipped table has no such rows yet. The robot hangs at its pelvis, or at its chest: then the waist's joint is above
-the legs.
+The robot hangs at its pelvis, or at its chest: then the waist's joint is above the legs. Its waist is one joint, or it
+has none: then pelvis and chest are held against each other.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import pytest
@@ -14,107 +13,20 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body import BodyPrior, Skeleton
+from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.reference import DirectionJacobian, OptimizationRetargeter
-from mrhubo.robot import BodyMap, Limb, Robot, align_pose, read_keypoints
-from mrhubo.robot.parts import PARTS, BodyPart, LimbPart, OrientedPart
+from mrhubo.robot import BodyMap, Limb, align_pose, read_keypoints
+from tests.reference.walkers import ROOTS, entries, walker
 
-FORWARD, UP = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
-PELVIS = OrientedPart(name="pelvis", joint="pelvis", region="trunk", words=("forward", "up"), rest=(FORWARD, UP))
-
-
-def leg(side: str) -> tuple[BodyPart, ...]:
-    """Thigh, shin and foot of a side."""
-    hip, knee, ankle = (f"{side}_{name}" for name in ("hip", "knee", "ankle"))
-    return (
-        LimbPart(name=f"{side}_thigh", joint=hip, region="leg", hangs_on="pelvis", seen_from="pelvis",
-                 start=hip, end=knee, inputs=(hip,)),
-        LimbPart(name=f"{side}_shin", joint=knee, region="leg", hangs_on=f"{side}_thigh", seen_from="pelvis",
-                 start=knee, end=ankle, inputs=(knee,)),
-        OrientedPart(name=f"{side}_foot", joint=ankle, region="foot", hangs_on=f"{side}_shin", seen_from="pelvis",
-                     words=("forward", "up"), rest=(FORWARD, UP), turned_by=(ankle,), inputs=(ankle,), weight=0.5,
-                     points=(f"{side}_foot", f"{side}_toe", f"{side}_heel")),
-    )  # fmt: skip
+FORWARD = (0.0, 0.0, 1.0)
 
 
-LEGS = (*PARTS, PELVIS, *leg("left"), *leg("right"))
-"""The table with legs, seen from the pelvis; arms are seen from the chest as ever."""
-
-
-def waist(table: tuple[BodyPart, ...]) -> tuple[BodyPart, ...]:
-    """The table with a chest that is seen from the pelvis."""
-    chest = dataclasses.replace(
-        table[0], hangs_on="pelvis", seen_from="pelvis", inputs=("spine1", "spine2", "spine3"),
-        turned_by=("spine1", "spine2", "spine3"), points=("neck", "left_shoulder", "right_shoulder"),
-    )  # fmt: skip
-    assert chest.name == "chest"
-    return (PELVIS, chest, *(part for part in table if part.name not in ("pelvis", "chest")))
-
-
-def write_urdf(path: Path, root: str = "pelvis") -> Path:
-    """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs."""
-    limit = '<limit lower="{}" upper="{}" effort="1" velocity="10"/>'
-
-    def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float, high: float) -> str:
-        return (f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-                f'<origin xyz="{xyz}"/><axis xyz="{axis}"/>{limit.format(low, high)}</joint>')  # fmt: skip
-
-    up = root == "pelvis"
-    above, below = ("pelvis", "chest") if up else ("chest", "pelvis")
-    rows = [joint("waist", above, below, f"0 0 {0.2 if up else -0.2}", f"0 0 {1 if up else -1}", -1, 1)]
-    for side, y in (("l", 1), ("r", -1)):
-        rows += [
-            joint(f"{side}_hip_yaw", "pelvis", f"{side}_yaw", f"0 {0.08 * y} -0.1", "0 0 1", -0.6, 0.6),
-            joint(f"{side}_hip_roll", f"{side}_yaw", f"{side}_roll", "0 0 0", "1 0 0", -0.5, 0.5),
-            joint(f"{side}_hip_pitch", f"{side}_roll", f"{side}_thigh", "0 0 0", "0 1 0", -1.6, 0.6),
-            joint(f"{side}_knee", f"{side}_thigh", f"{side}_shin", "0 0 -0.3", "0 1 0", 0.05, 2.2),
-            joint(f"{side}_ankle", f"{side}_shin", f"{side}_foot", "0 0 -0.3", "0 1 0", -0.9, 0.6),
-            joint(f"{side}_shoulder_pitch", "chest", f"{side}_upper", f"0 {0.15 * y} 0.2", "0 1 0", -2, 2),
-            joint(f"{side}_shoulder_roll", f"{side}_upper", f"{side}_arm", "0 0 0", "1 0 0", -1.5, 1.5),
-            joint(f"{side}_elbow", f"{side}_arm", f"{side}_fore", "0 0 -0.25", "0 1 0", -2, -0.05),
-        ]
-    links = ["pelvis", "chest", *(f"{s}_{n}" for s in "lr" for n in ("yaw", "roll", "thigh", "shin", "foot", "upper",
-                                                                     "arm", "fore"))]  # fmt: skip
-    path.write_text(f'<robot name="walker">{"".join(f"<link name={chr(34)}{n}{chr(34)}/>" for n in links)}{"".join(rows)}'
-                    "</robot>")  # fmt: skip
-    return path
-
-
-def entries() -> dict[str, object]:
-    """`robot.keypoints` of the robot."""
-    found: dict[str, object] = {"pelvis": "pelvis", "chest": "chest"}
-    for side, s in (("left", "l"), ("right", "r")):
-        found |= {
-            f"{side}_hip": f"{s}_thigh", f"{side}_knee": f"{s}_shin", f"{side}_ankle": f"{s}_foot",
-            f"{side}_foot": {"link": f"{s}_foot", "forward": [1, 0, 0], "up": [0, 0, 1]},
-            f"{side}_shoulder": f"{s}_upper", f"{side}_elbow": f"{s}_fore",
-            f"{side}_wrist": {"link": f"{s}_fore", "offset": [0, 0, -0.2]},
-        }  # fmt: skip
-    return found
-
-
-WAIST = waist(LEGS)
-TABLES = {"legs": LEGS, "legs and waist": WAIST}
-ROOTS = ["pelvis", "chest"]
-
-
-def walker(folder: Path, table: tuple[BodyPart, ...] = LEGS, root: str = "pelvis") -> BodyMap:
-    """The body map of the robot; the waist is one of its joints where the table has a waist."""
-    urdf = write_urdf(folder / f"walker_{root}.urdf", root)
-    names = [f"{s}_{n}" for s in "lr" for n in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle", "shoulder_pitch",
-                                                "shoulder_roll", "elbow")]  # fmt: skip
-    has_waist = any(part.name == "chest" and part.seen_from for part in table)
-    keypoints = read_keypoints(entries(), table)
-    robot = Robot(urdf, [*(["waist"] if has_waist else []), *names], keypoints.links)
-    return BodyMap.of(robot, keypoints, Skeleton())
-
-
-@pytest.fixture(params=[(table, root) for table in TABLES for root in ROOTS], ids="-".join)
+@pytest.fixture(params=[(root, waist) for root in ROOTS for waist in (True, False)], ids=lambda p: f"{p[0]}-{p[1]}")
 def body_map(request: pytest.FixtureRequest, tmp_path: Path) -> BodyMap:
-    table, root = request.param
-    return walker(tmp_path, TABLES[table], root)
+    root, waist = request.param
+    return walker(tmp_path, root, waist)
 
 
 def robot_directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
@@ -192,6 +104,9 @@ def test_a_human_who_squats_and_turns_is_followed(body_map: BodyMap) -> None:
     local_TJ33 = rotation.axis_angle_to_matrix(turn)
     result = OptimizationRetargeter(body_map).retarget(local_TJ33, 24.0)
     assert result.jumps == 0
+    robot = body_map.robot
+    assert bool(((result.q_TN >= robot.lower_N) & (result.q_TN <= robot.upper_N)).all())
+    assert bool((24 * result.q_TN.diff(dim=0).abs() <= robot.velocity_N).all())
     legs = [body_map.measured.index(i) for i in columns(body_map, "leg", "foot", "trunk")]
     assert float(result.residual_deg_TD[:, legs].mean()) < 3
     knee_T = result.q_TN[:, body_map.robot.joint_names.index("l_knee")]
@@ -237,6 +152,16 @@ def test_a_human_is_turned_until_he_points_there(body_map: BodyMap) -> None:
     torch.testing.assert_close(found_BD3[:, shown], wanted_BD3[:, shown], atol=2e-4, rtol=0)
 
 
+def test_a_foots_heading_gives_way_to_its_leg(body_map: BodyMap) -> None:
+    """Hip, knee and one ankle joint cannot turn a foot out: the sole stays flat, and the shin where it was."""
+    turn = torch.zeros(1, len(POSED_JOINT_NAMES), 3)
+    turn[:, POSED_JOINT_NAMES.index("left_knee"), 0] = 1.0
+    turn[:, POSED_JOINT_NAMES.index("left_ankle"), 1] = 0.6
+    result = OptimizationRetargeter(body_map).retarget(rotation.axis_angle_to_matrix(turn), 24.0)
+    off = dict(zip(body_map.measured_names, result.residual_deg_TD[0].tolist(), strict=True))
+    assert off["left_foot_forward"] > 15 and max(off["left_knee"], off["left_ankle"]) < 5
+
+
 def test_input_joints_are_those_of_the_rows(body_map: BodyMap) -> None:
     legs = {f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")}
     assert legs <= set(body_map.input_joints()) <= set(JOINT_NAMES)
@@ -246,8 +171,8 @@ def test_input_joints_are_those_of_the_rows(body_map: BodyMap) -> None:
 def test_a_foot_needs_its_shin_and_a_leg_its_pelvis() -> None:
     some = entries()
     with pytest.raises(UserError, match="robot.keypoints.left_foot: needs 'left_ankle' too"):
-        read_keypoints({name: entry for name, entry in some.items() if name != "left_ankle"}, LEGS)
+        read_keypoints({name: entry for name, entry in some.items() if name != "left_ankle"})
     with pytest.raises(UserError, match="'pelvis' is missing; name the link that carries 'left_hip'"):
-        read_keypoints({name: entry for name, entry in some.items() if name != "pelvis"}, LEGS)
-    with pytest.raises(UserError, match="body part 'left_hip' does not exist"):
-        read_keypoints({name: some[name] for name in ("chest", "left_hip")})
+        read_keypoints({name: entry for name, entry in some.items() if name != "pelvis"})
+    with pytest.raises(UserError, match="body part 'left_hop' does not exist; nearest: 'left_hip'"):
+        read_keypoints({name: some["left_hip"] for name in ("chest", "left_hop")})

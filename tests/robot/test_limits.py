@@ -52,8 +52,14 @@ YAW = 'lower="-1.5" upper="1.5"'
 def test_limits_that_cannot_be_meant_ask_for_a_range(pair: Pair, limits: str, message: str) -> None:
     with pytest.raises(UserError, match=message):
         build_body_map(pair(within("l_yaw", YAW, limits)))
-    if "impossible" not in message and "170" not in limits:
+    if "impossible" not in message:
         assert limits_of(pair(within("l_yaw", YAW, limits), ranges={"l_yaw": [-1.0, 1.25]})) == (-1.0, 1.25)
+
+
+def test_a_joint_whose_limits_are_in_degrees_is_held_at_zero(pair: Pair) -> None:
+    limits = 'lower="-1.5" upper="1.5"'
+    assert build_body_map(pair(within("neck", limits, 'lower="5" upper="120"'))).robot.held["neck"] == 0.0
+    assert build_body_map(pair(within("neck", limits, 'lower="0.5" upper="1.2"'))).robot.held["neck"] == 0.5
 
 
 def test_two_turns_are_a_range(pair: Pair) -> None:

@@ -25,7 +25,9 @@ class DirectionTerm(Term):
     def __init__(self, kinematics: DirectionJacobian) -> None:
         super().__init__()
         self.kinematics = kinematics
-        weights = [direction.part.weight for direction in kinematics.body_map.directions]
+        parts = kinematics.body_map.keypoints.parts
+        of = {name: w for p in parts for name, w in zip(p.direction_names, p.direction_weights, strict=True)}
+        weights = [of[direction.name] for direction in kinematics.body_map.directions]
         partial = [float(i in kinematics.body_map.shared.bend_columns) for i in range(len(weights))]
         self.register_buffer("partial_D", torch.tensor(partial).to(kinematics.robot.lower_N), persistent=False)
         self.register_buffer("weight_D", torch.tensor(weights).to(kinematics.robot.lower_N), persistent=False)
@@ -39,8 +41,9 @@ class DirectionTerm(Term):
         (B, D).
         """
         direction_BD3, jacobian_BD3N = self.kinematics.at(state.poses)
-        length_BD = torch.where(self.partial_D > 0, state.target_BD3.norm(dim=-1), 1.0)
-        miss_BD3 = direction_BD3 - state.target_BD3 / length_BD.clamp_min(1e-6)[..., None]
+        target_BD3 = state.target_BD3[:, : len(self.weight_D)]  # other terms' targets come after
+        length_BD = torch.where(self.partial_D > 0, target_BD3.norm(dim=-1), 1.0)
+        miss_BD3 = direction_BD3 - target_BD3 / length_BD.clamp_min(1e-6)[..., None]
         return miss_BD3, jacobian_BD3N, self.weight_D * length_BD
 
     def add_to(self, model: Quadratic | None, state: State, blocks: Blocks) -> Quadratic:

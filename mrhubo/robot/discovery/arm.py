@@ -15,16 +15,24 @@ import numpy as np
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow, rival
 from mrhubo.robot.discovery.gripper import without_hand
-from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine, unit
+from mrhubo.robot.discovery.limbs import ways_on
+from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
+_SHORT, _NAMED = 0.6, 0.5
+"""How long a forearm is usually at least, as a share of the upper arm, and one whose twist is called a wrist's: shorter
+ones are asked about where no joint that swings tells the wrist."""
 _TWIST_SINE, _TWIST_MISS = 0.42, 0.35
 """Of a twist axis: sine of its angle to the limb (25 degrees), and how far it may pass a limb's other end, as a share
 of its length."""
+_ACROSS = 0.7
+"""Sine of the angle between a twist axis and the elbow's hinge at the least: 45 degrees."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+_FINGER = 0.4
+"""How far fingers reach at most, as a share of the arm along its axes."""
 GUESS = 0.45
 """How sure a choice is between two that are about as good: asked about."""
 
@@ -76,6 +84,7 @@ class Arm:
 
 def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     """Roles and points of an arm's joints; None if it has no elbow."""
+    branches = long_branches(bodies, chain, _FINGER)
     chain, left_out = without_hand(bodies, chain)
     elbow_at = find_elbow(bodies, chain)
     if elbow_at is None:
@@ -107,7 +116,21 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     if other is not None:
         why = f"; '{other}' may as well be the elbow"
         shoulder, elbow, wrist = (doubted(spot, why) for spot in (shoulder, elbow, wrist))
+    if branches:
+        shoulder, elbow, wrist = (doubted(spot, branches) for spot in (shoulder, elbow, wrist))
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
+
+
+def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
+    """What is to be said of a limb that ends in branches longer than a share of it, one of which may be its rest, while
+    another is a linkage; nothing if none is as long.
+    """
+    way = float(measure(lines_of(chain)).out_N[-1])
+    onward = ways_on(bodies, chain[-1])
+    if not any(bodies.extent(on) > share * way for on in onward):
+        return ""
+    among = " and ".join(f"'{on.hinge.name}'" for on in onward)
+    return f"; the limb was taken to end where {among} begin, one of which may go on with it"
 
 
 def _twist(lines: list[Line], elbow_at: int) -> int | None:
@@ -115,7 +138,7 @@ def _twist(lines: list[Line], elbow_at: int) -> int | None:
     if elbow_at < 1:
         return None
     twist, hinge = lines[elbow_at - 1], lines[elbow_at]
-    if elbow_at == 1:
+    if elbow_at == 1 or sine(twist.axis_3, hinge.axis_3) < _ACROSS:
         return None
     foot_3 = feet(twist, hinge)[1]
     before_3 = feet(lines[elbow_at - 2], twist)[0]
@@ -200,9 +223,15 @@ def _wrist(
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))
         # Where the twist passes the elbow at a distance, the forearm's direction depends on how far out its end is.
         farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
-        if outward > _OUT * upper and farther:
+        # A hand that is fixed beyond a twist near the elbow tells more of the forearm's length.
+        fixed_hand = sure > GUESS and math.dist(end_3, elbow.point_3) > _SHORT * upper > outward
+        if outward > _OUT * upper and farther and not fixed_hand:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
+        step = chain[twist_at]
+        named = any(speaks_of(name, "wrist") for name in (step.hinge.name, step.outer_link))
+        if math.dist(end_3, elbow.point_3) < (_NAMED if named else _SHORT) * upper:
+            sure, how = min(sure, GUESS), f"{how}, which makes a short forearm"
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
 
 

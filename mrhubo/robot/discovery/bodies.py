@@ -8,6 +8,7 @@ Legend: all poses in the root link's frame with every joint at 0.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,9 +17,6 @@ import numpy as np
 from mrhubo.robot.discovery.lines import Line
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import Description
-
-_DOMINANT = 2.5
-"""How many times longer than any other branch the one must be in which a limb goes on; else it ends, as a hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +98,12 @@ class Bodies:
     body_of: dict[str, int]
     """By link."""
     hinges: tuple[Hinge, ...]
+    degrees: bool = False
+    """Whether the file's limits are in degrees; those of the hinges are in radians all the same."""
+    gains: Mapping[str, float] = field(default_factory=dict)
+    """By hinge: how much farther a limb turns than its joint, where a second hinge follows; 1 for all others."""
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
-    _nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
+    nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
     _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -153,6 +155,10 @@ class Bodies:
         centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
         return np.average(centres, axis=0, weights=[mass[0] for _, mass in found])
 
+    def weight(self, body: int) -> float:
+        """Mass of a body [kg]; 0 if the file gives none."""
+        return sum(self.description.masses[link][0] for link in self.links_of[body] if link in self.description.masses)
+
     def middle(self, body: int) -> np.ndarray:
         """About where a body is (3,): its centre of mass, else the mean of its corners."""
         centre_3 = self.centre(body)
@@ -198,50 +204,24 @@ class Bodies:
 
     def extent(self, step: Step) -> float:
         """How far the longest chain reaches beyond a joint, from body to body along joint origins and link ends [m]."""
-        if _key(step) in self._extents:
-            return self._extents[_key(step)]
+        if key_of(step) in self._extents:
+            return self._extents[key_of(step)]
         pending = [step]  # not a function that calls itself: a file may have thousands of joints in a row
         while pending:
             here = pending[-1]
             onward = self.onward(here)
-            if missing := [on for on in onward if _key(on) not in self._extents]:
+            if missing := [on for on in onward if key_of(on) not in self._extents]:
                 pending += missing
                 continue
             pending.pop()
             here_3 = self.position(here.outer_link)
             own = max(float(np.linalg.norm(self.position(link) - here_3)) for link in self.links_of[here.end])
             further = [
-                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self._extents[_key(on)] for on in onward
+                float(np.linalg.norm(self.position(on.outer_link) - here_3)) + self._extents[key_of(on)]
+                for on in onward
             ]
-            self._extents[_key(here)] = max([own, *further])
-        return self._extents[_key(step)]
-
-    def chain(self, step: Step) -> Chain:
-        """The limb that begins with a joint: outwards until it ends, or branches into what is alike (fingers)."""
-        found: dict[tuple[int, str], Step] = {}
-        on: Step | None = step
-        while on is not None and _key(on) not in found:
-            found[_key(on)] = on
-            on = self._next(on)
-        return tuple(found.values())
-
-    def _next(self, step: Step) -> Step | None:
-        """The joint with which a limb goes on; None where it ends or branches."""
-        key = _key(step)
-        if key not in self._nexts:
-            onward = [on for on in self.onward(step) if not self._idle(on)]
-            reach = {on.hinge.name: self._reach(step, on) for on in onward}
-            onward.sort(key=lambda on: (-reach[on.hinge.name], on.hinge.name))
-            alike = [on for on in onward[1:] if _DOMINANT * reach[on.hinge.name] > reach[onward[0].hinge.name]]
-            self._nexts[key] = onward[0] if onward and not alike else None
-        return self._nexts[key]
-
-    def _reach(self, last: Step, on: Step) -> float:
-        return self.extent(on) + float(np.linalg.norm(self.position(on.outer_link) - self.position(last.outer_link)))
-
-    def _idle(self, step: Step) -> bool:
-        """Whether a branch has no rotary joint driven by itself: a linkage, mimicking fingers, a sliding jaw."""
-        return not any(hinge.free and hinge.rotary for hinge in self.beyond(step)[1])
+            self._extents[key_of(here)] = max([own, *further])
+        return self._extents[key_of(step)]
 
     def path(self, start: int, end: int) -> Chain:
         """The joints from one body to another."""
@@ -268,5 +248,6 @@ class Bodies:
         return max(float(np.linalg.norm(points.max(0) - points.min(0))), 1e-6)
 
 
-def _key(step: Step) -> tuple[int, str]:
+def key_of(step: Step) -> tuple[int, str]:
+    """By which a step is remembered."""
     return step.start, step.hinge.name

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands
-from mrhubo.robot.discovery.arm import Arm, Spot, read_arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
+from mrhubo.robot.discovery.arm import Spot, read_arm
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
-from mrhubo.robot.discovery.lines import cross
-from mrhubo.robot.discovery.motion import bend_side, straight_angle
+from mrhubo.robot.discovery.ranges import driver, find_ranges
 from mrhubo.robot.discovery.reading import read_bodies
 from mrhubo.robot.discovery.result import (
     Candidate,
@@ -25,23 +22,17 @@ from mrhubo.robot.discovery.result import (
     FoundAxis,
     FoundEnd,
     FoundPoint,
-    FoundRange,
     Question,
     Vector,
 )
 from mrhubo.robot.discovery.roles import Roles, find_roles
 from mrhubo.robot.discovery.symmetry import find_pairs
-from mrhubo.robot.joint import drive
+from mrhubo.robot.limits import beyond_turns
 from mrhubo.robot.urdf import Description, describe
 
 SIDES = ("left", "right")
 _SURE = 0.5
 """Confidence under which the user is asked."""
-_BENDS = 0.1
-"""How far an elbow must bend the other way [rad] for its range to be narrowed."""
-_TURN = math.pi
-_MOST = 14.0
-"""Limits wider than that mean none (`robot.limits`)."""
 _ZERO = 1e-5
 
 
@@ -86,10 +77,10 @@ class _Finder:
 
     def found(self) -> Discovery:
         """The result."""
-        ranges, asked = self._ranges()
+        ranges, asked = find_ranges(self.bodies, self.arms, self.roles.neck, self.heading.forward_3)
         joints = self._joints()
         held = dict(self._held(joints))
-        questions = [*self._questions(), *asked]
+        questions = [*self._questions(), *asked, *self._coupled()]
         points = dict(self._points())
         return Discovery(
             name=_short_name(self.bodies.description),
@@ -186,18 +177,8 @@ class _Finder:
     def _joints(self) -> tuple[str, ...]:
         moved = [arm.chain if side in self.hands else arm.chain[: arm.elbow_at + 1] for side, arm in self.arms.items()]
         steps = [step for chain in (*moved, self.roles.neck) for step in chain]
-        found = [hinge.name for step in steps if (hinge := self._driver(step)) is not None and hinge.rotary]
+        found = [hinge.name for step in steps if (hinge := driver(self.bodies, step)) is not None and hinge.rotary]
         return tuple(dict.fromkeys(found))
-
-    def _driver(self, step: Step) -> Hinge | None:
-        """The joint by which one of a limb is driven: itself, or the one that it mimics, as behind a gear."""
-        if step.hinge.free:
-            return step.hinge
-        try:
-            name = drive(self.bodies.description.joints, step.hinge.name).joint
-        except UserError:  # told where it matters
-            return None
-        return next((hinge for hinge in self.bodies.hinges if hinge.name == name), None)
 
     def _held(self, joints: tuple[str, ...]) -> Iterator[tuple[str, str]]:
         for step in self.roles.waist:
@@ -239,55 +220,6 @@ class _Finder:
                 why = "it mimics another joint" if not hinge.free else "on no limb: a wheel, sensor or linkage"
             yield hinge.name, why
 
-    def _ranges(self) -> tuple[dict[str, FoundRange], list[Question]]:
-        found: dict[str, FoundRange] = {}
-        asked: list[Question] = []
-        for step in (step for chain in (*(arm.chain for arm in self.arms.values()), self.roles.neck) for step in chain):
-            hinge = self._driver(step)
-            if hinge is not None and hinge.rotary and not _limits_meant(hinge.lower, hinge.upper):
-                found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
-        for side, arm in self.arms.items():
-            narrowed, question = self._elbow_range(side, arm, found)
-            if narrowed is not None:
-                found[arm.chain[arm.elbow_at].hinge.name] = narrowed
-            if question is not None:
-                asked.append(question)
-        return found, asked
-
-    def _elbow_range(
-        self, side: str, arm: Arm, known: Mapping[str, FoundRange]
-    ) -> tuple[FoundRange | None, Question | None]:
-        """The human side of an elbow that bends both ways."""
-        step = arm.chain[arm.elbow_at]
-        name = step.hinge.name
-        if name in known:
-            lower, upper = known[name].lower, known[name].upper
-        else:
-            lower, upper = float(step.hinge.lower or 0.0), float(step.hinge.upper or 0.0)
-        axis_3 = step.sign * step.hinge.line.axis_3
-        upper_3, fore_3 = arm.elbow.point_3 - arm.shoulder.point_3, arm.wrist.point_3 - arm.elbow.point_3
-        straight = straight_angle(axis_3, fore_3, upper_3)
-        straight = min(
-            (straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper)
-        )
-        if min(straight - lower, upper - straight) < _BENDS:
-            return None, None
-        share = bend_side(lower, upper, straight)
-        above = share > 0
-        question = None
-        if abs(share) < 0.1:
-            moved_3 = cross(axis_3, upper_3)
-            ahead = float(moved_3 @ self.heading.forward_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
-            above = ahead > 0
-            if abs(ahead) < 0.3:
-                text = (
-                    f"'{name}' bends as far one way as the other, and nothing tells which is a human's; narrow it in "
-                )
-                question = Question(f"{side}_elbow", f"{text}robot.ranges if the arm bends backwards", (name,))
-        ends = (straight, upper) if above else (lower, straight)
-        why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human elbow one way; straight is at {straight:.2f}"
-        return FoundRange(float(ends[0]), float(ends[1]), why), question
-
     def _questions(self) -> Iterator[Question]:
         heading, roles = self.heading, self.roles
         if heading.forward_sure < _SURE:
@@ -307,7 +239,26 @@ class _Finder:
             if hand.doubt is not None:
                 yield Question(f"{side}_hand", f"{hand.doubt}; taken: {hand.cue}", (hand.link,))
 
+    def _coupled(self) -> Iterator[Question]:
+        """Joints of arms and neck that mimic others of them: as a file may have it that is for a show of one arm."""
+        chains = [*(arm.chain for arm in self.arms.values()), self.roles.neck]
+        whole = {step.hinge.name for chain in chains for step in chain}
+        for step in (step for chain in chains for step in chain if not step.hinge.free):
+            source = driver(self.bodies, step)
+            if source is not None and source.name in whole:
+                name = step.hinge.name
+                yield Question(name, f"'{name}' mimics '{source.name}', so neither follows a person by itself; if they "
+                               f"can on the robot, take the <mimic> element of '{name}' out of the URDF and "
+                               "describe it anew")  # fmt: skip
+
     def _notes(self) -> Iterator[str]:
+        if self.bodies.degrees:
+            joint = next(j for j in self.bodies.description.joints.values() if j.kind == "revolute" and beyond_turns(j))
+            yield (
+                f"the limits of most joints, as {joint.lower:g} .. {joint.upper:g} of '{joint.name}', can only be "
+                "degrees, where a URDF has radians; robot.ranges holds them in radians, and nothing else need be done "
+                "here, but other programs need a URDF with every limit times 0.0174533"
+            )
         for what in self.heading.contradicted:
             yield f"against where the robot was found to face speaks: {what}"
 
@@ -315,10 +266,6 @@ class _Finder:
         steps = [step for arm in self.arms.values() for step in arm.chain]
         links = [step.outer_link for step in (*steps, *self.roles.neck[-1:])]
         return tuple(dict.fromkeys(links))
-
-
-def _limits_meant(lower: float | None, upper: float | None) -> bool:
-    return lower is not None and upper is not None and upper - lower <= _MOST and max(abs(lower), abs(upper)) <= _MOST
 
 
 def _vector(numbers_3: np.ndarray) -> Vector:

@@ -7,6 +7,8 @@ import numpy as np
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.lines import LEAST, ON, measure
 
+WRIST_JOINTS = 3
+"""Joints beyond an elbow that an arm can have: a twist and two swings."""
 _HAND = 0.5
 """How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
 _CLOSE = 0.8
@@ -24,7 +26,14 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
     if scores is None:
         return None
     near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
-    return max(near, key=lambda i: (min(i, _BEFORE), scores[i]))  # of those about as good, one with a whole shoulder
+    # Of those about as good, one with a whole shoulder before it, and no more beyond it than a wrist has.
+    return max(near, key=lambda i: (min(i, _BEFORE), len(chain) - i - 1 <= WRIST_JOINTS, scores[i]))
+
+
+def elbow_reach(bodies: Bodies, chain: Chain) -> float:
+    """How long the shorter one of upper arm and forearm is about [m], whichever joint is the elbow; 0 without one."""
+    scores = _elbow_scores(bodies, chain)
+    return 0.0 if scores is None else float(scores.max())
 
 
 def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:

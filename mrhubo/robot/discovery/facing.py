@@ -6,7 +6,7 @@ Up is told by legs and trunk, not by the file's z; a base may lie on its back. F
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,9 @@ from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross, unit
-from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
+from mrhubo.robot.discovery.motion import reach_middle
 from mrhubo.robot.discovery.roles import Roles
+from mrhubo.robot.discovery.votes import NAMES, Vote, forward_votes
 
 _BELOW = 0.2
 """How far below the shoulders a head may be, as a share of the arm: some robots carry their arms high."""
@@ -25,17 +26,14 @@ _UNSURE = 0.3
 """Up less sure than that tells nothing of necks."""
 _AGREED = 1.5
 """How much it counts that all joints and frames agree on a direction, against what tells up only roughly."""
+_OPPOSED = 0.3
+"""How much all other votes must speak against the names of the sides to make them doubtful."""
+_TRUNK = 0.6
+"""How long a trunk is, as a share of the arm, that tells more than the legs."""
+_AGAINST, _HEAVY, _DOUBTED = 0.3, 2.0, 0.45
+"""Cosine under which a cue speaks against where up is, how much one has to count, and how sure up is then at most."""
 _SAME = 0.9986
 """Cosine of 3 degrees: directions that mean the same one."""
-
-
-@dataclass(frozen=True)
-class Vote:
-    """What one thing says, from -1 (against) to 1 (for), and how much it counts."""
-
-    what: str
-    value: float
-    weight: float
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
     normal_3 = _normal(bodies, roles)
     up_3, up_sure, up_cue = _up(bodies, roles, arms, legs, normal_3)
     forward_3 = cross(normal_3, up_3)
-    votes = list(_forward_votes(bodies, roles, arms, legs, up_3, forward_3, normal_3))
+    votes = list(forward_votes(bodies, roles, arms, legs, up_3, forward_3, normal_3))
     votes = [vote for vote in votes if abs(vote.value) > 0.1]
     total = sum(vote.weight for vote in votes)
     score = sum(vote.weight * vote.value for vote in votes)
@@ -97,7 +95,17 @@ def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg])
     cue = ", ".join(vote.what for vote in fors[:4]) or "nothing tells it; a guess"
     # Three points of weight all one way are certain; a tie, or nothing, is a guess.
     sure = float(np.clip(abs(score) / 3.0, 0.0, 1.0) * (abs(score) / max(total, 1e-9)) ** 0.5) if votes else 0.0
+    if total and _names_alone(votes, sign):
+        sure = min(sure, _DOUBTED)
     return Heading(up_3, sign * normal_3, sign * forward_3, up_sure, sure, up_cue, cue, swap, against)
+
+
+def _names_alone(votes: list[Vote], sign: float) -> bool:
+    """Whether all else, taken together, speaks against the names of the sides: they may be those that somebody sees who
+    stands before the robot.
+    """
+    others = sum(vote.weight * vote.value for vote in votes if vote.what != NAMES)
+    return any(vote.what == NAMES and vote.value * sign > 0 for vote in votes) and others * sign < -_OPPOSED
 
 
 def _normal(bodies: Bodies, roles: Roles) -> np.ndarray:
@@ -130,7 +138,10 @@ def _up(
     if legs:
         hips_3 = np.mean([leg.hip.point_3 for leg in legs], axis=0)
         ankles_3 = np.mean([leg.ankle.point_3 for leg in legs], axis=0)
-        cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", shoulders_3 - hips_3, 2.0)]
+        # A long trunk tells where the chest is up whatever the legs do, which may sit, or end in a loop.
+        trunk_3 = shoulders_3 - hips_3
+        long = min(1.0, float(np.linalg.norm(trunk_3)) / (_TRUNK * arms[0].length))
+        cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", trunk_3, 2.0 + 2.0 * long)]
     else:
         for what, at_3, weight in _below(bodies, roles):
             near = float(np.linalg.norm(at_3 - shoulders_3)) / (0.3 * arms[0].length)
@@ -155,7 +166,11 @@ def _up(
     total = sum(w for _, _, w in flat) or 1.0
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]
-    return unit(best - normal_3 * (normal_3 @ best)), float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+    against = [what for what, v, w in flat if float(best @ v) < _AGAINST and w >= _HEAVY]
+    sure, cue = float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
+    if against:
+        sure, cue = min(sure, _DOUBTED), f"{cue}; against {' and '.join(against)}"
+    return unit(best - normal_3 * (normal_3 @ best)), sure, cue
 
 
 def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:
@@ -186,95 +201,3 @@ def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tupl
         found = [(sign * v, 1.0) for v in (across_3, cross(normal_3, across_3)) for sign in (1.0, -1.0)]
     total = sum(w for _, w in flat) or 1.0
     return [(v, sum(w for other, w in found if float(v @ other) > _SAME) / total) for v, _ in found]
-
-
-def _forward_votes(
-    bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg], up_3: np.ndarray, forward_3: np.ndarray,
-    left_3: np.ndarray,
-) -> Iterator[Vote]:  # fmt: skip
-    yield Vote("the names of the sides", names.sides(_paired_names(roles)), 3.0)
-    if legs:
-        knees = [
-            _bend(leg.chain, leg.knee_at, leg.hip.point_3, leg.knee.point_3, leg.ankle.point_3, up_3, forward_3)
-            for leg in legs
-        ]
-        yield Vote("the knees bend backwards", -mean_sign(knees), 2.0)
-        hips = []
-        for leg in legs:
-            thigh = float(np.linalg.norm(leg.knee.point_3 - leg.hip.point_3))
-            to_3 = reach_middle(leg.chain[: leg.knee_at], leg.knee.point_3)
-            hips.append(float((to_3 - leg.hip.point_3) @ forward_3) / thigh * 4)
-        yield Vote("the thighs swing further forward", mean_sign(hips), 0.7)
-        yield Vote("the feet point forward", mean_sign(list(_feet(bodies, legs, forward_3))), 1.0)
-    elbows = [
-        _bend(arm.chain, arm.elbow_at, arm.shoulder.point_3, arm.elbow.point_3, arm.wrist.point_3, up_3, forward_3)
-        for arm in arms
-    ]
-    yield Vote("the elbows bend forward", mean_sign(elbows), 1.0)
-    hands = [
-        float((reach_middle(arm.chain, arm.wrist.point_3) - arm.shoulder.point_3) @ forward_3) / arm.length * 4
-        for arm in arms
-    ]
-    yield Vote("the hands reach further forward", mean_sign(hands), 1.5)
-    cameras = list(_cameras(bodies, roles, arms, forward_3))
-    if cameras:
-        yield Vote("cameras and eyes look forward", mean_sign(cameras), 1.0)
-    if up_3[2] > 0.9:
-        yield Vote("the file's x", float(forward_3[0]), 0.5)
-
-
-def _paired_names(roles: Roles) -> list[tuple[str, str]]:
-    found = []
-    for pair in (roles.arms, roles.legs):
-        if pair is not None:
-            for one, other in zip(*pair.chains, strict=False):
-                found += [(one.hinge.name, other.hinge.name), (one.outer_link, other.outer_link)]
-    return [(one, other) for one, other in found if names.side(one, other)]
-
-
-def _bend(
-    chain: Chain, at: int, start_3: np.ndarray, middle_3: np.ndarray, end_3: np.ndarray, up_3: np.ndarray,
-    forward_3: np.ndarray,
-) -> float:  # fmt: skip
-    """-1..1: how far forward a limb's end goes when its hinge bends, with the upper part hanging."""
-    step = chain[at]
-    if not step.hinge.limited:
-        return 0.0
-    axis_3 = step.sign * step.hinge.line.axis_3
-    upper_3, lower_3 = middle_3 - start_3, end_3 - middle_3
-    straight = straight_angle(axis_3, lower_3, upper_3)
-    lower, upper = usual_range(step.hinge)
-    side = bend_side(lower, upper, straight)
-    moved_3 = unit(cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
-    # Where forward is once the upper part hangs down: turned back from where it points, the short way.
-    down_3, upper_3 = -up_3, unit(upper_3)
-    about_3 = cross(down_3, upper_3)
-    if np.linalg.norm(about_3) > 1e-6:
-        angle = float(np.arctan2(np.linalg.norm(about_3), down_3 @ upper_3))
-        forward_3 = turned(forward_3, unit(about_3), angle)
-    return float(moved_3 @ forward_3) * min(1.0, 2 * abs(side))
-
-
-def _feet(bodies: Bodies, legs: Iterable[Leg], forward_3: np.ndarray) -> Iterator[float]:
-    for leg in legs:
-        along = (bodies.corners(leg.chain[-1].end) - leg.ankle.point_3) @ forward_3
-        length = float(np.linalg.norm(leg.ankle.point_3 - leg.knee.point_3))
-        if along.max() - along.min() > 0.15 * length:
-            yield float(along.max() + along.min()) / float(along.max() - along.min()) * 3
-            continue
-        centre_3 = bodies.centre(leg.chain[-1].end)
-        if centre_3 is not None:
-            yield float((centre_3 - leg.ankle.point_3) @ forward_3) / (0.05 * length)
-
-
-def _cameras(bodies: Bodies, roles: Roles, arms: list[Arm], forward_3: np.ndarray) -> Iterator[float]:
-    scale = 0.1 * arms[0].length
-    if roles.neck:
-        step = roles.neck[-1]
-        inside = bodies.beyond(step)[0]
-        origin_3 = step.hinge.line.point_3
-    else:
-        inside, origin_3 = {roles.chest}, np.mean([arm.shoulder.point_3 for arm in arms], axis=0)
-    for link, body in bodies.body_of.items():
-        if body in inside and names.speaks_of(link, "camera"):
-            yield float((bodies.position(link) - origin_3) @ forward_3) / scale

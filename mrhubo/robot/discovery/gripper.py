@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.elbow import find_elbow
+from mrhubo.robot.discovery.elbow import WRIST_JOINTS, elbow_reach, find_elbow
 from mrhubo.robot.discovery.lines import feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
-_WRIST_JOINTS = 3
-"""Joints beyond an elbow that an arm can have: a twist and two swings."""
 _BESIDE = 0.025
 """How far a jaw's axis passes the hand's line, as a share of the arm."""
 _MEET = 0.005
 """How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
+_LONGER = 1.5
+"""How many times longer the shorter one of upper arm and forearm must be with a driven joint than without it."""
 _SHORT = 4
 """Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 
@@ -22,7 +22,7 @@ _SHORT = 4
 def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
     """The joints of the arm proper, and those that belong to a hand: jaws, sliding ones, more than a wrist can have."""
     whole = chain
-    chain = without_gripper(chain)
+    chain = without_gripper(bodies, chain)
     end, why = len(chain), "others mimic it, or it slides: a gripper"
     elbow_at = find_elbow(bodies, chain)
     first = 2 if elbow_at is None else elbow_at + 1
@@ -31,7 +31,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
         # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
         if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.free):
             end = i
-        elif i - first >= _WRIST_JOINTS:
+        elif i - first >= WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
         elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
             end, why = i, "its name says that it belongs to the hand"
@@ -64,13 +64,18 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
 
 
-def without_gripper(chain: Chain) -> Chain:
+def without_gripper(bodies: Bodies, chain: Chain) -> Chain:
     """A limb without the joints at its end that slide, mimic, or are mimicked: they are a gripper wherever they lie,
-    and no part of a forearm.
+    and no part of a forearm. But an elbow may be driven by a motor elsewhere, or drive a bar beside it: then what is
+    left without it has no stretches as long on both sides of a joint.
     """
-    while len(chain) > 2 and _driven(chain[-1]) and (len(chain) > _SHORT or not chain[-1].hinge.free):
-        chain = chain[:-1]
-    return chain
+    kept = chain
+    while len(kept) > 2 and _driven(kept[-1]):
+        kept = kept[:-1]
+    for end in range(len(kept), len(chain)):
+        if chain[end].hinge.rotary and elbow_reach(bodies, chain[: end + 1]) > _LONGER * elbow_reach(bodies, kept):
+            kept = chain[: end + 1]
+    return kept
 
 
 def _driven(step: Step) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import Spot, limb_end
+from mrhubo.robot.discovery.arm import Spot, doubted, limb_end, long_branches
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine
@@ -22,6 +22,8 @@ _PARALLEL = 0.2
 """Sine under which hip, knee and ankle pitch count as parallel, as the joints stand: 11 degrees."""
 _TILTED = 0.6
 """The same of a hip's pitch, which some robots tilt by up to 30 degrees."""
+_TOES = 0.15
+"""How far toes reach at most, as a share of the leg along its axes."""
 _APART = 0.15
 """How far hip, knee and ankle are at least from each other, as a share of the leg."""
 
@@ -78,6 +80,8 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
     if min(math.dist(hip_3, knee_3), math.dist(knee_3, ankle.point_3)) < LEAST * bodies.size:
         return None
+    if branches := long_branches(bodies, chain, _TOES):
+        ankle = doubted(ankle, branches)
     return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
 
 

@@ -10,9 +10,13 @@ _WORDS = {
     "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar",
     "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|tip",
     "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
+    "wrist": r"wrist|wrj",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
     "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",
+    "rod": r"rod(_|$|\d)|crank|piston|cylinder|linkage|lever|pushrod|four_?bar|tendon|spring",
+    "face": r"jaw|chin|mouth|lip(_|s|$)|brow|eyelid|(^|_)lid|(^|^[lr]|[^a-z])eye|cheek|tongue|antenna|(^|_)ear(_|s|$)",
+    "sensor": r"lidar|laser|radar|scanner|spin|rotor|propeller",
     "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
     "tool": r"tool|tcp|ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
 }

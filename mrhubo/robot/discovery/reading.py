@@ -1,24 +1,56 @@
-"""From a URDF to bodies and hinges: joints that move nothing are taken for fixed ones."""
+"""From a URDF to bodies and hinges: joints that move nothing are taken for fixed ones, degrees are made radians."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Collection
 
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.robot.discovery.bodies import Bodies, Hinge
-from mrhubo.robot.discovery.lines import Line
+from mrhubo.robot.discovery.bodies import Bodies, Hinge, Step
+from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
 from mrhubo.robot.joint import ROTARY, drive
+from mrhubo.robot.limits import in_degrees
 from mrhubo.robot.urdf import Description
+
+_LIMB = 0.1
+"""How far a limb reaches beyond the second of two hinges that turn as one, as a share of the robot; no finger does."""
 
 
 def read_bodies(description: Description) -> Bodies:
-    """The bodies of a robot. Joints whose numbers cannot be used are taken as fixed where they stand."""
+    """The bodies of a robot. Joints whose numbers cannot be used are taken as fixed where they stand, and so is the
+    second of two parallel hinges one after the other that turn as one, as in some elbows.
+    """
+    bodies = _read(description, {})
+    turning = {hinge.name: hinge for hinge in bodies.hinges}
+    gains: dict[str, float] = {}
+    seconds: set[str] = set()
+    for step in (Step(hinge, hinge.bodies[0]) for hinge in bodies.hinges if not hinge.free and hinge.rotary):
+        mimic = description.joints[step.hinge.name].mimic
+        first = turning.get(mimic.joint) if mimic is not None else None
+        if mimic is None or first is None or first.bodies[1] != step.start or not first.rotary:
+            continue
+        axis_3 = first.line.axis_3
+        further = bodies.beyond(step)[1]
+        limb = bodies.extent(step) > _LIMB * bodies.size or any(
+            hinge.rotary and sine(axis_3, hinge.line.axis_3) > PARALLEL for hinge in further
+        )
+        if limb and sine(axis_3, step.hinge.line.axis_3) < PARALLEL:
+            along = float(np.sign(axis_3 @ step.hinge.line.axis_3))
+            gains[first.name] = gains.get(first.name, 1.0) + along * mimic.multiplier
+            seconds.add(step.hinge.name)
+    gains = {name: gain for name, gain in gains.items() if gain > 0.0}
+    return _read(description, gains, seconds) if gains else bodies
+
+
+def _read(description: Description, gains: dict[str, float], fixed: Collection[str] = ()) -> Bodies:
     below: dict[str, list[str]] = {}
     for joint in description.joints.values():
         below.setdefault(joint.parent, []).append(joint.name)
     pose_44, body_of, order = {description.root: np.eye(4)}, {description.root: 0}, [description.root]
     hinges: list[Hinge] = []
-    sources = _sources(description)
+    sources, degrees = _sources(description, fixed), in_degrees(description.joints.values())
     for link in order:
         for name in below.get(link, []):
             joint = description.joints[name]
@@ -28,17 +60,23 @@ def read_bodies(description: Description) -> Bodies:
             if (
                 joint.kind not in (*ROTARY, "prismatic")
                 or name in description.faults
+                or name in fixed
                 or _stuck(joint.lower, joint.upper)
             ):
                 body_of[joint.child] = body_of[link]
                 continue
             body_of[joint.child] = max(body_of.values()) + 1
             line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
+            limits = [_radians(end) if degrees and joint.rotary else end for end in (joint.lower, joint.upper)]
             hinges.append(Hinge(
-                name, line, joint.rotary, (body_of[link], body_of[joint.child]), joint.lower, joint.upper,
+                name, line, joint.rotary, (body_of[link], body_of[joint.child]), limits[0], limits[1],
                 joint.mimic is None, name in sources, (link, joint.child),
             ))  # fmt: skip
-    return Bodies(description, pose_44, body_of, tuple(hinges))
+    return Bodies(description, pose_44, body_of, tuple(hinges), degrees, gains)
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else math.radians(degrees)
 
 
 def _stuck(lower: float | None, upper: float | None) -> bool:
@@ -46,10 +84,10 @@ def _stuck(lower: float | None, upper: float | None) -> bool:
     return lower is not None and upper is not None and upper - lower < 1e-3
 
 
-def _sources(description: Description) -> set[str]:
+def _sources(description: Description, fixed: Collection[str]) -> set[str]:
     found = set()
     for joint in description.joints.values():
-        if joint.mimic is not None:
+        if joint.mimic is not None and joint.name not in fixed:
             try:
                 found.add(drive(description.joints, joint.name).joint)
             except UserError:  # told where it matters

@@ -9,19 +9,22 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.arm import read_arm
+from mrhubo.robot.discovery.arm import GUESS, read_arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
-from mrhubo.robot.discovery.lines import PARALLEL, Line, feet, measure, sine, unit
+from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
+from mrhubo.robot.discovery.necks import find_necks
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
-_PLANE = 0.03
-"""How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
 _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+_ARM = 4
+"""Joints of an arm with a whole shoulder."""
+_LEG = 3
+"""Joints of a leg at the least: with fewer, it may be a wing."""
 _CASTER = 2
 """Joints of a caster: it swivels and rolls."""
 
@@ -76,16 +79,19 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         raise UserError(
             f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
+            f"{_following(bodies)}"
         )
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
-            raise UserError(f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found")
+            raise UserError(
+                f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found{_following(bodies)}"
+            )
         arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     else:
         options = [
-            (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high), i, j)
+            (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high) + 2.0 * _whole_arm(high), i, j)
             for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
         ]  # fmt: skip
         options.sort(key=lambda option: -option[0])
@@ -106,12 +112,18 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             )
     if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
         legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
+    # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings.
+    spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
+    if (legs is not None and len(legs.chains[0]) < _LEG) or any(pair.size > arms.size for pair in spare):
+        sure = min(sure, GUESS)
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
     same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
     used = {chain[0].hinge.name for pair in same for chain in pair.chains}
+    if legs is None and any(names.speaks_of(step.hinge.name, "head") for step in waist):
+        waist = ()  # the root is the head
     used |= {step.hinge.name for step in waist}
-    necks = _necks(bodies, arms, used)
+    necks = find_necks(bodies, arms, used)
     arm = arms.chains[0]
     if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
         raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
@@ -119,11 +131,26 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 
+def _following(bodies: Bodies) -> str:
+    """The end of a sentence on a joint that mimics one of another limb, which hides its own; else nothing."""
+    root = bodies.body_of[bodies.description.root]
+    for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
+        mimic = bodies.description.joints[hinge.name].mimic
+        source = next((other for other in bodies.hinges if mimic is not None and other.name == mimic.joint), None)
+        above = {root, *(step.end for step in bodies.path(root, hinge.bodies[0]))}
+        if source is not None and source.bodies[0] not in above:
+            return (
+                f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
+                "take the <mimic> elements of such joints out of the URDF"
+            )
+    return ""
+
+
 def _legness(bodies: Bodies, pair: Pair) -> float:
     """About -2 (arms) to 2 (legs)."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     score = names.share(called, "leg") - names.share(called, "arm")
-    chain = without_gripper(pair.chains[0])
+    chain = without_gripper(bodies, pair.chains[0])
     end = chain[-1]
     beyond = [hinge for hinge in bodies.beyond(end)[1] if hinge is not end.hinge]
     if len(beyond) >= 2:
@@ -141,6 +168,11 @@ def _legness(bodies: Bodies, pair: Pair) -> float:
         lateral = [i for i in range(len(lines)) if sine(lines[i].axis_3, lines[knee_at].axis_3) < 0.2]
         score += 0.4 * (len(lateral) >= 3 and knee_at in lateral[1:-1] and shank / way > 0.2)
     return score
+
+
+def _whole_arm(pair: Pair) -> float:
+    """0..1: whether a pair has as many joints as arms: a whole shoulder and an elbow."""
+    return min(len(pair.chains[0]) / _ARM, 1.0)
 
 
 def _named_legs(pair: Pair) -> bool:
@@ -173,66 +205,3 @@ def _hangs_below(low: Pair, high: Pair) -> float:
     if np.linalg.norm(other_3 - mount_3) < 1e-3 * low.size:
         return 0.0
     return float(unit(mount_3 - ends) @ unit(other_3 - mount_3))
-
-
-def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float) -> bool:
-    """Whether a joint's axis is its own mirror image: across the mirror plane, or in it."""
-    line = step.hinge.line
-    across = abs(float(line.axis_3 @ normal_3))
-    if across > 0.97:
-        return True
-    return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
-
-
-def _necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
-    """The other chains from the chest with axes in the mirror plane, the likeliest neck first."""
-    middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
-    ranked: list[tuple[float, Chain]] = []
-    for step in bodies.steps_from[arms.body]:
-        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(bodies, step):
-            continue
-        chain: list[Step] = []
-        todo: list[Step] = [step]
-        while todo:
-            fitting = [
-                s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
-            ]
-            fitting = [
-                s for s in fitting if not _is_sensor(bodies, s) and not _has_twin(s, todo, arms.normal_3, middle_3)
-            ]
-            fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
-            if not fitting or len(chain) >= 4:
-                break
-            chain.append(fitting[0])
-            todo = bodies.onward(fitting[0])
-        if not chain:
-            continue
-        called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
-        named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
-        # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
-        start_3 = measure(lines_of(tuple(chain))).nodes_N3[0]
-        away = min(chain[0].hinge.line.distance(middle_3), float(np.linalg.norm(start_3 - middle_3)))
-        ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
-    ranked.sort(key=lambda found: -found[0])
-    return tuple(chain for _, chain in ranked)
-
-
-def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray) -> bool:
-    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear."""
-    line = step.hinge.line
-    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
-    image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
-
-    def miss(other: Line) -> float:
-        one_3, other_3 = feet(image, other)
-        return float(np.linalg.norm(one_3 - other_3)) + float(np.linalg.norm(image.point_3 - line.point_3)) * sine(
-            image.axis_3, other.axis_3
-        )
-
-    own = abs(float((line.point_3 - middle_3) @ normal_3))
-    return any(other is not step and miss(other.hinge.line) < 0.5 * own for other in others)
-
-
-def _is_sensor(bodies: Bodies, step: Step) -> bool:
-    """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all."""
-    return any(hinge.limited for hinge in bodies.hinges) and not step.hinge.limited and step.hinge.lower is None

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
+from mrhubo.robot.discovery.limbs import limb
 from mrhubo.robot.discovery.lines import Measures, measure, unit
 
 _LENGTH = 0.03
@@ -64,7 +65,7 @@ def find_pairs(bodies: Bodies) -> list[Pair]:
     """All pairs of limbs, the largest first; those within a limb of a larger pair (fingers) are left out."""
     found: list[Pair] = []
     for body, steps in enumerate(bodies.steps_from):
-        chains = [bodies.chain(step) for step in steps] if len(steps) > 1 else []
+        chains = [limb(bodies, step) for step in steps] if len(steps) > 1 else []
         for chain, other in itertools.combinations(chains, 2):
             least = max(_FEWEST, _ALIKE * max(len(chain), len(other)))
             if min(len(chain), len(other)) < least:

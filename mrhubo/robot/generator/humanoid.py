@@ -10,7 +10,9 @@ import numpy as np
 from mrhubo.robot.generator.hands import HandShape, hand
 from mrhubo.robot.generator.limbs import SIDES, ArmShape, Chance, LegShape, arm, leg, neck, trunk, zero_pose
 from mrhubo.robot.generator.naming import STYLES
+from mrhubo.robot.generator.odd_parts import Places
 from mrhubo.robot.generator.plan import Plan, X, Y, Z, about
+from mrhubo.robot.generator.strange import STRANGE, Strange
 from mrhubo.robot.generator.text import write
 
 
@@ -42,11 +44,19 @@ class Humanoid:
     wrist_swings: int
     told: frozenset[str]
     """What else is true, for tables: `names`, `legs`, `zero: t`, ..."""
+    mappable: bool
+    """Whether it has two arms that move by themselves; else it is to be refused."""
 
 
-def humanoid(seed: int) -> Humanoid:
-    """The random humanoid of a seed."""
-    chance = Chance(seed)
+def humanoid(seed: int, kind: str | None = None) -> Humanoid:
+    """The random humanoid of a seed.
+
+    Args:
+        seed: of what is random.
+        kind: what is strange about it, one of `strange.STRANGE`; the rest is as without.
+    """
+    chance, odd = Chance(seed), Chance(seed + 10**6)
+    strange = Strange() if kind is None else STRANGE[kind]
     scale = chance.either(0.35, 0.7, 1.0, 1.0, 1.2)
     plan = Plan()
     base = chance.either("legs", "legs", "legs", "legs", "wheels", "pedestal")
@@ -78,6 +88,7 @@ def humanoid(seed: int) -> Humanoid:
     shoulder_3 = np.array([0.0, scale * chance.between(0.13, 0.22), top + scale * chance.between(0.25, 0.4)])
     plan.solid(chest, np.array([0.0, 0.0, top + 0.05 * scale]), shoulder_3 * np.array([1.0, 0.0, 1.0]), 0.08 * scale)
     shape, hands = ArmShape(chance, scale), HandShape(chance, scale)
+    strange.shapes(odd, shape, hands)
     for name in SIDES:
         wrist, wrist_3 = arm(plan, chest, shape, name, shoulder_3)
         hand(chance, plan, wrist, wrist_3, hands, name)
@@ -86,13 +97,17 @@ def humanoid(seed: int) -> Humanoid:
     head = neck(chance, plan, chest, top_3, neck_joints, scale)
     _extras(chance, plan, head, scale)
     angles = zero_pose(chance, plan, shape, base == "legs")
+    last = len(plan.bodies) - 1
+    angles |= strange.build(odd, plan, Places(pelvis, chest, head, shoulder_3, scale))
     posed, moved = plan.posed(angles)
-    root = chance.either(
-        pelvis, pelvis, pelvis, chest, len(plan.bodies) - 1 if base == "legs" and chance.maybe(0.1) else pelvis
-    )
+    posed = strange.finish(posed)
+    root = chance.either(pelvis, pelvis, pelvis, chest, last if base == "legs" and chance.maybe(0.1) else pelvis)
+    root = strange.root(plan, root)
     style, tidy = chance.either(*STYLES), chance.maybe(0.4)
     base_44 = _base(chance, tidy)
-    written = write(chance, posed, moved, root, base_44, style, tidy, chance.maybe(0.7))
+    style = odd.either(*strange.names) if strange.names else style
+    shapes = chance.maybe(0.7) and not strange.bare
+    written = write(chance, posed, moved, root, base_44, style, tidy, shapes, masses=not strange.bare)
     back_44 = np.linalg.inv(base_44)
     turn_33 = back_44[:3, :3]
     # The chest faces where its body has gone.
@@ -128,6 +143,7 @@ def humanoid(seed: int) -> Humanoid:
         told=frozenset(
             {f"names: {style}", f"base: {base}", f"frames: {'tidy' if tidy else 'by chance'}", f"hand: {hands.kind}"}
         ),
+        mappable=strange.mappable,
     )
 
 

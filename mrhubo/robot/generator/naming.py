@@ -10,6 +10,29 @@ from mrhubo.robot.generator.limbs import Chance
 STYLES = ("words", "camel", "short", "numbered sides", "numbers", "noise")
 
 
+_SIDES = {
+    "french": ("gauche", "droite"),
+    "german": ("links", "rechts"),
+    "spanish": ("izquierdo", "derecho"),
+    "japanese": ("hidari", "migi"),
+}
+_WORDS = {
+    "french": "shoulder epaule elbow coude forearm avantbras wrist poignet hand main finger doigt thumb pouce "
+    "hip hanche knee genou ankle cheville neck cou head tete waist taille twist torsion pelvis bassin "
+    "wheel roue",
+    "german": "shoulder schulter elbow ellbogen forearm unterarm wrist handgelenk hand hand finger finger thumb "
+    "daumen hip huefte knee knie ankle knoechel neck hals head kopf waist taille twist drehung pelvis "
+    "becken wheel rad",
+    "spanish": "shoulder hombro elbow codo forearm antebrazo wrist muneca hand mano finger dedo thumb pulgar hip "
+    "cadera knee rodilla ankle tobillo neck cuello head cabeza waist cintura twist giro pelvis pelvis "
+    "wheel rueda",
+    "japanese": "shoulder kata elbow hiji forearm zenwan wrist tekubi hand te finger yubi thumb oyayubi hip koshi "
+    "knee hiza ankle ashikubi neck kubi head atama waist koshi twist hineri pelvis kotsuban wheel "
+    "sharin",
+}
+"""English words and those of the language, in turn."""
+
+
 def namer(chance: Chance, style: str) -> Callable[[str, str], str]:
     """How joints (`kind` joint) and links (`kind` link) are called, by their role; each role gets a name of its own."""
     taken: set[str] = set()
@@ -26,6 +49,11 @@ def namer(chance: Chance, style: str) -> Callable[[str, str], str]:
 
 
 def _styled(chance: Chance, style: str, role: str, kind: str, numbers: dict[str, int]) -> str:
+    if style.startswith("swapped "):
+        role = _swapped(role)
+        style = style.removeprefix("swapped ")
+    if style in _SIDES:
+        return f"{_translated(role, style)}_{kind}"
     side = {"left": "l", "right": "r"}.get(role.split("_")[0], "")
     rest = re.sub("^(left|right)_", "", role)
     if style == "camel":
@@ -53,3 +81,16 @@ def _styled(chance: Chance, style: str, role: str, kind: str, numbers: dict[str,
     if style == "noise":
         return "".join(chance.either(*"abcdefghijkmnopqrstuvwxyz") for _ in range(8))
     return f"{role}_{kind}"
+
+
+def _swapped(role: str) -> str:
+    """With the sides as who stands before the robot sees them."""
+    return re.sub("^(left|right)_", lambda found: {"left": "right_", "right": "left_"}[found[1]], role)
+
+
+def _translated(role: str, language: str) -> str:
+    words = _WORDS[language].split()
+    known = dict(zip(words[::2], words[1::2], strict=True)) | dict(
+        zip(("left", "right"), _SIDES[language], strict=True)
+    )
+    return "_".join(known.get(word, word) for word in role.split("_"))

@@ -6,7 +6,9 @@ The frame while planning: x forward, y left, z up, the ground at 0, arms hanging
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +89,36 @@ class Plan:
     def joint(self, role: str) -> PlannedJoint:
         """The joint with a role."""
         return next(joint for joint in self.joints if joint.role == role)
+
+    def change(self, role: str, **changes: Any) -> None:
+        """Gives the joint with a role other fields."""
+        self.joints = [replace(joint, **changes) if joint.role == role else joint for joint in self.joints]
+
+    def insert_before(
+        self, role: str, new: str, point_3: np.ndarray, axis_3: np.ndarray, limits: tuple[float, float],
+        kind: str = "revolute",
+    ) -> None:  # fmt: skip
+        """A joint between a joint and the body that carries it, with a body of its own."""
+        carried = self.joint(role)
+        body = self.join(new, carried.parent, point_3, axis_3, limits, kind)
+        self.change(role, parent=body)
+
+    def insert_after(
+        self, role: str, new: str, point_3: np.ndarray, axis_3: np.ndarray, limits: tuple[float, float],
+    ) -> None:  # fmt: skip
+        """A joint between a joint and the body that it carries, with a body of its own between them."""
+        carrier = self.joint(role)
+        body = self.body(new)
+        self.change(role, child=body)
+        self.joints.append(
+            PlannedJoint(new, "revolute", body, carrier.child, np.array(point_3), np.array(axis_3), *limits)
+        )
+
+    def remove(self, bodies: Collection[int]) -> None:
+        """Takes bodies away, with their joints, points and directions; the others keep their numbers."""
+        self.joints = [j for j in self.joints if j.child not in bodies and j.parent not in bodies]
+        self.points = {name: found for name, found in self.points.items() if found[0] not in bodies}
+        self.directions = {name: found for name, found in self.directions.items() if found[0] not in bodies}
 
     def rooted(self, root: int) -> list[PlannedJoint]:
         """The joints from a root outwards, each turned so that its parent is nearer to the root: the same motion, with

@@ -39,6 +39,8 @@ def asked(found: Discovery, wrong: list[str]) -> bool:
     about = {question.about for question in found.questions}
     if about & {"forward", "up", "chest"}:
         return True
+    # What asks about an elbow names the joints at which its arm was taken to end.
+    about |= {f"{side}_hand" for side in ("left", "right") if f"{side}_elbow" in about}
     return all(any(phrase.startswith(name) for name in about) for phrase in wrong)
 
 

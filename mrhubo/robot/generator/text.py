@@ -33,6 +33,7 @@ def write(
     style: str,
     tidy: bool,
     shapes: bool,
+    masses: bool = True,
 ) -> Written:
     """The URDF of a plan.
 
@@ -45,6 +46,7 @@ def write(
         style: how things are called.
         tidy: whether frames stand as the root's, with origins at the joints' points; else both are by chance.
         shapes: whether links have collision boxes.
+        masses: whether they have masses.
     """
     joints = plan.rooted(root)
     call = namer(chance, style)
@@ -63,7 +65,9 @@ def write(
     planned = {joint.role: joint for joint in plan.joints}
     # A reversed joint turns by the same angle about the opposite axis, which `rooted` has done.
     parts = [
-        _link(chance, plan, body, links[body], frames[body], moved[body], shapes) for body in range(len(plan.bodies))
+        _link(plan, body, links[body], frames[body], moved[body], shapes, masses)
+        for body in range(len(plan.bodies))
+        if body in frames
     ]
     parts += [_joint(joint, planned, names, links, frames, flips) for joint in joints]
     if not tidy:
@@ -97,18 +101,20 @@ def _joint(
 
 
 def _link(
-    chance: Chance, plan: Plan, body: int, name: str, frame_44: np.ndarray, moved_44: np.ndarray, shapes: bool
+    plan: Plan, body: int, name: str, frame_44: np.ndarray, moved_44: np.ndarray, shapes: bool, masses: bool
 ) -> str:
     solid = plan.solids.get(body)
-    if solid is None:
+    if solid is None or not (shapes or masses):
         return f'<link name="{name}"/>'
     pose_44 = moved_44.copy()
     pose_44[:3, 3] += moved_44[:3, :3] @ solid.centre_3
     local_44 = np.linalg.inv(frame_44) @ pose_44
     place = f'<origin xyz="{_numbers(local_44[:3, 3])}" rpy="{_numbers(_rpy(local_44[:3, :3]))}"/>'
     mass = 1000 * float(np.prod(2 * solid.half_3))
-    lines = [f'<link name="{name}">', f'  <inertial>{place}<mass value="{mass:.6g}"/>'
-             '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>']  # fmt: skip
+    lines = [f'<link name="{name}">']
+    if masses:
+        lines += [f'  <inertial>{place}<mass value="{mass:.6g}"/>'
+                  '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>']  # fmt: skip
     if shapes:
         lines.append(f'  <collision>{place}<geometry><box size="{_numbers(2 * solid.half_3)}"/></geometry></collision>')
     return "\n".join([*lines, "</link>"])

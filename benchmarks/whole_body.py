@@ -1,0 +1,173 @@
+"""Whole bodies: the optimiser's answers to clips with a root, on robots with legs.
+
+    python benchmarks/whole_body.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--rate 60] [--collisions avoid]
+        [--picture FILE.png]
+
+A row a clip and the mean over clips: angles to the person by part, horizontal speed of planted soles and the person's
+own, soles off the floor, the way gone, speeds of joints by their limits, steps of more than 0.5 rad, time. Clips are
+names of `data/external/cmu/whole_body`; robots are shipped as conf/ROBOT-whole-body.yaml. The picture shows moments of
+the first clip, the person above the robots.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import torch
+from common import print_header, print_table, read_options
+from PIL.Image import Image
+
+from mrhubo import rotation
+from mrhubo.body import Skeleton
+from mrhubo.errors import InputWarning
+from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
+from mrhubo.frames import human_to_world
+from mrhubo.motion import Motion, motion_files, read_motion, resample
+from mrhubo.reference import OptimizationRetargeter
+from mrhubo.robot import Robot
+from mrhubo.view import Solids, human_figure
+from mrhubo.view.camera import Camera
+from mrhubo.view.painter import render
+from mrhubo.view.pictures import Artist
+from mrhubo.view.sheets import contact_sheet, save_png
+
+_CLIPS = Path("data/external/cmu/whole_body")
+_MOMENTS = 8
+"""Of the picture."""
+_PARTS = {"knee": "thigh", "ankle": "shin", "trunk": "chest", "foot": "feet", "elbow": "upper arm", "wrist": "forearm"}
+
+
+def main(argv: list[str]) -> None:
+    """Prints a table a robot."""
+    options, rest = read_options(argv, robots="g1", clips="all", rate="", collisions="", picture="")
+    if rest:
+        sys.exit(f"{rest[0]}: is unknown")
+    torch.set_num_threads(1)
+    print_header()
+    rows_of_pictures: dict[str, list[Image]] = {}
+    for name in options["robots"].split(","):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
+            retargeter = OptimizationRetargeter(Robot.from_config(f"conf/{name}-whole-body.yaml"))
+        motions = [_motion(path, options["rate"]) for path in _paths(options["clips"])]
+        retargeter(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+        if options["picture"]:
+            rows_of_pictures.setdefault("person", _person(motions[0]))
+            rows_of_pictures[name] = _robot(retargeter, motions[0])
+        found = [_answer(retargeter, motion, bool(options["collisions"])) for motion in motions]
+        parts = [part for part in _PARTS if part in found[0][0].parts_deg]
+        rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
+        print(f"## {name}, {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
+        heads = ["slide, own [cm/s]", "over 1 cm/s", "sunk", "floats (max [cm])", "path [cm/m]", "heading [deg]",
+                 "speed", "jumps", "touches", "ms a frame"]  # fmt: skip
+        print_table(["clip", *(f"{_PARTS[part]} [deg]" for part in parts), *heads], [*rows, _row("mean", found, parts)])
+        print()
+    if options["picture"]:
+        seconds = [f"{second:.1f} s" for second in _moments(motions[0]) / motions[0].frame_rate]
+        sheet = contact_sheet(list(rows_of_pictures.values()), seconds, list(rows_of_pictures), motions[0].description)
+        print(f"picture: {save_png(sheet, options['picture'])}")
+
+
+def _moments(motion: Motion) -> np.ndarray:
+    return np.linspace(0.1, 0.9, _MOMENTS).round(2) * (len(motion) - 1) // 1
+
+
+def _person(motion: Motion) -> list[Image]:
+    skeleton, arrays = Skeleton(), motion.arrays
+    assert arrays.root_rotation_T33 is not None and arrays.root_position_T3 is not None
+    soles = skeleton.rest_points["left_heel"][1]
+    figures = []
+    for t in _moments(motion).astype(int):
+        pose_44 = np.eye(4)
+        pose_44[:3, :3] = human_to_world(human_to_world(arrays.root_rotation_T33[t]).T).T
+        pose_44[:3, 3] = human_to_world(arrays.root_position_T3[t])
+        figures.append(human_figure(motion.local_TJ33[t], skeleton).transformed(pose_44))
+    return _pictures(figures, -float(soles))
+
+
+def _robot(retargeter: OptimizationRetargeter, motion: Motion) -> list[Image]:
+    robot, result = retargeter.body_map.robot, retargeter(motion, avoid_collisions=True)
+    assert result.root_position is not None and result.root_quaternion_wxyz is not None
+    base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    artist, figures = Artist(robot), []
+    for t in _moments(motion).astype(int):
+        pose_44 = np.eye(4)
+        pose_44[:3, :3], pose_44[:3, 3] = base_T33[t].numpy(), result.root_position[t].numpy()
+        figures.append(artist.robot_figure(result.q[t], scaled=False).transformed(pose_44))
+    return _pictures(figures, float(np.ptp(figures[0].bounds()[:, 2])) / 2)
+
+
+def _pictures(figures: list[Solids], middle: float) -> list[Image]:
+    """Each figure seen from its left, with the floor at z = 0."""
+    found = []
+    for figure in figures:
+        x, y, _ = figure.bounds().mean(axis=0)
+        camera = Camera(60.0, 8.0, (float(x), float(y), middle), 1.75 * middle)
+        found.append(render(figure, (170, 235), camera, ground=0.0))
+    return found
+
+
+def _paths(clips: str) -> list[Path]:
+    if clips == "all" or Path(clips).is_dir():
+        return motion_files(_CLIPS if clips == "all" else Path(clips))
+    return [_CLIPS / f"{name}.npz" for name in clips.split(",")]
+
+
+def _motion(path: Path, rate: str) -> Motion:
+    motion = read_motion(path)
+    return resample(motion, float(rate)) if rate else motion
+
+
+def _cut(motion: Motion, frames: int) -> dict[str, object]:
+    arrays = vars(motion.arrays)
+    return {name: array[:frames] for name, array in arrays.items() if array is not None}
+
+
+def _answer(
+    retargeter: OptimizationRetargeter, motion: Motion, avoid: bool
+) -> tuple[WholeBodyScore, int, float, float]:
+    """Measures, steps of more than 0.5 rad in 1/24 s, share of frames that touch, and milliseconds a frame."""
+    start = time.perf_counter()
+    result = retargeter(motion, avoid_collisions=avoid)
+    seconds = time.perf_counter() - start
+    assert result.root_position is not None and result.root_quaternion_wxyz is not None
+    base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    score = score_whole_body(retargeter.body_map, motion, result.q, result.root_position, base_T33)
+    jumps = int((result.q.diff(dim=0).abs() * motion.frame_rate / 24 > 0.5).any(dim=1).sum())
+    touches = float("nan") if result.collision is None else float(result.collision.float().mean())
+    return score, jumps, touches, 1000 * seconds / len(motion)
+
+
+def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts: list[str]) -> list[str]:
+    scores = [score for score, *_ in found]
+
+    def mean(key: str) -> float:
+        return statistics.fmean(getattr(score, key) for score in scores)
+
+    def most(key: str) -> float:
+        return max(getattr(score, key) for score in scores)
+
+    touches = statistics.fmean(touches for _, _, touches, _ in found)
+    return [
+        name,
+        *(f"{statistics.fmean(score.parts_deg[part] for score in scores):.1f}" for part in parts),
+        f"{mean('slide_cm_s'):.1f}, {mean('human_slide_cm_s'):.1f}",
+        f"{mean('sliding'):.0%}",
+        f"{mean('sunk'):.1%} ({most('sunk_max_cm'):.1f})",
+        f"{mean('floating'):.1%} ({most('floating_max_cm'):.1f})",
+        f"{mean('path_cm_m'):.1f}",
+        f"{mean('heading_deg'):.1f}",
+        f"{most('speed_max'):.2f}",
+        str(sum(jumps for _, jumps, _, _ in found)),
+        "-" if touches != touches else f"{touches:.1%}",
+        f"{statistics.fmean(ms for *_, ms in found):.1f}",
+    ]
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,153 @@
+"""What a whole body's motion is worth: nearness to the person, feet on the floor, the way it goes, and speed.
+
+Of any retargeter: joint angles and the base's place and rotation are all that is asked for. Contacts are those of the
+person's feet (`mrhubo.motion.contacts`), the same for all who are compared; the floor is at z = 0.
+
+Legend: T frames, P points of soles, S soles, D directions, N joints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike
+from torch import Tensor
+
+from mrhubo.body.skeleton import PAIRED_KEYPOINTS
+from mrhubo.errors import UserError
+from mrhubo.frames import human_to_world
+from mrhubo.motion import Motion
+from mrhubo.reference import angle_between
+from mrhubo.reference.standing import HumanSteps, Legs, read_steps
+from mrhubo.robot import BodyMap
+
+SUNK_M, FLOATING_M = 0.01, 0.02
+"""From where on a sole is under the floor, and, while it is planted, above it."""
+SLIDING = 0.01
+"""Speed [m/s] from which on a planted point slides."""
+_SHORT_M = 1.0
+"""A path is taken for no shorter than this: somebody who sways on the spot has walked no metre."""
+
+
+@dataclass(frozen=True)
+class WholeBodyScore:
+    """Of one motion. NaN: the robot has no such part, or nothing is planted."""
+
+    parts_deg: dict[str, float]
+    """Mean angle to the person: of limbs by the point where they end (knee: thighs; ankle: shins; elbow: upper arms),
+    of oriented parts by their region (trunk, foot, hand, head); of both sides together."""
+    slide_cm_s: float
+    """Mean horizontal speed of points of soles while the person's are planted."""
+    human_slide_cm_s: float
+    """The same of the person's own points."""
+    sliding: float
+    """Share of these points and frames that are faster than 1 cm/s."""
+    sunk: float
+    """Share of frames with a sole more than 1 cm under the floor."""
+    sunk_max_cm: float
+    floating: float
+    """Share of frames with a planted sole more than 2 cm above the floor."""
+    floating_max_cm: float
+    path_cm_m: float
+    """Mean horizontal distance of the root to the person's path, scaled by the legs' length, for each metre of it."""
+    heading_deg: float
+    """Mean angle between where the robot's pelvis looks and the person's, seen from above."""
+    speed_max: float
+    """The highest speed of a joint by its limit."""
+    over_limit: float
+    """Share of steps in which a joint is faster than its limit."""
+    outside: float
+    """The most by which a joint is outside its range [rad]; 0: none is."""
+
+
+def score_whole_body(
+    body_map: BodyMap, motion: Motion, q_TN: Tensor, base_T3: Tensor, base_T33: Tensor
+) -> WholeBodyScore:
+    """Measures of one motion.
+
+    Args:
+        body_map: of a robot with feet.
+        motion: the person's, with a root.
+        q_TN: joint angles [rad].
+        base_T3: place of the base [m], x forward, y left, z up, the floor at z = 0.
+        base_T33: its rotation.
+
+    Raises:
+        UserError: the robot has no feet, or the motion no root.
+    """
+    legs, robot = Legs(body_map), body_map.robot
+    local_TJ33 = motion.for_skeleton(body_map.skeleton).local_TJ33
+    steps = read_steps(motion, local_TJ33, legs)
+    if steps is None:
+        raise UserError(
+            f"{motion.name}: a whole body is measured by its root and feet; the robot or the motion has none"
+        )
+    poses, rate = robot.forward(q_TN), motion.frame_rate
+    soles = legs.on_floor(poses, base_T3, base_T33)
+    planted_TP = steps.contacts.planted_TP
+    sliding_TP = horizontal_speed(soles.point_BP3.double().numpy(), rate)
+    human_TP = horizontal_speed(human_to_world(steps.place_TP3), rate)
+    low_TP = lowest(legs, soles.ball_BK3.double().numpy())
+    low_TS = low_TP.reshape(len(low_TP), -1, 2).min(axis=-1)
+    planted_TS = planted_TP.reshape(len(low_TP), -1, 2).any(axis=-1)
+    up_TS = np.where(planted_TS, low_TS, -np.inf)
+    angle_TD = torch.rad2deg(angle_between(body_map.robot_directions(poses), body_map.human_directions(local_TJ33)))
+    share_TN = q_TN.diff(dim=0).abs() * rate / robot.velocity_N
+    outside_TN = torch.maximum(robot.lower_N - q_TN, q_TN - robot.upper_N)
+    return WholeBodyScore(
+        parts_deg=_by_part(body_map, angle_TD),
+        slide_cm_s=100 * _mean(sliding_TP[planted_TP]),
+        human_slide_cm_s=100 * _mean(human_TP[planted_TP]),
+        sliding=_mean(sliding_TP[planted_TP] > SLIDING),
+        sunk=_mean((low_TS < -SUNK_M).any(axis=1)),
+        sunk_max_cm=100 * max(0.0, float(-low_TS.min())),
+        floating=_mean((up_TS > FLOATING_M).any(axis=1)),
+        floating_max_cm=100 * max(0.0, float(up_TS.max())),
+        path_cm_m=path_error(legs.root(poses, base_T3, base_T33), human_to_world(steps.path_T3)),
+        heading_deg=heading_error(legs.heading(poses, base_T33), steps),
+        speed_max=float(share_TN.max()) if len(share_TN) else 0.0,
+        over_limit=_mean((share_TN > 1).any(dim=1).numpy()),
+        outside=max(0.0, float(outside_TN.max())),
+    )
+
+
+def horizontal_speed(place_TP3: np.ndarray, frame_rate: float) -> np.ndarray:
+    """Horizontal speeds (T, P) [m/s] of places (T, P, 3) [m], z up; 0 where there is one frame alone."""
+    if len(place_TP3) < 2:
+        return np.zeros(place_TP3.shape[:-1])
+    return np.linalg.norm(np.gradient(place_TP3[..., :2], 1 / frame_rate, axis=0), axis=-1)
+
+
+def lowest(legs: Legs, ball_TK3: np.ndarray) -> np.ndarray:
+    """Height [m] of the lowest ball at each point of a sole (T, P), of places (T, K, 3) whose z is up."""
+    height_TK = ball_TK3[..., 2] - legs.radius_K.double().cpu().numpy()
+    return np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
+
+
+def path_error(root_T3: Tensor, path_T3: Tensor) -> float:
+    """Mean horizontal distance of the root (T, 3) to a path (T, 3), z up [m], for each metre of the path [cm/m]."""
+    off = (root_T3 - path_T3)[:, :2].norm(dim=-1).mean()
+    return 100 * float(off) / max(float(path_T3[:, :2].diff(dim=0).norm(dim=-1).sum()), _SHORT_M)
+
+
+def heading_error(axes_T33: Tensor, steps: HumanSteps) -> float:
+    """Mean angle [deg] between where a robot looks, human axes (T, 3, 3) of its pelvis in the world, and the person."""
+    robot_T2, human_T2 = axes_T33[:, :2, 2], human_to_world(steps.turn_T33[..., 2])[:, :2].to(axes_T33)
+    cross_T = robot_T2[:, 0] * human_T2[:, 1] - robot_T2[:, 1] * human_T2[:, 0]
+    return float(torch.rad2deg(torch.atan2(cross_T, (robot_T2 * human_T2).sum(-1)).abs()).mean())
+
+
+def _by_part(body_map: BodyMap, angle_TD: Tensor) -> dict[str, float]:
+    columns: dict[str, list[int]] = {}
+    for column in body_map.measured:
+        direction = body_map.directions[column]
+        both = (name for name, sides in PAIRED_KEYPOINTS.items() if direction.name in sides)
+        columns.setdefault(next(both, direction.part.region), []).append(column)
+    return {name: float(angle_TD[:, found].mean()) for name, found in columns.items()}
+
+
+def _mean(values: ArrayLike) -> float:
+    return float(np.mean(values)) if np.size(values) else nan

@@ -1,0 +1,90 @@
+"""What a person's motion tells of a robot's root: the path, scaled by the legs' length, and when feet are planted.
+
+World of this room: the human's, x left, y up, z forward; m. The floor is at y = 0.
+
+Legend: T frames, P points of soles, D directions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.poses import NOT_FINITE, refuse_frames
+from mrhubo.reference.standing.legs import Legs
+
+_CROOKED = 1e-2
+"""How far a rotation's numbers may be from those of one: files round them."""
+_FAR_M = 1e5
+"""No motion goes so far [m]; in float32, places out there are centimetres apart."""
+
+
+@dataclass(frozen=True)
+class HumanSteps:
+    """Of one motion."""
+
+    turn_T33: Tensor
+    """Human axes of what carries the legs, in the world."""
+    path_T3: Tensor
+    """The root on the person's path, made to fit the skeleton's legs, and scaled to the robot's."""
+    contacts: FootContacts
+    frame_rate: float
+    place_TP3: np.ndarray
+    """The person's own points, where the skeleton's are with the root's way made to fit."""
+
+
+def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | None:
+    """The steps of a person; None where the motion tells no root, or the robot has no feet.
+
+    Args:
+        motion: tells the root and the frame rate.
+        local_TJ33: its rotations (T, 21, 3, 3), for the legs' skeleton.
+        legs: the robot's.
+
+    Raises:
+        UserError: the root holds NaN, infinite numbers or places out of this world; says in which frame.
+    """
+    root_T33, root_T3 = motion.root_rotation_T33, motion.root_position_T3
+    if not legs.has_feet or root_T33 is None or root_T3 is None or not len(motion):
+        return None
+    crooked_T = (root_T33.mT @ root_T33 - torch.eye(3)).abs().amax(dim=(1, 2)) > _CROOKED
+    for wrong_T, what in (
+        (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), NOT_FINITE),
+        (crooked_T, "a root whose matrix is no rotation"),
+        (root_T3.abs().amax(dim=1) > _FAR_M, f"a root farther than {_FAR_M / 1000:.0f} km from the origin"),
+    ):
+        refuse_frames(wrong_T, what)
+    points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
+    root_T33, root_T3 = root_T33.to(points_TK3), root_T3.to(points_TK3)
+    turned_TK3 = points_TK3 @ root_T33.mT
+    soles_TP3, way_T3 = (x.double().cpu().numpy() for x in (turned_TK3[:, legs.contacts], root_T3))
+    world_TK3 = turned_TK3 + root_scale(soles_TP3, way_T3, motion.frame_rate) * root_T3[:, None]
+    place_TP3 = world_TK3[:, legs.contacts].double().cpu().numpy()
+    contacts = find_contacts(place_TP3, motion.frame_rate)
+    path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
+    return HumanSteps(
+        root_T33 @ turns_TJ33[:, legs.joint], legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
+    )
+
+
+def flatten(target_TD3: Tensor, steps: HumanSteps, legs: Legs) -> Tensor:
+    """Directions (T, D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is the
+    world's.
+    """
+    found_TD3, names = target_TD3.clone(), legs.body_map.direction_names
+    up_T3 = steps.turn_T33[:, 1].to(target_TD3)  # the world's up, seen from what carries the legs
+    weight_TP = torch.from_numpy(steps.contacts.weight_TP).to(target_TD3)
+    for number, sole in enumerate(legs.soles):
+        ahead, above = (names.index(name) for name in sole.part.direction_names)
+        share_T1 = weight_TP[:, 2 * number : 2 * number + 2].amin(dim=1, keepdim=True)
+        upright_T3 = normalize(torch.lerp(target_TD3[:, above], up_T3, share_T1), dim=-1)
+        forward_T3 = target_TD3[:, ahead]
+        forward_T3 = forward_T3 - upright_T3 * (forward_T3 * upright_T3).sum(-1, keepdim=True)
+        found_TD3[:, above], found_TD3[:, ahead] = upright_T3, normalize(forward_T3, dim=-1)
+    return found_TD3

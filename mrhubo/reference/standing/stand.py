@@ -1,0 +1,213 @@
+"""The root of a robot's motion, and its legs made to keep planted feet in their places.
+
+First the planted feet carry the root (`path`). Where two feet are planted, legs of other proportions than the person's
+cannot both keep still and point as the person's do: so the legs then give way, by the optimiser's own cost with a term
+for the places of soles, within limits and limits of speed. What swings goes where it went, shifted so that it takes off
+and lands where it is planted, and is kept above the floor. At last the feet carry the root once more.
+
+World: the human's, x left, y up, z forward; m. The floor is at y = 0.
+
+Legend: T frames, P points of soles, K balls or contacts, D directions, N joints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from mrhubo import rotation
+from mrhubo.fast.together.motion import AHEAD, WINDOW
+from mrhubo.frames import human_to_world
+from mrhubo.reference.avoidance import Avoidance
+from mrhubo.reference.refine import StepBound, refine
+from mrhubo.reference.solve import DirectionProblem
+from mrhubo.reference.speed import nearest_slow, speed_bound
+from mrhubo.reference.standing.human import HumanSteps
+from mrhubo.reference.standing.legs import Legs
+from mrhubo.reference.standing.path import carry
+from mrhubo.reference.terms import Smoothness
+from mrhubo.reference.terms.soles import SoleTerm
+
+PLANTED, SWINGING = 2500.0, 50.0
+"""Weights [1/m^2] of a planted point's place and of a swinging one's: a millimetre costs as much as a limb that is 3
+degrees off, or 0.4."""
+SWEEPS, TOLERANCE = 30, 3e-4
+"""How long legs give way, as for `refine`."""
+UNDER_M = 0.01
+"""How far under the floor [m] a swinging point counts as much as a planted one."""
+_FLAT = [0, 2]
+"""The horizontal axes of the world."""
+_UP = 1
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A robot's motion on the floor."""
+
+    q_TN: Tensor
+    """Joint angles [rad]."""
+    position_T3: Tensor
+    """Place of the base in the robot's world [m], x forward, y left, z up; the floor is at z = 0."""
+    rotation_T33: Tensor
+    """Its rotation there."""
+    root_T3: Tensor
+    """Place of the root, between the legs' first joints, in the human's world [m]."""
+
+    @property
+    def quaternion_T4(self) -> Tensor:
+        """The base's rotation as unit quaternions, w first, that go on from one another without a change of sign."""
+        quaternion_T4 = rotation.matrix_to_quaternion(self.rotation_T33)[:, [3, 0, 1, 2]]
+        turns_T = (quaternion_T4[1:] * quaternion_T4[:-1]).sum(-1) < 0
+        sign_T = torch.nn.functional.pad(1.0 - 2.0 * turns_T.to(quaternion_T4), (1, 0), value=1.0).cumprod(0)
+        return quaternion_T4 * sign_T[:, None]
+
+
+@dataclass(frozen=True)
+class _Carried:
+    """A root that planted feet carry, in the world [m]."""
+
+    root_T3: np.ndarray
+    place_K2: np.ndarray
+    """Places of the contacts on the floor."""
+    point_TP3: np.ndarray
+    """Points of soles."""
+    low_TP: np.ndarray
+    """Height of the lowest ball at each of them."""
+
+
+class Standing(nn.Module):
+    """Stands one robot on the floor."""
+
+    def __init__(self, legs: Legs) -> None:
+        super().__init__()
+        self.legs, self.robot = legs, legs.body_map.robot
+        self.problem = DirectionProblem(legs.body_map, [SoleTerm(legs)])
+        moved = set().union(*SoleTerm(legs).couplings())
+        legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
+        self._avoidance: Avoidance | None = None
+        self._legs_N = legs_N.to(self.robot.lower_N.device)
+
+    @property
+    def avoidance(self) -> Avoidance:
+        """What makes answers give way that touch the robot itself, with soles in place; made when first asked for."""
+        if self._avoidance is None:
+            self._avoidance = Avoidance(self.legs.body_map, [SoleTerm(self.legs)])
+        return self._avoidance
+
+    def forward(
+        self,
+        q_TN: Tensor,
+        target_TD3: Tensor,
+        steps: HumanSteps,
+        smoothness: Smoothness,
+        avoid_collisions: bool = False,
+    ) -> Stand:
+        """The motion on the floor.
+
+        Args:
+            q_TN: joint angles [rad] inside limits and limits of speed, which point as the person does.
+            target_TD3: the person's directions, with feet that stand flat (`flatten`).
+            steps: the person's.
+            smoothness: of the motion.
+            avoid_collisions: frames in which the robot would touch itself give way.
+        """
+        carried = self._carried(q_TN, steps)
+        extended_TX3 = self._extended(target_TD3, carried, steps)
+        q_TN = self._give_way(q_TN, extended_TX3, steps.frame_rate, smoothness, avoid_collisions)
+        after = self._carried(q_TN, steps, carried.place_K2)
+        root_T3 = torch.from_numpy(after.root_T3)
+        root_T3[:, _UP] -= torch.from_numpy(after.low_TP).amin(dim=1).clamp_max(0.0)  # no sole is under the floor
+        turn_T33 = steps.turn_T33.to(q_TN)
+        base_T3, base_T33 = self.legs.base(self.robot.forward(q_TN), human_to_world(root_T3.to(q_TN)), turn_T33)
+        return Stand(q_TN, base_T3, base_T33, root_T3)
+
+    def _carried(self, q_TN: Tensor, steps: HumanSteps, place_K2: np.ndarray | None = None) -> _Carried:
+        """Where planted feet carry the root; `place_K2` are the contacts' places, where they are decided."""
+        contacts, rate, legs = steps.contacts, steps.frame_rate, self.legs
+        seen = legs.places(self.robot.forward(q_TN))
+        point_TP3, ball_TK3 = (self._in_world(x, steps).double().cpu().numpy() for x in (seen.point_BP3, seen.ball_BK3))
+        height_TK = ball_TK3[..., _UP] - legs.radius_K.double().cpu().numpy()
+        low_TP = np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
+        path_T3 = steps.path_T3.double().cpu().numpy()
+        off_T2, place_K2 = carry(
+            path_T3[:, None, _FLAT] + point_TP3[..., _FLAT], contacts.weight_TP, contacts.phase_TP, rate, place_K2
+        )
+        above_TP, weight_TP = path_T3[:, None, _UP] + low_TP, contacts.weight_TP
+        level = float((weight_TP * above_TP).sum() / max(weight_TP.sum(), 1e-9))  # hips lie elsewhere on a robot
+        floor_TP = np.zeros(low_TP.shape, dtype=int)
+        rise_T1, _ = carry(above_TP[..., None] - level, weight_TP, floor_TP, rate, np.zeros((1, 1)))
+        root_T3 = path_T3 + np.stack((off_T2[:, 0], rise_T1[:, 0] - level, off_T2[:, 1]), axis=1)
+        return _Carried(root_T3, place_K2, point_TP3 + root_T3[:, None], low_TP + root_T3[:, [_UP]])
+
+    def _in_world(self, seen_TX3: Tensor, steps: HumanSteps) -> Tensor:
+        """What is seen from what carries the legs, along the world's axes."""
+        return seen_TX3 @ steps.turn_T33.to(seen_TX3).mT
+
+    def _wanted(self, carried: _Carried, steps: HumanSteps) -> tuple[np.ndarray, np.ndarray]:
+        """Where points of soles are to be (T, P, 3) in the world, and how much that counts (T, P), 0..1."""
+        phase_TP, weight_TP = steps.contacts.phase_TP, steps.contacts.weight_TP
+        found_TP3, frame_T = carried.point_TP3.copy(), np.arange(len(phase_TP))
+        low_TP = carried.low_TP.copy()
+        for p in range(found_TP3.shape[1]):
+            there_T = phase_TP[:, p] >= 0
+            if there_T.any():
+                flat_X2 = carried.place_K2[phase_TP[there_T, p]] - found_TP3[there_T, p][:, _FLAT]
+                off_X3 = np.stack((flat_X2[:, 0], -low_TP[there_T, p], flat_X2[:, 1]), axis=1)
+                off_T3 = np.stack([np.interp(frame_T, frame_T[there_T], off_X) for off_X in off_X3.T], axis=1)
+                found_TP3[:, p] += off_T3
+                low_TP[:, p] += off_T3[:, _UP]
+        under_TP = np.maximum(-low_TP, 0.0)
+        under_TP[phase_TP >= 0] = 0.0
+        found_TP3[..., _UP] += under_TP
+        return found_TP3, np.maximum(weight_TP, np.minimum(under_TP / UNDER_M, 1.0))
+
+    def _extended(self, target_TD3: Tensor, carried: _Carried, steps: HumanSteps) -> Tensor:
+        """The directions with the places of soles after them, as `SoleTerm` has it."""
+        wanted_TP3, counts_TP = self._wanted(carried, steps)
+        seen_TP3 = torch.from_numpy(wanted_TP3 - carried.root_T3[:, None]).to(target_TD3)
+        weight_TP3 = torch.zeros_like(seen_TP3)
+        weight_TP3[..., 0] = SWINGING + (PLANTED - SWINGING) * torch.from_numpy(counts_TP).to(seen_TP3)
+        return torch.cat((target_TD3, seen_TP3 @ steps.turn_T33.to(seen_TP3), weight_TP3), dim=1)
+
+    def _give_way(
+        self, q_TN: Tensor, target_TX3: Tensor, frame_rate: float, smoothness: Smoothness, avoid_collisions: bool
+    ) -> Tensor:
+        """Joint angles (T, N) of legs whose soles are where they are to be."""
+        step_N, around = speed_bound(self.robot.velocity_N, frame_rate)
+        found, settled = [q_TN[:0]], 0
+        while settled < len(q_TN):
+            before_LN = torch.cat(found[-2:])[-smoothness.reach :]
+            part = slice(settled - len(before_LN), settled + WINDOW)
+            motion_XN = torch.cat((before_LN, q_TN[settled : settled + WINDOW]))
+            fixed_X = torch.arange(len(motion_XN), device=q_TN.device) < len(before_LN)
+            motion_XN = self._refine(motion_XN, target_TX3[part], smoothness, step_N, fixed_X)
+            if avoid_collisions:
+                motion_XN = self._apart(motion_XN, target_TX3[part], smoothness, step_N, around, fixed_X)
+            used = WINDOW - AHEAD if settled + WINDOW < len(q_TN) else WINDOW
+            found.append(motion_XN[len(before_LN) :][:used])
+            settled += used
+        return nearest_slow(torch.cat(found), step_N)
+
+    def _refine(
+        self, q_XN: Tensor, target_XD3: Tensor, smoothness: Smoothness, step_N: Tensor, fixed_X: Tensor
+    ) -> Tensor:
+        """The best legs near others for some frames, of which the first are settled."""
+        if len(q_XN) == 1:
+            found_XN = self.problem.minimise(q_XN, target_XD3)[0]
+        else:
+            q_XN = nearest_slow(q_XN, step_N, fixed_X)
+            bound = StepBound(step_N, torch.ones(len(q_XN) - 1, dtype=torch.bool, device=q_XN.device))
+            found_XN = refine(self.problem, q_XN, target_XD3, smoothness, SWEEPS, TOLERANCE, fixed_X, bound)[0]
+            found_XN = nearest_slow(found_XN, step_N, fixed_X)
+        return torch.where(self._legs_N, found_XN, q_XN)
+
+    def _apart(
+        self, q_XN: Tensor, target_XD3: Tensor, smoothness: Smoothness, step_N: Tensor, around: int, fixed_X: Tensor
+    ) -> Tensor:
+        """The same with frames that gave way where the robot would touch itself."""
+        if len(q_XN) == 1:
+            return self.avoidance(q_XN, target_XD3)
+        return self.avoidance.in_motion(q_XN, target_XD3, smoothness, step_N, around, fixed_X)

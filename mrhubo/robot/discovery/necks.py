@@ -1,0 +1,108 @@
+"""Necks: chains in the middle above the chest, without what belongs to a face, and without sensors that turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrhubo.robot.discovery import names
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.lines import ON, Line, feet, measure, sine
+from mrhubo.robot.discovery.symmetry import Pair
+
+_PLANE = 0.03
+"""How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
+_LATERAL = 0.97
+"""Cosine of an axis's angle to what runs across the mirror plane, from which on it is its own mirror image."""
+_LIGHT = 0.25
+"""Share of its head's weight that a jaw has at most."""
+
+
+def in_plane(step: Step, normal_3: np.ndarray, middle_3: np.ndarray, size: float) -> bool:
+    """Whether a joint's axis is its own mirror image: across the mirror plane, or in it."""
+    line = step.hinge.line
+    across = abs(float(line.axis_3 @ normal_3))
+    if across > _LATERAL:
+        return True
+    return across < 0.25 and abs(float((line.point_3 - middle_3) @ normal_3)) < _PLANE * size
+
+
+def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
+    """The other chains from the chest with axes in the mirror plane, the likeliest neck first."""
+    middle_3, reach = arms.mounts_23.mean(0), measure(lines_of(arms.chains[0])).out_N[-1]
+    ranked: list[tuple[float, Chain]] = []
+    for step in bodies.steps_from[arms.body]:
+        if step.hinge.name in used or not step.hinge.rotary or _is_sensor(bodies, step):
+            continue
+        chain: list[Step] = []
+        todo, beside = [step], bodies.steps_from[arms.body]
+        while todo:
+            fitting = [
+                s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
+            ]
+            twins = [s for s in beside if _has_twin(s, beside, arms.normal_3, middle_3, ON * bodies.size)]
+            fitting = [s for s in fitting if not _is_sensor(bodies, s) and s not in twins]
+            paired = bool(twins)
+            fitting = [s for s in fitting if not (chain and _in_face(bodies, s, paired))]
+            fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
+            if not fitting or len(chain) >= 4:
+                break
+            chain.append(fitting[0])
+            todo = beside = bodies.onward(fitting[0])
+        if not chain:
+            continue
+        called = [name for s in chain for name in (s.outer_link, s.hinge.name)]
+        named = float(names.share(called, "head") > 0) - float(names.share(called, "waist") > 0)
+        # A neck begins near the shoulders; a waist upside down, below a root that is the chest, does not.
+        start_3 = measure(lines_of(tuple(chain))).nodes_N3[0]
+        away = min(chain[0].hinge.line.distance(middle_3), float(np.linalg.norm(start_3 - middle_3)))
+        ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
+    ranked.sort(key=lambda found: -found[0])
+    return tuple(chain for _, chain in ranked)
+
+
+def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray, least: float) -> bool:
+    """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear. None is of one that
+    lies nearer to the middle than `least` [m].
+    """
+    line = step.hinge.line
+    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
+
+    def miss(other: Line) -> float:
+        one_3, other_3 = feet(image, other)
+        return float(np.linalg.norm(one_3 - other_3)) + float(np.linalg.norm(image.point_3 - line.point_3)) * sine(
+            image.axis_3, other.axis_3
+        )
+
+    own = abs(float((line.point_3 - middle_3) @ normal_3))
+    # A lateral axis is its own mirror image wherever its frame lies: a twin's is the same one.
+    near = least if abs(float(line.axis_3 @ normal_3)) > _LATERAL else 0.5 * own
+    return own > least and any(other is not step and miss(other.hinge.line) < near for other in others)
+
+
+def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
+    """Whether a joint above a neck's is one of the face, as a jaw's or an eye's: by its name, or as a single one beside
+    pairs, or as one that carries little of the head's weight.
+    """
+    if _is_face(step):
+        return True
+    inside, hinges = bodies.beyond(step)
+    if paired and len(hinges) == 1:
+        return True
+    weights = [sum(map(bodies.weight, part)) for part in (inside, {step.start})]
+    return len(hinges) == 1 and 0 < weights[0] < _LIGHT * weights[1]
+
+
+def _is_face(step: Step) -> bool:
+    """Whether a joint's name, or its link's, is that of a part of a face."""
+    return any(names.speaks_of(name, "face") for name in (step.hinge.name, step.outer_link))
+
+
+def _is_sensor(bodies: Bodies, step: Step) -> bool:
+    """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all."""
+    if any(names.speaks_of(name, "sensor") for name in (step.hinge.name, step.outer_link)):
+        return True
+    limited = any(hinge.limited for hinge in bodies.hinges if hinge.rotary)
+    return limited and not step.hinge.limited and step.hinge.lower is None

@@ -1,0 +1,127 @@
+"""Where a robot's feet touch the floor: the lowest parts of what is fixed to a foot's link.
+
+Parts are balls: a capsule is two, a box its corners and a mesh its outermost vertices with no radius. What lies more
+than a little above the lowest of them, with the foot upright, never touches a flat floor before they do.
+
+Legend: K balls, F of them where the foot stands flat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mrhubo.robot.entries import End
+from mrhubo.robot.hulls import extremes
+from mrhubo.robot.meshes import read_meshes
+from mrhubo.robot.parts import OrientedPart
+from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
+from mrhubo.robot.standing import StandingRobot
+
+if TYPE_CHECKING:
+    from mrhubo.robot.body_map import BodyMap
+    from mrhubo.robot.urdf import Description
+
+_RIM = 8
+"""Points that stand for the round edge of a cylinder."""
+_SIDES = 0.5
+"""Balls lower than this share of the way from the foot's origin to its lowest part can touch the floor, where the foot
+is tilted."""
+_FLAT_M = 0.01
+"""Balls up to this far above the lowest are where it stands: soles have a profile."""
+
+
+@dataclass(frozen=True)
+class Sole:
+    """The sole of one foot, in the frame of its link; m."""
+
+    part: OrientedPart
+    link: str
+    balls_K4: np.ndarray
+    """Centres and radii (K, 4) of what can touch the floor."""
+    rear_3: np.ndarray
+    """The middle of the sole's rear edge."""
+    front_3: np.ndarray
+    """The middle of its front edge."""
+    known: bool
+    """Whether a shape or an entry tells; else the origins of the foot's links do."""
+
+
+def find_soles(body_map: BodyMap) -> tuple[Sole, ...]:
+    """The soles of the parts that stand on the floor, in the table's order."""
+    ends, description = body_map.keypoints.ends, body_map.robot.description
+    return tuple(_sole(part, ends[part.name], description) for part in body_map.keypoints.standing)
+
+
+def _sole(part: OrientedPart, end: End, description: Description) -> Sole:
+    forward_3, up_3 = end.axes_23.numpy().astype(float)
+    if end.sole is not None:
+        back, ahead, below = end.sole
+        places_23 = np.stack((-back * forward_3, ahead * forward_3)) - below * up_3
+        balls_K4, known = np.concatenate((places_23, np.zeros((2, 1))), axis=1), True
+    else:
+        balls_K4, known = _balls(end.link, description)
+    height_K = balls_K4[:, :3] @ up_3 - balls_K4[:, 3]
+    low = float(height_K.min())
+    flat_K = height_K <= low + _FLAT_M
+    along_F, left_3 = balls_K4[flat_K, :3] @ forward_3, np.cross(up_3, forward_3)
+    side = float(np.mean(balls_K4[flat_K, :3] @ left_3))
+    rear_3, front_3 = (x * forward_3 + side * left_3 + low * up_3 for x in (along_F.min(), along_F.max()))
+    return Sole(part, end.link, balls_K4[flat_K | (height_K <= _SIDES * low)], rear_3, front_3, known)
+
+
+def _balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
+    """Balls (K, 4) of all that is fixed to a link, in its frame: of collision shapes, or of looks where there are none,
+    or the links' origins; and whether shapes told.
+    """
+    links, parsed = _fixed_to(link, description), description.parsed
+    poses = StandingRobot(description, {}).poses
+    from_44 = {name: np.linalg.inv(poses[link]) @ poses[name] for name in links}
+    for shapes in (read_collision_geometry(parsed), read_geometry(parsed)):
+        found = [_placed(_of_shape(s), from_44[s.link] @ s.origin_44) for s in shapes if s.link in links]
+        if found:
+            return np.concatenate(found), True
+    others = {each.name for each in parsed.robot.links} - links
+    meshes = read_meshes(parsed, description.path, others)
+    found = [_placed(_points(extremes(mesh.vertices_V3)), from_44[mesh.link]) for mesh in meshes]
+    if found:
+        return np.concatenate(found), True
+    return _points(np.stack([from_44[name][:3, 3] for name in sorted(links)])), False
+
+
+def _fixed_to(link: str, description: Description) -> set[str]:
+    """A link and all below it that never move against it."""
+    found, joints = {link}, [joint for joint in description.joints.values() if joint.kind == "fixed"]
+    while more := {joint.child for joint in joints if joint.parent in found} - found:
+        found |= more
+    return found
+
+
+def _of_shape(shape: LinkGeometry) -> np.ndarray:
+    """The balls (K, 4) of a shape, in its own frame."""
+    if shape.kind == "sphere":
+        return np.array([[0.0, 0.0, 0.0, shape.size[0]]])
+    if shape.kind == "capsule":
+        return np.array([[0.0, 0.0, side * shape.size[1], shape.size[0]] for side in (-0.5, 0.5)])
+    return _points(np.array(list(_corners(shape))))
+
+
+def _corners(shape: LinkGeometry) -> Iterator[tuple[float, float, float]]:
+    if shape.kind == "box":
+        x, y, z = (0.5 * side for side in shape.size)
+        yield from ((i * x, j * y, k * z) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1))
+    else:
+        radius, length = shape.size
+        for angle in 2 * np.pi * np.arange(_RIM) / _RIM:
+            yield from ((radius * np.cos(angle), radius * np.sin(angle), side * length) for side in (-0.5, 0.5))
+
+
+def _points(places_K3: np.ndarray) -> np.ndarray:
+    return np.concatenate((places_K3, np.zeros((len(places_K3), 1))), axis=1)
+
+
+def _placed(balls_K4: np.ndarray, pose_44: np.ndarray) -> np.ndarray:
+    return np.concatenate((balls_K4[:, :3] @ pose_44[:3, :3].T + pose_44[:3, 3], balls_K4[:, 3:]), axis=1)

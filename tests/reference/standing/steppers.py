@@ -1,0 +1,50 @@
+"""People who squat or step on the spot, of hips, knees and ankles alone, with a root that fits."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body import Skeleton
+from mrhubo.body.skeleton import POSED_JOINT_NAMES, keypoint_indices
+from mrhubo.motion import Motion
+
+
+def squat(frames: int = 48, rate: float = 24.0, sway: float = 0.2) -> Motion:
+    """Bends the knees and sways from side to side; both feet stay where they are."""
+    phase_T = torch.linspace(0, 2 * torch.pi, frames)
+    return _standing(0.3 + 0.25 * torch.cos(phase_T), sway * torch.sin(phase_T), rate, 0.0)
+
+
+def jump(frames: int = 48, rate: float = 24.0) -> Motion:
+    """Squats, and is off the floor for the middle quarter."""
+    phase_T = torch.linspace(0, 1, frames)
+    air_T = ((phase_T - 0.375) / 0.25).clamp(0, 1)
+    return _standing(0.5 * torch.sin(torch.pi * phase_T) ** 2, 0 * phase_T, rate, 0.6 * air_T * (1 - air_T))
+
+
+def _standing(bend_T: Tensor, lean_T: Tensor, rate: float, above: Tensor | float) -> Motion:
+    turn_TJ3 = torch.zeros(len(bend_T), len(POSED_JOINT_NAMES), 3)
+    for side in ("left", "right"):
+        for joint, factor in (("hip", -1.0), ("knee", 2.0), ("ankle", -1.0)):
+            turn_TJ3[:, POSED_JOINT_NAMES.index(f"{side}_{joint}"), 0] = factor * bend_T
+        turn_TJ3[:, POSED_JOINT_NAMES.index(f"{side}_hip"), 2] += lean_T
+    local_TJ33 = rotation.axis_angle_to_matrix(turn_TJ3)
+    for side in ("left", "right"):  # ankles give back what hips have leaned
+        j = POSED_JOINT_NAMES.index(f"{side}_ankle")
+        chain = [POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("hip", "knee")]
+        local_TJ33[:, j] = (local_TJ33[:, chain[0]] @ local_TJ33[:, chain[1]]).mT
+    soles = keypoint_indices(["left_heel", "right_heel"])
+    place_T3 = -Skeleton().keypoints(local_TJ33)[:, soles].mean(dim=1)
+    place_T3[:, 1] += above
+    return Motion("person", local_TJ33, rate, root_rotation_T33=torch.eye(3).repeat(len(bend_T), 1, 1),
+                  root_position_T3=place_T3)  # fmt: skip
+
+
+def moved(motion: Motion, turn: float = 0.0, place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Motion:
+    """The same, turned about the vertical [rad] and elsewhere [m]."""
+    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, turn, 0.0]))
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    return motion.changed(root_rotation_T33=turn_33 @ motion.root_rotation_T33,
+                          root_position_T3=motion.root_position_T3 @ turn_33.T + torch.tensor(place))  # fmt: skip

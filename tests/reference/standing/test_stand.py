@@ -1,0 +1,127 @@
+"""A robot's feet stand on the floor, flat and still, while the person's do; wherever that is, and whichever way it faces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.errors import UserError
+from mrhubo.evaluation.whole_body import lowest, score_whole_body
+from mrhubo.motion import Motion
+from mrhubo.reference import OptimizationRetargeter
+from mrhubo.reference.result import OptimizationResult
+from mrhubo.reference.standing import Legs
+from mrhubo.robot import Robot
+from tests.reference.standing.steppers import jump, moved, squat
+from tests.reference.walkers import ROOTS, walker
+
+
+@pytest.fixture(scope="module", params=ROOTS)
+def retargeter(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> OptimizationRetargeter:
+    return OptimizationRetargeter(walker(tmp_path_factory.mktemp("walker"), request.param))
+
+
+def base(result: OptimizationResult) -> tuple[Tensor, Tensor]:
+    assert result.root_position is not None and result.root_quaternion_wxyz is not None
+    return result.root_position, rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+
+
+def soles(retargeter: OptimizationRetargeter, result: OptimizationResult) -> tuple[np.ndarray, np.ndarray]:
+    """Points (T, P, 3) and lowest heights (T, P) [m], z up."""
+    legs = Legs(retargeter.body_map)
+    found = legs.on_floor(retargeter.body_map.robot.forward(result.q), *base(result))
+    return found.point_BP3.double().numpy(), lowest(legs, found.ball_BK3.double().numpy())
+
+
+def test_planted_feet_keep_still_and_flat(retargeter: OptimizationRetargeter) -> None:
+    motion = squat()
+    result = retargeter(motion)
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert score.slide_cm_s < 0.5 and score.sliding < 0.05
+    assert score.sunk_max_cm < 0.05 and score.floating_max_cm < 1.0
+    assert score.parts_deg["knee"] < 4 and score.parts_deg["ankle"] < 4 and score.heading_deg < 0.01
+    assert score.over_limit == 0 and score.outside == 0
+    point_TP3, _ = soles(retargeter, result)
+    assert np.ptp(point_TP3[..., :2], axis=0).max() < 0.01
+
+
+def test_the_world_may_be_turned_and_its_floor_be_anywhere(retargeter: OptimizationRetargeter) -> None:
+    plain, other = retargeter(squat()), retargeter(moved(squat(), 2.0, (3.0, -1.2, 7.0)))
+    torch.testing.assert_close(other.q, plain.q, atol=2e-3, rtol=0)
+    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, 2.0]))
+    (place_T3, turn_T33), (other_T3, other_T33) = base(plain), base(other)
+    scale = Legs(retargeter.body_map).scale
+    expected_T3 = place_T3 @ turn_33.T + scale * torch.tensor([7.0, 3.0, 0.0])
+    torch.testing.assert_close(other_T3, expected_T3, atol=5e-3, rtol=0)
+    torch.testing.assert_close(other_T33, turn_33 @ turn_T33, atol=1e-4, rtol=0)
+
+
+def test_a_jump_is_as_high_as_the_persons_and_lands_on_the_floor(retargeter: OptimizationRetargeter) -> None:
+    result = retargeter(jump())
+    _, low_TP = soles(retargeter, result)
+    assert low_TP.min() > -1e-3
+    assert low_TP[24].min() == pytest.approx(0.15 * Legs(retargeter.body_map).scale, abs=0.05)
+    assert low_TP[[0, 1, -2, -1]].max() < 0.01
+
+
+def test_arms_are_what_they_are_without_a_root(retargeter: OptimizationRetargeter) -> None:
+    motion = squat()
+    names = retargeter.body_map.robot.joint_names
+    arms = [n for n, name in enumerate(names) if "shoulder" in name or "elbow" in name]
+    without = retargeter(motion.changed(root_position_T3=None, root_rotation_T33=None))
+    assert without.root_position is None and without.root_quaternion_wxyz is None
+    assert torch.equal(retargeter(motion).q[:, arms], without.q[:, arms])
+    assert torch.equal(retargeter(motion.local_TJ33, 24.0).q, without.q)
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_a_frame_or_two_stand(retargeter: OptimizationRetargeter, frames: int) -> None:
+    whole = squat().arrays
+    motion = squat().changed(local_TJ33=whole.local_TJ33[:frames], root_rotation_T33=whole.root_rotation_T33[:frames],
+                             root_position_T3=whole.root_position_T3[:frames])  # fmt: skip
+    _, low_TP = soles(retargeter, retargeter(motion))
+    assert abs(low_TP).max() < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"root_position_T3": torch.full((48, 3), torch.nan)}, "NaN"),
+        ({"root_position_T3": torch.full((48, 3), 1e9)}, "farther than 100 km"),
+        ({"root_rotation_T33": 2 * torch.eye(3).repeat(48, 1, 1)}, "no rotation"),
+    ],
+)
+def test_a_root_that_is_none_is_refused(
+    retargeter: OptimizationRetargeter, changes: dict[str, Tensor], message: str
+) -> None:
+    with pytest.raises(UserError, match=message):
+        retargeter(squat().changed(**changes))
+
+
+def test_long_motions_are_worked_on_in_windows(
+    retargeter: OptimizationRetargeter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mrhubo.reference.standing.stand.WINDOW", 30)
+    monkeypatch.setattr("mrhubo.reference.standing.stand.AHEAD", 12)
+    motion = squat()
+    result = retargeter(motion)
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert score.slide_cm_s < 0.5 and score.speed_max <= 1
+
+
+def test_who_has_no_feet_has_no_root(root: Path) -> None:
+    assert OptimizationRetargeter(Robot.from_config(root / "conf" / "nao.yaml"))(squat(frames=4)).root_position is None
+
+
+def test_a_measure_of_nothing_is_refused(tmp_path: Path) -> None:
+    body_map = walker(tmp_path)
+    motion: Motion = squat(frames=4).changed(root_position_T3=None)
+    with pytest.raises(UserError, match="a whole body is measured by its root and feet"):
+        score_whole_body(
+            body_map, motion, body_map.robot.home().repeat(4, 1), torch.zeros(4, 3), torch.eye(3).repeat(4, 1, 1)
+        )
