@@ -43,7 +43,7 @@ SCRIPTS = [
     "retarget",
     "scaling",
 ]
-SCRIPTS += ["stream", "training", "universal"]
+SCRIPTS += ["stream", "training", "universal", "universal_speed", "without_training"]
 LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
@@ -199,6 +199,21 @@ def test_universal(run: Run, clips: Path, tmp_path: Path) -> None:
     assert [row[0] for row in found] == ["nao", "nao", "coman", "coman"]
     assert all(float(row[4]) < 1 for row in found), "degrees over the optimum"
     assert "1 random humanoids, 2 frames each; 0 more were refused" in text
+
+
+def test_universal_speed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    speed = importlib.import_module("universal_speed")
+    monkeypatch.setattr(speed, "forms_here", lambda: ("numpy",))  # numba would compile for half a minute
+    found = rows(run("universal_speed", "--robots", "nao", "--batch", 3, "--rounds", 1), "robot")
+    assert [row[2] for row in found] == ["PyTorch", "numpy"] and all(float(row[5]) < 1e-3 for row in found)
+
+
+def test_without_training(run: Run, clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = importlib.import_module("without_training")
+    monkeypatch.setattr(module, "CLIPS", clips)
+    monkeypatch.setattr(importlib.import_module("files"), "_SECONDS", 0.2)
+    found = rows(run("without_training", "--robots", "nao", "--clips", 1), "robot")
+    assert [row[1] for row in found] == ["universal", "reference"] and all(float(row[3]) < 1 for row in found)
 
 
 @pytest.fixture(scope="module")
