@@ -150,4 +150,5 @@ def _by_part(body_map: BodyMap, angle_TD: Tensor) -> dict[str, float]:
 
 
 def _mean(values: ArrayLike) -> float:
-    return float(np.mean(values)) if np.size(values) else nan
+    found = np.asarray(values, float)
+    return float(found.mean()) if found.size else nan
