@@ -50,7 +50,8 @@ dashboard: .venv/.core
 	$(PIP_INSTALL) -e '.[dev]'
 	@touch .venv/.core $@
 
-# An environment that is already there and works is kept.
+# An environment that is already there and works is kept. A new one gets the newest pip, which chooses versions in half
+# the time of one that is three years old.
 .venv/.created:
 	@if ! $(BIN)/python -c "import pip; $(ENOUGH)" 2>/dev/null; then \
 	    $(PYTHON) -c "$(ENOUGH)" 2>/dev/null || { \
@@ -58,5 +59,6 @@ dashboard: .venv/.core
 	    echo "$(PYTHON) -m venv .venv"; \
 	    $(PYTHON) -m venv --clear .venv || { \
 	        echo "'$(PYTHON) -m venv' failed: install it first (Debian, Ubuntu: apt install python3-venv)" >&2; exit 2; }; \
+	    $(PIP_INSTALL) --quiet --upgrade pip || echo "no newer pip; the one that came with Python does too"; \
 	fi
 	@touch $@

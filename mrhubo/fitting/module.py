@@ -12,7 +12,7 @@ Legend: B batch, F input features, M robot links, N robot joints.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import lightning
 import torch
@@ -20,8 +20,11 @@ from torch import Tensor
 from torch.nn.functional import l1_loss, mse_loss
 
 from mrhubo.config import TrainerConfig
-from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.retargeter.networks import Piece, RetargetNetwork
 from mrhubo.runtime.trainer import cosine_schedule
+
+if TYPE_CHECKING:
+    from mrhubo.fitting.branch_threads import BranchThreads
 
 LOG_EVERY = 50
 """Steps between two entries of the losses; MLflow takes about 20 ms for each."""
@@ -34,10 +37,14 @@ class RetargetModule(lightning.LightningModule):
         super().__init__()
         self.network, self.settings, self.detach_student = network, settings, detach_student
         self._distance = {"l1": l1_loss, "mse": mse_loss}[settings.loss]
+        self.branch_threads: BranchThreads | None = None
+        """What trains the branches side by side; None: all in one."""
 
-    def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor) -> dict[str, Tensor]:
-        """`loss`, and for two stages `loss_pre` (of 6D numbers) and `loss_post` (of rad), squared with `mse`."""
-        network, distance = self.network, self._distance
+    def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor, piece: Piece | None = None) -> dict[str, Tensor]:
+        """`loss`, and for two stages `loss_pre` (of 6D numbers) and `loss_post` (of rad), squared with `mse`; of the
+        whole network, or of a piece and its columns.
+        """
+        network, distance = piece or self.network, self._distance
 
         def joint_loss(given: Tensor, wanted: Tensor) -> Tensor:
             return distance(network.limited.unlimited(network.post(given).float()), wanted)
@@ -45,7 +52,7 @@ class RetargetModule(lightning.LightningModule):
         if network.pre is None:
             return {"loss": joint_loss(features_BF, q_BN)}
         links = R_BM6.flatten(1)
-        predicted = network.links(features_BF).float()
+        predicted = network.pre(features_BF).float()
         pre = distance(predicted, links)
         student = predicted.detach() if self.detach_student else predicted
         # Teacher and student in one pass; the mean over both is half of their sum.
@@ -54,11 +61,26 @@ class RetargetModule(lightning.LightningModule):
 
     def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
         """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""
-        losses = self.losses(*batch)
+        losses = (self.branch_threads or self).losses(*batch)
         # Only when it is written anyway: each call costs milliseconds.
         if (self.trainer.global_step + 1) % LOG_EVERY == 0:
             self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         return losses["loss"]
+
+    def on_train_start(self) -> None:
+        """Leaves the cores to the threads of the branches."""
+        if self.branch_threads is not None:
+            torch.set_num_threads(1)
+
+    def optimizer_zero_grad(self, *args: Any, **kwargs: Any) -> None:
+        """Of the last step; the threads of the branches have done that, and have the new gradients already."""
+        if self.branch_threads is None:
+            super().optimizer_zero_grad(*args, **kwargs)
+
+    def backward(self, loss: Tensor, *args: Any, **kwargs: Any) -> None:
+        """The gradient of what `training_step` gave."""
+        if self.branch_threads is None:
+            super().backward(loss, *args, **kwargs)
 
     def on_train_batch_end(self, *_: Any) -> None:
         """Stops at the last step, also within an epoch."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from torch import Tensor
 from mrhubo.callbacks import BEST, LAST, CheckedFiles, Checkpoints, ClipMetrics, TrainingProgress, resumable
 from mrhubo.config import Config, TrainerConfig
 from mrhubo.evaluation import Clip
+from mrhubo.fitting.branch_threads import branches_in_threads
 from mrhubo.fitting.datamodule import PairData
 from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.fitting.preparation import Prepared, device_of
@@ -90,11 +92,14 @@ def train(
     saver = Checkpoints(checkpoints, "val/link_cm")
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
     progress = TrainingProgress(settings.max_steps, _SHOWN, report)
+    device = device_of(prepared.config).type
+    # In bf16, autocast would have to be told to each thread; several ranks add up gradients as they come about.
+    threads = device == "cpu" and ranks.count == 1 and settings.precision == "32"
     with quiet_lightning():
-        trainer = _trainer(
-            settings, device_of(prepared.config).type, ranks, logger, [metrics, *callbacks, progress, saver]
-        )
-        run_trainer(trainer, module, _start(checkpoints, module, report), datamodule=data)
+        trainer = _trainer(settings, device, ranks, logger, [metrics, *callbacks, progress, saver])
+        start = _start(checkpoints, module, report)
+        with branches_in_threads(module) if threads and isinstance(module, RetargetModule) else nullcontext():
+            run_trainer(trainer, module, start, datamodule=data)
     best = torch.load(checkpoints / BEST, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
     network.requires_grad_(False).eval()

@@ -5,7 +5,7 @@ Legend: B batch, I inputs, F numbers of all of them, M robot links, N robot join
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -70,6 +70,7 @@ class Branched(nn.Module):
         make: Callable[[int, int], nn.Module],
     ) -> None:
         super().__init__()
+        self.columns_in, self.columns_out = columns_in, columns_out
         self.parts = nn.ModuleList([make(len(a), len(b)) for a, b in zip(columns_in, columns_out, strict=True)])
         self._names = [f"_columns_{i}" for i in range(len(self.parts))]
         for name, columns in zip(self._names, columns_in, strict=True):
@@ -141,6 +142,26 @@ class JointNetwork(nn.Module):
         raise NotImplementedError
 
 
+@dataclass(frozen=True)
+class Piece:
+    """What a branch has of the networks; it shares their weights."""
+
+    inputs: Sequence[int]
+    """Its columns of the features."""
+    joints: Sequence[int]
+    """Its joints, and so its links."""
+    share: float
+    """Of all joints."""
+    pre: nn.Module | None
+    post: nn.Module
+    limited: LimitedOutput
+
+    def weights(self) -> Iterator[nn.Parameter]:
+        """Those of its networks."""
+        for network in (self.pre, self.post):
+            yield from () if network is None else network.parameters()
+
+
 class RetargetNetwork(JointNetwork):
     """Pre- and post-network (two stages), or one network from pose to joints (one stage)."""
 
@@ -174,7 +195,7 @@ class RetargetNetwork(JointNetwork):
         net = ResidualMLP if residual else mlp
         branches = branches or [Branch(tuple(range(len(features.names))), tuple(range(joints)))]
 
-        def branched(columns_in: list[list[int]], columns_out: list[list[int]]) -> nn.Module:
+        def branched(columns_in: list[list[int]], columns_out: list[list[int]]) -> Branched:
             return Branched(columns_in, columns_out, lambda a, b: net(a, hidden, layers, b))
 
         inputs = [features.columns(b.inputs) for b in branches]
@@ -189,6 +210,21 @@ class RetargetNetwork(JointNetwork):
         if self.pre is None:
             raise RuntimeError("a one-stage network predicts no links")
         return self.pre(features_BF)
+
+    def pieces(self) -> list[Piece]:
+        """Its branches, each with networks of its own."""
+        first, limited = self.pre or self.post, self.limited
+        return [
+            Piece(
+                first.columns_in[i],
+                joints,
+                len(joints) / len(limited.lower_N),
+                None if self.pre is None else self.pre.parts[i],
+                self.post.parts[i],
+                LimitedOutput(limited.lower_N[list(joints)], limited.upper_N[list(joints)], limited.kind),
+            )
+            for i, joints in enumerate(self.post.columns_out)
+        ]
 
     def joints(self, features_BF: Tensor) -> Tensor:
         """Joint angles (B, N) [rad], inside the limits, of features (B, F)."""
