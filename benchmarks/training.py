@@ -23,6 +23,8 @@ from mrhubo.callbacks.progress import TrainingProgress
 from mrhubo.config import load_config
 from mrhubo.fitting.datamodule import Batch, PairTable, batches_of
 from mrhubo.fitting.module import LOG_EVERY, RetargetModule
+from mrhubo.fitting.training import build_module
+from mrhubo.fitting.tuning import TuningModule
 from mrhubo.pairing import make_filter
 from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
@@ -57,9 +59,9 @@ def main(argv: list[str]) -> None:
     body_map = build_body_map(config.robot)
     joints = len(body_map.robot.joint_names)
 
-    def module() -> RetargetModule:
+    def module() -> RetargetModule | TuningModule:
         torch.manual_seed(0)
-        return RetargetModule(build_network(config, body_map), config.trainer)
+        return build_module(build_network(config, body_map), config)
 
     def data() -> DataLoader[Batch]:
         generator = torch.Generator().manual_seed(0)

@@ -43,6 +43,7 @@ __all__ = [
     "Stream",
     "UserError",
     "__version__",
+    "for_robot",
     "load",
     "load_fast",
     "read_motion",
@@ -83,6 +84,25 @@ def load(source: str | os.PathLike[str]) -> Retargeter:
     from mrhubo.retargeter import Retargeter
 
     return Retargeter.load(package_folder(source))
+
+
+def for_robot(robot: Robot | str | os.PathLike[str]) -> Retargeter:
+    """A retargeter for a robot that nothing was trained for, by the network that is the same for every robot.
+
+    Made in seconds. It answers motions, poses and streams with a confidence as a trained one does (docs/universal.md).
+
+    Args:
+        robot: a `Robot` that knows its body parts; or a config's file, the name of a shipped robot, or a URDF, whose
+            body parts are found out (`mrhubo describe` shows them; what is a guess is told as a warning).
+
+    Raises:
+        UserError: the file cannot be used, or the robot's body parts make no sense.
+    """
+    from mrhubo.describing.run import open_robot
+    from mrhubo.retargeter import untrained
+    from mrhubo.robot import Robot
+
+    return untrained(robot if isinstance(robot, Robot) else open_robot(os.fspath(robot)))
 
 
 def package_folder(source: str | os.PathLike[str]) -> Path:

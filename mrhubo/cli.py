@@ -26,6 +26,7 @@ VERBS = {
     "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit"),
     "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE"),
     "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours"),
+    "universal": Verb("mrhubo.universal.__main__", "train the network that is the same for every robot"),
     "prior": Verb("mrhubo.prior", "train a body prior on motion capture of your own"),
 }
 

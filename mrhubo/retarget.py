@@ -6,14 +6,17 @@ from argparse import BooleanOptionalAction
 from pathlib import Path
 
 from mrhubo.config import CommandParser, number, print_error, run_command
+from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot_motion import FORMATS, read_joint_order
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
     "Retargets files of human motion to a robot and writes its joint angles. What is in a file, and not its ending,"
-    " says how it is read. With a package its networks and some steps of optimisation answer; with a robot alone, the"
-    " reference retargeter: by optimisation, without training, and slower. docs/formats.md specifies all formats."
+    " says how it is read. With a package its networks and some steps of optimisation answer; with a robot alone, and"
+    " without any training, the network that is the same for every robot. docs/formats.md specifies all formats."
 )
+
+_METHODS = ("universal", "reference")
 
 
 def build_parser() -> CommandParser[None]:
@@ -24,6 +27,8 @@ def build_parser() -> CommandParser[None]:
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
     robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
+    method = "with --robot: `universal`, the network for every robot (default), or `reference`, the optimiser alone"
+    parser.add_argument("--method", metavar="METHOD", help=method)
     parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help="motion files, and folders of them")
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
     parser.add_argument("--out", metavar="FILE", required=True, help=out)
@@ -49,10 +54,10 @@ def build_parser() -> CommandParser[None]:
 def main(argv: list[str]) -> int:
     """The command; 2 where some of the motions could not be retargeted."""
     options = build_parser().parse_args(argv)
-    from mrhubo.errors import UserError
     from mrhubo.motion import ReadOptions
     from mrhubo.retargeting import Request, find_files, plan_places, retarget_files, table
 
+    method = _method(options.method, options.retargeter)
     files = find_files([Path(name) for name in options.motion])
     places = plan_places(options.out, options.format, files)
     bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
@@ -64,7 +69,7 @@ def main(argv: list[str]) -> int:
         mirrored=options.mirror,
         joint_order=None if options.joint_order is None else read_joint_order(Path(options.joint_order)),
     )
-    answerer = _answerer(options.retargeter, options.robot, options.avoid_collisions)
+    answerer = _answerer(options.retargeter, options.robot, method, options.avoid_collisions)
     print(answerer.described)
     outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
     if outcome.summaries:
@@ -80,14 +85,25 @@ def main(argv: list[str]) -> int:
     return print_error(f"{len(sentences)} of {len(files)} motions could not be retargeted: {names}")
 
 
-def _answerer(package: str | None, robot: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
-    from mrhubo.retargeting import of_package, of_reference
+def _method(method: str | None, package: str | None) -> str:
+    if method is None:
+        return _METHODS[0]
+    if method not in _METHODS:
+        raise UserError(f"command line: --method: {unknown_name('method', method, _METHODS)}")
+    if package is not None:
+        raise UserError("command line: --method goes with --robot alone; a package answers by the networks it has")
+    return method
+
+
+def _answerer(package: str | None, robot: str | None, method: str, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
+    from mrhubo.retargeting import of_package, of_reference, of_universal
 
     if package is not None:
         return of_package(package, avoid_collisions)
     from mrhubo.describing.run import open_robot
 
-    return of_reference(open_robot(str(robot)), avoid_collisions)
+    of_robot = {"universal": of_universal, "reference": of_reference}[method]
+    return of_robot(open_robot(str(robot)), avoid_collisions)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,10 @@ def test_every_verb_has_a_command_and_every_command_a_verb(root: Path) -> None:
         assert spec is not None and spec.origin is not None
         tree = ast.parse(Path(spec.origin).read_text())
         assert "main" in [node.name for node in tree.body if isinstance(node, ast.FunctionDef)], verb.module
-    commands = {p.stem for p in (root / "mrhubo").glob("*.py") if "run_command(main)" in p.read_text()}
+    files = [*(root / "mrhubo").glob("*.py"), *(root / "mrhubo").glob("*/__main__.py")]
+    commands = {
+        p.stem if p.stem != "__main__" else p.parent.name for p in files if "run_command(main)" in p.read_text()
+    }
     assert commands == set(VERBS)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from mrhubo.config import BaselineConfig, Config, PriorConfig, SweepConfig, load_config
+from mrhubo.config import BaselineConfig, Config, PriorConfig, SweepConfig, UniversalConfig, load_config
 from mrhubo.errors import UserError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -24,7 +24,8 @@ MODULES = {
     name: f"mrhubo.{name}"
     for name in ("describe", "fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
 }
-SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig}
+MODULES["universal"] = "mrhubo.universal.__main__"
+SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig, "universal": UniversalConfig}
 """Of the config; elsewhere `Config`."""
 HEAVY = {"torch", "lightning", "mlflow", "matplotlib", "optuna", "scipy", "pandas"}
 PAGES = [
@@ -130,7 +131,7 @@ def test_what_pages_show_is_accepted(path: Path, name: str, arguments: list[str]
     rest = [text for text in arguments if text not in settings]
     file = rest[rest.index("--config") + 1] if "--config" in rest else "" if not rest else rest[0]
     if not file or file.startswith("-"):
-        file = "conf/prior.yaml" if name == "prior" else "conf/nao.yaml"
+        file = f"conf/{name}.yaml" if name in ("prior", "universal") else "conf/nao.yaml"
     load_config(shipped(file), settings, SCHEMAS.get(name, Config))
     if "--sweep" in rest:
         load_config(shipped(rest[rest.index("--sweep") + 1], "sweeps/network"), (), SweepConfig)
@@ -221,6 +222,7 @@ NEEDED = {
     "baseline": 1,
     "reproduce": 0,
     "prior": 1,
+    "universal": 0,
 }
 """How many things each command cannot do without."""
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mrhubo.config import PriorConfig, load_config
+from mrhubo.config import SHIPPED_UNIVERSAL, PriorConfig, UniversalConfig, load_config
 from mrhubo.robot import build_body_map
 
 ROOT = Path(__file__).resolve().parent.parent
-ROBOTS = sorted(path for path in (ROOT / "conf").glob("*.yaml") if path.stem != "prior")
+ROBOTS = sorted(path for path in (ROOT / "conf").glob("*.yaml") if path.stem not in ("prior", "universal"))
 
 
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
@@ -32,6 +32,11 @@ def test_the_papers_settings(path: Path) -> None:
     assert (config.pairs.filter, config.pairs.filter_k) == ("linear", 1)
     assert (config.model.stages, config.model.hidden, config.model.layers) == (2, 512, 1)
     assert (config.trainer.loss, config.trainer.batch_size, config.trainer.lr) == ("mse", 2048, 1e-4)
+
+
+def test_universal() -> None:
+    config = load_config(ROOT / "conf" / "universal.yaml", schema=UniversalConfig)
+    assert config.tracking_dir == ROOT / "mlruns" and config.output == SHIPPED_UNIVERSAL
 
 
 def test_prior() -> None:

@@ -77,13 +77,21 @@ def test_a_package_answers_files_without_pytorch(package: Path, wave: Path, tmp_
             np.testing.assert_allclose(getattr(found, field), getattr(wanted, field), atol=most)
 
 
-def test_a_robot_without_a_package_is_answered_by_the_reference(
-    wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("method", "maker", "said"),
+    [
+        ([], "the universal network of mrhubo, without training", "the universal network answers"),
+        (["--method", "reference"], "the optimiser of mrhubo", "by optimisation and without any training"),
+    ],
+)
+def test_a_robot_without_a_package_is_answered(
+    method: list[str], maker: str, said: str, wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["--robot", "nao", "--motion", str(wave), "--out", f"{tmp_path}/out/", "--to", "0.3"]) == 0
+    given = ["--robot", "nao", *method, "--motion", str(wave), "--out", f"{tmp_path}/out/", "--to", "0.3"]
+    assert main(given) == 0
     found = read_robot_motion(tmp_path / "out" / "wave.npz")
-    assert found.robot.made_by == "the optimiser of mrhubo" and found.confidence is None and len(found) == 4
-    assert "by optimisation and without any training" in capsys.readouterr().out
+    assert found.robot.made_by == maker and (found.confidence is None) == bool(method) and len(found) == 4
+    assert said in capsys.readouterr().out
 
 
 def test_a_bad_file_among_several_is_told_at_the_end(
@@ -124,6 +132,8 @@ def test_the_robot_gives_way_unless_told_otherwise(root: Path, tmp_path: Path) -
             ["--robot", "nao", "--motion", "a.npz", "--out", "a.csv", "--joint-order", "none.txt"],
             "none.txt: there is no",
         ),
+        (["--robot", "nao", "--motion", "a", "--out", "b", "--method", "refrence"], "nearest: 'reference'"),
+        (["--retargeter", "x", "--motion", "a", "--out", "b", "--method", "reference"], "goes with --robot alone"),
         (["--robot", "nobody", "--motion", "a.npz", "--out", "a.csv"], "'nobody' is no file"),
         (["--retargeter", "nobody", "--motion", "a.npz", "--out", "a.csv"], "nobody: is no package"),
     ],

@@ -9,7 +9,7 @@ import torch
 
 from mrhubo.errors import UserError
 from mrhubo.evaluation import Clip, mean_score, predict_clips, score_clip
-from mrhubo.retargeter import RetargetNetwork
+from mrhubo.retargeter import JointNetwork
 from mrhubo.robot import Robot
 
 
@@ -26,7 +26,7 @@ class ClipMetrics(lightning.Callback):
             UserError: its weights are no numbers (its answers always are); the checkpoints are those of before.
         """
         network = pl_module.network
-        assert isinstance(network, RetargetNetwork)
+        assert isinstance(network, JointNetwork)
         if not all(bool(torch.isfinite(weights).all()) for weights in network.parameters()):
             raise UserError(f"the training came to NaN by step {trainer.global_step:,}; a lower trainer.lr helps")
         predictions = predict_clips(network, self.clips)

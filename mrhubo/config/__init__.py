@@ -37,9 +37,11 @@ from mrhubo.config.schema import (
 from mrhubo.config.shipped import find_config, is_config, shipped_root
 from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
 from mrhubo.config.typed import typed_value
+from mrhubo.config.universal import SHIPPED_UNIVERSAL, UniversalConfig
 
 __all__ = [
     "SHIPPED_PRIOR",
+    "SHIPPED_UNIVERSAL",
     "BaselineConfig",
     "BodyConfig",
     "CommandParser",
@@ -65,6 +67,7 @@ __all__ = [
     "SweepConfig",
     "TrackingConfig",
     "TrainerConfig",
+    "UniversalConfig",
     "Vector",
     "bounded",
     "changed_settings",

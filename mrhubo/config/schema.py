@@ -153,6 +153,9 @@ class PairsConfig:
 class ModelConfig:
     """The two networks."""
 
+    start: str = choice("scratch", "scratch", "universal")
+    """`scratch` = networks of the robot's own, from random weights. `universal` = the network that is the same for all
+    robots, tuned to this one: far fewer steps, and a slower answer; the keys below are of no use then."""
     stages: int = bounded(2, 1, 2)
     """2 = human -> links -> joints (the paper), 1 = human -> joints directly."""
     hidden: int = bounded(160, 1, 8_192)

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from mrhubo.evaluation.clips import Clip
 from mrhubo.reference import joint_error, link_error
-from mrhubo.retargeter import RetargetNetwork
+from mrhubo.retargeter import JointNetwork
 from mrhubo.robot import Robot
 from mrhubo.rotation import matrix_to_sixd
 
@@ -59,7 +59,7 @@ def mean_score(scores: Sequence[Score], over_frames: bool = False) -> Score:
 
 
 @torch.no_grad()
-def predict_clips(network: RetargetNetwork, clips: Sequence[Clip]) -> list[Tensor]:
+def predict_clips(network: JointNetwork, clips: Sequence[Clip]) -> list[Tensor]:
     """Joint angles (T, N) on the CPU for each clip, in one forward pass over all frames."""
     device = network.limited.lower_N.device
     training = network.training

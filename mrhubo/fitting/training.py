@@ -17,13 +17,14 @@ from lightning.pytorch.loggers import Logger
 from torch import Tensor
 
 from mrhubo.callbacks import BEST, LAST, CheckedFiles, Checkpoints, ClipMetrics, TrainingProgress, resumable
-from mrhubo.config import TrainerConfig
+from mrhubo.config import Config, TrainerConfig
 from mrhubo.evaluation import Clip
 from mrhubo.fitting.datamodule import PairData
 from mrhubo.fitting.module import LOG_EVERY, RetargetModule
 from mrhubo.fitting.preparation import Prepared, device_of
+from mrhubo.fitting.tuning import TuningModule
 from mrhubo.pairing import PairFilter, PairingReport
-from mrhubo.retargeter import Retargeter, RetargetNetwork, build_network
+from mrhubo.retargeter import JointNetwork, Retargeter, RetargetNetwork, UniversalJoints, build_network
 from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.ranks import Ranks
 from mrhubo.runtime.trainer import quiet_lightning, run_trainer
@@ -38,7 +39,7 @@ class Training:
 
     prepared: Prepared
     """What the pairs were made from: where the scale factor was searched for, with the one that was found."""
-    network: RetargetNetwork
+    network: JointNetwork
     pairs: dict[str, Tensor]
     filter: PairFilter
     pairing: PairingReport
@@ -85,7 +86,7 @@ def train(
         torch.manual_seed(settings.seed)
         network = build_network(prepared.config, prepared.body_map)
     data = PairData(prepared, network.features, report, ranks)
-    module = RetargetModule(network, settings, prepared.config.model.detach_student)
+    module = build_module(network, prepared.config)
     saver = Checkpoints(checkpoints, "val/link_cm")
     metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
     progress = TrainingProgress(settings.max_steps, _SHOWN, report)
@@ -108,7 +109,15 @@ def train(
     )
 
 
-def _start(checkpoints: Path, module: RetargetModule, report: Reporter) -> Path | None:
+def build_module(network: JointNetwork, config: Config) -> RetargetModule | TuningModule:
+    """Loss and optimiser for a network."""
+    if isinstance(network, UniversalJoints):
+        return TuningModule(network, config.trainer)
+    assert isinstance(network, RetargetNetwork)
+    return RetargetModule(network, config.trainer, config.model.detach_student)
+
+
+def _start(checkpoints: Path, module: lightning.LightningModule, report: Reporter) -> Path | None:
     """The checkpoint that the training goes on from; says what is passed over, and what happens in place of that."""
     if not os.path.lexists(checkpoints / LAST):
         return None

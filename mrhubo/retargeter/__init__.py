@@ -2,8 +2,21 @@
 
 from mrhubo.retargeter.architecture import build_network
 from mrhubo.retargeter.features import PoseFeatures
-from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.retargeter.networks import JointNetwork, RetargetNetwork
 from mrhubo.retargeter.package import POLISH, Retargeter
 from mrhubo.retargeter.result import RetargetResult, join_results
+from mrhubo.retargeter.universal import UniversalJoints
+from mrhubo.retargeter.without_training import untrained
 
-__all__ = ["POLISH", "PoseFeatures", "RetargetNetwork", "RetargetResult", "Retargeter", "build_network", "join_results"]
+__all__ = [
+    "POLISH",
+    "JointNetwork",
+    "PoseFeatures",
+    "RetargetNetwork",
+    "RetargetResult",
+    "Retargeter",
+    "UniversalJoints",
+    "build_network",
+    "join_results",
+    "untrained",
+]

@@ -8,20 +8,25 @@ from mrhubo.config import Config, ModelConfig
 from mrhubo.errors import UserError
 from mrhubo.reference import DirectionJacobian
 from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures, RotationFeatures
-from mrhubo.retargeter.networks import Branch, RetargetNetwork
+from mrhubo.retargeter.networks import Branch, JointNetwork, RetargetNetwork
+from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, Robot
+from mrhubo.universal.weights import open_network
 
 _MAX_WEIGHTS = 100_000_000
 """Weights of all networks together; training takes sixteen bytes for each. The defaults make some hundred thousand."""
 
 
-def build_network(config: Config, body_map: BodyMap) -> RetargetNetwork:
-    """An untrained network for a config's robot and `model` section.
+def build_network(config: Config, body_map: BodyMap) -> JointNetwork:
+    """An untrained network for a config's robot and `model` section; with `start: universal`, one with the weights that
+    come with mrhubo.
 
     Raises:
         UserError: an input joint does not exist or is named for networks that see no joints, or a branch would see
             none.
     """
+    if config.model.start == "universal":
+        return UniversalJoints(body_map, open_network())
     model, robot, blocks = config.model, body_map.robot, DirectionJacobian(body_map).blocks
     turned = sorted(direction for directions, _ in blocks for direction in directions)
     features: PoseFeatures

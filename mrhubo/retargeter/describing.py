@@ -46,7 +46,7 @@ from mrhubo.retargeter.describing_robot import (
     whole,
 )
 from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures
-from mrhubo.retargeter.networks import Branched, ResidualMLP
+from mrhubo.retargeter.networks import Branched, ResidualMLP, RetargetNetwork
 from mrhubo.robot import BodyMap
 from mrhubo.robot.parts import BendPart, LimbPart, OrientedPart
 
@@ -62,6 +62,8 @@ def describe(retargeter: Retargeter) -> Description:
         UserError: its body prior is one that the arrays do not hold.
     """
     network, body_map = retargeter.network, retargeter.body_map
+    if not isinstance(network, RetargetNetwork):
+        raise UserError("the universal network has no form without PyTorch yet; `mrhubo.load` reads its packages")
     features, first, last = network.features, network.pre, network.post
     parts = [part for stage in (first, last) if isinstance(stage, Branched) for part in stage.parts]
     constants = {

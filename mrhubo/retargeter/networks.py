@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import gelu
 
-from mrhubo.retargeter.features import PoseFeatures
+from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures
 
 _BLOCK_SCALE = 0.5
 """Of a residual block's first weights, so that the sums of many start as small as those of few."""
@@ -109,11 +109,39 @@ class LimitedOutput(nn.Module):
 
     def forward(self, raw_BN: Tensor) -> Tensor:
         """Angles [rad] inside [lower, upper], also for NaN and infinite input."""
-        angles = torch.nan_to_num(self.unlimited(raw_BN.float()), nan=0.0)
-        return torch.minimum(torch.maximum(angles, self.lower_N), self.upper_N)
+        return self.inside(self.unlimited(raw_BN.float()))
+
+    def inside(self, angle_BN: Tensor) -> Tensor:
+        """The nearest angles inside [lower, upper]; 0 for NaN, if that is inside."""
+        return torch.minimum(torch.maximum(torch.nan_to_num(angle_BN, nan=0.0), self.lower_N), self.upper_N)
 
 
-class RetargetNetwork(nn.Module):
+class JointNetwork(nn.Module):
+    """Joint angles of what is seen of a human pose."""
+
+    features: PoseFeatures
+    limited: LimitedOutput
+
+    @property
+    def directed(self) -> bool:
+        """Whether it sees directions alone, so that `of_directions` answers."""
+        return isinstance(self.features, DirectionFeatures)
+
+    def forward(self, pose_BJ6: Tensor) -> Tensor:
+        """Joint angles (B, N) [rad], inside the limits, of human poses (B, 21, 6)."""
+        return self.joints(self.features(pose_BJ6))
+
+    def of_directions(self, target_BD3: Tensor) -> Tensor:
+        """The same of a human's directions (B, D, 3)."""
+        assert isinstance(self.features, DirectionFeatures)
+        return self.joints(self.features.of(target_BD3))
+
+    def joints(self, features_BF: Tensor) -> Tensor:
+        """Joint angles (B, N) [rad], inside the limits, of features (B, F)."""
+        raise NotImplementedError
+
+
+class RetargetNetwork(JointNetwork):
     """Pre- and post-network (two stages), or one network from pose to joints (one stage)."""
 
     def __init__(
@@ -161,10 +189,6 @@ class RetargetNetwork(nn.Module):
         if self.pre is None:
             raise RuntimeError("a one-stage network predicts no links")
         return self.pre(features_BF)
-
-    def forward(self, pose_BJ6: Tensor) -> Tensor:
-        """Joint angles (B, N) [rad], inside the limits, of human poses (B, 21, 6)."""
-        return self.joints(self.features(pose_BJ6))
 
     def joints(self, features_BF: Tensor) -> Tensor:
         """Joint angles (B, N) [rad], inside the limits, of features (B, F)."""

@@ -30,12 +30,12 @@ from mrhubo.reference import Avoidance, DirectionProblem, Polish
 from mrhubo.retargeter.clip import join_frames
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, branches_of, shake
 from mrhubo.retargeter.describing import describe
-from mrhubo.retargeter.features import DirectionFeatures
 from mrhubo.retargeter.judging import judge
-from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.retargeter.parts import pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
+from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
 from mrhubo.robot_motion import RobotFacts
 
@@ -50,16 +50,16 @@ class Retargeter(nn.Module):
     Not made for training: its weights take no gradients, and its answers have none.
     """
 
-    network: RetargetNetwork
+    network: JointNetwork
     prior: BodyPrior
     body_map: BodyMap
 
     def __init__(
         self,
-        network: RetargetNetwork,
+        network: JointNetwork,
         body_map: BodyMap,
         prior: BodyPrior,
-        config: Config,
+        config: Config | None,
         phi_threshold: float,
         confidence: ConfidenceModel = STANDARD,
     ) -> None:
@@ -170,7 +170,7 @@ class Retargeter(nn.Module):
         """
         check_frame_rate(frame_rate)
         parts = list(self._parts(local_TJ33, polish))
-        directed = bool(polish or frame_rate) or isinstance(self.network.features, DirectionFeatures)
+        directed = bool(polish or frame_rate) or self.network.directed
         targets = [self.body_map.human_directions(part) for part in parts] if directed else [None] * len(parts)
         return self._predict(parts, targets, polish, frame_rate, avoid_collisions)
 
@@ -245,9 +245,8 @@ class Retargeter(nn.Module):
                 needed for steps of optimisation. Networks that see directions see these.
             polish: as for `predict`.
         """
-        features = self.network.features
-        if target_TD3 is not None and isinstance(features, DirectionFeatures):
-            q_TN = self.network.joints(features.of(target_TD3))
+        if target_TD3 is not None and self.network.directed:
+            q_TN = self.network.of_directions(target_TD3)
         else:
             q_TN = self.network(rotation.matrix_to_sixd(local_TJ33))
         if not polish or not len(q_TN) or target_TD3 is None:
@@ -255,7 +254,13 @@ class Retargeter(nn.Module):
         return self.polisher(q_TN, target_TD3, polish)
 
     def save(self, folder: Path, provenance: dict[str, str]) -> Path:
-        """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header."""
+        """Writes the package; `provenance` (run, commit, checksums, measures) goes into the header.
+
+        Raises:
+            UserError: the retargeter was made without a config.
+        """
+        if self.config is None:
+            raise UserError(f"{folder}: {self.origin} is not saved; a fit with model.start=universal makes a package")
         settings = {"phi_threshold": repr(self.phi_threshold), "confidence": self.confidence.to_json(), **provenance}
         write_package(folder, self.network, self.body_map, self.prior, self.config, settings)
         self.origin, self.checksum = f"package {folder.resolve().name}", package_checksum(folder)
@@ -267,13 +272,13 @@ class Retargeter(nn.Module):
         """All that an answer needs as plain arrays, for `mrhubo.fast`.
 
         Raises:
-            UserError: its body prior is VPoser, with which only PyTorch works.
+            UserError: its body prior is VPoser, with which only PyTorch works, or its network is the universal one.
         """
         return describe(self)
 
     def save_description(self, folder: Path) -> Path | None:
         """Writes `describe` into a folder; None for a retargeter that has no such arrays."""
-        if isinstance(self.prior, VPoser):
+        if isinstance(self.prior, VPoser) or isinstance(self.network, UniversalJoints):
             return None
         description = self.describe()
         tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}

@@ -25,7 +25,7 @@ from mrhubo.retargeter.integrity import (
     check_weights,
     file_checksums,
 )
-from mrhubo.retargeter.networks import RetargetNetwork
+from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.robot.solid_urdf import urdf_without_meshes
 
@@ -38,7 +38,7 @@ _OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)
 
 def write_package(
     folder: Path,
-    network: RetargetNetwork,
+    network: JointNetwork,
     body_map: BodyMap,
     prior: BodyPrior,
     config: Config,
@@ -81,7 +81,7 @@ def package_checksum(folder: Path) -> str:
     return checksum_file(folder / _WEIGHTS)
 
 
-def read_package(folder: Path) -> tuple[RetargetNetwork, BodyMap, BodyPrior, Config, float, ConfidenceModel]:
+def read_package(folder: Path) -> tuple[JointNetwork, BodyMap, BodyPrior, Config, float, ConfidenceModel]:
     """What a retargeter is made of.
 
     Raises:

@@ -1,6 +1,6 @@
 """From files of human motion to files of robot motion."""
 
-from mrhubo.retargeting.answering import Answerer, of_package, of_reference
+from mrhubo.retargeting.answering import Answerer, of_package, of_reference, of_universal
 from mrhubo.retargeting.places import Places, find_files, plan_places
 from mrhubo.retargeting.run import Outcome, Request, retarget_files
 from mrhubo.retargeting.summary import Summary, table
@@ -14,6 +14,7 @@ __all__ = [
     "find_files",
     "of_package",
     "of_reference",
+    "of_universal",
     "plan_places",
     "retarget_files",
     "table",

@@ -1,4 +1,4 @@
-"""Who answers a motion: a package, or the optimiser for a robot that has none.
+"""Who answers a motion: a package, or, for a robot that has none, the universal network or the optimiser.
 
 What needs PyTorch is imported where it is needed: most packages are answered without.
 """
@@ -20,6 +20,7 @@ from mrhubo.robot_motion import RobotFacts, RobotMotion
 
 if TYPE_CHECKING:
     from mrhubo.motion import Motion
+    from mrhubo.retargeter import Retargeter
     from mrhubo.robot import BodyMap, Robot
 
 
@@ -56,12 +57,17 @@ def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) ->
     import mrhubo
 
     folder = mrhubo.package_folder(source)
-    described = Description.read(folder) if (folder / FILE).is_file() else None
-    if described is not None and described.settings.own_rest:
-        return _of_description(folder, described, avoid_collisions)
+    arrays = Description.read(folder) if (folder / FILE).is_file() else None
+    if arrays is not None and arrays.settings.own_rest:
+        return _of_description(folder, arrays, avoid_collisions)
     retargeter = mrhubo.load(folder)
+    described = _describe(folder, retargeter.body_map.robot.name, retargeter.joint_names)
+    return _of_retargeter(described, retargeter, avoid_collisions)
+
+
+def _of_retargeter(described: str, retargeter: Retargeter, avoid_collisions: bool) -> Answerer:
     return Answerer(
-        _describe(folder, retargeter.body_map.robot.name, retargeter.joint_names),
+        described,
         lambda motion: retargeter(motion, avoid_collisions=avoid_collisions).robot_motion,
         retargeter.joint_names,
         retargeter.facts,
@@ -84,6 +90,14 @@ def _of_description(folder: Path, description: Description, avoid_collisions: bo
     )
 
 
+def of_universal(robot: Robot, avoid_collisions: bool = True) -> Answerer:
+    """The network that is the same for every robot, and steps of optimisation, each motion as a whole; no training."""
+    from mrhubo.retargeter import untrained
+
+    described = f"no package: the universal network answers, without any training; {_sized(robot)}"
+    return _of_retargeter(described, untrained(robot), avoid_collisions)
+
+
 def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     """The optimiser, which needs no training and takes longer."""
     from mrhubo.reference import OptimizationRetargeter
@@ -93,13 +107,16 @@ def of_reference(robot: Robot, avoid_collisions: bool = True) -> Answerer:
     if (why := reference.body_map.collision.why_unknown()) is not None:
         warnings.warn(why, InputWarning, stacklevel=2)
     return Answerer(
-        f"no package: the reference retargeter answers, by optimisation and without any training; robot '{robot.name}',"
-        f" {len(robot.joint_names)} joints",
+        f"no package: the reference retargeter answers, by optimisation and without any training; {_sized(robot)}",
         lambda motion: reference(motion, avoid_collisions=avoid_collisions).robot_motion,
         robot.joint_names,
         robot_facts(robot, "", ""),
         _limb_names(reference.body_map),
     )
+
+
+def _sized(robot: Robot) -> str:
+    return f"robot '{robot.name}', {len(robot.joint_names)} joints"
 
 
 def _describe(folder: Path, robot: str, joint_names: tuple[str, ...]) -> str:

@@ -42,7 +42,7 @@ SCRIPTS = [
     "retarget",
     "scaling",
 ]
-SCRIPTS += ["stream", "training"]
+SCRIPTS += ["stream", "training", "universal"]
 LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
@@ -182,6 +182,15 @@ def test_reference(run: Run, clips: Path) -> None:
     text = run("reference", "--robots", "nao", *two_clips(clips))
     assert "## nao, 2 clips, " in text
     assert [row[0] for row in rows(text, "output")] == ["q", "q_cf, from q"]
+
+
+def test_universal(run: Run, clips: Path, tmp_path: Path) -> None:
+    sizes = ["--every", 12, "--made", 1, "--frames", 2]
+    text = run("universal", "--robots", "nao,coman", "--clips", clips, "--urdfs", tmp_path, *sizes)
+    found = rows(text, "robot")
+    assert [row[0] for row in found] == ["nao", "nao", "coman", "coman"]
+    assert all(float(row[4]) < 1 for row in found), "degrees over the optimum"
+    assert "1 random humanoids, 2 frames each; 0 more were refused" in text
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,59 @@
+"""The tuning of the universal network to one robot, on the robot's pairs: `model.start: universal`.
+
+Legend: B batch, F = 3 D features, which are the human's directions, M robot links, N robot joints.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import lightning
+import torch
+from torch import Tensor
+
+from mrhubo.config import TrainerConfig
+from mrhubo.fitting.module import LOG_EVERY
+from mrhubo.retargeter.universal import UniversalJoints
+from mrhubo.runtime.trainer import cosine_schedule
+from mrhubo.universal.iterations import unroll
+from mrhubo.universal.learning.loss import loss
+
+BETAS = (0.9, 0.98)
+"""Of AdamW, as in the training of the universal network."""
+
+
+class TuningModule(lightning.LightningModule):
+    """The universal network's own loss; a pair's joint angles are the best known answer."""
+
+    def __init__(self, network: UniversalJoints, settings: TrainerConfig) -> None:
+        super().__init__()
+        self.network, self.settings = network, settings
+        network.optimiser.network.requires_grad_(True)
+
+    def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor) -> dict[str, Tensor]:  # noqa: ARG002
+        """`loss` of directions (B, F) and the joint angles that go with them (B, N); links tell it nothing more."""
+        optimiser = self.network.optimiser
+        branches = optimiser.branches
+        problem = branches.ask(features_BF.unflatten(1, (-1, 3)))
+        trace = unroll(optimiser.network, problem)
+        return {"loss": loss(trace, branches.apart(q_BN), problem.bounds.present_BN)}
+
+    def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
+        """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""
+        losses = self.losses(*batch)
+        if (self.trainer.global_step + 1) % LOG_EVERY == 0:
+            self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
+        return losses["loss"]
+
+    def on_train_batch_end(self, *_: Any) -> None:
+        """Stops at the last step, also within an epoch."""
+        if self.trainer.global_step >= self.settings.max_steps:
+            self.trainer.should_stop = True
+
+    def configure_optimizers(self) -> Any:
+        """AdamW with warm-up and cosine decay over `max_steps`."""
+        settings = self.settings
+        parameters = self.network.optimiser.network.parameters()
+        optimizer = torch.optim.AdamW(parameters, settings.lr, betas=BETAS, weight_decay=settings.weight_decay)
+        schedule = cosine_schedule(optimizer, settings.max_steps)
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
