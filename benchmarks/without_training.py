@@ -90,7 +90,7 @@ def _error(reference: OptimizationRetargeter, target_TD3: Tensor, limbs: list[in
 
 
 def _told(clips: list[tuple[Tensor, Tensor, float, float, float]]) -> list[str]:
-    best_T, own_T = (torch.cat([clip[place] for clip in clips]) for place in (0, 1))
+    best_T, own_T = torch.cat([clip[0] for clip in clips]), torch.cat([clip[1] for clip in clips])
     over_T = own_T - best_T
     jumps, fast, jerk = (sum(clip[place] for clip in clips) / len(clips) for place in (2, 3, 4))
     numbers = [float(best_T.mean()), float(over_T.mean()), float(over_T.quantile(0.99)), float(over_T.max())]

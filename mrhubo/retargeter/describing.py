@@ -73,11 +73,13 @@ def describe(retargeter: Retargeter) -> Description:
         "shake_deg": confidence.SHAKE_DEG, "acceleration": confidence.ACCELERATION,
         "neighbours": confidence.NEIGHBOURS, "usual_phi": retargeter.confidence.usual_phi,
     }  # fmt: skip
+    first, last = (_parts(stage) if isinstance(stage, Branched) else () for stage in stages)
     reading, prior, bodies = _reading(body_map), retargeter.prior, Bodies(body_map.robot)
     return Description(
         _human(body_map),
         _features(network.features),
-        *(_parts(stage) if isinstance(stage, Branched) else () for stage in stages),
+        first,
+        last,
         describe_kinematics(retargeter.directions, bodies),
         describe_cost(retargeter.directions, retargeter.polisher),
         reading,

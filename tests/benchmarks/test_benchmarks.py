@@ -43,7 +43,7 @@ SCRIPTS = [
     "retarget",
     "scaling",
 ]
-SCRIPTS += ["stream", "training", "universal", "universal_speed", "without_training"]
+SCRIPTS += ["stream", "training", "universal", "whole_body", "universal_speed", "without_training"]
 LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
@@ -190,6 +190,12 @@ def test_many_robots(run: Run, tmp_path: Path) -> None:
     text = run("many_robots", "--robots", "nao", "--urdfs", tmp_path, "--motion", motion, "--out", picture)
     ((name, *numbers),) = rows(text, "robot")
     assert name == "nao" and abs(float(numbers[1]) - float(numbers[2])) < 1 and picture.stat().st_size > 1000
+
+
+def test_whole_body(run: Run, clips: Path, tmp_path: Path) -> None:
+    text = run("whole_body", "--robots", "nao", "--clips", clips, "--picture", tmp_path / "moments.png")
+    found = rows(text, "clip")
+    assert [row[0] for row in found] == ["boxing", "wave", "mean"] and (tmp_path / "moments.png").stat().st_size > 1000
 
 
 def test_universal(run: Run, clips: Path, tmp_path: Path) -> None:

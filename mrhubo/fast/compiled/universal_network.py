@@ -66,7 +66,8 @@ def lay_out(universal: Universal) -> Weights:
     return Weights(
         turned("joint"), w["joint.bias"], turned("branch"), turned("first"), w["first.bias"], turned("later"),
         w["later.bias"], np.array(norms),
-        *(both(name, kind) for name in ("mix", "mixed", "up", "down") for kind in ("weight", "bias")),
+        both("mix", "weight"), both("mix", "bias"), both("mixed", "weight"), both("mixed", "bias"),
+        both("up", "weight"), both("up", "bias"), both("down", "weight"), both("down", "bias"),
         int(universal.size_2[0]),
     )  # fmt: skip
 

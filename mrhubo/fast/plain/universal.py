@@ -6,6 +6,7 @@ Legend: B frames, K hypotheses or dampings, N joints, C blocks, D directions, S 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -195,11 +196,11 @@ def _solve(matrix_BNN: np.ndarray, right_BN: np.ndarray, held_BN: np.ndarray) ->
     return np.linalg.solve(system_BNN, (right_BN * free_BN)[..., None])[..., 0]
 
 
-def _affine(w: dict[str, np.ndarray], name: str, x: np.ndarray) -> np.ndarray:
+def _affine(w: Mapping[str, np.ndarray], name: str, x: np.ndarray) -> np.ndarray:
     return x @ w[f"{name}.weight"].T + w[f"{name}.bias"]
 
 
-def _norm(w: dict[str, np.ndarray], name: str, x: np.ndarray) -> np.ndarray:
+def _norm(w: Mapping[str, np.ndarray], name: str, x: np.ndarray) -> np.ndarray:
     x = x - x.mean(axis=-1, keepdims=True)
     return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + _EPSILON) * w[f"{name}.weight"] + w[f"{name}.bias"]
 

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 X, Y, Z = np.eye(3)
+Limits = tuple[float | None, float | None]
+"""Of a joint [rad]; None where its description tells none."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Plan:
         return len(self.bodies) - 1
 
     def join(
-        self, role: str, parent: int, point_3: np.ndarray, axis_3: np.ndarray, limits: tuple[float, float] | None,
+        self, role: str, parent: int, point_3: np.ndarray, axis_3: np.ndarray, limits: Limits | None,
         kind: str = "revolute", body: str | None = None, mimics: tuple[str, float] | None = None,
     ) -> int:  # fmt: skip
         """A new body that hangs on a joint."""
@@ -95,7 +97,7 @@ class Plan:
         self.joints = [replace(joint, **changes) if joint.role == role else joint for joint in self.joints]
 
     def insert_before(
-        self, role: str, new: str, point_3: np.ndarray, axis_3: np.ndarray, limits: tuple[float, float],
+        self, role: str, new: str, point_3: np.ndarray, axis_3: np.ndarray, limits: Limits,
         kind: str = "revolute",
     ) -> None:  # fmt: skip
         """A joint between a joint and the body that carries it, with a body of its own."""
@@ -104,7 +106,7 @@ class Plan:
         self.change(role, parent=body)
 
     def insert_after(
-        self, role: str, new: str, point_3: np.ndarray, axis_3: np.ndarray, limits: tuple[float, float],
+        self, role: str, new: str, point_3: np.ndarray, axis_3: np.ndarray, limits: Limits,
     ) -> None:  # fmt: skip
         """A joint between a joint and the body that it carries, with a body of its own between them."""
         carrier = self.joint(role)
