@@ -1,5 +1,5 @@
-"""Which way answers a robot without a package better: the universal network or the optimiser (`mrhubo retarget
---method`).
+"""Which way answers a robot without a package better: the universal network or the optimiser (`--method` of
+`mrhubo retarget`).
 
     python benchmarks/without_training.py [--clips 9] [--robots nao,coman,reachy,FILE.urdf]
 
