@@ -38,7 +38,8 @@ def test_elbows_are_bent_the_other_way(local_BJ33: torch.Tensor) -> None:
         assert float((wrist - elbow)[2]) < -0.2
     backwards = bent_backwards(local_BJ33, torch.full((400,), 60.0), PARTS)
     changed = (backwards - local_BJ33).abs().amax((0, 2, 3)) > 1e-6
-    assert {n for n, c in zip(POSED_JOINT_NAMES, changed.tolist(), strict=True) if c} == {"left_elbow", "right_elbow"}
+    bent = {f"{side}_{name}" for side in ("left", "right") for name in ("elbow", "knee")}
+    assert {n for n, c in zip(POSED_JOINT_NAMES, changed.tolist(), strict=True) if c} == bent
 
 
 def test_joints_of_limbs_are_dislocated(local_BJ33: torch.Tensor, generator: torch.Generator) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
-from mrhubo.body.foot_axes import foot_rolls, level_feet, rolls_in_words
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.world import find_up
@@ -25,16 +24,13 @@ LARGEST_BETA = 1e6
 """No number of a body's shape is that large."""
 _LEVEL = math.radians(1.0)
 """Tilts of elbows' axes up to this stay: an angle that says nothing."""
-_LEVEL_SOLE = math.radians(5.0)
-"""Rolls of soles up to this stay: people stand so, and ankles are not known better."""
 
 
 def to_our_rest(motion: Motion) -> Motion:
     """The motion, whose rotations refer to its family's rest pose, with those that refer to ours.
 
     Elbows of a body that was fitted are no hinges; those of a converted skeleton are, about whatever axis it has. A
-    motion without a family may be of such a one. So with feet: soles of fitted bodies stand as the person's do, those
-    of a converted skeleton are rolled by a constant.
+    motion without a family may be of such a one.
     """
     if motion.family:
         local_TJ33 = motion.arrays.local_TJ33
@@ -42,30 +38,11 @@ def to_our_rest(motion: Motion) -> Motion:
             rows = slice(start, start + BLOCK)
             local_TJ33[rows] = from_family(local_TJ33[rows], motion.family)
         return motion
-    return _with_level_feet(_with_smpl_elbows(motion))
-
-
-def _with_smpl_elbows(motion: Motion) -> Motion:
-    """The motion, whose elbows bend about SMPL's axis where they are hinges."""
     tilt = elbow_tilt(motion.arrays.local_TJ33)
     if tilt is None or abs(tilt) <= _LEVEL:
         return motion
     note = f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"
     return motion.changed(local_TJ33=untilt_arms(motion.arrays.local_TJ33, tilt), notes=(*motion.notes, note))
-
-
-def _with_level_feet(motion: Motion) -> Motion:
-    """The motion, whose soles are level where they stand, if a constant makes them so; as it is where its root is not
-    known, as then nothing tells that a foot stands.
-    """
-    arrays = motion.arrays
-    if arrays.root_rotation_T33 is None or arrays.root_position_T3 is None:
-        return motion
-    rolls = foot_rolls(arrays.local_TJ33, arrays.root_rotation_T33, arrays.root_position_T3, motion.frame_rate)
-    rolls = {side: roll for side, roll in rolls.items() if abs(roll) > _LEVEL_SOLE}
-    if not rolls:
-        return motion
-    return motion.changed(local_TJ33=level_feet(arrays.local_TJ33, rolls), notes=(*motion.notes, rolls_in_words(rolls)))
 
 
 def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:

@@ -87,9 +87,10 @@ def gears(chance: Chance, plan: Plan, places: Places) -> Angles:
 
 def mimicking_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
     """A right arm that follows the left one, joint by joint."""
+    first, second = (f"{name}_" for name in SIDES)
     for joint in list(plan.joints):
-        other = joint.role.replace("right_", "left_", 1)
-        if joint.role.startswith("right_") and joint.mimics is None and _joint(plan, other) is not None:
+        other = joint.role.replace(second, first, 1)
+        if joint.role.startswith(second) and joint.mimics is None and _joint(plan, other) is not None:
             factor = 1.0 if abs(joint.axis_3[1]) > 0.9 else -1.0
             plan.change(joint.role, mimics=(other, factor))
     return {}
@@ -211,7 +212,8 @@ def wings(chance: Chance, plan: Plan, places: Places) -> Angles:
 
 def one_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
     """Without the right arm."""
-    gone = {joint.child for joint in plan.joints if joint.role.startswith("right_") and _in_arm(joint.role)}
+    _, second = SIDES
+    gone = {joint.child for joint in plan.joints if joint.role.startswith(second) and _in_arm(joint.role)}
     while more := {joint.child for joint in plan.joints if joint.parent in gone} - gone:
         gone |= more
     plan.remove(gone)
