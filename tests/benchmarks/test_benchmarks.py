@@ -116,8 +116,8 @@ def two_clips(folder: Path) -> list[str]:
 
 def test_discovery(run: Run, tmp_path: Path) -> None:
     (tmp_path / "nothing.urdf").write_text("<robot name='a'><link name='b'/></robot>")
-    text = run("discovery", "--seeds", "600-603", "--urdfs", tmp_path)
-    assert "| all " in text and "no body of the robot carries two limbs" in text
+    text = run("discovery", "--seeds", "600-603", "--strange", "600-601", "--urdfs", tmp_path)
+    assert "| all " in text and "| clavicles " in text and "no body of the robot carries two limbs" in text
     assert len(re.findall(r"^\| (nao|coman|reachy) ", text, re.M)) == 18
 
 
