@@ -21,7 +21,7 @@ from torch.nn.functional import l1_loss, mse_loss
 
 from mrhubo.config import TrainerConfig
 from mrhubo.retargeter.networks import Piece, RetargetNetwork
-from mrhubo.runtime.trainer import cosine_schedule
+from mrhubo.runtime.trainer import stop_at, with_schedule
 
 if TYPE_CHECKING:
     from mrhubo.fitting.branch_threads import BranchThreads
@@ -84,8 +84,7 @@ class RetargetModule(lightning.LightningModule):
 
     def on_train_batch_end(self, *_: Any) -> None:
         """Stops at the last step, also within an epoch."""
-        if self.trainer.global_step >= self.settings.max_steps:
-            self.trainer.should_stop = True
+        stop_at(self.settings.max_steps, self.trainer)
 
     def configure_optimizers(self) -> Any:
         """AdamW with warm-up and cosine decay over `max_steps`."""
@@ -93,5 +92,4 @@ class RetargetModule(lightning.LightningModule):
         optimizer = torch.optim.AdamW(
             self.network.parameters(), settings.lr, weight_decay=settings.weight_decay, fused=True
         )
-        schedule = cosine_schedule(optimizer, settings.max_steps)
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+        return with_schedule(optimizer, settings.max_steps)

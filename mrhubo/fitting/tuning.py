@@ -14,12 +14,9 @@ from torch import Tensor
 from mrhubo.config import TrainerConfig
 from mrhubo.fitting.module import LOG_EVERY
 from mrhubo.retargeter.universal import UniversalJoints
-from mrhubo.runtime.trainer import cosine_schedule
+from mrhubo.runtime.trainer import stop_at, with_schedule
 from mrhubo.universal.iterations import unroll
-from mrhubo.universal.learning.loss import loss
-
-BETAS = (0.9, 0.98)
-"""Of AdamW, as in the training of the universal network."""
+from mrhubo.universal.learning.loss import BETAS, loss
 
 
 class TuningModule(lightning.LightningModule):
@@ -47,13 +44,11 @@ class TuningModule(lightning.LightningModule):
 
     def on_train_batch_end(self, *_: Any) -> None:
         """Stops at the last step, also within an epoch."""
-        if self.trainer.global_step >= self.settings.max_steps:
-            self.trainer.should_stop = True
+        stop_at(self.settings.max_steps, self.trainer)
 
     def configure_optimizers(self) -> Any:
         """AdamW with warm-up and cosine decay over `max_steps`."""
         settings = self.settings
         parameters = self.network.optimiser.network.parameters()
         optimizer = torch.optim.AdamW(parameters, settings.lr, betas=BETAS, weight_decay=settings.weight_decay)
-        schedule = cosine_schedule(optimizer, settings.max_steps)
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+        return with_schedule(optimizer, settings.max_steps)

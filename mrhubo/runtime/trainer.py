@@ -54,6 +54,18 @@ def run_trainer(
         signal.signal(signal.SIGINT, handler)
 
 
+def stop_at(step: int, trainer: lightning.Trainer) -> None:
+    """Ends a training at its last step, also within an epoch; asked after each step."""
+    if trainer.global_step >= step:
+        trainer.should_stop = True
+
+
+def with_schedule(optimizer: torch.optim.Optimizer, steps: int) -> dict[str, Any]:
+    """An optimiser with `cosine_schedule`, as a LightningModule's `configure_optimizers` gives them."""
+    schedule = cosine_schedule(optimizer, steps)
+    return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+
+
 def cosine_schedule(optimizer: torch.optim.Optimizer, steps: int) -> torch.optim.lr_scheduler.LambdaLR:
     """Learning-rate factor: linear warm-up over 2% of the steps, then cosine decay to 0 at the last."""
     warm_up = max(1, steps // 50)

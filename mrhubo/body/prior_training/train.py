@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import lightning
@@ -34,15 +33,13 @@ from mrhubo.body.prior_training.losses import orthonormality_penalty, pseudo_hub
 from mrhubo.body.prior_training.measures import measure, reconstruction
 from mrhubo.body.prior_training.poses import PoseDataset, RandomBatches, load_training_poses, plausible_frames
 from mrhubo.body.skeleton import Skeleton, mirror_pose
-from mrhubo.callbacks import CheckedFiles, Checkpoints, TrainingProgress
-from mrhubo.config import PriorConfig, changed_settings, fingerprint, to_plain, without_paths
+from mrhubo.callbacks import Checkpoints, TrainingProgress
+from mrhubo.callbacks.small_training import small_trainer, tracked
+from mrhubo.config import PriorConfig, fingerprint, to_plain, without_paths
 from mrhubo.errors import UserError
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.run_logger import RunLogger
-from mrhubo.runtime.runs import ending, take_up_run
-from mrhubo.runtime.tracking import open_client
-from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
+from mrhubo.runtime.trainer import quiet_lightning, run_trainer, stop_at, with_schedule
 from mrhubo.runtime.workspace import Workspace
 
 _MEASURED_TRAINING, _MEASURED_HELD_OUT = 50_000, 5_000
@@ -107,8 +104,7 @@ class PriorTraining(lightning.LightningModule):
 
     def on_train_batch_end(self, *_: Any) -> None:
         """Stops at the last step, also within an epoch."""
-        if self.trainer.global_step >= self.config.steps:
-            self.trainer.should_stop = True
+        stop_at(self.config.steps, self.trainer)
 
     def validation_step(self, pose_BJ6: Tensor, _: int) -> None:
         """Encode, take the mean, decode: distance of the 22 joints and angle of the 21 rotations."""
@@ -119,10 +115,7 @@ class PriorTraining(lightning.LightningModule):
     def configure_optimizers(self) -> Any:
         """AdamW, linear warm-up over 2% of the steps, cosine decay to 0."""
         optimizer = torch.optim.AdamW(self.prior.parameters(), self.config.lr, weight_decay=self.config.weight_decay)
-        return {
-            "optimizer": optimizer,
-            "lr_scheduler": {"scheduler": cosine_schedule(optimizer, self.config.steps), "interval": "step"},
-        }
+        return with_schedule(optimizer, self.config.steps)
 
 
 @dataclass(frozen=True)
@@ -165,17 +158,9 @@ def train(config: PriorConfig, report: Reporter = SILENT) -> BodyPrior:
     """Trains, measures, saves the weights with their card, and returns the prior."""
     lightning.seed_everything(config.seed, verbose=False)
     split, module = Split.of(config), PriorTraining(config)
-    settings = to_plain(config)
-    key = fingerprint({k: v for k, v in settings.items() if k not in ("output", "tracking_dir")})
+    key = fingerprint({k: v for k, v in to_plain(config).items() if k not in ("output", "tracking_dir")})
     with Workspace(config.tracking_dir / "fits", "prior", key) as workspace, quiet_lightning():
-        name = ", ".join(f"{k}={v}" for k, v in changed_settings(config).items()) or "defaults"
-        client = open_client(config.tracking_dir, _EXPERIMENT)
-        tags = {"git_commit": git_commit(Path(__file__).parent)}
-        run, _ = take_up_run(client, _EXPERIMENT, workspace, name, tags)
-        client.keep_in(workspace.unsent)
-        with ending(client, run.info.run_id):
-            logger = RunLogger(client, run.info.run_id)
-            logger.log_parameters(settings, run.data.params)
+        with tracked(config, workspace, _EXPERIMENT) as logger:
             _fit(module, split, workspace, report, logger)
             prior = module.prior.cpu().requires_grad_(False).eval()
             if not all(bool(torch.isfinite(weights).all()) for weights in prior.state_dict().values()):
@@ -191,22 +176,9 @@ def _fit(module: PriorTraining, split: Split, workspace: Workspace, report: Repo
     """Lightning's trainer, from the last checkpoint if there is one."""
     config = module.config
     epoch = min(_EPOCH, config.steps)
-    trainer = lightning.Trainer(
-        max_epochs=-(-config.steps // epoch),  # max_steps would break exact resumption
-        logger=logger,
-        log_every_n_steps=100,
-        accelerator="auto",
-        devices=1,
-        gradient_clip_val=1.0,
-        enable_model_summary=False,
-        enable_progress_bar=False,
-        num_sanity_val_steps=0,
-        callbacks=[
-            TrainingProgress(config.steps, _SHOWN, report),
-            Checkpoints(workspace.checkpoints, "val/joint_mm"),
-        ],
-        plugins=[CheckedFiles()],
-    )
+    saver = Checkpoints(workspace.checkpoints, "val/joint_mm")
+    progress = TrainingProgress(config.steps, _SHOWN, report)
+    trainer = small_trainer(config.steps, epoch, logger, 100, "auto", progress, saver)
     batches = RandomBatches(len(split.training), config.batch_size, epoch, config.seed)
     in_order = [torch.arange(a, min(a + 4_096, len(split.held_out))) for a in range(0, len(split.held_out), 4_096)]
     run_trainer(

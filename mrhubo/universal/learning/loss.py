@@ -19,6 +19,9 @@ from torch import Tensor
 
 from mrhubo.universal.iterations import Trace
 
+BETAS = (0.9, 0.98)
+"""Of AdamW, in a training and in a tuning."""
+
 
 def loss(trace: Trace, known_BN: Tensor, present_BN: Tensor) -> Tensor:
     """The mean of L over problems, whose best known answers [rad] are given; 1 where there is a joint, else 0."""

@@ -7,7 +7,6 @@ Legend: B problems, N joints, K hypotheses.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import lightning
@@ -16,19 +15,17 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
 from mrhubo.body.prior_training.poses import RandomBatches
-from mrhubo.callbacks import CheckedFiles, Checkpoints, TrainingProgress
-from mrhubo.config import UniversalConfig, changed_settings, fingerprint, to_plain, without_paths
+from mrhubo.callbacks import Checkpoints, TrainingProgress
+from mrhubo.callbacks.small_training import small_trainer, tracked
+from mrhubo.config import UniversalConfig, fingerprint, to_plain, without_paths
 from mrhubo.errors import UserError
 from mrhubo.reference import angle_between
 from mrhubo.runtime.progress import SILENT, Reporter
-from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.run_logger import RunLogger
-from mrhubo.runtime.runs import ending, take_up_run
-from mrhubo.runtime.tracking import open_client
-from mrhubo.runtime.trainer import cosine_schedule, quiet_lightning, run_trainer
+from mrhubo.runtime.trainer import quiet_lightning, run_trainer, stop_at, with_schedule
 from mrhubo.runtime.workspace import Workspace
 from mrhubo.universal.iterations import unroll
-from mrhubo.universal.learning.loss import loss
+from mrhubo.universal.learning.loss import BETAS, loss
 from mrhubo.universal.learning.problems import Lessons, load_lessons
 from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.weights import save_network
@@ -60,8 +57,7 @@ class UniversalTraining(lightning.LightningModule):
 
     def on_train_batch_end(self, *_: Any) -> None:
         """Stops at the last step, also within an epoch."""
-        if self.trainer.global_step >= self.config.steps:
-            self.trainer.should_stop = True
+        stop_at(self.config.steps, self.trainer)
 
     def validation_step(self, rows_B: Tensor, _: int) -> None:
         """How much farther limbs are from the human than in the best known answer."""
@@ -71,10 +67,9 @@ class UniversalTraining(lightning.LightningModule):
         """AdamW, linear warm-up over 2% of the steps, cosine decay to 0."""
         settings = self.config
         optimizer = torch.optim.AdamW(
-            self.network.parameters(), settings.lr, betas=(0.9, 0.98), weight_decay=settings.weight_decay
+            self.network.parameters(), settings.lr, betas=BETAS, weight_decay=settings.weight_decay
         )
-        schedule = cosine_schedule(optimizer, settings.steps)
-        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+        return with_schedule(optimizer, settings.steps)
 
 
 @torch.no_grad()
@@ -114,19 +109,12 @@ def train(config: UniversalConfig, report: Reporter = SILENT) -> UniversalNetwor
     """Makes the problems, trains, measures, saves the weights with their card, and returns the network."""
     if config.width % config.attention_heads:
         raise UserError(f"width: {config.width} is no multiple of attention_heads, {config.attention_heads}")
-    settings = to_plain(config)
-    key = fingerprint({k: v for k, v in settings.items() if k not in ("output", "tracking_dir")})
+    key = fingerprint({k: v for k, v in to_plain(config).items() if k not in ("output", "tracking_dir")})
     with Workspace(config.tracking_dir / "fits", "universal", key) as workspace, quiet_lightning():
         lessons = load_lessons(config, config.tracking_dir / "universal_problems", report)
         lightning.seed_everything(config.seed, verbose=False)  # whether problems had to be made or not
         module = UniversalTraining(config, *lessons)
-        name = ", ".join(f"{k}={v}" for k, v in changed_settings(config).items()) or "defaults"
-        client = open_client(config.tracking_dir, _EXPERIMENT)
-        run, _ = take_up_run(client, _EXPERIMENT, workspace, name, {"git_commit": git_commit(Path(__file__).parent)})
-        client.keep_in(workspace.unsent)
-        with ending(client, run.info.run_id):
-            logger = RunLogger(client, run.info.run_id)
-            logger.log_parameters(settings, run.data.params)
+        with tracked(config, workspace, _EXPERIMENT) as logger:
             _fit(module, workspace, report, logger)
             network = module.network.cpu().requires_grad_(False).eval()
             if not all(bool(weights.isfinite().all()) for weights in network.state_dict().values()):
@@ -141,20 +129,9 @@ def train(config: UniversalConfig, report: Reporter = SILENT) -> UniversalNetwor
 def _fit(module: UniversalTraining, workspace: Workspace, report: Reporter, logger: RunLogger) -> None:
     """Lightning's trainer, from the last checkpoint if there is one."""
     config, epoch = module.config, min(_EPOCH, module.config.steps)
-    trainer = lightning.Trainer(
-        max_epochs=-(-config.steps // epoch),  # max_steps would break exact resumption
-        logger=logger,
-        log_every_n_steps=50,
-        accelerator="cpu",
-        devices=1,
-        gradient_clip_val=1.0,
-        enable_model_summary=False,
-        enable_progress_bar=False,
-        num_sanity_val_steps=0,
-        callbacks=[TrainingProgress(config.steps, _SHOWN, report),
-                   Checkpoints(workspace.checkpoints, "val/limb_excess_deg")],
-        plugins=[CheckedFiles()],
-    )  # fmt: skip
+    saver = Checkpoints(workspace.checkpoints, "val/limb_excess_deg")
+    progress = TrainingProgress(config.steps, _SHOWN, report)
+    trainer = small_trainer(config.steps, epoch, logger, 50, "cpu", progress, saver)
     batches = RandomBatches(len(module.learnt), config.batch_size, epoch, config.seed)
     rows = [torch.arange(len(module.held_out))]
     run_trainer(
