@@ -18,14 +18,11 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from mrhubo.universal.network import DAMPINGS, UniversalNetwork
+from mrhubo.fast.plain.universal import DAMPINGS, FINAL, FINAL_DAMPINGS, KEPT
+from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.problem import Place, Problem, choose
 
-KEPT = (4, 2)
-"""How many hypotheses go into the second and the third iteration."""
-FINAL_DAMPINGS = (1e-4, 3e-2)
-"""Of the last iterations."""
-ITERATIONS = 5
+ITERATIONS = 1 + len(KEPT) + FINAL
 
 
 @dataclass
@@ -66,12 +63,12 @@ def unroll(network: UniversalNetwork, problem: Problem, start_BN: Tensor | None 
         place = place.rows(_best(cost_BK, keep))
         step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))
         network_XN = _answer(network, place, step_XKN, first=False)[:, 0]
-        tried = [place.problem.at(q_XN) for q_XN in (network_XN, place.q_BN.detach() + step_XKN[:, 0])]
+        tried = [place.problem.at(network_XN), place.problem.at(place.q_BN.detach() + step_XKN[:, 0])]
         trace.learnt.append(tried[0].cost_B.unflatten(0, (count, -1)))
         place = choose(*tried)
         cost_BK = place.cost_B.detach().unflatten(0, (count, -1))
         trace.see(place.q_BN.unflatten(0, (count, -1)), cost_BK)
-    for _ in range(ITERATIONS - 1 - len(KEPT)):
+    for _ in range(FINAL):
         place = place.rows(_best(cost_BK, 1))
         step_BKN = place.steps(place.q_BN.new_tensor([FINAL_DAMPINGS]))
         place = choose(*(place.problem.at(place.q_BN.detach() + step_BN) for step_BN in step_BKN.unbind(1)))

@@ -45,14 +45,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
 
+from mrhubo.fast.plain.universal import DAMPINGS, REACH
 from mrhubo.universal.chains import Local
 from mrhubo.universal.objective import Bounds, Quadratic, frozen
 
-DAMPINGS = (3e-3, 3e-2, 0.5)
 JOINT_FEATURES, BRANCH_FEATURES = 44, 37
 _LAYERS = 2
-REACH = 1.0
-"""How far a correction goes at most [rad]."""
 _OUTPUTS = len(DAMPINGS) + 1
 
 

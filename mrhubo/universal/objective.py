@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from mrhubo.fast.plain.steps import FLOOR
+from mrhubo.reference.terms.posture import EPSILON
 from mrhubo.universal.chains import Local
-from mrhubo.universal.slots import EPSILON, FLOOR
 
 
 @dataclass(frozen=True)

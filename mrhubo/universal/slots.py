@@ -17,10 +17,6 @@ MIRROR_3 = (-1.0, 1.0, 1.0)
 SIGN_3 = (0.8139, 0.5057, 0.2861)
 """A joint's sense of turn is canonical if its axis makes an acute angle with this direction in the middle of all
 ranges. Oblique, so that no axis that people choose is at right angles to it."""
-EPSILON = 1e-4
-"""Of the posture's cost, `mrhubo.reference.terms.posture`."""
-FLOOR = 0.01
-"""Added to the Hessian's diagonal, which damping multiplies; as `mrhubo.reference.solve` has it."""
 
 
 def slot_of(part: BodyPart, word: int, carried: bool) -> int:

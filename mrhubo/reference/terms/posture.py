@@ -14,7 +14,7 @@ from torch import Tensor
 from mrhubo.reference.blocks import Blocks
 from mrhubo.reference.terms.term import Quadratic, State, Term
 
-_EPSILON = 1e-4
+EPSILON = 1e-4
 
 
 class PostureTerm(Term):
@@ -31,7 +31,7 @@ class PostureTerm(Term):
         half_N = (upper_N - lower_N) / 2
         self.register_buffer("mid_N", (upper_N + lower_N) / 2, persistent=False)
         self.register_buffer("half_N", half_N, persistent=False)
-        self.register_buffer("ridge_N", _EPSILON / half_N.square(), persistent=False)
+        self.register_buffer("ridge_N", EPSILON / half_N.square(), persistent=False)
 
     def couplings(self) -> list[set[int]]:
         """Every joint for itself."""
