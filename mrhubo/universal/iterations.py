@@ -63,7 +63,7 @@ def unroll(network: UniversalNetwork, problem: Problem, start_BN: Tensor | None 
         place = place.rows(_best(cost_BK, keep))
         step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))
         network_XN = _answer(network, place, step_XKN, first=False)[:, 0]
-        tried = [place.problem.at(network_XN), place.problem.at(place.q_BN.detach() + step_XKN[:, 0])]
+        tried = [place.problem.at(network_XN), place.moved(step_XKN[:, 0])]
         trace.learnt.append(tried[0].cost_B.unflatten(0, (count, -1)))
         place = choose(*tried)
         cost_BK = place.cost_B.detach().unflatten(0, (count, -1))
@@ -71,7 +71,7 @@ def unroll(network: UniversalNetwork, problem: Problem, start_BN: Tensor | None 
     for _ in range(FINAL):
         place = place.rows(_best(cost_BK, 1))
         step_BKN = place.steps(place.q_BN.new_tensor([FINAL_DAMPINGS]))
-        place = choose(*(place.problem.at(place.q_BN.detach() + step_BN) for step_BN in step_BKN.unbind(1)))
+        place = choose(*(place.moved(step_BN) for step_BN in step_BKN.unbind(1)))
         cost_BK = place.cost_B.detach()[:, None]
         trace.see(place.q_BN[:, None], cost_BK)
     return trace

@@ -16,11 +16,10 @@ def minimise(problem: Problem, q_BN: Tensor, iterations: int) -> tuple[Tensor, T
     place = problem.at(q_BN)
     damping_B = torch.full_like(place.model.cost_B, 1e-2)
     for _ in range(iterations):
-        trial = problem.at(q_BN + place.steps(damping_B[:, None])[:, 0])
+        trial = place.moved(place.steps(damping_B[:, None])[:, 0])
         better_B = trial.model.cost_B < place.model.cost_B
         damping_B = torch.where(better_B, damping_B * 0.1, damping_B * 10.0).clamp(1e-7, 1e6)
         place = choose(place, trial)
-        q_BN = place.q_BN
     return place.q_BN, place.model.cost_B
 
 

@@ -74,6 +74,10 @@ class Place:
         with torch.no_grad():
             return steps(self.model, self.q_BN, self.problem.bounds, damping_BK)
 
+    def moved(self, step_BN: Tensor) -> Place:
+        """Where a step (B, N) [rad] leads, inside the limits: the sum of two roundings may lie beyond them."""
+        return self.problem.at(self.problem.bounds.clip(self.q_BN.detach() + step_BN))
+
     def rows(self, rows: Tensor) -> Place:
         """Some of the problems, in that order."""
         return Place(self.problem.rows(rows), self.q_BN[rows], _rows(self.local, rows), _rows(self.model, rows))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import torch
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mrhubo.config import UniversalConfig
@@ -26,6 +26,7 @@ def draw(seed: int, count: int) -> Problem:
 
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**31), size=st.floats(0.1, 30.0))
+@example(seed=8388609, size=30.0)  # an angle and the way to its limit, rounded, sum up to more than the limit
 def test_limits_hold_and_costs_never_rise(seed: int, size: float) -> None:
     torch.manual_seed(seed)
     network = UniversalNetwork(width=8, heads=2, hypotheses=4)
