@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -132,6 +133,39 @@ def test_onnx(package: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert (tmp_path / "robot.onnx").is_file() and "joints: LShoulderPitch, " in text
     (off,) = re.findall(r"433 frames, (\S+) rad off at most", text)
     assert float(off) < 1e-4
+
+
+def test_live(package: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run("10_live.py", package, str(ROOT / "data" / "motions" / "wave.npz"), "0.3")
+    text = capsys.readouterr().out
+    assert text.startswith("8 joints, 60 times a second") and "following" in text and "ended" in text
+    (fastest,) = re.findall(r"faster than (\S+) rad/s", text)
+    assert 0 < float(fastest) <= 5
+
+
+def test_code_of_a_sink_and_a_session_runs(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from mrhubo import live
+
+    arm = SimpleNamespace(
+        told=[], angles=lambda names: robot.home_N + arm.off, set_watchdog=lambda seconds: None, is_well=lambda: True,
+        target=lambda names, q_N, velocity_N: arm.told.append(q_N), disconnect=lambda: arm.told.append("end"), off=1.0,
+    )  # fmt: skip
+    sink, session = [code for code in blocks("docs/live.md") if "MyArm" in code]
+    names: dict[str, Any] = {"my_sdk": SimpleNamespace(connect=lambda address: arm)}
+    calls: list[Any] = []
+    monkeypatch.setattr(live, "run", lambda *arguments: calls.append(arguments))
+    exec(sink, names)
+    exec(re.sub(r"mlruns/packages/nao-\w+", package, session), names)
+    ((robot, (source,), (made,), config),) = calls
+    assert config.rate == 100 and source.endpoint.port == 8766
+    with pytest.raises(mrhubo.UserError, match="at home"):
+        made.open(robot, config)
+    arm.off = 0.0
+    own = live.Session.of(robot, [], [made], config)
+    own.open()
+    own.step(0.0)
+    own.close()
+    assert np.allclose(arm.told[0], robot.home_N) and arm.told[1] == "end"
 
 
 def test_code_that_writes_runs(package: str) -> None:

@@ -43,7 +43,7 @@ SCRIPTS = [
     "retarget",
     "scaling",
 ]
-SCRIPTS += ["stream", "training", "universal", "whole_body", "universal_speed", "without_training"]
+SCRIPTS += ["live", "stream", "training", "universal", "whole_body", "universal_speed", "without_training"]
 LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
@@ -337,6 +337,18 @@ def test_stream(run: Run, package: Path, clips: Path) -> None:
     found = rows(text, "motion")
     assert [row[1] for row in found[:3]] == ["networks", "`retarget`", "stream"]
     assert all(row[4] == "0" and row[5] == "0.0%" for row in found if row[1] == "stream")
+
+
+def test_live(run: Run, package: Path, clips: Path) -> None:
+    sizes = ["--frames", 10, "--minutes", 1, "--form", "numpy"]
+    live = importlib.import_module("live")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(live, "_RATE", 20.0)
+        patch.setattr(live, "_MINUTE", 4.0)
+        text = run("live", package, "--motion", clips / "wave.npz", *sizes)
+    assert [row[0] for row in rows(text, "time")] == ["the clock's", "the thread's own"]
+    (minute,) = rows(text, "minute")
+    assert minute[-1] == "0" and "malformed" in text
 
 
 def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None:

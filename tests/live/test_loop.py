@@ -129,7 +129,7 @@ def test_a_signal_stops_the_robot_and_then_interrupts(clock: Clock, replay: Repl
     def terminated(*_: object) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, terminated)
+    before = signal.signal(number, terminated)
     try:
         sink, read = Kept(), replay.read
 
@@ -141,9 +141,9 @@ def test_a_signal_stops_the_robot_and_then_interrupts(clock: Clock, replay: Repl
         replay.read = reading
         with pytest.raises(KeyboardInterrupt):
             loop.run(random_robot(0), [replay], [sink], LiveConfig(ramp_time=0.0))
-        assert signal.getsignal(signal.SIGTERM) is terminated
+        assert signal.getsignal(number) is terminated
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(number, before)
     assert not is_still(sink.outputs[99]) and is_still(sink.outputs[-1]) and len(sink.outputs) < 115
 
 
