@@ -42,6 +42,7 @@ def main(argv: list[str]) -> int:
     """The command; 128 and the signal's number where a signal other than Ctrl-C ended it."""
     config, options = parse_arguments(build_parser(), argv)
     from mrhubo.config.command import Terminated
+    from mrhubo.fast.kept import is_kept, numba_is_there
     from mrhubo.live import LiveRobot
     from mrhubo.live.loop import Session, run_session
     from mrhubo.live.plan import Plan
@@ -51,6 +52,8 @@ def main(argv: list[str]) -> int:
         plan.add_source(text)
     for text in options.sink:
         plan.add_sink(text)
+    if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
+        print("compiling, which takes a minute, once for all sessions", flush=True)
     make = LiveRobot.of_robot if options.retargeter is None else LiveRobot.of_package
     robot = make(options.retargeter or options.robot, config, options.form)
     print(f"robot '{robot.facts.name}', {len(robot.joint_names)} joints; {config.rate:g} joint angles a second")

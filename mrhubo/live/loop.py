@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from mrhubo.config.live import LiveConfig
-from mrhubo.errors import UserError
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.output import Output
 from mrhubo.live.pilot import Pilot
@@ -58,7 +57,7 @@ class Sink(Protocol):
         """Takes the joint angles of a moment; must not wait longer than a small part of a period.
 
         Raises:
-            UserError: it is broken: the session then stops the robot and ends.
+            UserError: it is broken: the session then stops the robot and ends, as after any other error.
         """
         ...
 
@@ -76,8 +75,8 @@ class Session:
     sinks: Sequence[Sink]
     last: Output | None = None
     """What was sent last."""
-    fault: UserError | None = None
-    """The first thing that broke."""
+    fault: Exception | None = None
+    """Of a sink, the first."""
     states: Counter[str] = field(default_factory=Counter)
     """How many outputs were of each state."""
 
@@ -127,7 +126,7 @@ class Session:
         for sink in self.sinks:
             try:
                 sink.send(output)
-            except UserError as error:
+            except Exception as error:  # the other sinks are still to hear how the robot stops
                 self.fault = self.fault or error
 
     def end(self, steps: Callable[[], float]) -> None:
@@ -150,7 +149,7 @@ class Session:
         for part in (*self.sources, *self.sinks):
             try:
                 part.close()
-            except UserError as error:
+            except Exception as error:
                 self.fault = self.fault or error
 
 

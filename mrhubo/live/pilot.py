@@ -11,6 +11,7 @@ import secrets
 import numpy as np
 
 from mrhubo.config.live import LiveConfig
+from mrhubo.errors import UserError
 from mrhubo.live.body import Body, SeenPose
 from mrhubo.live.doubt import Doubt
 from mrhubo.live.governor import Governor
@@ -99,8 +100,13 @@ class Pilot:
         self._doubt.see(None if pose is None else pose.sure_J)
         if pose is None and not self._met:
             return
+        try:
+            answer = self.robot.answer(None if pose is None else pose.local_J33, now)
+        except UserError:  # the retargeter is stricter about rotations than the message's reader was
+            self.inbox.counts["malformed"] += 1
+            self._doubt.see(None)
+            return
         self._met = True
-        answer = self.robot.answer(None if pose is None else pose.local_J33, now)
         self._answer_N, self._confidence_X = answer.q_N, answer.confidence_X
 
     def _may_go(self, now: float) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import socket
 import ssl
 import threading
 from collections import deque
@@ -72,13 +73,16 @@ class Server:
         self._stop: asyncio.Event | None = None
         self._clients: dict[ServerConnection, asyncio.Event] = {}
         self._shown = ""
-        self._fault: OSError | None = None
+        self._fault: Exception | None = None
 
     @property
     def url(self) -> str:
         """Of the page; beyond loopback it holds the token, behind a mark that browsers do not send."""
         scheme = "http" if self._certificate is None else "https"
-        return f"{scheme}://{self.endpoint.shown}/" + ("" if self.token is None else f"#token={self.token}")
+        endpoint = self.endpoint
+        if endpoint.host in ("0.0.0.0", "::"):  # everywhere: no address that a browser could open
+            endpoint = Endpoint(socket.gethostname(), endpoint.port)
+        return f"{scheme}://{endpoint.shown}/" + ("" if self.token is None else f"#token={self.token}")
 
     def open(self) -> None:
         """Listens; does nothing if it does already.
@@ -92,7 +96,7 @@ class Server:
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve(ready)), name="live", daemon=True)
         self._thread.start()
         if not ready.wait(_OPENING) or self._fault is not None:
-            why = "it takes too long" if self._fault is None else self._fault.strerror or self._fault
+            why = "it takes too long" if self._fault is None else getattr(self._fault, "strerror", None) or self._fault
             self.close()
             raise UserError(f"{self.endpoint.shown}: cannot listen there: {why}")
 
@@ -138,7 +142,7 @@ class Server:
                 self.endpoint = Endpoint(self.endpoint.host, port)
                 ready.set()
                 await self._stop.wait()
-        except OSError as error:
+        except Exception as error:  # an address that is used, or none, or whatever ends the thread
             self._fault = error
         finally:
             ready.set()

@@ -6,9 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mrhubo.body.joints import KEYPOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.body.skeleton import Skeleton
+from mrhubo.fast.rotations import are_crooked
 from mrhubo.live.body import UPRIGHT_CONFIDENCE, Body, SeenPose
 from mrhubo.motion import read_motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
@@ -84,6 +88,19 @@ def test_without_hips_the_trunk_is_upright(points: dict[str, np.ndarray]) -> Non
     assert np.abs(found.local_J33 - see(Body(), points, 0).local_J33).max() < 0.2
 
 
+PLACES = st.tuples(*[st.one_of(st.sampled_from([0.0, 1.0, -1.0]), st.floats(-1e3, 1e3))] * 3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.dictionaries(st.sampled_from([*TOLD, "nose"]), PLACES), max_size=4))
+def test_whatever_the_points_are_the_pose_is_rotations(frames: list[dict[str, tuple[float, float, float]]]) -> None:
+    body = Body()
+    for told in frames:
+        found = body.see(told, {})
+        if found is not None:
+            assert not are_crooked(found.local_J33).any() and ((found.sure_J >= 0) & (found.sure_J <= 1)).all()
+
+
 def test_nothing_is_told_before_the_shoulders_are_seen() -> None:
     assert Body().see({"left_wrist": (0.0, 0.0, 0.0)}, {}) is None
     same = (1.0, 1.0, 1.0)
@@ -95,7 +112,7 @@ def test_nothing_is_told_before_the_shoulders_are_seen() -> None:
 def test_arms_that_have_never_been_seen_hang(points: dict[str, np.ndarray]) -> None:
     arms = tuple(name for name in points if "hip" not in name and "shoulder" not in name)
     found = see(Body(), points, 0, without=arms)
-    turns = Skeleton().keypoints_and_rotations(__import__("torch").from_numpy(found.local_J33[None]))[0][0].numpy()
+    turns = Skeleton().keypoints_and_rotations(torch.from_numpy(found.local_J33[None]))[0][0].numpy()
     for side in ("left", "right"):
         arm = turns[KEYPOINT_NAMES.index(f"{side}_wrist")] - turns[KEYPOINT_NAMES.index(f"{side}_shoulder")]
         chest_up = turns[KEYPOINT_NAMES.index("spine3")] - turns[KEYPOINT_NAMES.index("spine2")]

@@ -110,6 +110,21 @@ def test_a_broken_sink_stops_the_robot_for_all(clock: Clock, replay: ReplaySourc
     assert 90 <= len(other.outputs) < 100 and is_still(other.outputs[-1]) and other.closed == broken.closed == 1
 
 
+def test_a_bug_in_a_sink_too(clock: Clock, replay: ReplaySource, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken, other = Kept(), Kept()
+    monkeypatch.setattr(broken, "send", lambda output: other.outputs[99:] and 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        loop.run(random_robot(0), [replay], [broken, other], LiveConfig(ramp_time=0.0))
+    assert is_still(other.outputs[-1]) and len(other.outputs) < 115 and other.closed == broken.closed == 1
+
+
+def test_a_slow_file_is_resampled(tmp_path: Path) -> None:
+    from mrhubo.motion import write_motion
+
+    write_motion(tmp_path / "slow.npz", np.zeros((9, 63)), np.zeros((9, 3)), np.zeros((9, 3)), 5.0, "stands")
+    assert ReplaySource.of_file(tmp_path / "slow.npz")._rate == 30
+
+
 def test_a_bug_in_a_source_stops_the_robot(clock: Clock, replay: ReplaySource, monkeypatch: pytest.MonkeyPatch) -> None:
     read, sink = replay.read, Kept()
 

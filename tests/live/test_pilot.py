@@ -151,6 +151,15 @@ def test_after_a_pause_of_the_process_it_goes_on_from_where_the_robot_stopped() 
     assert np.array_equal(after.q_N, before.stop_N) and not after.velocity_N.any()
 
 
+def test_a_pose_that_the_retargeter_refuses_is_counted() -> None:
+    def refuse(pose: Any, time: float) -> np.ndarray:
+        raise UserError("no")
+
+    pilot = Pilot(make_robot(refuse), LiveConfig(), True)
+    pilot.inbox.offer(message(0), "a", 0.0)
+    assert pilot.tick(0.0).state == "waiting" and pilot.inbox.counts["malformed"] == 1
+
+
 def sure(**joints: float) -> list[float]:
     from mrhubo.body.joints import POSED_JOINT_NAMES
 

@@ -9,9 +9,11 @@ import numpy as np
 from mrhubo.live.body import SeenPose
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Message
-from mrhubo.motion import Motion, ReadOptions, read_motion
+from mrhubo.motion import Motion, ReadOptions, read_motion, resample
 
 _NAME = "replay"
+_SLOWEST = 30.0
+"""Frames per second: slower ones would look like a stream that breaks off again and again."""
 
 
 class ReplaySource:
@@ -35,7 +37,8 @@ class ReplaySource:
         Raises:
             UserError: it is missing, damaged, or tells no frame rate.
         """
-        return cls(read_motion(path, ReadOptions()), loop)
+        motion = read_motion(path, ReadOptions())
+        return cls(motion if motion.frame_rate >= _SLOWEST else resample(motion, _SLOWEST), loop)
 
     def open(self) -> None:
         """The first frame is due when it is asked for."""
