@@ -53,6 +53,8 @@ uint32 nanosec
 _SECOND = 1_000_000_000
 _MAX_BAG = 2**30
 _MAX_CHUNK = 2**30
+_CHUNK = 8_192
+"""Bytes that are written together. The index in memory has an entry for each such piece, so none for each message."""
 _MOMENTS, _POINTS_OF_A_MOMENT = 2, 2
 """So many messages or more, of so many points, are a live session's."""
 
@@ -152,16 +154,15 @@ def write_mcap(motion: RobotMotion, path: Path) -> None:
 
 
 class JointTrajectoryBag:
-    """An MCAP file of JointTrajectory messages. Each is handed to the system when it is written: if the process is
-    killed, all that were can be read.
+    """An MCAP file of JointTrajectory messages, which are handed to the system some ten at a time: if the process is
+    killed, all but the last of them can be read.
     """
 
     def __init__(self, file: BinaryIO) -> None:
         """`file`: to write to. Raises a UserError where mcap-ros2-support is not installed."""
         self._file = file
         compression = _import("mcap.writer").CompressionType.NONE
-        # A chunk is written when it is full; the smallest is full after one message.
-        self._writer = _import("mcap_ros2.writer").Writer(file, chunk_size=1, compression=compression)
+        self._writer = _import("mcap_ros2.writer").Writer(file, chunk_size=_CHUNK, compression=compression)
         self._schema = self._writer.register_msgdef(_TYPE, _DEFINITION)
 
     def write(self, topic: str, message: dict[str, Any], time: float) -> None:

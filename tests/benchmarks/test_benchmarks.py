@@ -343,8 +343,8 @@ def test_live(run: Run, package: Path, clips: Path) -> None:
     sizes = ["--frames", 10, "--minutes", 1, "--form", "numpy"]
     live = importlib.import_module("live")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(live, "_RATE", 20.0)
-        patch.setattr(live, "_MINUTE", 4.0)
+        patch.setattr(live, "_RATE", 30.0)
+        patch.setattr(live, "_MINUTE", 2.0)
         text = run("live", package, "--motion", clips / "wave.npz", *sizes)
     assert [row[0] for row in rows(text, "time")] == ["the clock's", "the thread's own"]
     (minute,) = rows(text, "minute")

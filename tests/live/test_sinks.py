@@ -33,7 +33,7 @@ CONFIG = LiveConfig(ramp_time=0.0)
 def outputs() -> list[Output]:
     """A robot on its way up."""
     pilot, found = Pilot(make_robot(lambda pose, time: UPPER), CONFIG, True), []
-    for step in range(12):
+    for step in range(60):
         pilot.inbox.offer(message(step, time=step / 60), "a", step / 60)
         found.append(pilot.tick(step / 60))
     return found
@@ -52,11 +52,15 @@ def test_a_bag_of_a_session_is_its_motion(tmp_path: Path, outputs: list[Output])
     found = mrhubo.read_robot_motion(path)
     assert np.allclose(found.q, [output.q_N for output in outputs], atol=1e-6)
     assert found.joint_names == NAMES and found.frame_rate == pytest.approx(60)
-    for cut in (0, 1, 300):  # all had been handed to the system; of a disk that lost the end, all before are read
+    for cut in (
+        0,
+        1,
+        300,
+    ):  # nearly all had been handed to the system; of a disk that lost the end, what is before is read
         path.write_bytes(as_killed[: len(as_killed) - cut])
         with pytest.warns(InputWarning, match="ends early"):
             early = mrhubo.read_robot_motion(path)
-        assert len(early) == 12 or cut and len(early) >= 10
+        assert 60 - 40 <= len(early) < 60
         assert np.array_equal(early.q, found.q[: len(early)])
     path.write_bytes(as_killed[:60])
     with pytest.raises(UserError):

@@ -1,4 +1,4 @@
-"""The session as a ROS 2 bag that grows: what has been written is there, even if the process is killed."""
+"""The session as a ROS 2 bag that grows: if the process is killed, all but the last third of a second is there."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mrhubo.robot_motion.ros2 import TOPIC, JointTrajectoryBag, import_mcap
 
 
 class McapSink:
-    """A JointTrajectory for every output, handed to the system at once."""
+    """A JointTrajectory for every output, handed to the system some ten at a time."""
 
     def __init__(self, path: Path) -> None:
         """Where to write.
