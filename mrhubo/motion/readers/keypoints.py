@@ -22,7 +22,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
 
-_UNSURE = 0.3
+UNSURE = 0.3
 """Points that their source is less sure of are taken as missing; detectors draw no point below it."""
 _SAMPLES = 256
 _NONSENSE = 0.6
@@ -132,7 +132,7 @@ def _without_missing(found: Keypoints) -> np.ndarray:
     zero_TK = (point_TK3 == 0).all(-1)
     missing_TK = zero_TK & (zero_TK.sum(1, keepdims=True) > 1)
     if found.confidence_TK is not None:
-        missing_TK |= found.confidence_TK < _UNSURE
+        missing_TK |= found.confidence_TK < UNSURE
     return np.where(missing_TK[..., None], np.nan, point_TK3)
 
 
