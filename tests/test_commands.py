@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from mrhubo.config import BaselineConfig, Config, PriorConfig, SweepConfig, UniversalConfig, load_config
+from mrhubo.config import BaselineConfig, Config, LiveConfig, PriorConfig, SweepConfig, UniversalConfig, load_config
 from mrhubo.errors import UserError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,8 +36,9 @@ MODULES = {
         "models",
     )
 }
-MODULES["universal"] = "mrhubo.universal.__main__"
-SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig, "universal": UniversalConfig}
+MODULES |= {name: f"mrhubo.{name}.__main__" for name in ("universal", "live")}
+SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig, "universal": UniversalConfig,
+           "live": LiveConfig}  # fmt: skip
 """Of the config; elsewhere `Config`."""
 HEAVY = {"torch", "lightning", "mlflow", "matplotlib", "optuna", "scipy", "pandas"}
 PAGES = [
@@ -144,7 +145,7 @@ def test_what_pages_show_is_accepted(path: Path, name: str, arguments: list[str]
     file = rest[rest.index("--config") + 1] if "--config" in rest else "" if not rest else rest[0]
     if not file or file.startswith("-"):
         file = f"conf/{name}.yaml" if name in ("prior", "universal") else "conf/nao.yaml"
-    load_config(shipped(file), settings, SCHEMAS.get(name, Config))
+    load_config(None if name == "live" else shipped(file), settings, SCHEMAS.get(name, Config))
     if "--sweep" in rest:
         load_config(shipped(rest[rest.index("--sweep") + 1], "sweeps/network"), (), SweepConfig)
 
@@ -222,6 +223,8 @@ GIVEN = {
     "--robot": "nao",
     "--to": "numpy",
     "FILE": "my.urdf",
+    "--source": "udp",
+    "--sink": "ws",
 }
 NEEDED = {
     "describe": 1,
@@ -236,6 +239,7 @@ NEEDED = {
     "prior": 1,
     "models": 0,
     "universal": 0,
+    "live": 3,
 }
 """How many things each command cannot do without."""
 

@@ -12,12 +12,13 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = (
     "errors", "lazy", "rotation", "frames", "files", "robot_motion", "fast", "config", "runtime", "search", "body", "robot", "video", "motion", "reference",
-    "universal", "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "describing", "callbacks", "body.prior_training", "universal.learning", "fitting",
-    "baselines", "paper", "universal.__main__", "commands",
+    "universal", "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "describing", "live", "callbacks", "body.prior_training", "universal.learning", "fitting",
+    "baselines", "paper", "universal.__main__", "live.__main__", "commands",
 )  # fmt: skip
 """Each may import from itself and from those before it. `commands` is everything else that lies in the package's
 folder: the verbs, the table of them, and the public names. The prior's training lies in the body, but is a training: it
-has callbacks, and the body does not know it; so does the universal network's, and `__main__` beside it starts that."""
+has callbacks, and the body does not know it; so does the universal network's, and `__main__` beside it starts that. A
+live session is started by the `__main__` in its room."""
 
 
 def modules() -> dict[str, Path]:

@@ -16,6 +16,7 @@ from mrhubo.config.entries import (
 from mrhubo.config.fields import bounded, choice
 from mrhubo.config.help import field_docs
 from mrhubo.config.kinds import keys_of
+from mrhubo.config.live import LiveConfig
 from mrhubo.config.loading import load_config
 from mrhubo.config.places import places_named, where, with_places
 from mrhubo.config.plain import changed_settings, fingerprint, flow_yaml, to_plain, to_yaml, without_paths
@@ -51,6 +52,7 @@ __all__ = [
     "FrameEntry",
     "HandEntry",
     "KeypointEntry",
+    "LiveConfig",
     "ManualEntry",
     "ManualScaleConfig",
     "MeanEntry",

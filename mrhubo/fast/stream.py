@@ -44,7 +44,7 @@ class FastStream:
         self.retargeter, self.rate, self.settings = retargeter, float(rate), settings or StreamSettings()
         self._engine, self._cost = retargeter.engine, retargeter.description.cost
         self._longest_step = self.settings.longest_step(self.rate)
-        self._limits = Limits(self._cost, self.settings.ramp_time)
+        self._limits = Limits.of_cost(self._cost, self.settings.ramp_time)
         self.reset()
         for _ in range(2):  # a first frame, and one that follows
             self(_REST_J33)

@@ -16,7 +16,7 @@ import numpy as np
 from mrhubo.body.joints import JOINT_NAMES, KEYPOINT_NAMES, REST_K3, SIDES
 from mrhubo.fast.plain.human import cross, norm, normalize
 
-_HEAD_POINTS = {
+HEAD_POINTS = {
     "nose": (0.0, 0.035, 0.115),
     "left_ear": (0.072, 0.06, -0.005),
     "right_ear": (-0.072, 0.06, -0.005),
@@ -24,9 +24,9 @@ _HEAD_POINTS = {
 }
 """Points of the head that our skeleton has not, from the head's joint [m]: round numbers of an adult; the tip of the
 nose lies a little lower than the ears' holes."""
-_SHORTEST = 1e-6
+SHORTEST = 1e-6
 """Vectors between points shorter than this [m] point nowhere."""
-_PARALLEL = 0.05
+PARALLEL = 0.05
 """Sine of the angle between two vectors, under which they fix no rotation: 3 degrees."""
 
 Place = tuple[str, ...]
@@ -103,7 +103,7 @@ TRIADS: dict[str, tuple[Triad, ...]] = _table()
 def rest_points() -> dict[str, np.ndarray]:
     """Points (1, 3) [m] of our skeleton at rest, float64, and those of the head that it has not; the pelvis at 0."""
     rest = dict(zip(KEYPOINT_NAMES, REST_K3.astype(np.float64)[:, None], strict=True))
-    return rest | {name: rest["head"] + np.array([place]) for name, place in _HEAD_POINTS.items()}
+    return rest | {name: rest["head"] + np.array([place]) for name, place in HEAD_POINTS.items()}
 
 
 def turn_of(joint: str, points: Mapping[str, np.ndarray]) -> np.ndarray | None:
@@ -135,7 +135,7 @@ def frame_of(first_T3: np.ndarray, second_T3: np.ndarray) -> np.ndarray:
     x_T3 = normalize(first_T3)
     across_T3 = second_T3 - x_T3 * (x_T3 * second_T3).sum(-1, keepdims=True)
     second_T = norm(second_T3)
-    wrong_T = (norm(across_T3) < _PARALLEL * second_T) | (norm(first_T3) < _SHORTEST) | (second_T < _SHORTEST)
+    wrong_T = (norm(across_T3) < PARALLEL * second_T) | (norm(first_T3) < SHORTEST) | (second_T < SHORTEST)
     y_T3 = normalize(across_T3)
     frame_T33 = np.stack((x_T3, y_T3, cross(x_T3, y_T3)), axis=-1)
     return np.where(wrong_T[:, None, None], np.nan, frame_T33)

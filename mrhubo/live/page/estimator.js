@@ -6,7 +6,7 @@ export class Estimator {
   // Loads it; refuses with what is missing.
   static async make(complexity) {
     if (!globalThis.Pose) {
-      const there = await fetch(FOLDER + "pose.js", {method: "HEAD"}).then(answer => answer.ok, () => false);
+      const there = await fetch(FOLDER + "pose.js").then(answer => answer.ok, () => false);
       if (!there) throw new Error("the models are not there: run `mrhubo models`, and reload this page");
       await new Promise((done, fail) => {
         const script = document.createElement("script");

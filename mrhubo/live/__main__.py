@@ -1,0 +1,74 @@
+"""`mrhubo live --robot nao --source replay:dance.bvh --sink ws`: a robot follows a person who is seen now."""
+
+from __future__ import annotations
+
+from mrhubo.config import CommandParser, parse_arguments, run_command
+from mrhubo.config.arguments import number
+from mrhubo.config.live import LiveConfig
+
+DESCRIPTION = (
+    "A robot's arms, hands and head follow a person who is seen now: frames come in, joint angles go out at a fixed"
+    " rate, inside limits of position, speed and acceleration. It moves only while somebody holds the button, or as"
+    " long as a stream without one goes on. Ctrl-C stops the robot softly and ends. docs/live.md specifies all of it."
+)
+
+
+def build_parser() -> CommandParser[LiveConfig]:
+    """The command's arguments."""
+    from mrhubo.live.kinds import SINKS, SOURCES
+
+    parser = CommandParser("mrhubo live", DESCRIPTION, LiveConfig, takes_config=False)
+    who = parser.add_mutually_exclusive_group(required=True)
+    package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
+    who.add_argument("--retargeter", metavar="FOLDER", help=package)
+    robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
+    who.add_argument("--robot", metavar="ROBOT", help=robot)
+    source = f"where frames come from, may be given several times; {'; '.join(SOURCES.values())}"
+    parser.add_argument("--source", metavar="SOURCE", action="append", required=True, help=source)
+    sink = f"where joint angles go, may be given several times; {'; '.join(SINKS.values())}"
+    parser.add_argument("--sink", metavar="SINK", action="append", required=True, help=sink)
+    host = (
+        "where to listen (default: 127.0.0.1, for this machine alone); elsewhere senders need a token, the one that is"
+        " printed, or that of the environment variable MRHUBO_LIVE_TOKEN"
+    )
+    parser.add_argument("--host", metavar="HOST", default="127.0.0.1", help=host)
+    parser.add_argument("--seconds", metavar="SECONDS", type=number(0), help="end after so long; default: never")
+    form = "compiled (default where numba is installed; the first start ever takes a minute) or numpy"
+    parser.add_argument("--form", choices=("compiled", "numpy"), help=form)
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    """The command; 128 and the signal's number where a signal other than Ctrl-C ended it."""
+    config, options = parse_arguments(build_parser(), argv)
+    from mrhubo.config.command import Terminated
+    from mrhubo.live import LiveRobot
+    from mrhubo.live.loop import Session, run_session
+    from mrhubo.live.plan import Plan
+
+    plan = Plan(options.host)
+    for text in options.source:
+        plan.add_source(text)
+    for text in options.sink:
+        plan.add_sink(text)
+    make = LiveRobot.of_robot if options.retargeter is None else LiveRobot.of_package
+    robot = make(options.retargeter or options.robot, config, options.form)
+    print(f"robot '{robot.facts.name}', {len(robot.joint_names)} joints; {config.rate:g} joint angles a second")
+
+    def started() -> None:
+        for sentence in plan.told():
+            print(sentence, flush=True)
+        print("Ctrl-C stops the robot and ends", flush=True)
+
+    session = Session.of(robot, plan.sources, plan.sinks, config)
+    status = 0
+    try:
+        run_session(session, options.seconds, started)
+    except KeyboardInterrupt:
+        status = 0 if Terminated.number is None else 128 + Terminated.number
+    print(session.summary())
+    return status
+
+
+if __name__ == "__main__":
+    run_command(main)

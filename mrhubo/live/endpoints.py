@@ -1,0 +1,102 @@
+"""Where a session listens and sends: addresses as users write them, and who may be listened to.
+
+Loopback needs no token: whoever can send there is on this machine. Anything else does.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import secrets
+import socket
+from dataclasses import dataclass
+
+from mrhubo.errors import UserError, shortened
+
+LOOPBACK = "127.0.0.1"
+TOKEN_VARIABLE = "MRHUBO_LIVE_TOKEN"
+_SHORTEST_TOKEN = 16
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A host and a port."""
+
+    host: str
+    port: int
+
+    @classmethod
+    def read(cls, text: str, what: str, default_port: int | None = None, host: str = LOOPBACK) -> Endpoint:
+        """Of `HOST:PORT`, `[IPv6]:PORT`, `PORT`, or nothing.
+
+        Args:
+            text: what a user wrote.
+            what: the flag, for sentences.
+            default_port: where none is written.
+            host: where none is written.
+
+        Raises:
+            UserError: there is no port, or it is none.
+        """
+        name, colon, port = text.rpartition(":")
+        if not text:
+            port = "" if default_port is None else str(default_port)
+        if colon:
+            host = name.removeprefix("[").removesuffix("]")
+        if not port.isascii() or not port.isdigit() or len(port) > 5 or int(port) > 65_535 or not host:
+            raise UserError(f"{what}: '{shortened(text)}' is no HOST:PORT, for instance 127.0.0.1:9000")
+        return cls(host, int(port))
+
+    @property
+    def shown(self) -> str:
+        """As it is written in a URL."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this machine reaches it."""
+        return is_loopback(self.host)
+
+    def socket(self, kind: int = socket.SOCK_DGRAM) -> tuple[socket.socket, tuple]:
+        """A socket of the right family that is not bound yet, and the address.
+
+        Raises:
+            UserError: the host has no address.
+        """
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(self.host, self.port, type=kind)[0]
+            return socket.socket(family, kind, protocol), address
+        except (OSError, UnicodeError) as error:
+            raise UserError(f"{self.shown}: cannot be used: {getattr(error, 'strerror', None) or error}") from error
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine alone."""
+    try:
+        return ipaddress.ip_address(host.split("%")[0]).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def find_token(host: str) -> str | None:
+    """The token that messages need which come to a host: None on loopback, else that of the environment variable
+    MRHUBO_LIVE_TOKEN, or a random one.
+
+    Raises:
+        UserError: the variable's is too short to be a secret.
+    """
+    if is_loopback(host):
+        return None
+    given = os.environ.get(TOKEN_VARIABLE)
+    if given is None:
+        return secrets.token_urlsafe(24)
+    if len(given) < _SHORTEST_TOKEN or not given.isascii() or not given.isprintable() or " " in given:
+        raise UserError(f"{TOKEN_VARIABLE}: must be {_SHORTEST_TOKEN} letters and digits or more, without spaces")
+    return given
+
+
+def token_fits(expected: str | None, given: object) -> bool:
+    """Whether a sender may be listened to; takes as long for a wrong token as for a nearly right one."""
+    if expected is None:
+        return True
+    return isinstance(given, str) and secrets.compare_digest(expected.encode(), given.encode("utf-8", "replace"))

@@ -1,0 +1,17 @@
+"""What sources and sinks there are, as `--help` tells them."""
+
+from __future__ import annotations
+
+SOURCES = {
+    "ws": "ws[:PORT]: JSON messages by WebSocket, with a page for the browser (port 8765)",
+    "udp": "udp[:PORT]: JSON messages in UDP datagrams (port 8766)",
+    "vmc": "vmc[:PORT]: an avatar's bones by the VMC protocol, from this machine (port 39539)",
+    "replay": "replay:FILE: a motion file at its rate; replay-loop:FILE: again and again",
+}
+"""By name, what comes from where."""
+SINKS = {
+    "ws": "ws[:PORT]: JSON messages by WebSocket, with the page (port 8765)",
+    "udp": "udp:HOST:PORT: JSON messages in UDP datagrams",
+    "file": "file:PATH: a file as mrhubo retarget writes it, of the whole session",
+}
+"""By name, what goes where."""

@@ -1,0 +1,204 @@
+"""The messages that a live session is sent, as JSON: what docs/live.md specifies, and nothing else.
+
+Whatever is wrong with one, it is `Refused`, with the kind of fault under which it is counted.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+
+from mrhubo.body.joints import KEYPOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.fast.rotations import are_crooked, axis_angle_to_matrix
+from mrhubo.live.body import SeenPose
+from mrhubo.live.point_sets import POINT_SETS, PointSet
+from mrhubo.live.vectors import Vector
+from mrhubo.motion.orientations import HEAD_POINTS
+from mrhubo.motion.readers.keypoints import UNSURE
+
+VERSION = 1
+MAX_BYTES = 65_536
+"""Of one message."""
+_MOST_POINTS = 256
+_FARTHEST = 1e3
+"""No coordinate of a point is further from 0 [m]."""
+_MOST_TURN = 6 * math.pi
+_LONGEST_NAME = 64
+_OURS = {*KEYPOINT_NAMES, *HEAD_POINTS}
+_JOINTS = len(POSED_JOINT_NAMES)
+
+
+class Refused(Exception):
+    """A message that changes nothing; its text is the kind of fault: `malformed`, `version`, `too_long`."""
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """Points of a person."""
+
+    points: dict[str, Vector]
+    """Those that are seen [m], y up, right-handed, by our names."""
+    sure: dict[str, float]
+    """How sure the sender is of each, 0..1."""
+
+
+@dataclass(frozen=True)
+class Nobody:
+    """The sender sees nobody."""
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """The sender is there."""
+
+    held: bool
+    """Whether its key or button is held, so that the robot may move."""
+
+
+Content = Landmarks | SeenPose | Nobody | Heartbeat
+
+
+@dataclass(frozen=True)
+class Message:
+    """One message."""
+
+    session: str
+    """Of the sender: another one each time it starts."""
+    number: int
+    """Greater with every message of a session."""
+    time: float
+    """On the sender's clock, when what it tells was seen [s]."""
+    content: Content
+
+
+def read_message(data: bytes | str) -> Message:
+    """A message of its JSON.
+
+    Raises:
+        Refused: it is too long, no JSON, of another version, or not what docs/live.md specifies.
+    """
+    if len(data) > MAX_BYTES:
+        raise Refused("too_long")
+    try:
+        told = json.loads(data, parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        raise Refused("malformed") from error
+    if not isinstance(told, dict):
+        raise Refused("malformed")
+    if told.get("mrhubo") != VERSION or isinstance(told["mrhubo"], bool):
+        raise Refused("version")
+    session, number, kind = told.get("session"), told.get("number"), told.get("kind")
+    if not isinstance(session, str) or not 0 < len(session) <= _LONGEST_NAME:
+        raise Refused("malformed")
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 2**53:
+        raise Refused("malformed")
+    reader = _KINDS.get(kind) if isinstance(kind, str) else None
+    if reader is None:
+        raise Refused("malformed")
+    return Message(session, number, _number(told.get("time"), 1e12), reader(told))
+
+
+def _no_number(name: str) -> NoReturn:
+    raise ValueError(name)
+
+
+def _number(value: Any, most: float) -> float:
+    if not isinstance(value, int | float) or isinstance(value, bool) or not -most <= value <= most:
+        raise Refused("malformed")
+    return float(value)
+
+
+def _landmarks(told: dict[str, Any]) -> Landmarks:
+    name = told.get("set")
+    known = POINT_SETS.get(name) if isinstance(name, str) else None
+    if known is None:
+        raise Refused("malformed")
+    triples = _list(told.get("points"))
+    names = _names(known, told, len(triples))
+    weights = told.get("visibility")
+    weights = [1.0] * len(triples) if weights is None else _list(weights)
+    if len(names) != len(triples) or len(weights) != len(triples):
+        raise Refused("malformed")
+    points, sure = {}, {}
+    for ours, triple, weight in zip(names, triples, weights, strict=True):
+        if ours is None or triple is None or weight is None:
+            continue
+        x, y, z = (_number(value, _FARTHEST) for value in _list(triple, 3))
+        weight = min(1.0, max(0.0, _number(weight, 1e6)))
+        if weight >= UNSURE:
+            points[ours] = known.signs[0] * x, known.signs[1] * y, known.signs[2] * z
+            sure[ours] = weight
+    return Landmarks(points, sure)
+
+
+def _names(known: PointSet, told: dict[str, Any], count: int) -> list[str | None]:
+    """Our name of each point; None where it is not used."""
+    if known.names is not None:
+        return [None if name == "-" else name for name in known.names]
+    theirs = _list(told.get("names"))
+    if any(not isinstance(name, str) or len(name) > _LONGEST_NAME for name in theirs) or len(set(theirs)) < len(theirs):
+        raise Refused("malformed")
+    ours = theirs if known.theirs is None else [known.theirs.get(name) for name in theirs]
+    return [name if name in _OURS else None for name in ours]
+
+
+def _list(value: Any, length: int | None = None) -> list[Any]:
+    if not isinstance(value, list) or len(value) > _MOST_POINTS or (length is not None and len(value) != length):
+        raise Refused("malformed")
+    return value
+
+
+def _rotations(told: dict[str, Any]) -> SeenPose:
+    rows = [[_number(value, _MOST_TURN) for value in _list(row)] for row in _list(told.get("rotations"), _JOINTS)]
+    widths = {len(row) for row in rows}
+    if widths == {3}:
+        angle = max(math.sqrt(x * x + y * y + z * z) for x, y, z in rows)
+        if angle > _MOST_TURN:
+            raise Refused("malformed")
+        local_J33 = axis_angle_to_matrix(np.array(rows))
+    elif widths == {4}:
+        local_J33 = of_quaternions(np.array(rows))
+    else:
+        raise Refused("malformed")
+    if are_crooked(local_J33).any():
+        raise Refused("malformed")
+    weights = told.get("confidence")
+    weights = [1.0] * _JOINTS if weights is None else [_number(value, 1e6) for value in _list(weights, _JOINTS)]
+    return SeenPose(local_J33.astype(np.float32), np.clip(weights, 0.0, 1.0))
+
+
+def of_quaternions(xyzw_J4: np.ndarray) -> np.ndarray:
+    """Rotations (J, 3, 3) of quaternions, w last, which need not be of length 1.
+
+    Raises:
+        Refused: one is nearly 0, and no rotation.
+    """
+    length_J1 = np.sqrt((xyzw_J4**2).sum(-1, keepdims=True))
+    if not (length_J1 > 0.1).all():
+        raise Refused("malformed")
+    x, y, z, w = (xyzw_J4 / length_J1).T
+    rows = (
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip
+    return np.stack(rows, axis=-1).reshape(-1, 3, 3)
+
+
+def _heartbeat(told: dict[str, Any]) -> Heartbeat:
+    held = told.get("held")
+    if not isinstance(held, bool):
+        raise Refused("malformed")
+    return Heartbeat(held)
+
+
+_KINDS = {
+    "landmarks": _landmarks,
+    "rotations": _rotations,
+    "nobody": lambda told: Nobody(),
+    "heartbeat": _heartbeat,
+}

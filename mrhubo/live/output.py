@@ -1,0 +1,70 @@
+"""What is sent to a robot at every moment, and its JSON (docs/live.md specifies it).
+
+Legend: N joints.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrhubo.live.messages import VERSION
+
+STATES = {
+    "stopped": "nobody holds the button, or the stream has broken off: the robot brakes, and stands",
+    "waiting": "the button is held, and nobody has been seen",
+    "following": "the robot follows the person",
+    "doubtful": "some of its parts are hardly seen, or nobody is",
+    "ended": "the session ends: the last angles",
+}
+"""By name, what a session is doing."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """The joint angles of one moment."""
+
+    number: int
+    """Greater by 1 each time."""
+    time: float
+    """On our clock [s]."""
+    state: str
+    """A key of `STATES`."""
+    joint_names: tuple[str, ...]
+    q_N: np.ndarray
+    """Joint angles (N,) [rad], float64."""
+    velocity_N: np.ndarray
+    """How fast the joints turn (N,) [rad/s]."""
+    stop_N: np.ndarray
+    """Where they stand (N,) [rad] if they brake from now on: where a robot is to go that hears no more of us."""
+    stop_in: float
+    """How long that takes [s]."""
+    confidence: Mapping[str, float]
+    """Of the robot's parts, 0..1: the lesser of the source's and the retargeter's."""
+    session: str = ""
+    """Another one each time that a session starts."""
+
+    def message(self, counts: Mapping[str, int] | None = None) -> str:
+        """The JSON message; with counts, these too."""
+        told: dict[str, Any] = {
+            "mrhubo": VERSION,
+            "kind": "joints",
+            "session": self.session,
+            "number": self.number,
+            "time": round(self.time, 6),
+            "state": self.state,
+            "names": self.joint_names,
+            "angles": _rounded(self.q_N),
+            "velocities": _rounded(self.velocity_N),
+            "stop": {"angles": _rounded(self.stop_N), "in": round(self.stop_in, 6)},
+            "confidence": {name: round(value, 4) for name, value in self.confidence.items()},
+        }
+        return json.dumps(told if counts is None else {**told, "counts": dict(counts)}, separators=(",", ":"))
+
+
+def _rounded(value_N: np.ndarray) -> list[float]:
+    return [round(value, 9) for value in value_N.tolist()]

@@ -1,0 +1,108 @@
+"""Sources and sinks by what a user writes after `--source` and `--sink`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+from mrhubo.errors import UserError, shortened, unknown_name
+from mrhubo.live.endpoints import LOOPBACK, Endpoint
+from mrhubo.live.loop import Sink, Source
+from mrhubo.live.server import PORT, PageSink, PageSource, Server
+
+UDP_PORT = 8766
+Part = TypeVar("Part")
+
+
+class Plan:
+    """The sources and sinks of one session, which share one server where both are on one port."""
+
+    def __init__(self, host: str = LOOPBACK) -> None:
+        """`host`: where to listen."""
+        self._host = host
+        self._servers: dict[int, Server] = {}
+        self.sources: list[Source] = []
+        self.sinks: list[Sink] = []
+
+    def told(self) -> list[str]:
+        """Where it listens once all is open, a sentence each."""
+        said = [f"page: {server.url}" for server in self._servers.values()]
+        for source in self.sources:
+            endpoint = getattr(source, "endpoint", None)
+            if isinstance(endpoint, Endpoint):
+                token = getattr(source, "token", None)
+                said.append(f"listening: udp {endpoint.shown}" + ("" if token is None else f", token {token}"))
+        return said
+
+    def add_source(self, text: str) -> None:
+        """`NAME` or `NAME:WHERE`.
+
+        Raises:
+            UserError: there is no such source, or it needs what is missing.
+        """
+        name, _, where = text.partition(":")
+        makers: dict[str, Callable[[str], Source]] = {
+            "ws": lambda where: PageSource(self._server(where, text)),
+            "udp": self._udp_source,
+            "vmc": self._vmc_source,
+            "replay": lambda where: _replay(where, False),
+            "replay-loop": lambda where: _replay(where, True),
+        }
+        self.sources.append(_chosen("source", name, makers)(where))
+
+    def add_sink(self, text: str) -> None:
+        """`NAME` or `NAME:WHERE`.
+
+        Raises:
+            UserError: there is no such sink, or it needs what is missing.
+        """
+        name, _, where = text.partition(":")
+        makers: dict[str, Callable[[str], Sink]] = {
+            "ws": lambda where: PageSink(self._server(where, text)),
+            "udp": _udp_sink,
+            "file": _file_sink,
+        }
+        self.sinks.append(_chosen("sink", name, makers)(where))
+
+    def _server(self, where: str, text: str) -> Server:
+        endpoint = Endpoint.read(where, text, PORT, self._host)
+        return self._servers.setdefault(endpoint.port, Server(endpoint))
+
+    def _udp_source(self, where: str) -> Source:
+        from mrhubo.live.sources.udp import UdpSource
+
+        return UdpSource(Endpoint.read(where, "--source udp", UDP_PORT, self._host))
+
+    def _vmc_source(self, where: str) -> Source:
+        from mrhubo.live.sources.vmc import PORT, VmcSource
+
+        return VmcSource(Endpoint.read(where, "--source vmc", PORT))
+
+
+def _chosen(kind: str, name: str, makers: Mapping[str, Callable[[str], Part]]) -> Callable[[str], Part]:
+    if name not in makers:
+        raise UserError(f"--{kind}: {unknown_name(kind, shortened(name), makers)}")
+    return makers[name]
+
+
+def _replay(where: str, loop: bool) -> Source:
+    from mrhubo.live.sources.replay import ReplaySource
+
+    if not where:
+        raise UserError("--source replay: names no file; write replay:dance.bvh")
+    return ReplaySource.of_file(Path(where), loop)
+
+
+def _udp_sink(where: str) -> Sink:
+    from mrhubo.live.sinks.udp import UdpSink
+
+    return UdpSink(Endpoint.read(where, "--sink udp"))
+
+
+def _file_sink(where: str) -> Sink:
+    from mrhubo.live.sinks.file import FileSink
+
+    if not where:
+        raise UserError("--sink file: names no file; write file:session.npz")
+    return FileSink(Path(where))

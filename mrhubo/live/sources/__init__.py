@@ -1,0 +1,1 @@
+"""Where a live session's frames and heartbeats come from."""

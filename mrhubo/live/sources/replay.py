@@ -1,0 +1,58 @@
+"""Any motion file as a stream, at its rate: how a session is tried without a camera or a headset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.live.body import SeenPose
+from mrhubo.live.inbox import Inbox
+from mrhubo.live.messages import Message
+from mrhubo.motion import Motion, ReadOptions, read_motion
+
+_NAME = "replay"
+
+
+class ReplaySource:
+    """The frames of a motion, each when it is due; those that are over when they are asked for are left out."""
+
+    has_heartbeat = False
+
+    def __init__(self, motion: Motion, loop: bool = False) -> None:
+        """A motion from its first frame on; `loop`: again and again."""
+        arrays = motion.arrays
+        self._local_TJ33, self._rate, self._loop = arrays.local_TJ33, motion.frame_rate, loop
+        sure_TJ = arrays.confidence_TJ
+        self._sure_TJ = np.ones(self._local_TJ33.shape[:2]) if sure_TJ is None else sure_TJ
+        self._begun: float | None = None
+        self._last = -1
+
+    @classmethod
+    def of_file(cls, path: Path, loop: bool = False) -> ReplaySource:
+        """A motion file, of any kind that `read_motion` reads.
+
+        Raises:
+            UserError: it is missing, damaged, or tells no frame rate.
+        """
+        return cls(read_motion(path, ReadOptions()), loop)
+
+    def open(self) -> None:
+        """The first frame is due when it is asked for."""
+        self._begun, self._last = None, -1
+
+    def read(self, inbox: Inbox, now: float) -> bool:
+        """Gives the newest frame that is due; False after the last."""
+        self._begun = now if self._begun is None else self._begun
+        frames = len(self._local_TJ33)
+        due = int((now - self._begun) * self._rate + 1e-6)
+        if not self._loop and due >= frames:
+            return False
+        if due > self._last:
+            self._last = due
+            pose = SeenPose(self._local_TJ33[due % frames], self._sure_TJ[due % frames])
+            inbox.offer(Message(_NAME, due, now, pose), _NAME, now)
+        return True
+
+    def close(self) -> None:
+        """Nothing is open."""

@@ -1,0 +1,153 @@
+"""The Virtual Motion Capture protocol: rotations of an avatar's bones, as OSC messages over UDP.
+
+Protocol: https://protocol.vmc.info/english (`/VMC/Ext/Bone/Pos` with the name of a Unity humanoid bone, its position
+and its rotation, both relative to the bone above it). Unity's axes are left-handed: x to the right, y up, z forward,
+which is where an avatar looks. Mirrored in x they are ours. A bone's rotation refers to the avatar's T-pose, in which
+VRM has all rotations 0, as our rest pose has.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
+from mrhubo.errors import UserError
+from mrhubo.live.body import SeenPose
+from mrhubo.live.endpoints import Endpoint
+from mrhubo.live.inbox import Inbox
+from mrhubo.live.messages import MAX_BYTES, Message, Refused, of_quaternions
+from mrhubo.live.sources.udp import Datagrams
+
+PORT = 39_539
+"""On which programs that receive VMC listen by default."""
+ADDRESS = "/VMC/Ext/Bone/Pos"
+_ARGUMENTS = 8
+_CENTRAL = {"Spine": "spine1", "Chest": "spine2", "UpperChest": "spine3", "Neck": "neck", "Head": "head"}
+_SIDED = {
+    "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
+    "UpperLeg": "hip", "LowerLeg": "knee", "Foot": "ankle", "Toes": "foot",
+}  # fmt: skip
+BONES = {
+    **_CENTRAL,
+    **{f"{side.capitalize()}{bone}": f"{side}_{joint}" for side in SIDES for bone, joint in _SIDED.items()},
+}
+"""Our joints, by Unity's names of bones."""
+_PLACE = {bone: POSED_JOINT_NAMES.index(joint) for bone, joint in BONES.items()}
+_ARMS = [POSED_JOINT_NAMES.index(f"{side}_{name}") for side in SIDES for name in ("shoulder", "elbow")]
+
+
+class Bones:
+    """The newest rotations of an avatar's bones."""
+
+    def __init__(self) -> None:
+        self._xyzw_J4 = np.tile([0.0, 0.0, 0.0, 1.0], (len(POSED_JOINT_NAMES), 1))
+        self._seen_J = np.zeros(len(POSED_JOINT_NAMES), bool)
+
+    def take(self, datagram: bytes) -> bool:
+        """Takes the bones of one datagram, all or none; whether there were any.
+
+        Raises:
+            Refused: it is no OSC, or a bone in it has no rotation.
+        """
+        if len(datagram) > MAX_BYTES:
+            raise Refused("too_long")
+        found: dict[int, tuple[float, ...]] = {}
+        for address, arguments in _osc(datagram):
+            if address != ADDRESS:
+                continue
+            if len(arguments) != _ARGUMENTS or not isinstance(arguments[0], str):
+                raise Refused("malformed")
+            place = _PLACE.get(arguments[0])
+            if place is not None:
+                found[place] = _quaternion(arguments[4:])
+        for place, (x, y, z, w) in found.items():
+            self._xyzw_J4[place] = x, -y, -z, w  # mirrored in x
+            self._seen_J[place] = True
+        return bool(found)
+
+    @property
+    def pose(self) -> SeenPose:
+        """As they are now; a bone that has never come rests, and an arm that has never come is not sure."""
+        sure_J = np.ones(len(self._seen_J))
+        for place in _ARMS:
+            sure_J[place] = self._seen_J[place]
+        return SeenPose(of_quaternions(self._xyzw_J4).astype(np.float32), sure_J)
+
+
+def _quaternion(values: Any) -> tuple[float, ...]:
+    numbers = tuple(float(value) for value in values if isinstance(value, int | float) and abs(value) <= 2.0)
+    if len(numbers) != 4 or not 0.5 < math.sqrt(sum(n * n for n in numbers)) < 2.0:
+        raise Refused("malformed")
+    return numbers
+
+
+def _osc(datagram: bytes) -> Iterator[tuple[str, list[Any]]]:
+    """Address and arguments of every message in a datagram."""
+    from pythonosc.osc_packet import OscPacket
+
+    try:
+        for timed in OscPacket(datagram).messages:
+            yield timed.message.address, list(timed.message.params)
+    except Refused:
+        raise
+    except Exception as error:  # whatever python-osc makes of a stranger's bytes
+        raise Refused("malformed") from error
+
+
+class VmcSource:
+    """A VMC receiver. The protocol knows no token, so it listens on loopback alone; it knows no heartbeat either."""
+
+    has_heartbeat = False
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        """Where to listen.
+
+        Raises:
+            UserError: python-osc is not installed, or the host is reached by others.
+        """
+        try:
+            import pythonosc.osc_packet  # noqa: F401
+        except ImportError as error:
+            raise UserError("VMC needs python-osc: pip install 'mrhubo[live]'") from error
+        if not endpoint.is_loopback:
+            raise UserError(
+                f"--source vmc:{endpoint.shown}: VMC has no token, so it is taken on loopback alone; let a program on"
+                " this machine send it on to 127.0.0.1"
+            )
+        self._datagrams, self._bones = Datagrams(endpoint), Bones()
+        self._session, self._number = str(time.time_ns()), 0
+
+    @property
+    def endpoint(self) -> Endpoint:
+        """Where it listens."""
+        return self._datagrams.endpoint
+
+    def open(self) -> None:
+        """Binds."""
+        self._datagrams.open()
+
+    def read(self, inbox: Inbox, now: float) -> bool:
+        """Empties the socket; all bones that have come are one frame."""
+        moved = False
+
+        def take(data: bytes, sender: str) -> None:
+            nonlocal moved
+            try:
+                moved |= self._bones.take(data)
+            except Refused as fault:
+                inbox.counts[str(fault)] += 1
+
+        self._datagrams.read(take)
+        if moved:
+            self._number += 1
+            inbox.offer(Message(self._session, self._number, now, self._bones.pose), "vmc", now)
+        return True
+
+    def close(self) -> None:
+        """Unbinds."""
+        self._datagrams.close()

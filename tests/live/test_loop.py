@@ -1,0 +1,281 @@
+"""A session from its sources to its sinks, by a clock of the test's own; and how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mrhubo
+from mrhubo.config.live import LiveConfig
+from mrhubo.errors import UserError
+from mrhubo.live import loop
+from mrhubo.live.endpoints import TOKEN_VARIABLE, Endpoint
+from mrhubo.live.inbox import Inbox
+from mrhubo.live.loop import Periods, Session
+from mrhubo.live.output import STATES, Output
+from mrhubo.live.plan import Plan
+from mrhubo.live.sinks.file import FileSink
+from mrhubo.live.sinks.udp import UdpSink
+from mrhubo.live.sources.replay import ReplaySource
+from mrhubo.live.sources.udp import UdpSource
+from mrhubo.motion import read_motion
+from tests.live.messages import beat, message
+from tests.live.robots import NAMES, UPPER, make_robot, random_robot
+
+PERIOD = 1 / 60
+
+
+class Kept:
+    """A sink that keeps all."""
+
+    def __init__(self, breaks_at: int = -1) -> None:
+        self.outputs: list[Output] = []
+        self.closed, self.breaks_at = 0, breaks_at
+
+    def open(self, robot: Any, config: Any) -> None:
+        self.closed = 0
+
+    def send(self, output: Output) -> None:
+        self.outputs.append(output)
+        if len(self.outputs) == self.breaks_at:
+            raise UserError("the arm has come off")
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+class Clock:
+    """Time passes as it is slept away."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    found = Clock()
+    monkeypatch.setattr(loop, "Periods", lambda rate: Periods(rate, found, found.sleep))
+    return found
+
+
+@pytest.fixture
+def replay(root: Path) -> ReplaySource:
+    return ReplaySource(read_motion(root / "data" / "motions" / "wave.npz"))
+
+
+def is_still(output: Output) -> bool:
+    return bool(np.abs(output.velocity_N).max() < 1e-9)
+
+
+def test_a_replay_is_followed_to_its_end_and_stopped(clock: Clock, replay: ReplaySource) -> None:
+    sink, config = Kept(), LiveConfig(ramp_time=0.2)
+    session = loop.run(random_robot(0), [replay], [sink], config)
+    frames = len(replay._local_TJ33)
+    assert session.counts["frames"] == pytest.approx(frames, abs=3)
+    assert len(sink.outputs) == pytest.approx(frames / 60 * config.rate, abs=15)
+    assert sink.outputs[-1].state == "ended" and is_still(sink.outputs[-1]) and sink.closed == 1
+    assert max(np.abs(output.velocity_N).max() for output in sink.outputs) > 2
+    assert [output.number for output in sink.outputs] == list(range(1, len(sink.outputs) + 1))
+    assert set(session.states) <= set(STATES) and session.states["following"] > 300
+    assert "frames" in session.summary()
+
+
+def test_no_two_outputs_are_closer_than_a_period() -> None:
+    clock, delays = Clock(), iter([0.0, 0.05, 0.001, 0.0, 0.002] * 9)
+    periods, times = Periods(60.0, clock, clock.sleep), []
+    for delay in delays:
+        times.append(periods())
+        clock.now += delay
+    assert np.diff(times).min() >= PERIOD - 1e-9 and np.diff(times).max() < 0.051
+
+
+def test_a_broken_sink_stops_the_robot_for_all(clock: Clock, replay: ReplaySource) -> None:
+    broken, other = Kept(breaks_at=90), Kept()
+    with pytest.raises(UserError, match="come off"):
+        loop.run(random_robot(0), [replay], [broken, other], LiveConfig(ramp_time=0.0))
+    assert 90 <= len(other.outputs) < 100 and is_still(other.outputs[-1]) and other.closed == broken.closed == 1
+
+
+def test_a_bug_in_a_source_stops_the_robot(clock: Clock, replay: ReplaySource, monkeypatch: pytest.MonkeyPatch) -> None:
+    read, sink = replay.read, Kept()
+
+    def failing(inbox: Inbox, now: float) -> bool:
+        if len(sink.outputs) == 100:
+            raise ZeroDivisionError
+        return read(inbox, now)
+
+    monkeypatch.setattr(replay, "read", failing)
+    with pytest.raises(ZeroDivisionError):
+        loop.run(random_robot(0), [replay], [sink], LiveConfig(ramp_time=0.0))
+    assert not is_still(sink.outputs[99]) and is_still(sink.outputs[-1]) and sink.closed == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_the_robot_and_then_interrupts(clock: Clock, replay: ReplaySource, number: int) -> None:
+    def terminated(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, terminated)
+    try:
+        sink, read = Kept(), replay.read
+
+        def reading(inbox: Inbox, now: float) -> bool:
+            if len(sink.outputs) == 100:
+                os.kill(os.getpid(), number)
+            return read(inbox, now)
+
+        replay.read = reading
+        with pytest.raises(KeyboardInterrupt):
+            loop.run(random_robot(0), [replay], [sink], LiveConfig(ramp_time=0.0))
+        assert signal.getsignal(signal.SIGTERM) is terminated
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert not is_still(sink.outputs[99]) and is_still(sink.outputs[-1]) and len(sink.outputs) < 115
+
+
+def test_it_ends_after_some_time(clock: Clock, replay: ReplaySource) -> None:
+    sink = Kept()
+    loop.run(make_robot(), [replay], [sink], LiveConfig(), seconds=0.5)
+    assert 30 <= len(sink.outputs) <= 33
+
+
+def test_what_cannot_be_opened_leaves_nothing_open(replay: ReplaySource, tmp_path: Path) -> None:
+    first, second = UdpSource(Endpoint("127.0.0.1", 0)), Kept()
+    first.open()
+    with pytest.raises(UserError, match="cannot listen"):
+        loop.run(make_robot(), [replay, UdpSource(first.endpoint)], [second])
+    first.close()
+    assert second.closed == 1 and not second.outputs
+
+
+# Sockets and files
+
+
+def test_udp_from_end_to_end() -> None:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", 0))
+    receiver.settimeout(2)
+    source, sink = UdpSource(Endpoint("127.0.0.1", 0)), UdpSink(Endpoint(*receiver.getsockname()))
+    session = Session.of(make_robot(lambda pose, time: UPPER), [source], [sink], LiveConfig(ramp_time=0.0))
+    session.open()
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        for step in range(8):
+            now = step * PERIOD
+            for data in (beat(step, now), message(step, time=now), message(step, time=now), b"\xff\x00garbage"):
+                sender.sendto(data, (source.endpoint.host, source.endpoint.port))
+            session.step(now)
+        told = [json.loads(receiver.recv(65_536)) for _ in range(8)]
+    finally:
+        session.close()
+        sender.close()
+        receiver.close()
+    assert [one["number"] for one in told] == list(range(1, 9)) and {one["mrhubo"] for one in told} == {1}
+    assert (
+        told[-1]["names"] == list(NAMES)
+        and told[-1]["state"] == "following"
+        and told[-1]["confidence"] == {"left": 1, "right": 1}
+    )
+    assert told[-1]["angles"][0] > told[0]["angles"][0] and told[-1]["velocities"][0] > 0
+    assert told[-1]["stop"]["angles"][0] > told[-1]["angles"][0] and 0 < told[-1]["stop"]["in"] <= 0.1
+    assert session.counts["malformed"] == session.counts["repeated"] == 8
+
+
+def test_udp_with_a_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(TOKEN_VARIABLE, "a-secret-of-some-length")
+    source, inbox = UdpSource(Endpoint("0.0.0.0", 0)), Inbox(0.25)
+    source.open()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for data in (
+            beat(0),
+            b"[" * 9_000,
+            beat(1)[:-1] + b', "token": "a-secret-of-some-lengtH"}',
+            beat(2)[:-1] + b', "token": "a-secret-of-some-length"}',
+        ):
+            sender.sendto(data, ("127.0.0.1", source.endpoint.port))
+        source.read(inbox, 0.0)
+    source.close()
+    assert inbox.counts["token"] == 3 and inbox.counts["heartbeats"] == 1 and inbox.held
+
+
+@pytest.mark.parametrize("ending", ["npz", "csv"])
+def test_a_file_of_the_session(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "new" / f"session.{ending}"
+    session = Session.of(
+        make_robot(lambda pose, time: UPPER), [], [FileSink(path)], LiveConfig(ramp_time=0.0, deadman="frames")
+    )
+    session.open()
+    sent = []
+    for step in range(20):
+        session.pilot.inbox.offer(message(step, time=step * PERIOD), "a", step * PERIOD)
+        session.step(step * PERIOD)
+        assert session.last is not None
+        sent.append(session.last.q_N)
+    assert not path.exists()
+    session.close()
+    session.close()
+    found = mrhubo.read_robot_motion(path)
+    assert (
+        np.allclose(found.q, sent, atol=1e-6) and found.frame_rate == pytest.approx(60) and found.joint_names == NAMES
+    )
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+def test_a_file_that_cannot_be_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="must end in"):
+        FileSink(tmp_path / "session.txt")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        FileSink(tmp_path / "file" / "session.npz").open(make_robot(), LiveConfig())
+
+
+def test_a_replay_gives_the_newest_frame_that_is_due(replay: ReplaySource) -> None:
+    inbox = Inbox(0.25)
+    replay.open()
+    assert replay.read(inbox, 5.0) and replay.read(inbox, 5.0) and inbox.counts["frames"] == 1
+    assert replay.read(inbox, 5.5) and inbox.counts["frames"] == 2 and inbox.counts["repeated"] == 0
+    seen = inbox.take_frame()
+    assert np.array_equal(seen.local_J33, replay._local_TJ33[30])  # pyright: ignore
+    assert not replay.read(inbox, 500.0)
+    replay._loop = True
+    assert replay.read(inbox, 500.0)
+
+
+WRONG: list[tuple[Callable[[Plan], object], str]] = [
+    (lambda plan: plan.add_source("udb:1"), "nearest: 'udp'"),
+    (lambda plan: plan.add_source("replay"), "names no file"),
+    (lambda plan: plan.add_source("replay:/no/such/file.bvh"), "no such file"),
+    (lambda plan: plan.add_source("udp:x"), "HOST:PORT"),
+    (lambda plan: plan.add_sink("udp"), "HOST:PORT"),
+    (lambda plan: plan.add_sink("file:"), "names no file"),
+    (lambda plan: plan.add_sink("tape:1"), "does not exist"),
+]
+
+
+@pytest.mark.parametrize(("add", "sentence"), WRONG)
+def test_what_a_command_line_may_get_wrong(add: Callable[[Plan], object], sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        add(Plan())
+
+
+def test_source_and_sink_on_one_port_share_a_server() -> None:
+    plan = Plan()
+    plan.add_source("ws:8111")
+    plan.add_sink("ws:8111")
+    plan.add_sink("ws:8112")
+    assert plan.sources[0].server is plan.sinks[0].server is not plan.sinks[1].server  # pyright: ignore
+    assert [said.split(" ")[0] for said in plan.told()] == ["page:", "page:"]
