@@ -1,4 +1,4 @@
-// What is drawn: the camera's picture with the points that were found in it, and bars of numbers.
+// The camera's picture with the points that were found in it.
 
 const LINES = [[11, 12], [11, 13], [13, 15], [12, 14], [14, 16], [11, 23], [12, 24], [23, 24], [23, 25], [25, 27],
   [24, 26], [26, 28], [27, 31], [28, 32], [15, 19], [16, 20], [15, 21], [16, 22], [15, 17], [16, 18]];
@@ -34,23 +34,4 @@ export function draw(canvas, image, points) {
     pen.fill();
   });
   pen.globalAlpha = 1;
-}
-
-// A row for each name: a bar from `low` to `high`, and the number in words. Rows are made once, and then changed.
-export function bars(parent, names, values, low, high, words) {
-  if (parent.children.length !== names.length) {
-    parent.replaceChildren(...names.map(name => {
-      const row = document.createElement("div");
-      row.className = "row";
-      row.append(document.createElement("span"), document.createElement("meter"), document.createElement("span"));
-      row.firstChild.textContent = row.firstChild.title = name;
-      Object.assign(row.children[1], {min: low, max: high});
-      return row;
-    }));
-  }
-  values.forEach((value, place) => {
-    const row = parent.children[place];
-    row.children[1].value = value;
-    row.children[2].textContent = words(value);
-  });
 }
