@@ -6,6 +6,7 @@ SOURCES = {
     "ws": "ws[:PORT]: JSON messages by WebSocket, with a page for the browser (port 8765)",
     "udp": "udp[:PORT]: JSON messages in UDP datagrams (port 8766)",
     "vmc": "vmc[:PORT]: an avatar's bones by the VMC protocol, from this machine (port 39539)",
+    "pico": "pico: body tracking of a PICO headset by XRoboToolkit",
     "replay": "replay:FILE: a motion file at its rate; replay-loop:FILE: again and again",
 }
 """By name, what comes from where."""
@@ -13,5 +14,8 @@ SINKS = {
     "ws": "ws[:PORT]: JSON messages by WebSocket, with the page (port 8765)",
     "udp": "udp:HOST:PORT: JSON messages in UDP datagrams",
     "file": "file:PATH: a file as mrhubo retarget writes it, of the whole session",
+    "mcap": "mcap:PATH: a ROS 2 bag that grows, a JointTrajectory for each moment",
+    "ros2": "ros2[:TOPIC]: a JointTrajectory for each moment (/joint_trajectory)",
+    "mujoco": "mujoco[:MODEL]: the robot in simulation, its base fixed; mujoco-free[:MODEL]: free, on a floor",
 }
 """By name, what goes where."""

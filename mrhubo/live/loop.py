@@ -90,7 +90,8 @@ class Session:
         """What happened, in a few lines."""
         sent = ", ".join(f"{count} {state}" for state, count in self.states.items())
         came = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count)
-        return f"sent: {sent or 'nothing'}\nreceived: {came or 'nothing'}"
+        more = [str(told()) for sink in self.sinks if callable(told := getattr(sink, "told", None))]
+        return "\n".join([f"sent: {sent or 'nothing'}\nreceived: {came or 'nothing'}", *more])
 
     @classmethod
     def of(cls, robot: LiveRobot, sources: Sequence[Source], sinks: Sequence[Sink], config: LiveConfig) -> Session:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -47,9 +47,11 @@ class Output:
     """Of the robot's parts, 0..1: the lesser of the source's and the retargeter's."""
     session: str = ""
     """Another one each time that a session starts."""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """Messages that came until now, by kind."""
 
-    def message(self, counts: Mapping[str, int] | None = None) -> str:
-        """The JSON message; with counts, these too."""
+    def message(self, with_counts: bool = False) -> str:
+        """The JSON message."""
         told: dict[str, Any] = {
             "mrhubo": VERSION,
             "kind": "joints",
@@ -63,7 +65,9 @@ class Output:
             "stop": {"angles": _rounded(self.stop_N), "in": round(self.stop_in, 6)},
             "confidence": {name: round(value, 4) for name, value in self.confidence.items()},
         }
-        return json.dumps(told if counts is None else {**told, "counts": dict(counts)}, separators=(",", ":"))
+        if with_counts:
+            told["counts"] = dict(self.counts)
+        return json.dumps(told, separators=(",", ":"))
 
 
 def _rounded(value_N: np.ndarray) -> list[float]:

@@ -86,6 +86,7 @@ class Pilot:
             stop_in=stop_in,
             confidence=dict(zip(self.robot.branch_names, sure_X, strict=True)),
             session=self._session,
+            counts=self.inbox.counts,
         )
 
     def _look(self, frame: Frame, now: float) -> None:

@@ -46,6 +46,7 @@ class Plan:
             "ws": lambda where: PageSource(self._server(where, text)),
             "udp": self._udp_source,
             "vmc": self._vmc_source,
+            "pico": _pico,
             "replay": lambda where: _replay(where, False),
             "replay-loop": lambda where: _replay(where, True),
         }
@@ -62,6 +63,10 @@ class Plan:
             "ws": lambda where: PageSink(self._server(where, text)),
             "udp": _udp_sink,
             "file": _file_sink,
+            "mcap": _mcap_sink,
+            "ros2": _ros2_sink,
+            "mujoco": lambda where: _mujoco_sink(where, False),
+            "mujoco-free": lambda where: _mujoco_sink(where, True),
         }
         self.sinks.append(_chosen("sink", name, makers)(where))
 
@@ -86,6 +91,12 @@ def _chosen(kind: str, name: str, makers: Mapping[str, Callable[[str], Part]]) -
     return makers[name]
 
 
+def _pico(where: str) -> Source:
+    from mrhubo.live.sources.pico import PicoSource
+
+    return PicoSource()
+
+
 def _replay(where: str, loop: bool) -> Source:
     from mrhubo.live.sources.replay import ReplaySource
 
@@ -106,3 +117,23 @@ def _file_sink(where: str) -> Sink:
     if not where:
         raise UserError("--sink file: names no file; write file:session.npz")
     return FileSink(Path(where))
+
+
+def _mcap_sink(where: str) -> Sink:
+    from mrhubo.live.sinks.mcap import McapSink
+
+    if not where:
+        raise UserError("--sink mcap: names no file; write mcap:session.mcap")
+    return McapSink(Path(where))
+
+
+def _ros2_sink(where: str) -> Sink:
+    from mrhubo.live.sinks.ros2 import Ros2Sink
+
+    return Ros2Sink(where)
+
+
+def _mujoco_sink(where: str, free: bool) -> Sink:
+    from mrhubo.live.sinks.mujoco import MujocoSink
+
+    return MujocoSink(Path(where) if where else None, free)

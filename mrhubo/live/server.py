@@ -243,8 +243,6 @@ class PageSink:
 
     def __init__(self, server: Server) -> None:
         self.server = server
-        self.counts: dict[str, int] | None = None
-        """Told with every output; the session's own, which change."""
         self._every, self._number = 1, 0
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
@@ -256,7 +254,7 @@ class PageSink:
         """Tells the newest."""
         self._number += 1
         if self._number % self._every == 0 or output.state == "ended":
-            self.server.show(output.message(self.counts))
+            self.server.show(output.message(with_counts=True))
 
     def close(self) -> None:
         """Ends all connections."""

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import importlib
 import json
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from mrhubo.errors import UserError, first_line, shortened
+from mrhubo.errors import InputWarning, UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import check_regular, open_regular
 from mrhubo.robot_motion.clock import find_rate, nanoseconds
@@ -52,6 +53,8 @@ uint32 nanosec
 _SECOND = 1_000_000_000
 _MAX_BAG = 2**30
 _MAX_CHUNK = 2**30
+_MOMENTS, _POINTS_OF_A_MOMENT = 2, 2
+"""So many messages or more, of so many points, are a live session's."""
 
 
 def write_yaml(motion: RobotMotion, path: Path) -> None:
@@ -134,8 +137,7 @@ def write_mcap(motion: RobotMotion, path: Path) -> None:
     Raises:
         UserError: the frame rate is not known, or mcap-ros2-support is not installed.
     """
-    writer_module = _import("mcap_ros2.writer")
-    compression = _import("mcap.writer").CompressionType.NONE
+    import_mcap()
     points = [
         {"positions": positions, "velocities": [], "accelerations": [], "effort": [],
          "time_from_start": {"sec": sec, "nanosec": nanosec}}
@@ -144,14 +146,38 @@ def write_mcap(motion: RobotMotion, path: Path) -> None:
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     message = {"header": header, "joint_names": list(motion.joint_names), "points": points}
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        writer = writer_module.Writer(file, compression=compression)
-        schema = writer.register_msgdef(_TYPE, _DEFINITION)
-        writer.write_message(TOPIC, schema, message, log_time=0, publish_time=0)
-        writer.finish()
+        bag = JointTrajectoryBag(file)
+        bag.write(TOPIC, message, 0.0)
+        bag.finish()
+
+
+class JointTrajectoryBag:
+    """An MCAP file of JointTrajectory messages. Each is handed to the system when it is written: if the process is
+    killed, all that were can be read.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        """`file`: to write to. Raises a UserError where mcap-ros2-support is not installed."""
+        self._file = file
+        compression = _import("mcap.writer").CompressionType.NONE
+        # A chunk is written when it is full; the smallest is full after one message.
+        self._writer = _import("mcap_ros2.writer").Writer(file, chunk_size=1, compression=compression)
+        self._schema = self._writer.register_msgdef(_TYPE, _DEFINITION)
+
+    def write(self, topic: str, message: dict[str, Any], time: float) -> None:
+        """One message as nested dictionaries, at a time [s]."""
+        at = round(time * _SECOND)
+        self._writer.write_message(topic, self._schema, message, log_time=at, publish_time=at)
+        self._file.flush()
+
+    def finish(self) -> None:
+        """Writes the index."""
+        self._writer.finish()
 
 
 def read_mcap(path: Path) -> RobotMotion:
-    """The motion of the first JointTrajectory in a bag.
+    """The motion of the first JointTrajectory in a bag; of the bag of a live session, in which each tells one moment,
+    that of all.
 
     Raises:
         UserError: the file is missing, damaged, too large, holds no such message, or mcap-ros2-support is not
@@ -161,17 +187,40 @@ def read_mcap(path: Path) -> RobotMotion:
     # Our definition of the message, not the file's: nothing in a stranger's bag is taken for a program.
     ours = records.Schema(id=1, name=_TYPE, encoding="ros2msg", data=_DEFINITION.encode())
     decode = decoder.DecoderFactory().decoder_for("cdr", ours)
+    messages: list[Any] = []
     try:
-        data = next(_trajectories(path, records), None)
-        message = None if data is None else decode(data)
+        for data in _trajectories(path, records):
+            message = decode(data)
+            if not _is_moment(message, messages):
+                break
+            messages.append(message)
     except UserError:
         raise
     except Exception as error:  # whatever mcap makes of a stranger's bytes
-        raise UserError(f"{path}: cannot be read as MCAP: {shortened(first_line(error), 200)}") from error
-    if message is None:
+        if len(messages) < _MOMENTS:
+            raise UserError(f"{path}: cannot be read as MCAP: {shortened(first_line(error), 200)}") from error
+        warnings.warn(f"{path}: ends early; {len(messages)} moments of it are whole", InputWarning, stacklevel=2)
+    if not messages:
         raise UserError(f"{path}: holds no message of type {_TYPE}")
-    times = [(p.time_from_start.sec, p.time_from_start.nanosec) for p in message.points]
-    return _from_points(path, list(message.joint_names), times, [list(p.positions) for p in message.points])
+    first = messages[0]
+    if len(messages) < _MOMENTS:
+        points = [(p.time_from_start, p.positions) for p in first.points]
+    else:
+        points = [(message.header.stamp, message.points[0].positions) for message in messages]
+    times = [(stamp.sec, stamp.nanosec) for stamp, _ in points]
+    return _from_points(path, list(first.joint_names), times, [list(positions) for _, positions in points])
+
+
+def _is_moment(message: Any, before: list[Any]) -> bool:
+    """Whether a message goes on with those before it: the same joints, a later stamp, and where one of them is in a
+    period and where it would stop, as `mrhubo.live` writes them. The first always does.
+    """
+    if not before:
+        return True
+    last = before[-1]
+    is_short = all(len(one.points) == _POINTS_OF_A_MOMENT for one in (before[0], message))
+    stamps = [(one.header.stamp.sec, one.header.stamp.nanosec) for one in (last, message)]
+    return is_short and stamps[0] < stamps[1] and list(message.joint_names) == list(last.joint_names)
 
 
 def _trajectories(path: Path, records: Any) -> Iterator[bytes]:

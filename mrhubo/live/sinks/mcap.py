@@ -1,0 +1,75 @@
+"""The session as a ROS 2 bag that grows: what has been written is there, even if the process is killed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mrhubo.config.live import LiveConfig
+from mrhubo.errors import UserError
+from mrhubo.live.output import Output
+from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.trajectory import trajectory
+from mrhubo.robot_motion.ros2 import TOPIC, JointTrajectoryBag, import_mcap
+
+
+class McapSink:
+    """A JointTrajectory for every output, handed to the system at once."""
+
+    def __init__(self, path: Path) -> None:
+        """Where to write.
+
+        Raises:
+            UserError: mcap-ros2-support is not installed.
+        """
+        import_mcap()
+        self.path = path
+        self._file: BinaryIO | None = None
+        self._bag: Any = None
+        self._period, self._first = 0.0, 0
+
+    def open(self, robot: LiveRobot, config: LiveConfig) -> None:
+        """Begins the file.
+
+        Raises:
+            UserError: the folder or the disk refuses it.
+        """
+        self._period, self._first = 1.0 / config.rate, 0
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = open(self.path, "wb")
+            self._bag = JointTrajectoryBag(self._file)
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def send(self, output: Output) -> None:
+        """Appends a message; its stamp counts periods from 0 on, its log time is our clock's.
+
+        Raises:
+            UserError: the disk refuses it.
+        """
+        if self._file is None:
+            return
+        self._first = self._first or output.number
+        stamp = (output.number - self._first) * self._period
+        try:
+            self._bag.write(TOPIC, trajectory(output, self._period, stamp), output.time)
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def close(self) -> None:
+        """Ends the file with its index, as far as the disk allows.
+
+        Raises:
+            UserError: the disk refuses it.
+        """
+        file, self._file = self._file, None
+        if file is not None:
+            try:
+                self._bag.finish()
+                file.close()
+            except OSError as error:
+                raise self._refused(error) from error
+
+    def _refused(self, error: OSError) -> UserError:
+        return UserError(f"{self.path}: cannot be written: {error.strerror or error}")

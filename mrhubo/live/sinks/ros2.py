@@ -1,0 +1,58 @@
+"""A ROS 2 topic of JointTrajectory messages, where `rclpy` is there (it comes with ROS 2, not from a registry)."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from mrhubo.config.live import LiveConfig
+from mrhubo.errors import UserError
+from mrhubo.live.output import Output
+from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.trajectory import trajectory
+from mrhubo.robot_motion.ros2 import TOPIC
+
+
+class Ros2Sink:
+    """Publishes; the newest message alone is kept for who is slow."""
+
+    def __init__(self, topic: str = "") -> None:
+        """`topic`: default `/joint_trajectory`. Raises a UserError where ROS 2 is not there."""
+        self.topic = topic or TOPIC
+        try:
+            self._rclpy: Any = importlib.import_module("rclpy")
+            self._trajectories: Any = importlib.import_module("trajectory_msgs.msg")
+        except ImportError as error:
+            raise UserError("--sink ros2: ROS 2's rclpy is not there; source its setup.bash first") from error
+        self._node: Any = None
+        self._publisher: Any = None
+        self._period = 0.0
+
+    def open(self, robot: LiveRobot, config: LiveConfig) -> None:
+        """Makes the node `mrhubo_live`."""
+        self._period = 1.0 / config.rate
+        if not self._rclpy.ok():
+            self._rclpy.init()
+        self._node = self._rclpy.create_node("mrhubo_live")
+        self._publisher = self._node.create_publisher(self._trajectories.JointTrajectory, self.topic, 1)
+
+    def send(self, output: Output) -> None:
+        """Publishes a trajectory that begins now: its stamp is 0, as controllers take it."""
+        if self._node is None:
+            return
+        told = trajectory(output, self._period, 0.0)
+        message = self._trajectories.JointTrajectory()
+        message.joint_names = told["joint_names"]
+        for row in told["points"]:
+            point = self._trajectories.JointTrajectoryPoint()
+            point.positions, point.velocities = row["positions"], row["velocities"]
+            point.time_from_start.sec = row["time_from_start"]["sec"]
+            point.time_from_start.nanosec = row["time_from_start"]["nanosec"]
+            message.points.append(point)
+        self._publisher.publish(message)
+
+    def close(self) -> None:
+        """Ends the node."""
+        node, self._node = self._node, None
+        if node is not None:
+            node.destroy_node()

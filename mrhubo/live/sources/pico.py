@@ -1,0 +1,89 @@
+"""Body tracking of a PICO headset by XRoboToolkit: 24 joints, of which the places are read.
+
+SDK: https://github.com/XR-Robotics, on PyPI `xrobotoolkit-sdk`; its joints are SMPL's and two hands, its axes are taken
+to be right-handed with y up. Not tried with a headset: what is tested is the conversion, and that the SDK is asked as
+its documentation says.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from typing import Any
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.live.inbox import Inbox
+from mrhubo.live.messages import Landmarks, Message, Nobody, Refused
+from mrhubo.live.point_sets import POINT_SETS
+
+_JOINTS = 24
+_FARTHEST = 1e3
+_NAME = "pico"
+
+
+def to_landmarks(poses: Any) -> Landmarks:
+    """Points of `get_body_joints_pose()`: (24, 7), each x, y, z [m] and a quaternion, which is not read.
+
+    Raises:
+        Refused: it has another shape or holds no numbers.
+    """
+    try:
+        pose_K7 = np.asarray(poses, np.float64)
+    except (TypeError, ValueError) as error:
+        raise Refused("malformed") from error
+    if pose_K7.shape != (_JOINTS, 7) or not (np.abs(pose_K7[:, :3]) <= _FARTHEST).all():
+        raise Refused("malformed")
+    names = POINT_SETS["pico"].names or ()
+    points = {name: (x, y, z) for name, (x, y, z) in zip(names, pose_K7[:, :3].tolist(), strict=True)}
+    return Landmarks(points, {})
+
+
+class PicoSource:
+    """Asks the SDK once a period."""
+
+    has_heartbeat = False
+
+    def __init__(self) -> None:
+        """Raises a UserError where the SDK is not installed."""
+        try:
+            self._sdk: Any = importlib.import_module("xrobotoolkit_sdk")
+        except ImportError as error:
+            raise UserError("--source pico: needs XRoboToolkit's SDK: pip install xrobotoolkit-sdk") from error
+        self._session, self._number, self._stamp = str(time.time_ns()), 0, None
+        self._is_open = False
+
+    def open(self) -> None:
+        """Connects to the service on this machine.
+
+        Raises:
+            UserError: it does not answer.
+        """
+        try:
+            self._sdk.init()
+        except Exception as error:
+            raise UserError(f"--source pico: XRoboToolkit's service does not answer: {error}") from error
+        self._is_open = True
+
+    def read(self, inbox: Inbox, now: float) -> bool:
+        """Gives the pose, if it is a new one; nobody, where the headset tracks no body."""
+        tracked = bool(self._sdk.is_body_data_available())
+        stamp = self._sdk.get_body_timestamp_ns() if tracked else None
+        if tracked and stamp == self._stamp:
+            return True
+        self._stamp = stamp
+        self._number += 1
+        try:
+            content = to_landmarks(self._sdk.get_body_joints_pose()) if tracked else Nobody()
+        except Refused as fault:
+            inbox.counts[str(fault)] += 1
+            return True
+        inbox.offer(Message(self._session, self._number, now, content), _NAME, now)
+        return True
+
+    def close(self) -> None:
+        """Disconnects."""
+        if self._is_open:
+            self._sdk.close()
+        self._is_open = False

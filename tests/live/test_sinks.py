@@ -1,0 +1,171 @@
+"""Bags that outlive a killed process, ROS 2's messages, and the robot in simulation."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mrhubo
+from mrhubo.config.live import LiveConfig
+from mrhubo.errors import InputWarning, UserError
+from mrhubo.live.output import Output
+from mrhubo.live.pilot import Pilot
+from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.mcap import McapSink
+from mrhubo.live.sinks.mujoco import MujocoSink
+from mrhubo.live.sinks.ros2 import Ros2Sink
+from mrhubo.live.sinks.trajectory import trajectory
+from mrhubo.robot_motion import FollowingJoint, RobotFacts
+from tests.live.messages import message
+from tests.live.robots import NAMES, UPPER, make_robot
+
+CONFIG = LiveConfig(ramp_time=0.0)
+
+
+@pytest.fixture
+def outputs() -> list[Output]:
+    """A robot on its way up."""
+    pilot, found = Pilot(make_robot(lambda pose, time: UPPER), CONFIG, True), []
+    for step in range(12):
+        pilot.inbox.offer(message(step, time=step / 60), "a", step / 60)
+        found.append(pilot.tick(step / 60))
+    return found
+
+
+def test_a_bag_of_a_session_is_its_motion(tmp_path: Path, outputs: list[Output]) -> None:
+    pytest.importorskip("mcap_ros2")
+    path = tmp_path / "new" / "session.mcap"
+    sink = McapSink(path)
+    sink.open(make_robot(), CONFIG)
+    for output in outputs:
+        sink.send(output)
+    as_killed = path.read_bytes()
+    sink.close()
+    sink.close()
+    found = mrhubo.read_robot_motion(path)
+    assert np.allclose(found.q, [output.q_N for output in outputs], atol=1e-6)
+    assert found.joint_names == NAMES and found.frame_rate == pytest.approx(60)
+    for cut in (0, 1, 300):  # all had been handed to the system; of a disk that lost the end, all before are read
+        path.write_bytes(as_killed[: len(as_killed) - cut])
+        with pytest.warns(InputWarning, match="ends early"):
+            early = mrhubo.read_robot_motion(path)
+        assert len(early) == 12 or cut and len(early) >= 10
+        assert np.array_equal(early.q, found.q[: len(early)])
+    path.write_bytes(as_killed[:60])
+    with pytest.raises(UserError):
+        mrhubo.read_robot_motion(path)
+
+
+def test_a_trajectory_ends_where_the_robot_would_stand(outputs: list[Output]) -> None:
+    for output in outputs:
+        told = trajectory(output, 1 / 60, 1.5)
+        first, second = told["points"]
+        assert told["header"]["stamp"] == {"sec": 1, "nanosec": 500_000_000}
+        assert first["positions"] == output.q_N.tolist() and second["positions"] == output.stop_N.tolist()
+        assert not any(second["velocities"])
+        times = [
+            point["time_from_start"]["sec"] + 1e-9 * point["time_from_start"]["nanosec"] for point in (first, second)
+        ]
+        assert times[0] == pytest.approx(1 / 60) and 2 / 60 - 1e-6 <= times[1] <= 0.2
+
+
+def test_ros2_publishes_the_same(monkeypatch: pytest.MonkeyPatch, outputs: list[Output]) -> None:
+    sent: list[Any] = []
+    node = SimpleNamespace(
+        create_publisher=lambda kind, topic, depth: SimpleNamespace(publish=lambda told: sent.append((topic, told))),
+        destroy_node=lambda: sent.append("destroyed"),
+    )
+    rclpy = SimpleNamespace(ok=lambda: True, create_node=lambda name: node)
+    messages = SimpleNamespace(
+        JointTrajectory=lambda: SimpleNamespace(joint_names=[], points=[]),
+        JointTrajectoryPoint=lambda: SimpleNamespace(time_from_start=SimpleNamespace(sec=0, nanosec=0)),
+    )
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    with pytest.raises(UserError, match="rclpy"):
+        Ros2Sink()
+    monkeypatch.setitem(sys.modules, "rclpy", rclpy)
+    monkeypatch.setitem(sys.modules, "trajectory_msgs.msg", messages)
+    sink = Ros2Sink("/arm")
+    sink.open(make_robot(), CONFIG)
+    sink.send(outputs[-1])
+    sink.close()
+    sink.close()
+    (topic, told), end = sent
+    assert topic == "/arm" and end == "destroyed" and told.joint_names == list(NAMES)
+    wanted = trajectory(outputs[-1], 1 / 60, 0.0)["points"]
+    assert [point.positions for point in told.points] == [point["positions"] for point in wanted]
+    assert [point.time_from_start.nanosec for point in told.points] == [
+        point["time_from_start"]["nanosec"] for point in wanted
+    ]
+
+
+@pytest.fixture(scope="module")
+def nao(root: Path) -> LiveRobot:
+    """NAO's left arm, hand half open; it answers nothing."""
+    names = ("LShoulderPitch", "LShoulderRoll", "LElbowYaw", "LElbowRoll")
+    home = np.array([1.4, 0.2, -1.0, -0.5])
+    facts = RobotFacts(
+        "nao",
+        lower=home - 1,
+        upper=home + 1,
+        velocity=np.full(4, 5.0),
+        others=(FollowingJoint("LFinger11", offset=0.5),),
+    )
+    robot = make_robot()
+    return dataclasses.replace(
+        robot, facts=facts, joint_names=names, home_N=home, urdf=root / "data/robots/nao/nao.urdf"
+    )
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_simulated_robot_follows(nao: LiveRobot, free: bool) -> None:
+    pytest.importorskip("mujoco")
+    sink = MujocoSink(free=free)
+    sink.open(nao, CONFIG)
+    assert sink.model.opt.gravity[2] < -9 and sink.model.nq - sink.model.nv == (1 if free else 0)
+    assert np.allclose(sink.joints, nao.home_N)
+    rest_N = nao.home_N
+    for step in range(60):
+        q_N = rest_N + 0.3 * np.sin(2 * np.pi * step / 60)
+        sink.send(Output(step, 0.0, "following", nao.joint_names, q_N, q_N, q_N, 0.0, {}))
+    for step in range(60):
+        sink.send(Output(step, 0.0, "stopped", nao.joint_names, rest_N, q_N, q_N, 0.0, {}))
+    if free:  # nobody balances it: it falls over, onto its arms too, and stays above the floor
+        assert -0.1 < sink.data.qpos[2] < 0.5 and np.isfinite(sink.data.qpos).all()
+    else:
+        assert np.abs(sink.joints - rest_N).max() < 0.05, "gravity and all it holds up to a few degrees"
+        assert sink.told().startswith("mujoco: joints were off by 0.0")
+    sink.close()
+
+
+def test_simulation_without_a_model_or_with_another(nao: LiveRobot, root: Path, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    with pytest.raises(UserError, match="write mujoco:MODEL"):
+        MujocoSink().open(make_robot(), CONFIG)
+    with pytest.raises(UserError, match="has no joint left_a"):
+        MujocoSink(root / "data/robots/nao/nao.urdf").open(make_robot(), CONFIG)
+    (tmp_path / "broken.xml").write_text("<mujoco><worldbody><body>")
+    with pytest.raises(UserError, match="cannot load"):
+        MujocoSink(tmp_path / "broken.xml").open(nao, CONFIG)
+    with pytest.raises(UserError, match="no such file"):
+        MujocoSink(tmp_path / "none.xml").open(nao, CONFIG)
+
+
+def test_a_model_whose_meshes_are_missing_still_moves(tmp_path: Path, nao: LiveRobot) -> None:
+    pytest.importorskip("mujoco")
+    links = "".join(f'<link name="l{i}"><visual><geometry><mesh filename="package://x/none_{i}.stl"/></geometry></visual>'
+                    f'<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>' for i in range(5))  # fmt: skip
+    joints = "".join(f'<joint name="{name}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/><axis xyz="0 1 0"/>'
+                     f'<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>' for i, name in enumerate(nao.joint_names))  # fmt: skip
+    (tmp_path / "arm.urdf").write_text(f'<robot name="arm">{links}{joints}</robot>')
+    sink = MujocoSink(tmp_path / "arm.urdf")
+    with warnings.catch_warnings():
+        sink.open(nao, CONFIG)
+    assert sink.model.nu == 4 and np.allclose(sink.joints, nao.home_N)

@@ -1,0 +1,200 @@
+"""Streams of other programs: VMC against a skeleton of its own in Unity's axes, and PICO's joints."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip("pythonosc")
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+from mrhubo import rotation
+from mrhubo.body.joints import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, REST_K3
+from mrhubo.body.skeleton import Skeleton
+from mrhubo.errors import UserError
+from mrhubo.live.body import Body, SeenPose
+from mrhubo.live.endpoints import Endpoint
+from mrhubo.live.inbox import Inbox
+from mrhubo.live.messages import Landmarks, Nobody, Refused
+from mrhubo.live.sources import vmc
+from mrhubo.live.sources.pico import PicoSource, to_landmarks
+from mrhubo.live.sources.vmc import ADDRESS, BONES, Bones, VmcSource
+
+UNITY = {"pelvis": "Hips", **{joint: bone for bone, joint in BONES.items()}}
+UNITY_OFFSETS = {
+    name: (REST_K3[i] - (REST_K3[PARENTS[i]] if i else 0)) * [-1.0, 1.0, 1.0] for i, name in enumerate(JOINT_NAMES)
+}
+"""Our skeleton in Unity's axes: x to the right, y up, z forward, where the avatar looks."""
+
+
+def osc(bone: str, xyzw: Any, address: str = ADDRESS) -> Any:
+    builder = OscMessageBuilder(address)
+    for value in (bone, 0.0, 1.0, 0.0, *map(float, xyzw)):
+        builder.add_arg(value)
+    return builder.build()
+
+
+def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A vector turned by a quaternion x, y, z, w, by the formula of quaternions, which knows no handedness."""
+    u, w = q[:3], q[3]
+    return v + 2 * w * np.cross(u, v) + 2 * np.cross(u, np.cross(u, v))
+
+
+def times(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    vector = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
+    return np.append(vector, p[3] * q[3] - p[:3] @ q[:3])
+
+
+def unity_places(local: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Where Unity draws the joints of an avatar, by its own chain of transforms."""
+    turn, place = {"pelvis": np.array([0.0, 0, 0, 1])}, {"pelvis": np.zeros(3)}
+    for i, name in enumerate(JOINT_NAMES[1:], start=1):
+        above = JOINT_NAMES[PARENTS[i]]
+        place[name] = place[above] + rotate(turn[above], UNITY_OFFSETS[name])
+        turn[name] = times(turn[above], local.get(name, np.array([0.0, 0, 0, 1])))
+    return place
+
+
+def test_an_avatar_is_where_unity_draws_it() -> None:
+    generator = np.random.default_rng(3)
+    local = {name: generator.normal(size=4) + [0, 0, 0, 2] for name in POSED_JOINT_NAMES}
+    local = {name: q / np.linalg.norm(q) for name, q in local.items()}
+    bundle = OscBundleBuilder(IMMEDIATELY)  # pyright: ignore
+    for name, xyzw in local.items():
+        bundle.add_content(osc(UNITY[name], xyzw))
+    bones = Bones()
+    assert bones.take(bundle.build().dgram)
+    ours_K3 = Skeleton().keypoints(torch.from_numpy(bones.pose.local_J33[None]))[0].numpy()
+    for i, name in enumerate(JOINT_NAMES):
+        assert np.allclose(ours_K3[i], unity_places(local)[name] * [-1, 1, 1], atol=1e-5), name
+
+
+def test_a_left_arm_that_is_lowered_in_unity_is_our_left_arm_lowered() -> None:
+    bones, down = Bones(), np.radians(80)
+    bones.take(osc("LeftUpperArm", [0, 0, np.sin(down / 2), np.cos(down / 2)]).dgram)  # about z: its arm points to -x
+    ours_K3 = Skeleton().keypoints(torch.from_numpy(bones.pose.local_J33[None]))[0].numpy()
+    way = ours_K3[JOINT_NAMES.index("left_wrist")] - ours_K3[JOINT_NAMES.index("left_shoulder")]
+    assert way[1] < -0.9 * np.linalg.norm(way) and way[0] > 0
+    sure_J = bones.pose.sure_J
+    assert sure_J[POSED_JOINT_NAMES.index("left_shoulder")] == 1 and sure_J[POSED_JOINT_NAMES.index("right_elbow")] == 0
+
+
+@pytest.fixture
+def source() -> Any:
+    found = VmcSource(Endpoint("127.0.0.1", 0))
+    found.open()
+    yield found
+    found.close()
+
+
+def test_datagrams_between_two_periods_are_one_frame(source: VmcSource) -> None:
+    inbox, unit = Inbox(0.25), [0.0, 0.0, 0.0, 1.0]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        wrong = [osc("LeftHand", [0, 0, 0, 0]), osc("LeftHand", [9, 9, 9, 9]), osc("LeftHand", [0, 0, 1])]
+        for data in (
+            osc("LeftUpperArm", unit),
+            osc("RightUpperArm", unit),
+            osc("Tail", unit),
+            osc("x", unit, "/other"),
+            *wrong,
+        ):
+            sender.sendto(data.dgram, ("127.0.0.1", source.endpoint.port))
+        sender.sendto(b"\0\1garbage", ("127.0.0.1", source.endpoint.port))
+        source.read(inbox, 0.0)
+        assert inbox.counts["frames"] == 1 and inbox.counts["malformed"] == 4
+        source.read(inbox, 0.1)
+        assert inbox.counts["frames"] == 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.one_of(st.binary(max_size=80), st.binary(max_size=40).map(lambda tail: b"#bundle\0" + tail), st.binary(max_size=40).map(lambda tail: ADDRESS.encode() + b"\0\0\0,sfffffff\0\0\0" + tail)))  # fmt: skip
+def test_whatever_is_sent_is_read_or_refused(data: bytes) -> None:
+    bones = Bones()
+    try:
+        bones.take(data)
+    except Refused as fault:
+        assert str(fault) == "malformed"
+        assert not bones._seen_J.any()
+    assert np.isfinite(bones.pose.local_J33).all()
+
+
+def test_vmc_stays_on_this_machine() -> None:
+    with pytest.raises(UserError, match="no token"):
+        VmcSource(Endpoint("0.0.0.0", vmc.PORT))
+
+
+# PICO
+
+
+def rows(pose: torch.Tensor) -> np.ndarray:
+    """What the SDK gives of a person of our skeleton: its joints and the middle of its hands, with any rotations."""
+    place_K3 = Skeleton().keypoints(pose[None])[0].numpy()
+    from mrhubo.body.joints import KEYPOINT_NAMES
+
+    hands = [KEYPOINT_NAMES.index(f"{side}_middle") for side in ("left", "right")]
+    turned = np.concatenate([place_K3[:22], place_K3[hands]]) @ np.diag([-1.0, 1.0, -1.0])  # the person looks at us
+    return np.concatenate([turned + [1.0, 0.5, 2.0], np.full((24, 4), 0.5)], axis=1)
+
+
+def test_pico_joints_become_the_pose_that_they_are_of() -> None:
+    turns = torch.zeros(21, 3)
+    for name, turn in (("left_shoulder", (0.2, 0.3, -0.9)), ("left_elbow", (0, -0.8, 0)), ("right_elbow", (0, 1.2, 0))):
+        turns[POSED_JOINT_NAMES.index(name)] = torch.tensor(turn)
+    pose = rotation.axis_angle_to_matrix(turns)
+    content = to_landmarks(rows(pose))
+    found = Body().see(content.points, content.sure)
+    assert isinstance(found, SeenPose)
+    wanted_K3, seen_K3 = (
+        Skeleton().keypoints(local[None])[0].numpy() for local in (pose, torch.from_numpy(found.local_J33))
+    )
+    for side in ("left", "right"):
+        for start, end in (("shoulder", "elbow"), ("elbow", "wrist")):
+            ways = [
+                k[JOINT_NAMES.index(f"{side}_{end}")] - k[JOINT_NAMES.index(f"{side}_{start}")]
+                for k in (wanted_K3, seen_K3)
+            ]
+            assert np.allclose(*ways, atol=2e-3), (side, end)
+
+
+@pytest.mark.parametrize("poses", [None, [], "x", np.zeros((23, 7)), np.full((24, 7), np.nan), [[1, 2]] * 24])
+def test_pico_what_is_no_pose(poses: Any) -> None:
+    with pytest.raises(Refused):
+        to_landmarks(poses)
+
+
+def test_pico_is_asked_as_its_documentation_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+    state = {"tracked": True, "stamp": 5}
+    sdk = SimpleNamespace(
+        init=lambda: calls.append("init"),
+        close=lambda: calls.append("close"),
+        is_body_data_available=lambda: state["tracked"],
+        get_body_timestamp_ns=lambda: state["stamp"],
+        get_body_joints_pose=lambda: rows(torch.eye(3).expand(21, 3, 3)).tolist(),
+    )
+    monkeypatch.setitem(sys.modules, "xrobotoolkit_sdk", sdk)
+    source, inbox = PicoSource(), Inbox(0.25)
+    source.open()
+    for now in (0.0, 0.1, 0.2):
+        source.read(inbox, now)
+    assert inbox.counts["frames"] == 1 and isinstance(inbox.take_frame(), Landmarks)
+    state["stamp"] = 6
+    source.read(inbox, 0.3)
+    state["tracked"] = False
+    source.read(inbox, 0.4)
+    assert isinstance(inbox.take_frame(), Nobody)
+    source.close()
+    source.close()
+    assert calls == ["init", "close"]
+    monkeypatch.setitem(sys.modules, "xrobotoolkit_sdk", None)
+    with pytest.raises(UserError, match="pip install"):
+        PicoSource()
