@@ -28,6 +28,7 @@ VERBS = {
     "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE"),
     "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours"),
     "universal": Verb("mrhubo.universal.__main__", "train the network that is the same for every robot"),
+    "models": Verb("mrhubo.models", "fetch the models that find a human body in videos, once"),
     "prior": Verb("mrhubo.prior", "train a body prior on motion capture of your own"),
 }
 

@@ -33,7 +33,8 @@ def build_parser() -> CommandParser[None]:
         " tells too where a robot with feet goes (default for those)"
     )
     parser.add_argument("--method", metavar="METHOD", help=method)
-    parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help="motion files, and folders of them")
+    motion = "motion files and videos, and folders of motion files"
+    parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help=motion)
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
     parser.add_argument("--out", metavar="FILE", required=True, help=out)
     formats = "; ".join(f"{name}: {row.meaning}" for name, row in FORMATS.items())
@@ -49,6 +50,8 @@ def build_parser() -> CommandParser[None]:
     person = "which of several people in a file, by the name or number that it has for them; default: seen longest"
     parser.add_argument("--person", metavar="PERSON", help=person)
     parser.add_argument("--bvh-map", metavar="FILE", help="YAML file that says which joint of a BVH file is which")
+    model = "which model finds the body in a video: lite, full (default) or heavy"
+    parser.add_argument("--pose-model", metavar="MODEL", default="full", help=model)
     avoid = "whether frames in which the robot would touch itself give way, by its URDF's collision shapes"
     parser.add_argument("--avoid-collisions", action=BooleanOptionalAction, default=True, help=avoid)
     parser.add_argument("--quiet", action="store_true", help="no progress lines")
@@ -66,7 +69,7 @@ def main(argv: list[str]) -> int:
     places = plan_places(options.out, options.format, files)
     bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
     request = Request(
-        options=ReadOptions(rate=options.rate, person=options.person, bvh_map=bvh_map),
+        options=ReadOptions(options.rate, options.person, bvh_map, options.pose_model),
         start=getattr(options, "from") or 0.0,
         end=options.to,
         rate=options.out_rate,

@@ -22,7 +22,19 @@ from mrhubo.errors import UserError
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = {
     name: f"mrhubo.{name}"
-    for name in ("describe", "fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
+    for name in (
+        "describe",
+        "fit",
+        "pair",
+        "retarget",
+        "evaluate",
+        "export",
+        "sweep",
+        "baseline",
+        "reproduce",
+        "prior",
+        "models",
+    )
 }
 MODULES |= {name: f"mrhubo.{name}.__main__" for name in ("universal", "live")}
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig, "universal": UniversalConfig,
@@ -225,6 +237,7 @@ NEEDED = {
     "baseline": 1,
     "reproduce": 0,
     "prior": 1,
+    "models": 0,
     "universal": 0,
     "live": 3,
 }

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = (
-    "errors", "lazy", "rotation", "frames", "files", "robot_motion", "fast", "config", "runtime", "search", "body", "robot", "motion", "reference",
+    "errors", "lazy", "rotation", "frames", "files", "robot_motion", "fast", "config", "runtime", "search", "body", "robot", "video", "motion", "reference",
     "universal", "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "describing", "live", "callbacks", "body.prior_training", "universal.learning", "fitting",
     "baselines", "paper", "universal.__main__", "live.__main__", "commands",
 )  # fmt: skip

@@ -24,7 +24,7 @@ from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
-from mrhubo.live.visitors import SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file
+from mrhubo.live.visitors import SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -166,7 +166,7 @@ class Server:
             return _response(403, b"refused\n", "text/plain")
         if urlsplit(request.path).path == SOCKET_PATH:
             return None if len(self._clients) < _MOST_CLIENTS else _response(503, b"too many\n", "text/plain")
-        found = find_file(self._page, request.path)
+        found = find_file(self._page, request.path) or find_model(request.path)
         if found is None:
             return _response(404, b"no such file\n", "text/plain")
         return _response(200, found[0].read_bytes(), found[1])

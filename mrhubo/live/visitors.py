@@ -15,8 +15,10 @@ from pathlib import Path
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from mrhubo.live.endpoints import Endpoint, token_fits
+from mrhubo.video.models import FILES, models_folder
 
 SOCKET_PATH = "/live"
+POSE_PATH = "/pose/"
 _TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm", ".html": "text/html",
           ".css": "text/css", ".json": "application/json", ".tflite": "application/octet-stream"}  # fmt: skip
 SECURITY_HEADERS = {
@@ -74,6 +76,16 @@ class Visitors:
             own = socket.gethostname().lower()
             names = {self.endpoint.host.lower(), own, f"{own}.local"}
             return not self.endpoint.is_loopback and name in names
+
+
+def find_model(path: str) -> tuple[Path, str] | None:
+    """The file of the models that find a body in pictures which a path names, and its type; None where it names none,
+    or they have not been fetched (`mrhubo models`).
+    """
+    name = urlsplit(path).path
+    if not name.startswith(POSE_PATH) or name.removeprefix(POSE_PATH) not in FILES:
+        return None
+    return find_file(models_folder(), name.removeprefix(POSE_PATH))
 
 
 def find_file(folder: Path, path: str) -> tuple[Path, str] | None:

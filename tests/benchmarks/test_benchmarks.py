@@ -24,8 +24,10 @@ from mrhubo.config import load_config
 from mrhubo.pairing import lbfgs
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
+from tests.video.films import needs_models
 
 SCRIPTS = [
+    "camera",
     "collisions",
     "confidence",
     "discovery",
@@ -261,6 +263,15 @@ def test_inference(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> 
     over = {(row[0], row[1].removesuffix(" (numpy)")): float(row[4]) for row in rows(text, "motion")}
     assert over["wide", "10 steps"] < over["wide", "1 step"] < over["wide", "network"]
     assert "left out: mink: is not installed" in text and "left out: closed form of seven-joint arms: no arm" in text
+
+
+def test_camera(run: Run, clips: Path) -> None:
+    needs_models()
+    text = run("camera", "--motions", clips, "--seconds", 0.12, "--views", "0,45", "--models", "lite", "--size", 240)
+    found = {row[0]: [float(cell) for cell in row[1:]] for row in rows(text, "model")}
+    assert found["drawn"][:7] == [0] * 7 and found["lite"][5] < 45
+    assert found["true points"][5] < found["lite"][5] and found["lite, smoothed"][7] < found["lite"][7]
+    assert re.search(r"^\| lite +\| \d+\.\d +\| \d+\.\d +\|$", text, re.M), text
 
 
 def test_missing_points(run: Run, root: Path, tmp_path: Path) -> None:

@@ -74,6 +74,21 @@ def test_it_serves_the_page_and_nothing_beside_it(server: Server) -> None:
         assert get(server, path)[0] == 404, path
 
 
+def test_it_hands_on_the_models_and_nothing_beside_them(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MRHUBO_POSE_MODELS", str(tmp_path / "models"))
+    assert get(server, "/pose/pose.js")[0] == 404, "they have not been fetched"
+    (tmp_path / "models").mkdir()
+    for name in ("pose.js", "pose_solution_wasm_bin.wasm", "other.js"):
+        (tmp_path / "models" / name).write_bytes(name.encode())
+    status, body, headers = get(server, "/pose/pose.js")
+    assert (status, body) == (200, b"pose.js") and headers["Content-Type"].startswith("text/javascript")
+    assert get(server, "/pose/pose_solution_wasm_bin.wasm")[2]["Content-Type"] == "application/wasm"
+    for path in ("/pose/other.js", "/pose/../secret.txt", "/pose/", "/pose/%2e%2e/secret.txt", "/pose.js"):
+        assert get(server, path)[0] == 404, path
+
+
 def test_a_client_sends_and_watches(server: Server) -> None:
     inbox, source = Inbox(0.25), PageSource(server)
     with connect(live(server), origin=f"http://127.0.0.1:{server.endpoint.port}") as client:  # pyright: ignore

@@ -1,5 +1,6 @@
 // What the page shows of a session. Text from messages is set as text, never as markup.
 
+import { Camera } from "./camera.js";
 import { Live, deadman } from "./live.js";
 
 const at = (id) => document.getElementById(id);
@@ -50,3 +51,4 @@ const live = new Live({
   closed: (reason) => { release(false); tell("closed", `Not connected: ${reason}.`); },
 });
 release = deadman(live, at("hold"));
+new Camera(at("stage"), live, () => release(false));

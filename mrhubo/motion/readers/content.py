@@ -27,7 +27,6 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"#ROSBAG", "a ROS bag"),
     (b"SQLite format 3", "an SQLite database"),
     (b"\x7fELF", "a program"),
-    (b"\x1aE\xdf\xa3", "a video"),
     (b"7z\xbc\xaf", "a 7z archive"),
     (b"Rar!", "a RAR archive"),
     (b"v https://git-lfs", "a pointer of Git LFS, in place of the file itself"),
@@ -118,9 +117,9 @@ class Content:
             if self.start.startswith(magic):
                 return what
         if self.start[4:8] == b"ftyp":
-            return "a video (MP4)"
+            return "a sound or a picture (MPEG-4)"
         if self.start[:4] == b"RIFF":
-            return "a video or a sound (RIFF)"
+            return "a sound or a picture (RIFF)"
         if self.is_torch:
             return "a PyTorch file"
         if self.arrays:

@@ -23,6 +23,8 @@ class ReadOptions:
     longest."""
     bvh_map: Path | None = None
     """A YAML file that says which joint of a BVH file is which."""
+    pose_model: str = "full"
+    """Which model finds the body in a video: `lite`, `full` or `heavy`, the faster or the more exact."""
 
     def __post_init__(self) -> None:
         """Raises a UserError where the rate is none."""

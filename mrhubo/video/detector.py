@@ -1,0 +1,88 @@
+"""Whether there is a body in a picture, and where: BlazePose's detector.
+
+V. Bazarevsky et al., "BlazePose: On-device Real-time Body Pose tracking", 2020 (https://arxiv.org/abs/2006.10204). The
+numbers are the options of `mediapipe/modules/pose_detection/pose_detection_cpu.pbtxt`, and what is done with them is
+that of `ssd_anchors_calculator.cc`, `tensors_to_detections_calculator.cc` and `non_max_suppression_calculator.cc` in
+https://github.com/google-ai-edge/mediapipe (Apache-2.0).
+
+Legend: A anchors, S side of the network's input in pixels.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.video.interpreter import Network
+from mrhubo.video.region import Region
+
+SIDE = 224
+_STRIDES = (8, 16, 32, 32, 32)
+_PER_LAYER = 2
+"""Anchors of each layer at a place, both of the same size: one has the layer's scale, one a scale between two layers,
+and a fixed size takes the place of both."""
+_SURE = 0.5
+_OVERLAP = 0.3
+_HIPS, _CIRCLE = 0, 1
+"""Of the four points that each anchor tells: the middle of the hips, and where the circle around them that holds the
+whole body is straight above."""
+
+
+def anchors() -> np.ndarray:
+    """The middles (2254, 2) of the anchors, x and y from 0 to 1: rows from top to bottom in each group of layers of one
+    stride, from left to right in a row, all of the group's anchors at one place together.
+    """
+    grids = []
+    for stride in dict.fromkeys(_STRIDES):
+        cells = -(-SIDE // stride)
+        middle = (np.arange(cells) + 0.5) / cells
+        grid_X2 = np.stack(np.meshgrid(middle, middle), axis=-1).reshape(-1, 2)
+        grids.append(np.repeat(grid_X2, _PER_LAYER * _STRIDES.count(stride), axis=0))
+    return np.concatenate(grids)
+
+
+class Detector:
+    """Finds the body that it is surest of."""
+
+    def __init__(self, path: Path, threads: int = 1) -> None:
+        """Raises a UserError where the file is no such network; arguments as for `Network`."""
+        self._network = Network(path, threads)
+        self._anchor_A2 = anchors()
+        self._network.check((len(self._anchor_A2), 12), (len(self._anchor_A2), 1))
+
+    def find(self, image_HW3: np.ndarray) -> Region | None:
+        """The region of a body in a picture (H, W, 3), RGB, uint8; None where there is nobody."""
+        whole = Region.whole(image_HW3.shape[1], image_HW3.shape[0])
+        found = self._network(2 * whole.crop(image_HW3, SIDE) - 1)
+        best_X2 = best_of(found["Identity"], found["Identity_1"][:, 0], self._anchor_A2)
+        if best_X2 is None:
+            return None
+        return Region.around(*whole.to_picture(best_X2[[_HIPS, _CIRCLE]]))
+
+
+def best_of(told_A12: np.ndarray, logit_A: np.ndarray, anchor_A2: np.ndarray) -> np.ndarray | None:
+    """The points (4, 2), 0 to 1, of the surest detection, averaged with those whose boxes overlap its own, each as much
+    as it is sure; None where none is sure.
+
+    Args:
+        told_A12: middle, size and four points of boxes, from the anchors, in pixels of the network's input.
+        logit_A: how sure the network is.
+        anchor_A2: `anchors()`.
+    """
+    sure_A = 1 / (1 + np.exp(-np.clip(logit_A.astype(np.float64), -100, 100)))
+    sure_A = np.where(np.isfinite(told_A12).all(1), sure_A, 0.0)
+    chosen_X = np.flatnonzero(sure_A >= _SURE)
+    if not len(chosen_X):
+        return None
+    told_X62 = told_A12[chosen_X].astype(np.float64).reshape(-1, 6, 2) / SIDE
+    sure_X = sure_A[chosen_X]
+    middle_X2, size_X2 = told_X62[:, 0] + anchor_A2[chosen_X], told_X62[:, 1]
+    point_X42 = told_X62[:, 2:] + anchor_A2[chosen_X, None]
+    low_X2, high_X2 = middle_X2 - size_X2 / 2, middle_X2 + size_X2 / 2
+    best = int(sure_X.argmax())
+    common_X = np.clip(np.minimum(high_X2, high_X2[best]) - np.maximum(low_X2, low_X2[best]), 0, None).prod(1)
+    area_X = np.clip(size_X2, 0, None).prod(1)
+    weight_X = np.where(common_X > _OVERLAP * (area_X + area_X[best] - common_X), sure_X, 0.0)
+    weight_X[best] = sure_X[best]
+    return np.einsum("x,xpc->pc", weight_X, point_X42) / weight_X.sum()

@@ -1,0 +1,133 @@
+"""The page in a real browser, whose camera is a film of a figure that we draw."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+pytest.importorskip("websockets")
+
+from mrhubo.body import KEYPOINT_NAMES, Skeleton
+from mrhubo.config.live import LiveConfig
+from mrhubo.live.body import Body
+from mrhubo.live.endpoints import Endpoint
+from mrhubo.live.loop import Session
+from mrhubo.live.point_sets import POINT_SETS
+from mrhubo.live.server import PageSink, PageSource, Server
+from mrhubo.video import PoseEstimator
+from mrhubo.video.models import FOLDER_VARIABLE
+from mrhubo.view import Camera, human_figure, render
+from tests.live.browser import Browser, find_browser, write_y4m
+from tests.live.robots import NAMES, make_robot
+from tests.video.films import needs_models
+
+
+@pytest.fixture(scope="module")
+def image() -> np.ndarray:
+    """A figure that lifts a hand."""
+    local_J33 = torch.eye(3).repeat(21, 1, 1)
+    for joint, angle in ((15, -1.1), (16, 1.25), (17, -0.6)):
+        local_J33[joint] = torch.matrix_exp(torch.tensor([[0.0, -angle, 0.0], [angle, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    figure = human_figure(local_J33)
+    camera = Camera.framing(figure, (320, 240), azimuth_deg=0, elevation_deg=0, margin=0.08)
+    return np.asarray(render(figure, (320, 240), camera, (0.5, 0.55, 0.5), supersample=1))
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    found = Server(Endpoint("127.0.0.1", 0))
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def browser(tmp_path_factory: pytest.TempPathFactory, image: np.ndarray, server: Server) -> Iterator[Browser]:
+    """With the page open."""
+    needs_models()
+    find_browser()
+    folder = tmp_path_factory.mktemp("browser")
+    with Browser(folder / "profile", write_y4m(folder / "camera.y4m", [image, image])) as found:
+        server.open()
+        found.go(server.url)
+        yield found
+
+
+def arms(local_J33: np.ndarray) -> np.ndarray:
+    """Directions (4, 3) of upper arms and forearms, the pelvis upright."""
+    points_K3 = Skeleton().keypoints(torch.as_tensor(local_J33, dtype=torch.float32)[None])[0].numpy()
+    rows = []
+    for side in ("left", "right"):
+        for start, end in (("shoulder", "elbow"), ("elbow", "wrist")):
+            bone_3 = (
+                points_K3[KEYPOINT_NAMES.index(f"{side}_{end}")] - points_K3[KEYPOINT_NAMES.index(f"{side}_{start}")]
+            )
+            rows.append(bone_3 / np.linalg.norm(bone_3))
+    return np.stack(rows)
+
+
+def test_a_camera_moves_a_robot_while_the_key_is_held(
+    browser: Browser, server: Server, image: np.ndarray, tmp_path: Path
+) -> None:
+    poses = list[np.ndarray]()
+
+    def answer(local_J33: np.ndarray | None, moment: float) -> np.ndarray:
+        if local_J33 is not None:
+            poses.append(local_J33.copy())
+        return np.full(len(NAMES), 0.2)
+
+    config = LiveConfig(late=10.0)  # drawing by the CPU, a browser takes seconds for a picture
+    session = Session.of(make_robot(answer), [PageSource(server)], [PageSink(server)], config)
+    session.open()
+
+    def until(true: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
+        end = time.monotonic() + seconds
+        while not true():
+            assert time.monotonic() < end, f"{what}: {session.summary()}; {browser.complaints()}"
+            session.step(time.monotonic())
+            time.sleep(0.01)
+
+    until(lambda: browser.ask("document.getElementById('state').textContent") == "stopped", "the page does not connect")
+    browser.ask("document.getElementById('model').value = '0'; document.getElementById('camera').click()")
+    until(lambda: len(poses) >= 3, "nobody is seen")
+    assert not session.pilot.inbox.held and set(session.states) <= {"stopped"}
+
+    def pressed() -> bool:
+        """Presses the key, again where a connection that broke off in a slow browser has let go of it."""
+        if browser.ask("document.getElementById('hold').getAttribute('aria-pressed')") != "true":
+            browser.key("keyUp")
+            browser.key("keyDown")
+        return session.pilot.inbox.held and session.states["following"] > 0
+
+    until(pressed, "the key changes nothing")
+    until(lambda: browser.ask("document.querySelectorAll('#joints tr').length") == len(NAMES), "no joint is shown")
+    browser.key("keyUp")
+    until(lambda: not session.pilot.inbox.held, "letting go changes nothing")
+    assert session.last is not None and (session.last.q_N != 0).any()
+    assert session.counts["malformed"] == session.counts["version"] == session.counts["repeated"] == 0
+    assert browser.complaints() == []
+
+    estimator = PoseEstimator("lite")
+    for _ in range(3):
+        found = estimator.landmarks(image)
+    names = POINT_SETS["mediapipe"].names
+    assert names is not None
+    told = {name: tuple(found.point_K3[place].tolist()) for place, name in enumerate(names) if name != "-"}
+    ours = Body().see(told, dict.fromkeys(told, 1.0))
+    assert ours is not None
+    off = np.degrees(np.arccos(np.clip((arms(poses[-1]) * arms(ours.local_J33)).sum(1), -1, 1)))
+    assert np.median(off) < 8 and off.max() < 25, "MediaPipe's own program in the browser finds what ours does"
+    session.close()
+
+
+def test_without_models_the_page_says_what_to_do(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "none"))
+    browser.ask("document.getElementById('camera').click()")
+    browser.until("document.getElementById('notice').textContent.includes('mrhubo models')")

@@ -1,0 +1,87 @@
+"""A body through a video; how it is followed is looked at with an estimator whose answers are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrhubo.errors import UserError
+from mrhubo.video import track as module
+from mrhubo.video.estimator import Estimate
+from mrhubo.video.frames import Frame
+from mrhubo.video.track import at_rate, track_body
+
+
+class Known:
+    """Finds points at the brightness of a picture's first pixel; nobody where it is black."""
+
+    def __init__(self) -> None:
+        self.resets = 0
+
+    def reset(self) -> None:
+        self.resets += 1
+
+    def landmarks(self, image_HW3: np.ndarray) -> Estimate:
+        value = float(image_HW3[0, 0, 0]) or np.nan
+        point_K3 = np.full((33, 3), value)
+        return Estimate(point_K3, np.nan_to_num(point_K3[:, 0] / 255), 1.0, point_K3[:, :2])
+
+
+@pytest.fixture
+def film(monkeypatch: pytest.MonkeyPatch):
+    """Gives a film of pictures at given times."""
+
+    def make(times: list[float], values: list[int]) -> None:
+        images = [np.full((2, 2, 3), value, np.uint8) for value in values]
+        monkeypatch.setattr(module, "frames", lambda path: map(Frame, times, images))
+
+    return make
+
+
+def test_a_steady_film_is_taken_as_it_is(film) -> None:
+    times = [round(number / 30, 3) for number in range(10)]  # as Matroska rounds them
+    film(times, list(range(100, 110)))
+    estimator = Known()
+    track = track_body(Path("a.mkv"), estimator)
+    assert estimator.resets == 1 and track.rate == pytest.approx(30, rel=1e-3) and track.notes == ()
+    assert track.point_TK3[:, 0, 0] == pytest.approx(np.arange(100, 110)) and track.seen_T.all()
+
+
+def test_an_unsteady_film_is_interpolated_between_its_true_times(film) -> None:
+    film([0.0, 0.1, 0.2, 0.5, 0.6, 0.7], [10, 20, 30, 60, 70, 80])
+    track = track_body(Path("a.mkv"), Known())
+    assert track.rate == pytest.approx(10) and "100 to 300 ms" in track.notes[0]
+    assert track.point_TK3[:, 0, 0] == pytest.approx(np.arange(10, 90, 10))
+
+
+def test_nobody_stays_nobody(film) -> None:
+    film([0.0, 0.1, 0.2, 0.3, 0.45], [10, 0, 30, 40, 55])
+    track = track_body(Path("a.mkv"), Known())
+    assert track.seen_T.tolist() == [True, False, True, True, True] and (track.visibility_TK[1] == 0).all()
+    assert track.notes[0] == "nobody is found in 1 of 5 frames"
+    film([0.0, 0.1, 0.2], [0, 0, 0])
+    with pytest.raises(UserError, match="a.mkv: nobody is found in any of its 3 frames"):
+        track_body(Path("a.mkv"), Known())
+
+
+def test_no_film_of_one_picture_or_of_years(film) -> None:
+    film([0.0], [10])
+    with pytest.raises(UserError, match="one frame"):
+        track_body(Path("a.mkv"), Known())
+    film([0.0, 0.01, 0.02, 1e6], [10, 20, 30, 40])
+    with pytest.raises(UserError, match="spread over 1e.06 s"):
+        track_body(Path("a.mkv"), Known())
+
+
+def test_values_at_a_rate_are_those_of_the_line() -> None:
+    time_T = np.array([0.0, 0.04, 0.1, 0.11, 0.3])
+    value_TX = np.stack([2 * time_T, 1 - time_T], axis=1)
+    found_SX = at_rate(time_T, value_TX, 50.0)
+    time_S = np.arange(16) / 50
+    assert len(found_SX) == 16
+    assert found_SX == pytest.approx(np.stack([2 * time_S, 1 - time_S], axis=1))
+    gap_TX = value_TX.copy()
+    gap_TX[1] = np.nan
+    assert np.isnan(at_rate(time_T, gap_TX, 50.0)[:, 0]).tolist() == [False, True, True, True, True] + 11 * [False]
