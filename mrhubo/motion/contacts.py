@@ -28,9 +28,9 @@ _STILL = 0.1
 """Speed [m/s] of a root that tells nothing of its scale."""
 _TOLD = 0.05
 """To what the scale can be told: where a person's legs are known, it comes out 4% too small or large, as feet roll."""
-_BAND_M = 0.04
+BAND_M = 0.04
 """Heights of points on one floor."""
-_GATHERED = 0.5
+GATHERED = 0.5
 """A band of heights with this share of the fullest one's slow points is the floor, if none is below: who stands on a
 step stood on the floor too."""
 
@@ -112,9 +112,9 @@ def find_floor(height_TP: np.ndarray, speed_TP: np.ndarray) -> float:
     if not len(slow):  # all are in flight, or slip: the lowest is near the floor
         return float(np.quantile(height_TP, 0.02))
     first = np.arange(len(slow))
-    count = np.searchsorted(slow, slow + _BAND_M, side="right") - first
-    lowest = int(np.flatnonzero(count >= _GATHERED * count.max())[0])
-    fullest = lowest + int(count[lowest : np.searchsorted(slow, slow[lowest] + _BAND_M, side="right")].argmax())
+    count = np.searchsorted(slow, slow + BAND_M, side="right") - first
+    lowest = int(np.flatnonzero(count >= GATHERED * count.max())[0])
+    fullest = lowest + int(count[lowest : np.searchsorted(slow, slow[lowest] + BAND_M, side="right")].argmax())
     return float(np.median(slow[fullest : fullest + count[fullest]]))
 
 
