@@ -3,10 +3,10 @@
     python benchmarks/whole_body.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--rate 60] [--collisions avoid]
         [--ways motion,stream] [--picture FILE.png]
 
-A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of planted soles and the person's
-own, soles off the floor, the way gone, speeds of joints by their limits, steps of more than 0.5 rad, time. Clips are
-names of `data/external/cmu/whole_body`; robots are shipped as conf/ROBOT-whole-body.yaml. The picture shows moments of
-the first clip, the person above the robots.
+A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
+planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
+than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
+conf/ROBOT-whole-body.yaml. The picture shows moments of the first clip, the person above the robots.
 """
 
 from __future__ import annotations

@@ -49,20 +49,26 @@ class FootContacts:
     """Height of the floor [m], in the motion's world."""
 
 
-def find_contacts(place_TP3: np.ndarray, frame_rate: float, floor: float | None = None) -> FootContacts:
+def find_contacts(
+    place_TP3: np.ndarray, frame_rate: float, floor: float | None = None, given_TP: np.ndarray | None = None
+) -> FootContacts:
     """The contacts of points of soles.
 
     Args:
         place_TP3: their places (T, P, 3) [m], in a world whose y is up.
         frame_rate: frames per second.
         floor: height of the floor [m]; None: it is looked for.
+        given_TP: which points are planted (T, P), where that is known; None: it is found.
     """
     speed_TP = speeds(place_TP3, frame_rate)
+    if floor is None and given_TP is not None and given_TP.any():
+        floor = float(np.median(place_TP3[..., 1][given_TP]))
     floor = find_floor(place_TP3[..., 1], speed_TP) if floor is None else floor
     height_TP = place_TP3[..., 1] - floor
-    planted_TP = _hold(
-        (height_TP < PLANTED_M) & (speed_TP < PLANTED_SPEED), (height_TP > LIFTED_M) | (speed_TP > LIFTED_SPEED)
-    )
+    planted_TP = given_TP
+    if planted_TP is None:
+        begins_TP = (height_TP < PLANTED_M) & (speed_TP < PLANTED_SPEED)
+        planted_TP = _hold(begins_TP, (height_TP > LIFTED_M) | (speed_TP > LIFTED_SPEED))
     phase_TP, weight_TP = np.full(planted_TP.shape, -1), np.zeros(planted_TP.shape)
     count = 0
     for point, (first, last) in _runs(planted_TP):

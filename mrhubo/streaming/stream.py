@@ -26,7 +26,16 @@ from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.motion import Motion, MotionLike, read_poses, to_tensor
 from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import OptimizationRetargeter
-from mrhubo.reference.standing import CROOKED, FAR_M, Legs, Standing, has_root, motion_root, standing_fields
+from mrhubo.reference.standing import (
+    CROOKED,
+    FAR_M,
+    Legs,
+    Standing,
+    given_contacts,
+    has_root,
+    motion_root,
+    standing_fields,
+)
 from mrhubo.retargeter import Retargeter, RetargetResult, join_results
 from mrhubo.retargeter.without_training import optimised
 from mrhubo.streaming.follow import Follower, StreamState
@@ -246,11 +255,14 @@ class Stream:
         root move the base of a robot with feet.
         """
         answers: dict[int, _Answer] = {}
-        kinds = [(motion.frame_rate, self._legs.has_feet and has_root(motion)) for motion in motions]
+        kinds = [
+            (motion.frame_rate, self._legs.has_feet and has_root(motion), motion.contact_T4 is not None)
+            for motion in motions
+        ]
         for kind in sorted(set(kinds)):
             chosen = [i for i, motion in enumerate(motions) if kinds[i] == kind and len(motion)]
             if chosen:
-                answers |= dict(zip(chosen, self._run([motions[i] for i in chosen], *kind), strict=True))
+                answers |= dict(zip(chosen, self._run([motions[i] for i in chosen], *kind[:2]), strict=True))
         results = []
         for i, motion in enumerate(motions):
             local_TJ33 = self._poses(motion)
@@ -297,7 +309,14 @@ class Stream:
         local_TBJ33, turn_TB33, place_TB3 = (
             pad(list(found)) for found in (poses, [turn for turn, _ in roots], [place for _, place in roots])
         )
-        return [Seen(*frame) for frame in zip(local_TBJ33, turn_TB33, place_TB3, strict=True)]
+        given = [given_contacts(motion, self._legs) for motion in motions]
+        known = (
+            None
+            if any(contact_TP is None for contact_TP in given)
+            else pad([torch.from_numpy(contact_TP) for contact_TP in given if contact_TP is not None]).numpy()
+        )
+        frames = zip(local_TBJ33, turn_TB33, place_TB3, strict=True)
+        return [Seen(*frame, None if known is None else known[t]) for t, frame in enumerate(frames)]
 
     def _poses(self, motion: Motion) -> Tensor:
         poses = read_poses(motion, skeleton=self.retargeter.body_map.skeleton)

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from mrhubo.motion import mirror, read_motion, resample, trim
 from mrhubo.motion.contacts import find_contacts
 from mrhubo.motion.live_contacts import LiveContacts, next_contacts
+from mrhubo.motion.writers.amass import write_motion
+from mrhubo.reference.standing import Legs, read_steps
+from mrhubo.rotation import matrix_to_axis_angle
+from tests.reference.standing.steppers import squat
+from tests.reference.walkers import walker
 
 
 def stepping(rate: float, seconds: float = 4.0, floor: float = 0.0) -> np.ndarray:
@@ -64,3 +72,29 @@ def test_people_know_nothing_of_each_other() -> None:
         alone = live(place_TP3, 60.0)[-1]
         assert (state.planted_BP[person] == alone.planted_BP[0]).all() and state.floor_B[person] == alone.floor_B[0]
         np.testing.assert_allclose(state.weight_BP[person], alone.weight_BP[0], atol=1e-12)
+
+
+def test_contacts_of_a_file_come_back_and_are_taken(tmp_path: Path) -> None:
+    motion, given_T4 = squat(6), np.arange(24).reshape(6, 4) % 3 == 0
+    turns_TJ3 = matrix_to_axis_angle(motion.local_TJ33)
+    assert motion.root_position_T3 is not None
+    write_motion(tmp_path / "a.npz", turns_TJ3.flatten(1).numpy(), np.zeros((6, 3)), motion.root_position_T3.numpy(), 24.0,
+                 "squats", given_T4)  # fmt: skip
+    found = read_motion(tmp_path / "a.npz")
+    assert np.array_equal(found.arrays.contact_T4, given_T4)
+    assert np.array_equal(mirror(found).arrays.contact_T4, given_T4[:, [2, 3, 0, 1]])
+    assert np.array_equal(resample(found, 12.0).arrays.contact_T4, given_T4[::2])
+    assert np.array_equal(trim(found, 0.0, 0.1).arrays.contact_T4, given_T4[:3])
+    place_TP3 = np.zeros((6, 4, 3)) + [0.0, 0.3, 0.0]
+    contacts = find_contacts(place_TP3, 24.0, given_TP=given_T4)
+    assert np.array_equal(contacts.planted_TP, given_T4) and contacts.floor == pytest.approx(0.3)
+    legs = Legs(walker(tmp_path))
+    steps = read_steps(found, found.local_TJ33, legs)
+    assert steps is not None and np.array_equal(steps.contacts.planted_TP, given_T4)
+
+
+def test_contacts_of_another_shape_are_left_out(tmp_path: Path) -> None:
+    with np.errstate(all="ignore"):
+        np.savez(tmp_path / "a.npz", pose_body=np.zeros((3, 63)), mocap_frame_rate=24.0, contact=np.ones((2, 4), bool))
+    found = read_motion(tmp_path / "a.npz")
+    assert found.arrays.contact_T4 is None and any("'contact' is left out" in note for note in found.notes)

@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
-from mrhubo.motion.motion import Motion
+from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
 
@@ -56,7 +56,7 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | N
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
     world_TK3 = points_TK3 @ root_T33.mT + way_T3[:, None]
     place_TP3 = world_TK3[:, legs.contacts].double().cpu().numpy()
-    contacts = find_contacts(place_TP3, motion.frame_rate)
+    contacts = find_contacts(place_TP3, motion.frame_rate, given_TP=given_contacts(motion, legs))
     path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
     return HumanSteps(
         root_T33 @ turns_TJ33[:, legs.joint], legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
@@ -66,6 +66,15 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | N
 def has_root(motion: Motion) -> bool:
     """Whether a motion tells where its root is and how it is turned."""
     return motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+
+
+def given_contacts(motion: Motion, legs: Legs) -> np.ndarray | None:
+    """Which points of soles (T, P) a motion says are planted; None: it does not say."""
+    contact_T4 = motion.arrays.contact_T4
+    if contact_T4 is None:
+        return None
+    columns = [SOLE_POINTS.index(name) for sole in legs.soles for name in sole.part.stands]
+    return np.asarray(contact_T4, dtype=bool)[:, columns]
 
 
 def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor, Tensor]:
