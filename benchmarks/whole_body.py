@@ -152,20 +152,19 @@ _WAYS = {"motion": _as_motion, "stream": _as_stream}
 
 def _measure(
     retargeter: OptimizationRetargeter, motion: Motion, answers: Callable[[Motion], Answer]
-) -> tuple[WholeBodyScore, int, float, float]:
-    """Measures, steps of more than 0.5 rad in 1/24 s, share of frames that touch, and milliseconds a frame."""
+) -> tuple[WholeBodyScore, float, float]:
+    """Measures, share of frames that touch, and milliseconds a frame."""
     start = time.process_time()
     result = answers(motion)
     seconds = time.process_time() - start
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
     base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
     score = score_whole_body(retargeter.body_map, motion, result.q, result.root_position, base_T33)
-    jumps = int((result.q.diff(dim=0).abs() * motion.frame_rate / 24 > 0.5).any(dim=1).sum())
     touches = float("nan") if result.collision is None else float(result.collision.float().mean())
-    return score, jumps, touches, 1000 * seconds / len(motion)
+    return score, touches, 1000 * seconds / len(motion)
 
 
-def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts: list[str]) -> list[str]:
+def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: list[str]) -> list[str]:
     scores = [score for score, *_ in found]
 
     def mean(key: str) -> float:
@@ -174,7 +173,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts
     def most(key: str) -> float:
         return max(getattr(score, key) for score in scores)
 
-    touches = statistics.fmean(touches for _, _, touches, _ in found)
+    touches = statistics.fmean(touches for _, touches, _ in found)
     return [
         name,
         *(f"{statistics.fmean(score.parts_deg[part] for score in scores):.1f}" for part in parts),
@@ -185,7 +184,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts
         f"{mean('path_cm_m'):.1f}",
         f"{mean('heading_deg'):.1f}",
         f"{most('speed_max'):.2f}",
-        str(sum(jumps for _, jumps, _, _ in found)),
+        f"{sum(score.jumps for score in scores):.0f}",
         "-" if touches != touches else f"{touches:.1%}",
         f"{statistics.fmean(ms for *_, ms in found):.1f}",
     ]
