@@ -1,12 +1,12 @@
-"""Whole bodies: the optimiser's answers to clips with a root, on robots with legs.
+"""Whole bodies: the optimiser's answers to clips with a root, on robots with legs, as whole motions and as streams.
 
     python benchmarks/whole_body.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--rate 60] [--collisions avoid]
-        [--picture FILE.png]
+        [--ways motion,stream] [--picture FILE.png]
 
-A row a clip and the mean over clips: angles to the person by part, horizontal speed of planted soles and the person's
-own, soles off the floor, the way gone, speeds of joints by their limits, steps of more than 0.5 rad, time. Clips are
-names of `data/external/cmu/whole_body`; robots are shipped as conf/ROBOT-whole-body.yaml. The picture shows moments of
-the first clip, the person above the robots.
+A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
+planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
+than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
+conf/ROBOT-whole-body.yaml. The picture shows moments of the first clip, the person above the robots.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import statistics
 import sys
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +29,17 @@ from mrhubo.errors import InputWarning
 from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
 from mrhubo.frames import human_to_world
 from mrhubo.motion import Motion, motion_files, read_motion, resample
-from mrhubo.reference import OptimizationRetargeter
+from mrhubo.reference import OptimizationResult, OptimizationRetargeter
+from mrhubo.retargeter import RetargetResult
 from mrhubo.robot import Robot
+from mrhubo.streaming import Stream, StreamSettings
 from mrhubo.view import Solids, human_figure
 from mrhubo.view.camera import Camera
 from mrhubo.view.painter import render
 from mrhubo.view.pictures import Artist
 from mrhubo.view.sheets import contact_sheet, save_png
+
+Answer = OptimizationResult | RetargetResult
 
 _CLIPS = Path("data/external/cmu/whole_body")
 _MOMENTS = 8
@@ -44,9 +49,10 @@ _PARTS = {"knee": "thigh", "ankle": "shin", "trunk": "chest", "foot": "feet", "e
 
 def main(argv: list[str]) -> None:
     """Prints a table a robot."""
-    options, rest = read_options(argv, robots="g1", clips="all", rate="", collisions="", picture="")
-    if rest:
-        sys.exit(f"{rest[0]}: is unknown")
+    options, rest = read_options(argv, robots="g1", clips="all", rate="", collisions="", ways="motion", picture="")
+    ways = options["ways"].split(",")
+    if rest or not set(ways) <= set(_WAYS):
+        sys.exit(f"{[*rest, *(way for way in ways if way not in _WAYS)][0]}: is unknown")
     torch.set_num_threads(1)
     print_header()
     rows_of_pictures: dict[str, list[Image]] = {}
@@ -55,18 +61,21 @@ def main(argv: list[str]) -> None:
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
             retargeter = OptimizationRetargeter(Robot.from_config(f"conf/{name}-whole-body.yaml"))
         motions = [_motion(path, options["rate"]) for path in _paths(options["clips"])]
-        retargeter(motions[0].changed(**_cut(motions[0], 10)))  # not timed
         if options["picture"]:
             rows_of_pictures.setdefault("person", _person(motions[0]))
             rows_of_pictures[name] = _robot(retargeter, motions[0])
-        found = [_answer(retargeter, motion, bool(options["collisions"])) for motion in motions]
-        parts = [part for part in _PARTS if part in found[0][0].parts_deg]
-        rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
-        print(f"## {name}, {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
-        heads = ["slide, own [cm/s]", "over 1 cm/s", "sunk", "floats (max [cm])", "path [cm/m]", "heading [deg]",
-                 "speed", "jumps", "touches", "ms a frame"]  # fmt: skip
-        print_table(["clip", *(f"{_PARTS[part]} [deg]" for part in parts), *heads], [*rows, _row("mean", found, parts)])
-        print()
+        for way in ways:
+            answers = _WAYS[way](retargeter, bool(options["collisions"]))
+            answers(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+            found = [_measure(retargeter, motion, answers) for motion in motions]
+            parts = [part for part in _PARTS if part in found[0][0].parts_deg]
+            rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
+            print(f"## {name}, as a {way}: {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
+            heads = ["slide, own [cm/s]", "over 1 cm/s", "sunk", "floats (max [cm])", "path [cm/m]", "heading [deg]",
+                     "speed", "jumps", "touches", "ms a frame"]  # fmt: skip
+            columns = ["clip", *(f"{_PARTS[part]} [deg]" for part in parts), *heads]
+            print_table(columns, [*rows, _row("mean", found, parts)])
+            print()
     if options["picture"]:
         seconds = [f"{second:.1f} s" for second in _moments(motions[0]) / motions[0].frame_rate]
         sheet = contact_sheet(list(rows_of_pictures.values()), seconds, list(rows_of_pictures), motions[0].description)
@@ -128,22 +137,34 @@ def _cut(motion: Motion, frames: int) -> dict[str, object]:
     return {name: array[:frames] for name, array in arrays.items() if array is not None}
 
 
-def _answer(
-    retargeter: OptimizationRetargeter, motion: Motion, avoid: bool
-) -> tuple[WholeBodyScore, int, float, float]:
-    """Measures, steps of more than 0.5 rad in 1/24 s, share of frames that touch, and milliseconds a frame."""
-    start = time.perf_counter()
-    result = retargeter(motion, avoid_collisions=avoid)
-    seconds = time.perf_counter() - start
+def _as_motion(retargeter: OptimizationRetargeter, avoid: bool) -> Callable[[Motion], Answer]:
+    """All frames at once."""
+    return lambda motion: retargeter(motion, avoid_collisions=avoid)
+
+
+def _as_stream(retargeter: OptimizationRetargeter, avoid: bool) -> Callable[[Motion], Answer]:
+    """One frame after the other."""
+    return Stream(retargeter, settings=StreamSettings(avoid_collisions=avoid)).retarget
+
+
+_WAYS = {"motion": _as_motion, "stream": _as_stream}
+
+
+def _measure(
+    retargeter: OptimizationRetargeter, motion: Motion, answers: Callable[[Motion], Answer]
+) -> tuple[WholeBodyScore, float, float]:
+    """Measures, share of frames that touch, and milliseconds a frame."""
+    start = time.process_time()
+    result = answers(motion)
+    seconds = time.process_time() - start
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
     base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
     score = score_whole_body(retargeter.body_map, motion, result.q, result.root_position, base_T33)
-    jumps = int((result.q.diff(dim=0).abs() * motion.frame_rate / 24 > 0.5).any(dim=1).sum())
     touches = float("nan") if result.collision is None else float(result.collision.float().mean())
-    return score, jumps, touches, 1000 * seconds / len(motion)
+    return score, touches, 1000 * seconds / len(motion)
 
 
-def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts: list[str]) -> list[str]:
+def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: list[str]) -> list[str]:
     scores = [score for score, *_ in found]
 
     def mean(key: str) -> float:
@@ -152,7 +173,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts
     def most(key: str) -> float:
         return max(getattr(score, key) for score in scores)
 
-    touches = statistics.fmean(touches for _, _, touches, _ in found)
+    touches = statistics.fmean(touches for _, touches, _ in found)
     return [
         name,
         *(f"{statistics.fmean(score.parts_deg[part] for score in scores):.1f}" for part in parts),
@@ -163,7 +184,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, int, float, float]], parts
         f"{mean('path_cm_m'):.1f}",
         f"{mean('heading_deg'):.1f}",
         f"{most('speed_max'):.2f}",
-        str(sum(jumps for _, jumps, _, _ in found)),
+        f"{sum(score.jumps for score in scores):.0f}",
         "-" if touches != touches else f"{touches:.1%}",
         f"{statistics.fmean(ms for *_, ms in found):.1f}",
     ]

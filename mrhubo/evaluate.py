@@ -1,4 +1,4 @@
-"""`mrhubo evaluate nao --retargeter FOLDER`: how good a trained retargeter is."""
+"""`mrhubo evaluate nao --retargeter FOLDER`: how good a trained retargeter is, or the optimiser of a whole body."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DESCRIPTION = (
     "Measures a trained retargeter on human motion: against the reference retargeter (joints, links), against the"
     " human (directions of limbs, hands, head, jerk), and in time. The motions, and what is a key link, are those of"
     " the config; the robot is the retargeter's own and must be the config's. Or measures files of robot motion in"
-    " the same way, whoever made them."
+    " the same way, whoever made them. Or measures the optimiser's whole bodies."
 )
 
 
@@ -26,6 +26,11 @@ def build_parser() -> CommandParser[Config]:
         " rate, and the name of the motion that it answers, in the file or as the file's"
     )
     what.add_argument("--predictions", metavar="FILE", nargs="+", help=predictions)
+    optimiser = (
+        "the optimiser, of a robot with feet: limbs, feet on the floor, the way gone, speeds; as whole motions and as"
+        " streams (docs/whole-body.md)"
+    )
+    what.add_argument("--optimiser", action="store_true", help=optimiser)
     polish = (
         "so many steps of optimisation after the networks, each frame on its own (default: the networks alone, then"
         " every way of answering: frame by frame, whole clips, stream; and the same motions re-shared)"
@@ -45,6 +50,13 @@ def main(argv: list[str]) -> None:
     from mrhubo.fitting.preparation import prepare
 
     report = Reporter(options.quiet)
+    if options.optimiser:
+        from mrhubo.fitting.whole_body import measure_optimiser
+
+        if options.polish is not None:
+            raise UserError("command line: --polish is for a package")
+        print(measure_optimiser(config, report, options.validation))
+        return
     if options.predictions is None:
         package = Path(options.retargeter)
         print(measure_package(prepare(config), report, package, options.validation, options.polish))

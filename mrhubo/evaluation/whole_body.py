@@ -8,8 +8,10 @@ Legend: T frames, P points of soles, S soles, D directions, N joints.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from math import nan
+from statistics import fmean
 
 import numpy as np
 import torch
@@ -28,6 +30,7 @@ SUNK_M, FLOATING_M = 0.01, 0.02
 """From where on a sole is under the floor, and, while it is planted, above it."""
 SLIDING = 0.01
 """Speed [m/s] from which on a planted point slides."""
+_JUMP_RAD, _JUMP_S = 0.5, 1 / 24
 _SHORT_M = 1.0
 """A path is taken for no shorter than this: somebody who sways on the spot has walked no metre."""
 
@@ -59,6 +62,8 @@ class WholeBodyScore:
     """The highest speed of a joint by its limit."""
     over_limit: float
     """Share of steps in which a joint is faster than its limit."""
+    jumps: float
+    """Steps in which a joint turns by more than 0.5 rad in 1/24 s."""
     outside: float
     """The most by which a joint is outside its range [rad]; 0: none is."""
 
@@ -110,8 +115,24 @@ def score_whole_body(
         heading_deg=heading_error(legs.heading(poses, base_T33), steps),
         speed_max=float(share_TN.max()) if len(share_TN) else 0.0,
         over_limit=_mean((share_TN > 1).any(dim=1).numpy()),
+        jumps=float((q_TN.diff(dim=0).abs() * rate * _JUMP_S > _JUMP_RAD).any(dim=1).sum()),
         outside=max(0.0, float(outside_TN.max())),
     )
+
+
+def mean_whole_body(scores: Sequence[WholeBodyScore]) -> dict[str, float]:
+    """Each measure over motions, by name: the mean, of what is called max the largest, and the sum of jumps; angles of
+    parts as `PART_deg`.
+    """
+    found = {
+        f"{part}_deg": fmean(score.parts_deg[part] for score in scores if part in score.parts_deg)
+        for part in dict.fromkeys(part for score in scores for part in score.parts_deg)
+    }
+    for name in (field.name for field in fields(WholeBodyScore) if field.name != "parts_deg"):
+        values = [value for score in scores if (value := getattr(score, name)) == value]
+        most = name == "outside" or "_max" in name
+        found[name] = nan if not values else max(values) if most else sum(values) if name == "jumps" else fmean(values)
+    return found
 
 
 def horizontal_speed(place_TP3: np.ndarray, frame_rate: float) -> np.ndarray:

@@ -28,9 +28,9 @@ _STILL = 0.1
 """Speed [m/s] of a root that tells nothing of its scale."""
 _TOLD = 0.05
 """To what the scale can be told: where a person's legs are known, it comes out 4% too small or large, as feet roll."""
-_BAND_M = 0.04
+BAND_M = 0.04
 """Heights of points on one floor."""
-_GATHERED = 0.5
+GATHERED = 0.5
 """A band of heights with this share of the fullest one's slow points is the floor, if none is below: who stands on a
 step stood on the floor too."""
 
@@ -49,20 +49,26 @@ class FootContacts:
     """Height of the floor [m], in the motion's world."""
 
 
-def find_contacts(place_TP3: np.ndarray, frame_rate: float, floor: float | None = None) -> FootContacts:
+def find_contacts(
+    place_TP3: np.ndarray, frame_rate: float, floor: float | None = None, given_TP: np.ndarray | None = None
+) -> FootContacts:
     """The contacts of points of soles.
 
     Args:
         place_TP3: their places (T, P, 3) [m], in a world whose y is up.
         frame_rate: frames per second.
         floor: height of the floor [m]; None: it is looked for.
+        given_TP: which points are planted (T, P), where that is known; None: it is found.
     """
     speed_TP = speeds(place_TP3, frame_rate)
+    if floor is None and given_TP is not None and given_TP.any():
+        floor = float(np.median(place_TP3[..., 1][given_TP]))
     floor = find_floor(place_TP3[..., 1], speed_TP) if floor is None else floor
     height_TP = place_TP3[..., 1] - floor
-    planted_TP = _hold(
-        (height_TP < PLANTED_M) & (speed_TP < PLANTED_SPEED), (height_TP > LIFTED_M) | (speed_TP > LIFTED_SPEED)
-    )
+    planted_TP = given_TP
+    if planted_TP is None:
+        begins_TP = (height_TP < PLANTED_M) & (speed_TP < PLANTED_SPEED)
+        planted_TP = _hold(begins_TP, (height_TP > LIFTED_M) | (speed_TP > LIFTED_SPEED))
     phase_TP, weight_TP = np.full(planted_TP.shape, -1), np.zeros(planted_TP.shape)
     count = 0
     for point, (first, last) in _runs(planted_TP):
@@ -112,9 +118,9 @@ def find_floor(height_TP: np.ndarray, speed_TP: np.ndarray) -> float:
     if not len(slow):  # all are in flight, or slip: the lowest is near the floor
         return float(np.quantile(height_TP, 0.02))
     first = np.arange(len(slow))
-    count = np.searchsorted(slow, slow + _BAND_M, side="right") - first
-    lowest = int(np.flatnonzero(count >= _GATHERED * count.max())[0])
-    fullest = lowest + int(count[lowest : np.searchsorted(slow, slow[lowest] + _BAND_M, side="right")].argmax())
+    count = np.searchsorted(slow, slow + BAND_M, side="right") - first
+    lowest = int(np.flatnonzero(count >= GATHERED * count.max())[0])
+    fullest = lowest + int(count[lowest : np.searchsorted(slow, slow[lowest] + BAND_M, side="right")].argmax())
     return float(np.median(slow[fullest : fullest + count[fullest]]))
 
 

@@ -54,5 +54,6 @@ def mirror(motion: Motion) -> Motion:
         root_rotation_T33=None if root is None else root * sign[:, None] * sign,
         root_position_T3=None if place is None else place * sign,
         confidence_TJ=None if trust is None else trust[:, MIRROR],
+        contact_T4=None if arrays.contact_T4 is None else arrays.contact_T4[:, [2, 3, 0, 1]],
         notes=(*motion.notes, "left and right are exchanged, as asked"),
     )

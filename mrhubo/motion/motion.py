@@ -32,6 +32,11 @@ class MotionArrays:
     root_rotation_T33: np.ndarray | None
     root_position_T3: np.ndarray | None
     confidence_TJ: np.ndarray | None
+    contact_T4: np.ndarray | None
+
+
+SOLE_POINTS = ("left_heel", "left_toe", "right_heel", "right_toe")
+"""Keypoints of soles, of which a motion may tell when they are planted."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,9 @@ class Motion:
     rotations referred; empty where that was our own."""
     confidence_TJ: Tensor | None = None
     """How sure the source is of each joint (T, 21), 0..1; None where it does not say."""
+    contact_T4: Tensor | None = None
+    """Whether each of `SOLE_POINTS` is planted on the floor (T, 4), bool; None where the file does not say: then it is
+    found (`mrhubo.motion.contacts`)."""
 
     @classmethod
     def of(cls, **parts: Any) -> Motion:

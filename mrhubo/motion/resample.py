@@ -52,6 +52,7 @@ def resample(motion: Motion, frame_rate: float) -> Motion:
         root_rotation_T33=None if root is None else _slerp(root, before_S, after_S, share_S),
         root_position_T3=line(arrays.root_position_T3),
         confidence_TJ=line(arrays.confidence_TJ),
+        contact_T4=None if arrays.contact_T4 is None else arrays.contact_T4[np.where(share_S < 0.5, before_S, after_S)],
     )
 
 

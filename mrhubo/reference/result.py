@@ -34,7 +34,7 @@ class OptimizationResult(Answer):
     """Joint angles and how near they bring the robot to the human; the names are those of `RetargetResult`, which has a
     confidence besides. T stands for the leading axes of the human poses, none for a single pose.
 
-    N robot joints, D directions (limbs, hands, head).
+    N robot joints, D directions (limbs, hands, head), F feet.
     """
 
     q: Tensor
@@ -60,6 +60,10 @@ class OptimizationResult(Answer):
     robot has no feet, or the motion tells no root."""
     root_quaternion_wxyz: Tensor | None = None
     """Rotation (T, 4) of the base in the world, a unit quaternion, w first; None where there is no place."""
+    contact: Tensor | None = None
+    """Whether each foot is planted (T, F), bool; None where there is no place of the base."""
+    contact_names: tuple[str, ...] = ()
+    """The F feet."""
 
 
 def _without_torch(value: Any) -> Any:

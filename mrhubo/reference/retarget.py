@@ -27,7 +27,7 @@ from mrhubo.reference.metrics import angle_between, at_limit_share, direction_er
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import speed_bound
-from mrhubo.reference.standing import HumanSteps, Legs, Stand, Standing, flatten, read_steps
+from mrhubo.reference.standing import HumanSteps, Legs, Stand, Standing, flatten, read_steps, standing_fields
 from mrhubo.reference.starts import StartPool
 from mrhubo.reference.terms import REFERENCE_RATE, Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, pick, smooth_motion
@@ -129,7 +129,8 @@ class OptimizationRetargeter(nn.Module):
             self.body_map.measured_names, poses.frame_rate,
             *((motion.name, motion.source) if isinstance(motion, Motion) else ("", "")),
             robot_facts(robot, "the optimiser of mrhubo", robot.description.kinematics),
-            *((None, None) if stand is None else (stand.position_T3, stand.quaternion_T4)),
+            **({} if stand is None or steps is None else standing_fields(
+                stand.position_T3, stand.rotation_T33, self._legs.planted(steps.contacts.planted_TP), self._legs)),
         )  # fmt: skip
 
     def _solve(self, local_TJ33: Tensor, frame_rate: float | None, avoid_collisions: bool) -> Tensor:

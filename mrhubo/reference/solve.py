@@ -78,7 +78,8 @@ class DirectionProblem(nn.Module):
         """How much the directions of each block count together (B, C): a block costs about this times the mean square
         of its angles to the human.
         """
-        return (target_BD3.norm(dim=-1) * self.directions.weight_D) @ self.blocks.directions_DC
+        length_BD = target_BD3[:, : len(self.directions.weight_D)].norm(dim=-1)  # other terms' targets come after
+        return (length_BD * self.directions.weight_D) @ self.blocks.directions_DC
 
     def frozen(self, q_BN: Tensor, gradient_BN: Tensor, bounds: tuple[Tensor, Tensor] | None = None) -> Tensor:
         """Active set (B, N): joints at a limit that the gradient's descent would push beyond it; limits are the joints'

@@ -17,7 +17,7 @@ from mrhubo.robot_motion import RobotFacts
 class RetargetResult(Answer):
     """Joint angles and how far to trust them; T stands for the leading axes of the human poses, none for a single pose.
 
-    N robot joints, D directions (limbs, hands, head), C branches.
+    N robot joints, D directions (limbs, hands, head), C branches, F feet.
     """
 
     q: Tensor
@@ -49,6 +49,15 @@ class RetargetResult(Answer):
     """What the motion was read from, in words."""
     robot: RobotFacts = field(default_factory=RobotFacts)
     """What is known of the robot, and of who answered."""
+    root_position: Tensor | None = None
+    """Place (T, 3) [m] of the robot's base in the world: x forward, y left, z up, the floor at z = 0; None where the
+    robot has no feet, or the motion tells no root."""
+    root_quaternion_wxyz: Tensor | None = None
+    """Rotation (T, 4) of the base in the world, a unit quaternion, w first; None where there is no place."""
+    contact: Tensor | None = None
+    """Whether each foot is planted (T, F), bool; None where there is no place of the base."""
+    contact_names: tuple[str, ...] = ()
+    """The F feet."""
 
     def with_leading(
         self, shape: tuple[int, ...], frame_rate: float | None, name: str = "", source: str = ""
@@ -62,7 +71,8 @@ class RetargetResult(Answer):
         return dataclasses.replace(self, **tensors, frame_rate=frame_rate, name=name, source=source)
 
 
-_TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision", "branch_confidence")
+_TENSORS = ("q", "confidence", "direction_error_deg", "phi", "collision", "branch_confidence", "root_position",
+            "root_quaternion_wxyz", "contact")  # fmt: skip
 
 
 def join_results(parts: Sequence[RetargetResult]) -> RetargetResult:

@@ -6,6 +6,8 @@ import math
 
 from mrhubo.body import BodyPrior
 from mrhubo.retargeter.calibration import calibrate
+from mrhubo.retargeter.nearest import NearestJoints
+from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.retargeter.package import Retargeter
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, Robot
@@ -25,8 +27,20 @@ def untrained(robot: Robot | BodyMap) -> Retargeter:
         UserError: the robot's body parts make no sense.
     """
     body_map = robot if isinstance(robot, BodyMap) else BodyMap.of(robot)
-    network, prior = UniversalJoints(body_map, open_network()), BodyPrior.open()
-    retargeter = Retargeter(network, body_map, prior, None, math.nan)
-    retargeter.origin = "the universal network of mrhubo, without training"
+    return _calibrated(
+        UniversalJoints(body_map, open_network()), body_map, "the universal network of mrhubo, without training"
+    )
+
+
+def optimised(body_map: BodyMap) -> Retargeter:
+    """A retargeter without any network, for streams of the optimiser: its answers come from the nearest of some
+    thousand robot poses. Its confidence is calibrated as that of a trained one is.
+    """
+    return _calibrated(NearestJoints(body_map), body_map, "the optimiser of mrhubo")
+
+
+def _calibrated(network: JointNetwork, body_map: BodyMap, origin: str) -> Retargeter:
+    retargeter = Retargeter(network, body_map, BodyPrior.open(), None, math.nan)
+    retargeter.origin = origin
     retargeter.confidence = calibrate(retargeter)
     return retargeter

@@ -18,8 +18,8 @@ _ROOT = {
     "root_quaternion_wxyz": ("root_qw", "root_qx", "root_qy", "root_qz"),
 }
 _SINGLE = ("confidence", "phi", "collision")
-_BRANCH, _ERROR = "confidence_", "error_"
-"""What the names of columns of a branch's confidence and of a direction's error begin with."""
+_BRANCH, _ERROR, _CONTACT = "confidence_", "error_", "contact_"
+"""What the names of columns of a branch's confidence, of a direction's error and of a foot's contact begin with."""
 
 
 def to_columns(motion: RobotMotion) -> dict[str, np.ndarray]:
@@ -37,6 +37,7 @@ def to_columns(motion: RobotMotion) -> dict[str, np.ndarray]:
     for field in _SINGLE:
         if (array := getattr(single, field)) is not None:
             columns[field] = array
+    columns |= _split(single.contact, [f"{_CONTACT}{name}" for name in single.contact_names])
     columns |= _split(single.branch_confidence, [f"{_BRANCH}{name}" for name in single.branch_names])
     return columns | _split(single.direction_error_deg, [f"{_ERROR}{name}{_DEG}" for name in single.direction_names])
 
@@ -51,12 +52,14 @@ def from_columns(columns: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dic
     joints = [name for name in columns if name.endswith(_RAD)]
     branches = [name for name in columns if name.startswith(_BRANCH)]
     errors = [name for name in columns if name.startswith(_ERROR) and name.endswith(_DEG)]
+    contacts = [name for name in columns if name.startswith(_CONTACT)]
     if not joints:
         raise UserError("no column is named 'JOINT [rad]'; the header names every joint and its unit")
     facts: dict[str, Any] = {
         "joint_names": [name.removesuffix(_RAD) for name in joints],
         "branch_names": [name.removeprefix(_BRANCH) for name in branches],
         "direction_names": [name.removeprefix(_ERROR).removesuffix(_DEG) for name in errors],
+        "contact_names": [name.removeprefix(_CONTACT) for name in contacts],
     }
     if TIME in columns and (rate := find_rate(columns[TIME], seconds)) is not None:
         facts["frame_rate"] = rate
@@ -65,6 +68,8 @@ def from_columns(columns: Mapping[str, np.ndarray]) -> tuple[dict[str, Any], dic
         frames["branch_confidence"] = _join(columns, branches)
     if errors:
         frames["direction_error_deg"] = _join(columns, errors)
+    if contacts:
+        frames["contact"] = _join(columns, contacts)
     for field, names in _ROOT.items():
         if all(name in columns for name in names):
             frames[field] = _join(columns, names)

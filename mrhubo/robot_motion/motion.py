@@ -1,7 +1,7 @@
 """A robot's motion in memory: joint angles over time and all that is known of them, as plain NumPy arrays.
 
 Legend: ... leading axes, of which the last is the time (T frames), none for a single pose; N joints, C branches (an
-arm, the head), D directions (limbs, hands, head).
+arm, the head), D directions (limbs, hands, head), F feet.
 """
 
 from __future__ import annotations
@@ -25,8 +25,13 @@ PER_FRAME = {
     "collision": (),
     "root_position": (3,),
     "root_quaternion_wxyz": (4,),
+    "contact": ("contact_names",),
 }
 """Fields with a value a frame, by name, and their further axes: sizes, or the field whose names they have."""
+NAMES = ("joint_names", "branch_names", "direction_names", "contact_names")
+"""Fields that name what is along an axis."""
+FLAGS = ("collision", "contact")
+"""Fields of `PER_FRAME` that are true or false."""
 _LIMITS = ("lower", "upper", "velocity")
 _UNIT = 1e-3
 """How far the norm of a quaternion may be from 1: rounded text still passes."""
@@ -103,6 +108,10 @@ class RobotMotion:
     """Place (..., 3) [m] of the base in the world: x forward, y left, z up; None where the base is fixed."""
     root_quaternion_wxyz: np.ndarray | None = None
     """Rotation (..., 4) of the base in the world, a unit quaternion, w first; None where the base is fixed."""
+    contact: np.ndarray | None = None
+    """Whether each foot is planted (..., F), bool; None: not known."""
+    contact_names: tuple[str, ...] = ()
+    """The F feet."""
 
     @classmethod
     def trusted(cls, **parts: Any) -> RobotMotion:
@@ -113,7 +122,7 @@ class RobotMotion:
 
     def __post_init__(self) -> None:
         """Raises a UserError where the parts do not fit together or are no numbers."""
-        for name in ("joint_names", "branch_names", "direction_names"):
+        for name in NAMES:
             object.__setattr__(self, name, _names(name, getattr(self, name)))
         if not self.joint_names:
             raise UserError("joint_names is empty; a motion moves one joint at least")
@@ -122,7 +131,7 @@ class RobotMotion:
             given = getattr(self, name)
             if given is not None:
                 sizes = [len(getattr(self, axis)) if isinstance(axis, str) else axis for axis in further]
-                kind = np.bool_ if name == "collision" else np.float32
+                kind = np.bool_ if name in FLAGS else np.float32
                 object.__setattr__(self, name, _array(name, given, (*leading, *sizes), kind))
         if (self.root_position is None) != (self.root_quaternion_wxyz is None):
             raise UserError("root_position and root_quaternion_wxyz go together; one of them is missing")

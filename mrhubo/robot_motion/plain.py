@@ -16,7 +16,7 @@ from mrhubo.robot_motion.motion import PER_FRAME, FollowingJoint, RobotFacts, Ro
 FORMAT = "mrhubo.robot_motion/1"
 UNIT = "rad"
 TEXTS = ("format", "unit", "name", "source", "robot", "made_by", "checksum")
-NAME_LISTS = ("joint_names", "branch_names", "direction_names", "other_names", "other_follows")
+NAME_LISTS = ("joint_names", "branch_names", "direction_names", "contact_names", "other_names", "other_follows")
 NUMBERS = ("frame_rate",)
 NUMBER_LISTS = ("lower_rad", "upper_rad", "velocity_rad_s", "other_multiplier", "other_offset_rad")
 FACTS = (*TEXTS, *NAME_LISTS, *NUMBERS, *NUMBER_LISTS)
@@ -38,6 +38,7 @@ def facts_of(motion: RobotMotion) -> dict[str, Any]:
         "checksum": robot.checksum,
         "branch_names": list(motion.branch_names),
         "direction_names": list(motion.direction_names),
+        "contact_names": list(motion.contact_names),
         "lower_rad": None if robot.lower is None else short(robot.lower),
         "upper_rad": None if robot.upper is None else short(robot.upper),
         "velocity_rad_s": None if robot.velocity is None else short(robot.velocity),
@@ -89,6 +90,7 @@ def build(facts: Mapping[str, Any], frames: Mapping[str, np.ndarray], path: Path
             robot=robot,
             branch_names=told.get("branch_names", ()),
             direction_names=told.get("direction_names", ()),
+            contact_names=told.get("contact_names", ()),
             **{name: frames[name] for name in PER_FRAME if name in frames},
         )
     except UserError as error:

@@ -18,7 +18,7 @@ from mrhubo.errors import UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import check_regular, read_regular
 from mrhubo.robot_motion.columns import from_columns, to_columns
-from mrhubo.robot_motion.motion import RobotMotion, find_repeated
+from mrhubo.robot_motion.motion import FLAGS, RobotMotion, find_repeated
 from mrhubo.robot_motion.plain import build, facts_of
 
 MAX_TEXT = 2**29
@@ -99,8 +99,7 @@ def _from_columns(path: Path, columns: Mapping[str, np.ndarray], known: Mapping[
         facts, frames = from_columns(columns)
     except UserError as error:
         raise UserError(f"{path}: {error}") from error
-    if "collision" in frames:
-        frames["collision"] = frames["collision"] != 0
+    frames |= {name: frames[name] != 0 for name in FLAGS if name in frames}
     return build({**facts, **(known or {})}, frames, path)
 
 

@@ -11,23 +11,42 @@ Legend: B people, T frames, D directions, N joints, J = 21 human joints.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.body.skeleton import POSED_JOINT_NAMES
+from mrhubo.body.skeleton import KEYPOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.fast import StreamSettings
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.motion import Motion, MotionLike, read_poses, to_tensor
 from mrhubo.motion.checks import check_frame_rate
+from mrhubo.reference import OptimizationRetargeter
+from mrhubo.reference.standing import (
+    CROOKED,
+    FAR_M,
+    Legs,
+    Standing,
+    given_contacts,
+    has_root,
+    motion_root,
+    standing_fields,
+)
 from mrhubo.retargeter import Retargeter, RetargetResult, join_results
+from mrhubo.retargeter.without_training import optimised
 from mrhubo.streaming.follow import Follower, StreamState
+from mrhubo.streaming.ground import GroundState, Seen
 
 _MOST_PEOPLE = 10_000
 _PART = 8_192
 """Frames that are worked on at a time where that is possible."""
+
+
+Root = tuple[MotionLike, MotionLike]
 
 
 class Stream:
@@ -35,30 +54,39 @@ class Stream:
 
     def __init__(
         self,
-        retargeter: Retargeter,
+        retargeter: Retargeter | OptimizationRetargeter,
         rate: float = 60.0,
         people: int | None = None,
         settings: StreamSettings | None = None,
+        floor: float | None = None,
     ) -> None:
         """A stream that has seen nobody.
 
         Args:
-            retargeter: as it was loaded; where it is on a GPU, so is the stream.
+            retargeter: as it was loaded; where it is on a GPU, so is the stream. The optimiser needs some seconds until
+                the stream is there.
             rate: frames per second, for frames that come without a time.
             people: how many people, each with a robot of their own, are in every frame; poses and answers then have a
                 leading axis of this size. None: one, and no such axis.
             settings: times and speeds; default: `StreamSettings()`.
+            floor: height of the floor in the people's world [m], for robots with feet; None: it is learned on the way.
 
         Raises:
-            UserError: the rate is not positive, or the number of people none.
+            UserError: the rate is not positive, the number of people none, or the floor no number.
         """
         check_frame_rate(rate, needed=True)
         if people is not None and (type(people) is not int or not 1 <= people <= _MOST_PEOPLE):
             raise UserError(
                 f"stream: people must be a whole number from 1 to {_MOST_PEOPLE:,}, or None, found {people}"
             )
+        if isinstance(retargeter, OptimizationRetargeter):
+            retargeter = optimised(retargeter.body_map)
         self.retargeter, self.rate, self.people = retargeter, float(rate), people
-        self.settings = settings or StreamSettings()
+        if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
+            raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
+        self.settings, self.floor = settings or StreamSettings(), floor
+        self._legs = Legs(retargeter.body_map)
+        self._standing: Standing | None = None
         self.reset()
 
     def reset(self, q: MotionLike | None = None) -> None:
@@ -70,13 +98,17 @@ class Stream:
         Raises:
             UserError: q has another shape, is no number, or lies outside the joints' limits.
         """
-        self._follower = Follower(self.retargeter, self.settings, self.settings.longest_step(self.rate))
-        self._state = self._follower.begin(self.people or 1, None if q is None else self._standing(q))
+        self._begin_BN = None if q is None else self._standing_at(q)
+        self._state: StreamState | None = None
+        """None: no frame has come, so it is not known whether roots will come with them."""
         rest_33 = torch.eye(3, device=self.retargeter.device)
         self._seen_BJ33 = rest_33.expand(self.people or 1, len(POSED_JOINT_NAMES), 3, 3)
+        self._root_B33, self._place_B3 = rest_33.expand(self.people or 1, 3, 3), rest_33.new_zeros(self.people or 1, 3)
         self._clock = StreamClock(self.rate)
 
-    def __call__(self, pose: MotionLike | None, time: float | None = None) -> RetargetResult:
+    def __call__(
+        self, pose: MotionLike | None, time: float | None = None, root: Root | None = None, contacts: Any = None
+    ) -> RetargetResult:
         """The answer to one frame, as a retargeter gives it for a single pose, or for (people,) poses.
 
         Args:
@@ -85,31 +117,103 @@ class Stream:
                 the same for those whose pose holds NaN or infinite numbers. Their confidence is 0.
             time: of the frame [s], on any clock; default: 1 / rate after the last one. A time that has already been
                 answered gets the same answer again.
+            root: rotation (3, 3) and place (3,) [m] of the person's pelvis in a world whose y is up, as a `Motion` has
+                them, with a leading axis if there are several people. Then a robot with feet stands on its floor, and
+                the answer tells where its base is; root comes with every pose or with none. Other robots do not look.
+            contacts: whether each point of the person's soles is planted (P,), rear and front of each foot
+                (`Stream.contact_points`), with a leading axis if there are several people; None: it is found.
 
         Raises:
-            UserError: the pose has another shape or holds what is no rotation, or the time is no number or before the
-                last one. The stream is as it was.
+            UserError: the pose, the root or the contacts have another shape or hold what is no rotation, the time is no
+                number or before the last one, or roots came with some poses alone. The stream is as it was.
         """
-        seen_B = self._advance(pose, time)
-        result = self.retargeter.judge(self._state.joints.q_BN, self._seen_BJ33)
-        result = _without_confidence(result, ~seen_B)
+        seen_B = self._advance(pose, time, root, contacts)
+        assert self._state is not None
+        q_BN = self._state.joints.q_BN
+        result = _without_confidence(self.retargeter.judge(q_BN, self._seen_BJ33), ~seen_B)
+        if self._state.ground is not None:
+            result = dataclasses.replace(result, **self._stands(self._state.ground, q_BN))
         return result.with_leading(() if self.people is None else (self.people,), None)
 
-    def joints(self, pose: MotionLike | None, time: float | None = None) -> Tensor:
-        """The joint angles (N,) or (people, N) [rad] of `__call__` alone, which take half of its time."""
-        self._advance(pose, time)
+    def _stands(self, ground: GroundState, q_BN: Tensor) -> dict[str, Any]:
+        """What an answer tells of the floor."""
+        assert self._follower.ground is not None
+        base = self._follower.ground.base(ground, self.retargeter.body_map.robot.forward(q_BN))
+        found = standing_fields(*base, self._follower.ground.planted(ground), self._legs)
+        return found
+
+    def joints(
+        self, pose: MotionLike | None, time: float | None = None, root: Root | None = None, contacts: Any = None
+    ) -> Tensor:
+        """The joint angles (N,) or (people, N) [rad] of `__call__` alone, in less time."""
+        self._advance(pose, time, root, contacts)
+        assert self._state is not None
         return self._state.joints.q_BN[0] if self.people is None else self._state.joints.q_BN
 
+    @property
+    def contact_points(self) -> tuple[str, ...]:
+        """The human keypoints of the soles on which the robot stands; none if it has no feet."""
+        return tuple(KEYPOINT_NAMES[k] for k in self._legs.contacts) if self._legs.has_feet else ()
+
     @torch.no_grad()
-    def _advance(self, pose: MotionLike | None, time: float | None) -> Tensor:
+    def _advance(self, pose: MotionLike | None, time: float | None, root: Root | None, contacts: Any) -> Tensor:
         """Works on a frame; who is seen (B,)."""
         local_BJ33, seen_B = self._read(pose)
+        root_B33, place_B3, given_BP = self._read_root(root, contacts, seen_B, pose is None)
         passed, time = self._clock.passed(time)
+        if self._state is None:
+            self._follower = self._make(self.rate, root is not None)
+            self._state = self._follower.begin(self.people or 1, self._begin_BN)
         if passed > 0:
             target_BD3 = self.retargeter.body_map.human_directions(local_BJ33)
-            self._state = self._follower.advance(self._state, local_BJ33, target_BD3, seen_B, passed)
+            seen = Seen(local_BJ33, root_B33, place_B3, given_BP)
+            self._state = self._follower.advance(self._state, local_BJ33, target_BD3, seen_B, passed, seen)
         self._seen_BJ33, self._clock.time = local_BJ33, time
+        self._root_B33, self._place_B3 = root_B33, place_B3
         return seen_B
+
+    def _make(self, rate: float, rooted: bool) -> Follower:
+        """What follows people with a root, or without."""
+        standing = None
+        if rooted and self._legs.has_feet:
+            standing = self._standing = self._standing or Standing(self._legs)
+        return Follower(self.retargeter, self.settings, self.settings.longest_step(rate), standing, self.floor)
+
+    def _read_root(
+        self, root: Root | None, contacts: Any, seen_B: Tensor, nobody: bool
+    ) -> tuple[Tensor, Tensor, np.ndarray | None]:
+        """Roots (B, 3, 3), (B, 3) [m], the last ones of those who are not seen, whose flags `seen_B` loses those whose
+        root is no number; and contacts (B, P), where they are given.
+        """
+        people = self.people or 1
+        rooted = self._state is not None and self._state.ground is not None
+        if root is None or not self._legs.has_feet:
+            if rooted and not nobody:
+                raise UserError("stream: earlier poses came with a root, this one has none; reset() begins anew")
+            return self._root_B33, self._place_B3, None
+        if self._state is not None and not rooted:
+            raise UserError("stream: earlier poses came without a root; reset() begins anew")
+        turn, place = (to_tensor(x).to(self.retargeter.device, torch.float32) for x in root)
+        if self.people is None:
+            turn, place = turn[None], place[None]
+        if tuple(turn.shape) != (people, 3, 3) or tuple(place.shape) != (people, 3):
+            raise UserError(
+                "stream: a root is a rotation (3, 3) and a place (3,), with a leading axis if there are several people;"
+                f" found {tuple(turn.shape)} and {tuple(place.shape)}"
+            )
+        seen_B &= turn.flatten(1).isfinite().all(dim=1) & (place.abs() < FAR_M).all(dim=1)
+        crooked_B = (turn.mT @ turn - torch.eye(3).to(turn)).abs().amax(dim=(1, 2)) > CROOKED
+        if bool((crooked_B & seen_B).any()):
+            raise UserError("stream: the root's matrix is no rotation")
+        given_BP = None
+        if contacts is not None:
+            given_BP = np.asarray(contacts, dtype=bool).reshape(people, -1)
+            if given_BP.shape[1] != len(self._legs.contacts):
+                raise UserError(
+                    f"stream: expected contacts of {len(self._legs.contacts)} points: {', '.join(self.contact_points)}"
+                )
+        root_B33 = torch.where(seen_B[:, None, None], turn, self._root_B33)
+        return root_B33, torch.where(seen_B[:, None], place, self._place_B3), given_BP
 
     def _read(self, pose: MotionLike | None) -> tuple[Tensor, Tensor]:
         """Poses (B, 21, 3, 3), the last ones of those who are not seen, and who is seen (B,)."""
@@ -129,7 +233,7 @@ class Stream:
         local_BJ33[seen_B] = poses.local_TJ33.to(local_BJ33)
         return local_BJ33, seen_B
 
-    def _standing(self, q: MotionLike) -> Tensor:
+    def _standing_at(self, q: MotionLike) -> Tensor:
         robot, people = self.retargeter.body_map.robot, self.people or 1
         q_BN = to_tensor(q).to(self.retargeter.device, torch.float32)
         q_BN = q_BN[None] if self.people is None else q_BN
@@ -147,42 +251,85 @@ class Stream:
 
     @torch.no_grad()
     def retarget_all(self, motions: Sequence[Motion]) -> list[RetargetResult]:
-        """As `retarget`, for motions of any lengths and frame rates, those of one rate at the same time."""
-        answers: dict[int, Tensor] = {}
-        for rate in sorted({motion.frame_rate for motion in motions}):
-            chosen = [i for i, motion in enumerate(motions) if motion.frame_rate == rate and len(motion)]
+        """As `retarget`, for motions of any lengths and frame rates, those of one rate at the same time. Those with a
+        root move the base of a robot with feet.
+        """
+        answers: dict[int, _Answer] = {}
+        kinds = [
+            (motion.frame_rate, self._legs.has_feet and has_root(motion), motion.contact_T4 is not None)
+            for motion in motions
+        ]
+        for kind in sorted(set(kinds)):
+            chosen = [i for i, motion in enumerate(motions) if kinds[i] == kind and len(motion)]
             if chosen:
-                answers |= dict(zip(chosen, self._run([motions[i] for i in chosen], rate), strict=True))
+                answers |= dict(zip(chosen, self._run([motions[i] for i in chosen], *kind[:2]), strict=True))
         results = []
         for i, motion in enumerate(motions):
             local_TJ33 = self._poses(motion)
-            q_TN = answers.get(i, local_TJ33.new_zeros(0, len(self.retargeter.joint_names)))
-            parts = zip(q_TN.split(_PART), local_TJ33.split(_PART), strict=True)
+            nothing = _Answer(local_TJ33.new_zeros(0, len(self.retargeter.joint_names)), {})
+            answer = answers.get(i, nothing)
+            parts = zip(answer.q_TN.split(_PART), local_TJ33.split(_PART), strict=True)
             result = join_results(
                 [self.retargeter.judge(*part, motion.frame_rate if len(motion) else None) for part in parts]
             )
+            result = dataclasses.replace(result, **answer.stands)
             results.append(result.with_leading((len(motion),), motion.frame_rate, motion.name, motion.source))
         return results
 
-    def _run(self, motions: Sequence[Motion], rate: float) -> list[Tensor]:
-        """Joint angles (T, N) of motions of one rate, each of which is a person."""
-        follower = Follower(self.retargeter, self.settings, self.settings.longest_step(rate))
+    def _run(self, motions: Sequence[Motion], rate: float, rooted: bool) -> list[_Answer]:
+        """Answers to motions of one rate, each of which is a person."""
+        follower = self._make(rate, rooted)
         poses = [self._poses(motion) for motion in motions]
         targets = [torch.cat([self.retargeter.body_map.human_directions(part) for part in local.split(_PART)])
                    for local in poses]  # fmt: skip
         lengths_B = torch.tensor([len(motion) for motion in motions], device=self.retargeter.device)
         local_TBJ33, target_TBD3 = (torch.nn.utils.rnn.pad_sequence(found) for found in (poses, targets))
+        seen_T = self._people(motions, poses) if rooted else [None] * len(local_TBJ33)
         state: StreamState = follower.begin(len(motions))
-        found = []
-        for frame, (local_BJ33, target_BD3) in enumerate(zip(local_TBJ33, target_TBD3, strict=True)):
-            state = follower.advance(state, local_BJ33, target_BD3, frame < lengths_B, 1 / rate)
+        found, bases = [], []
+        for frame, (local_BJ33, target_BD3, seen) in enumerate(zip(local_TBJ33, target_TBD3, seen_T, strict=True)):
+            state = follower.advance(state, local_BJ33, target_BD3, frame < lengths_B, 1 / rate, seen)
             found.append(state.joints.q_BN)
-        q_TBN = torch.stack(found)
-        return [q_TBN[: len(motion), i] for i, motion in enumerate(motions)]
+            if follower.ground is not None and state.ground is not None:
+                poses_B = self.retargeter.body_map.robot.forward(state.joints.q_BN)
+                planted_BS = torch.from_numpy(follower.ground.planted(state.ground))
+                bases.append((*follower.ground.base(state.ground, poses_B), planted_BS))
+        q_TBN, answers = torch.stack(found), []
+        columns = [torch.stack(column) for column in zip(*bases, strict=True)]
+        for i, motion in enumerate(motions):
+            part = [column[: len(motion), i] for column in columns]
+            stands = standing_fields(part[0], part[1], part[2].numpy(), self._legs) if part else {}
+            answers.append(_Answer(q_TBN[: len(motion), i], stands))
+        return answers
+
+    def _people(self, motions: Sequence[Motion], poses: Sequence[Tensor]) -> list[Seen]:
+        """People with a root, frame by frame."""
+        roots = [motion_root(motion, local, self._legs) for motion, local in zip(motions, poses, strict=True)]
+        pad = torch.nn.utils.rnn.pad_sequence
+        local_TBJ33, turn_TB33, place_TB3 = (
+            pad(list(found)) for found in (poses, [turn for turn, _ in roots], [place for _, place in roots])
+        )
+        given = [given_contacts(motion, self._legs) for motion in motions]
+        known = (
+            None
+            if any(contact_TP is None for contact_TP in given)
+            else pad([torch.from_numpy(contact_TP) for contact_TP in given if contact_TP is not None]).numpy()
+        )
+        frames = zip(local_TBJ33, turn_TB33, place_TB3, strict=True)
+        return [Seen(*frame, None if known is None else known[t]) for t, frame in enumerate(frames)]
 
     def _poses(self, motion: Motion) -> Tensor:
         poses = read_poses(motion, skeleton=self.retargeter.body_map.skeleton)
         return poses.local_TJ33.to(self.retargeter.device)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Answer:
+    """To one motion."""
+
+    q_TN: Tensor
+    stands: dict[str, Any]
+    """What is told of the floor: fields of a result."""
 
 
 def _without_confidence(result: RetargetResult, chosen_B: Tensor) -> RetargetResult:

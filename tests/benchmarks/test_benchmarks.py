@@ -195,9 +195,11 @@ def test_many_robots(run: Run, tmp_path: Path) -> None:
 
 
 def test_whole_body(run: Run, clips: Path, tmp_path: Path) -> None:
-    text = run("whole_body", "--robots", "nao", "--clips", clips, "--picture", tmp_path / "moments.png")
+    text = run("whole_body", "--robots", "nao", "--clips", clips, "--ways", "motion,stream",
+               "--picture", tmp_path / "moments.png")  # fmt: skip
     found = rows(text, "clip")
-    assert [row[0] for row in found] == ["boxing", "wave", "mean"] and (tmp_path / "moments.png").stat().st_size > 1000
+    assert [row[0] for row in found] == ["boxing", "wave", "mean"] and "as a stream: 2 clips" in text
+    assert (tmp_path / "moments.png").stat().st_size > 1000
 
 
 def test_universal(run: Run, clips: Path, tmp_path: Path) -> None:

@@ -105,5 +105,5 @@ def test_the_command(root: Path, prepared: Prepared, answer: RobotMotion, tmp_pa
     assert rows(capsys.readouterr().out)["wave"][2] == "0.000"
     with pytest.raises(UserError, match="--polish and --validation are for a package"):
         main([*given, "--polish", "1"])
-    with pytest.raises(UserError, match="--retargeter --predictions is required"):
+    with pytest.raises(UserError, match="--retargeter --predictions --optimiser is required"):
         main(["nao"])

@@ -25,7 +25,7 @@ def arrays(shape: tuple[int, ...], elements: st.SearchStrategy[Any] = FLOATS) ->
 @st.composite
 def motions(draw: st.DrawFn) -> RobotMotion:
     frames, names = draw(st.integers(1, 5)), draw(st.lists(NAMES, min_size=1, max_size=4, unique=True))
-    branches, directions = (draw(st.lists(NAMES, max_size=2, unique=True)) for _ in range(2))
+    branches, directions, feet = (draw(st.lists(NAMES, max_size=2, unique=True)) for _ in range(3))
     unit = st.floats(0, 1, width=32)
     found: dict[str, Any] = {
         "confidence": draw(arrays((frames,), unit)),
@@ -33,6 +33,7 @@ def motions(draw: st.DrawFn) -> RobotMotion:
         "direction_error_deg": draw(arrays((frames, len(directions)))) if directions else None,
         "phi": draw(arrays((frames,))),
         "collision": draw(hnp.arrays(np.bool_, (frames,))),
+        "contact": draw(hnp.arrays(np.bool_, (frames, len(feet)))) if feet else None,
     }
     found = {name: array if draw(st.booleans()) else None for name, array in found.items()}
     if draw(st.booleans()):
@@ -49,7 +50,8 @@ def motions(draw: st.DrawFn) -> RobotMotion:
     return RobotMotion(
         draw(arrays((frames, len(names)))), tuple(names), draw(st.none() | RATES), draw(NAMES), draw(NAMES), facts,
         branch_names=tuple(branches) if found["branch_confidence"] is not None else (),
-        direction_names=tuple(directions) if found["direction_error_deg"] is not None else (), **found,
+        direction_names=tuple(directions) if found["direction_error_deg"] is not None else (),
+        contact_names=tuple(feet) if found["contact"] is not None else (), **found,
     )  # fmt: skip
 
 

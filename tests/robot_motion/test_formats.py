@@ -48,7 +48,7 @@ def test_the_same_numbers_come_back(tmp_path: Path, name: str, motion: RobotMoti
     found = there_and_back(motion, tmp_path, name)
     if name in WHOLE:
         assert_same(found, motion)
-        for field in ("name", "source", "branch_names", "direction_names"):
+        for field in ("name", "source", "branch_names", "direction_names", "contact_names"):
             assert getattr(found, field) == getattr(motion, field)
         for field in ("name", "made_by", "checksum", "others"):
             assert getattr(found.robot, field) == getattr(motion.robot, field)

@@ -19,7 +19,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
-from mrhubo.motion.motion import Motion
+from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.readers.assemble import (
     BLOCK,
     FARTHEST_M,
@@ -36,6 +36,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.world import WORLDS
+from mrhubo.motion.writers.amass import CONTACT_KEY
 
 _MAX_SMALL = 1_000_000
 """Bytes of an array that holds a number, some, or a text."""
@@ -88,6 +89,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         description = _read_description(file, notes)
         root_rotation_T33, root_position_T3 = _read_root(file, key, form, len(local_TJ33), notes)
         betas = _read_betas(file, notes)
+        contact_T4 = _read_contacts(file, len(local_TJ33), notes)
         family, rest = find_family(file, betas)
     name = motion_name(path)
     motion = Motion.of(
@@ -98,6 +100,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         root_rotation_T33=root_rotation_T33,
         root_position_T3=root_position_T3,
         betas=betas,
+        contact_T4=contact_T4,
         source=f"SMPL-family .npz with '{key}'",
         family=family,
         notes=tuple(notes),
@@ -149,6 +152,20 @@ def _read_root(
             notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
             position_T3 = None
     return rotation_T33, None if position_T3 is None else position_T3.astype(np.float32)
+
+
+def _read_contacts(file: NpzFile, frames: int, notes: list[str]) -> np.ndarray | None:
+    """Whether soles are planted (T, 4), of `contact`, whose columns are `SOLE_POINTS`, as mrhubo writes it."""
+    if CONTACT_KEY not in file.keys:
+        return None
+    try:
+        shape = file.shape(CONTACT_KEY, "fiub", max_rows=MAX_FRAMES)
+        if shape != (frames, len(SOLE_POINTS)):
+            raise UserError(f"has shape {shape}; expected {(frames, len(SOLE_POINTS))}")
+        return file.read(CONTACT_KEY, "fiub") != 0
+    except UserError as error:
+        notes.append(f"'{CONTACT_KEY}' is left out: {shortened(str(error), 200)}")
+        return None
 
 
 def _root_matrices(key: str, rows_TX: np.ndarray | None, notes: list[str]) -> np.ndarray | None:

@@ -16,6 +16,9 @@ REST_KEY, OWN_REST = "rest_directions", "mrhubo"
 """The key that says to which rest pose rotations refer, and its text where that is our own skeleton's: other programs
 want to hear of a body model they know (`surface_model_type`)."""
 
+CONTACT_KEY = "contact"
+"""The key of which points of soles are planted."""
+
 
 def write_motion(
     path: Path,
@@ -24,12 +27,14 @@ def write_motion(
     trans_T3: np.ndarray,
     frame_rate: float,
     description: str,
+    contact_T4: np.ndarray | None = None,
 ) -> None:
     """Writes a motion with AMASS's keys, as float32, atomically; the same numbers give the same bytes.
 
     ``pose_body_T63`` and ``root_orient_T3``: axis-angle [rad] of joints 1..21, which refer to our skeleton's rest pose,
     and of the pelvis; ``trans_T3``: place of
-    the pelvis [m]; ``frame_rate``: frames per second.
+    the pelvis [m]; ``frame_rate``: frames per second; ``contact_T4``: whether the left heel, the left toe, the right
+    heel and the right toe are planted, where that is known.
     """
     frames = len(pose_body_T63)
     arrays = {"pose_body": (pose_body_T63, 63), "root_orient": (root_orient_T3, 3), "trans": (trans_T3, 3)}
@@ -47,5 +52,9 @@ def write_motion(
         REST_KEY: np.asarray(OWN_REST, dtype="<U6"),
         "description": np.asarray(description, dtype=f"<U{max(1, len(description))}"),
     }
+    if contact_T4 is not None:
+        if np.shape(contact_T4) != (frames, 4):
+            raise ValueError(f"{CONTACT_KEY}: expected shape ({frames}, 4), got {np.shape(contact_T4)}")
+        content[CONTACT_KEY] = np.asarray(contact_T4, dtype=np.bool_)
     with atomic_path(Path(path)) as temporary, open(temporary, "wb") as handle:
         np.savez(handle, **content)

@@ -1,7 +1,34 @@
 """Where a robot with feet stands and goes: its root, and legs that keep planted feet where they are."""
 
-from mrhubo.reference.standing.human import HumanSteps, flatten, read_steps
+from mrhubo.reference.standing.human import (
+    CROOKED,
+    FAR_M,
+    HumanSteps,
+    flatten,
+    given_contacts,
+    has_root,
+    motion_root,
+    read_steps,
+    stand_flat,
+)
 from mrhubo.reference.standing.legs import Legs
-from mrhubo.reference.standing.stand import Stand, Standing
+from mrhubo.reference.standing.stand import PLANTED, UNDER_M, Stand, Standing, continuous, standing_fields
 
-__all__ = ["HumanSteps", "Legs", "Stand", "Standing", "flatten", "read_steps"]
+__all__ = [
+    "CROOKED",
+    "FAR_M",
+    "PLANTED",
+    "UNDER_M",
+    "HumanSteps",
+    "Legs",
+    "Stand",
+    "Standing",
+    "continuous",
+    "flatten",
+    "given_contacts",
+    "has_root",
+    "motion_root",
+    "read_steps",
+    "stand_flat",
+    "standing_fields",
+]

@@ -15,13 +15,13 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
-from mrhubo.motion.motion import Motion
+from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
 
-_CROOKED = 1e-2
+CROOKED = 1e-2
 """How far a rotation's numbers may be from those of one: files round them."""
-_FAR_M = 1e5
+FAR_M = 1e5
 """No motion goes so far [m]; in float32, places out there are centimetres apart."""
 
 
@@ -50,36 +50,65 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | N
     Raises:
         UserError: the root holds NaN, infinite numbers or places out of this world; says in which frame.
     """
-    root_T33, root_T3 = motion.root_rotation_T33, motion.root_position_T3
-    if not legs.has_feet or root_T33 is None or root_T3 is None or not len(motion):
+    if not legs.has_feet or not has_root(motion) or not len(motion):
         return None
-    crooked_T = (root_T33.mT @ root_T33 - torch.eye(3)).abs().amax(dim=(1, 2)) > _CROOKED
-    for wrong_T, what in (
-        (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), NOT_FINITE),
-        (crooked_T, "a root whose matrix is no rotation"),
-        (root_T3.abs().amax(dim=1) > _FAR_M, f"a root farther than {_FAR_M / 1000:.0f} km from the origin"),
-    ):
-        refuse_frames(wrong_T, what)
+    root_T33, way_T3 = motion_root(motion, local_TJ33, legs)
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
-    root_T33, root_T3 = root_T33.to(points_TK3), root_T3.to(points_TK3)
-    turned_TK3 = points_TK3 @ root_T33.mT
-    soles_TP3, way_T3 = (x.double().cpu().numpy() for x in (turned_TK3[:, legs.contacts], root_T3))
-    world_TK3 = turned_TK3 + root_scale(soles_TP3, way_T3, motion.frame_rate) * root_T3[:, None]
+    world_TK3 = points_TK3 @ root_T33.mT + way_T3[:, None]
     place_TP3 = world_TK3[:, legs.contacts].double().cpu().numpy()
-    contacts = find_contacts(place_TP3, motion.frame_rate)
+    contacts = find_contacts(place_TP3, motion.frame_rate, given_TP=given_contacts(motion, legs))
     path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
     return HumanSteps(
         root_T33 @ turns_TJ33[:, legs.joint], legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
     )
 
 
+def has_root(motion: Motion) -> bool:
+    """Whether a motion tells where its root is and how it is turned."""
+    return motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+
+
+def given_contacts(motion: Motion, legs: Legs) -> np.ndarray | None:
+    """Which points of soles (T, P) a motion says are planted; None: it does not say."""
+    contact_T4 = motion.arrays.contact_T4
+    if contact_T4 is None:
+        return None
+    columns = [SOLE_POINTS.index(name) for sole in legs.soles for name in sole.part.stands]
+    return np.asarray(contact_T4, dtype=bool)[:, columns]
+
+
+def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor, Tensor]:
+    """Rotation (T, 3, 3) and place (T, 3) [m] of a motion's root, whose way is made to fit the skeleton's legs.
+
+    Raises:
+        UserError: as for `read_steps`.
+    """
+    root_T33, root_T3 = motion.root_rotation_T33, motion.root_position_T3
+    assert root_T33 is not None and root_T3 is not None
+    crooked_T = (root_T33.mT @ root_T33 - torch.eye(3)).abs().amax(dim=(1, 2)) > CROOKED
+    for wrong_T, what in (
+        (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), NOT_FINITE),
+        (crooked_T, "a root whose matrix is no rotation"),
+        (root_T3.abs().amax(dim=1) > FAR_M, f"a root farther than {FAR_M / 1000:.0f} km from the origin"),
+    ):
+        refuse_frames(wrong_T, what)
+    root_T33, root_T3 = root_T33.to(local_TJ33), root_T3.to(local_TJ33)
+    turned_TP3 = legs.body_map.skeleton.keypoints(local_TJ33)[:, legs.contacts] @ root_T33.mT
+    soles_TP3, way_T3 = (x.double().cpu().numpy() for x in (turned_TP3, root_T3))
+    return root_T33, root_scale(soles_TP3, way_T3, motion.frame_rate) * root_T3
+
+
 def flatten(target_TD3: Tensor, steps: HumanSteps, legs: Legs) -> Tensor:
     """Directions (T, D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is the
     world's.
     """
-    found_TD3, names = target_TD3.clone(), legs.body_map.direction_names
     up_T3 = steps.turn_T33[:, 1].to(target_TD3)  # the world's up, seen from what carries the legs
-    weight_TP = torch.from_numpy(steps.contacts.weight_TP).to(target_TD3)
+    return stand_flat(target_TD3, up_T3, torch.from_numpy(steps.contacts.weight_TP).to(target_TD3), legs)
+
+
+def stand_flat(target_TD3: Tensor, up_T3: Tensor, weight_TP: Tensor, legs: Legs) -> Tensor:
+    """The same, told the world's up (T, 3) as directions see it, and how much points of soles are planted (T, P)."""
+    found_TD3, names = target_TD3.clone(), legs.body_map.direction_names
     for number, sole in enumerate(legs.soles):
         ahead, above = (names.index(name) for name in sole.part.direction_names)
         share_T1 = weight_TP[:, 2 * number : 2 * number + 2].amin(dim=1, keepdim=True)

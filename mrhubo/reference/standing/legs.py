@@ -35,6 +35,18 @@ class LegPoses:
     """Centres of what can touch the floor."""
 
 
+@dataclass(frozen=True)
+class LegBuild:
+    """How a leg is built, as far as its directions tell where its sole is; at home, m."""
+
+    hip_3: Tensor
+    """Where it starts, from the root, in the human axes of what carries the legs."""
+    bones: tuple[tuple[str, float], ...]
+    """The direction and the length of each limb, outwards."""
+    sole_23: Tensor
+    """Rear and front of the sole from where the last limb ends: in the foot's forward, up and left."""
+
+
 class Legs(nn.Module):
     """The legs of one robot; `has_feet` says whether it has any that stand."""
 
@@ -77,6 +89,8 @@ class Legs(nn.Module):
         """Human keypoints between which a person's root is."""
         self.joint = JOINT_NAMES.index(parts[self.carrier].joint)
         """The human joint that turns what carries the legs."""
+        self.built: list[LegBuild] = []
+        """How each leg is built."""
         self.contacts = keypoint_indices([name for sole in self.soles for name in sole.part.stands])
         """Human keypoints of the points of soles (P)."""
         self._link_rows = [robot.link_index(sole.link) for sole in self.soles]
@@ -121,6 +135,9 @@ class Legs(nn.Module):
             robots += float((ankle_3 - self.points_P3[2 * number]) @ up_3)
             humans += float(rest[chain[-1].end][1] - min(rest[name][1] for name in sole.part.stands))
             lengths.append(robots / humans)
+            out_3 = poses.rotation_BL33[0, row].mT @ (place(chain[0].start) - poses.position_BL3[0, row]) - self.root_3
+            bones = tuple((limb.end, float((place(limb.end) - place(limb.start)).norm())) for limb in chain)
+            self.built.append(LegBuild(self.axes_33.mT @ out_3, bones, _in_foot(self, number, ankle_3)))
         self.scale = sum(lengths) / len(lengths)
         """Length of the robot's legs by that of a person's."""
 
@@ -174,10 +191,33 @@ class Legs(nn.Module):
         base_B33 = carrier_B33 @ poses.rotation_BL33[:, self._carrier_row].mT
         return root_B3 - (base_B33 @ self._root(poses)[..., None])[..., 0], base_B33
 
+    def pointing(self, target_BD3: Tensor) -> Tensor:
+        """Where points of soles are (B, P, 3) [m] if legs point as directions (B, D, 3) say, as `places` has it: of
+        their lengths alone, whatever joints can do.
+        """
+        names, found = self.body_map.direction_names, []
+        for leg, sole in zip(self.built, self.soles, strict=True):
+            place_B3 = leg.hip_3 + sum(length * target_BD3[:, names.index(name)] for name, length in leg.bones)
+            forward_B3, up_B3 = (target_BD3[:, names.index(name)] for name in sole.part.direction_names)
+            axes_B33 = torch.stack((forward_B3, up_B3, torch.linalg.cross(up_B3, forward_B3)), dim=1)
+            found.append(place_B3[:, None] + leg.sole_23 @ axes_B33)
+        return torch.cat(found, dim=1)
+
+    def planted(self, planted_TP: np.ndarray) -> np.ndarray:
+        """Whether each foot (T, S) is planted, of points of soles (T, P)."""
+        return np.logical_or(planted_TP[:, ::2], planted_TP[:, 1::2])
+
     def human_root(self, keypoint_BK3: Tensor) -> Tensor:
         """The place (B, 3) of a person's root, of keypoints (B, K, 3)."""
         assert keypoint_BK3.shape[1] == len(KEYPOINT_NAMES)
         return keypoint_BK3[:, self.starts].mean(dim=1)
+
+
+def _in_foot(legs: Legs, number: int, ankle_3: Tensor) -> Tensor:
+    """Rear and front of a sole (2, 3) from the ankle, in the foot's forward, up and left."""
+    forward_3, up_3 = legs.body_map.keypoints.ends[legs.soles[number].part.name].axes_23.to(ankle_3)
+    axes_33 = torch.stack((forward_3, up_3, torch.linalg.cross(up_3, forward_3)))
+    return (legs.points_P3[2 * number : 2 * number + 2] - ankle_3) @ axes_33.mT
 
 
 def _nearest_balls(soles: Sequence[Sole]) -> np.ndarray:

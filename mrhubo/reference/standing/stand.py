@@ -13,6 +13,7 @@ Legend: T frames, P points of soles, K balls or contacts, D directions, N joints
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -55,14 +56,6 @@ class Stand:
     """Its rotation there."""
     root_T3: Tensor
     """Place of the root, between the legs' first joints, in the human's world [m]."""
-
-    @property
-    def quaternion_T4(self) -> Tensor:
-        """The base's rotation as unit quaternions, w first, that go on from one another without a change of sign."""
-        quaternion_T4 = rotation.matrix_to_quaternion(self.rotation_T33)[:, [3, 0, 1, 2]]
-        turns_T = (quaternion_T4[1:] * quaternion_T4[:-1]).sum(-1) < 0
-        sign_T = torch.nn.functional.pad(1.0 - 2.0 * turns_T.to(quaternion_T4), (1, 0), value=1.0).cumprod(0)
-        return quaternion_T4 * sign_T[:, None]
 
 
 @dataclass(frozen=True)
@@ -211,3 +204,27 @@ class Standing(nn.Module):
         if len(q_XN) == 1:
             return self.avoidance(q_XN, target_XD3)
         return self.avoidance.in_motion(q_XN, target_XD3, smoothness, step_N, around, fixed_X)
+
+
+def standing_fields(position_T3: Tensor, rotation_T33: Tensor, planted_TS: np.ndarray, legs: Legs) -> dict[str, Any]:
+    """What an answer tells of a robot on its floor, by the names of `RobotMotion`.
+
+    Args:
+        position_T3: place of the base in the robot's world [m].
+        rotation_T33: its rotation there.
+        planted_TS: whether each foot is planted.
+        legs: the robot's.
+    """
+    return {
+        "root_position": position_T3,
+        "root_quaternion_wxyz": continuous(rotation.matrix_to_quaternion(rotation_T33)[:, [3, 0, 1, 2]]),
+        "contact": torch.from_numpy(planted_TS).to(position_T3.device),
+        "contact_names": tuple(sole.part.name for sole in legs.soles),
+    }
+
+
+def continuous(quaternion_T4: Tensor) -> Tensor:
+    """Unit quaternions that go on from one another without a change of sign."""
+    turns_T = (quaternion_T4[1:] * quaternion_T4[:-1]).sum(-1) < 0
+    sign_T = torch.nn.functional.pad(1.0 - 2.0 * turns_T.to(quaternion_T4), (1, 0), value=1.0).cumprod(0)
+    return quaternion_T4 * sign_T[:, None]

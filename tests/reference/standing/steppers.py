@@ -7,7 +7,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import Skeleton
-from mrhubo.body.skeleton import POSED_JOINT_NAMES, keypoint_indices
+from mrhubo.body.skeleton import KEYPOINT_NAMES, POSED_JOINT_NAMES, keypoint_indices
 from mrhubo.motion import Motion
 
 
@@ -22,6 +22,31 @@ def jump(frames: int = 48, rate: float = 24.0) -> Motion:
     phase_T = torch.linspace(0, 1, frames)
     air_T = ((phase_T - 0.375) / 0.25).clamp(0, 1)
     return _standing(0.5 * torch.sin(torch.pi * phase_T) ** 2, 0 * phase_T, rate, 0.6 * air_T * (1 - air_T))
+
+
+def walk(frames: int, speed: float = 0.6) -> Motion:
+    """Goes straight on with bent knees [m/s]: each foot is planted for half a second and swings forward for another; at
+    60 frames a second.
+    """
+    still, skeleton = _standing(torch.full((frames,), 0.45), torch.zeros(frames), 60.0, 0.0), Skeleton()
+    local_TJ33, time_T = still.local_TJ33.clone(), torch.arange(frames) / 60
+    heights = dict(zip(KEYPOINT_NAMES, skeleton.keypoints(local_TJ33[:1])[0, :, 1].tolist(), strict=True))
+    for late, side in enumerate(("left", "right")):
+        hip, knee, ankle = (POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("hip", "knee", "ankle"))
+        phase_T = (2 * time_T + late) % 2
+        ahead_T = speed / 2 * torch.where(phase_T < 1, 0.5 - phase_T, phase_T - 1.5)
+        lift_T = 0.5 * (phase_T - 1).clamp_min(0) * (2 - phase_T)
+        swing_T = -(ahead_T / (heights[f"{side}_hip"] - heights[f"{side}_ankle"])).asin()
+        local_TJ33[:, hip] = _pitch(swing_T - 2 * lift_T) @ local_TJ33[:, hip]
+        local_TJ33[:, knee] = local_TJ33[:, knee] @ _pitch(4 * lift_T)
+        local_TJ33[:, ankle] = (local_TJ33[:, hip] @ local_TJ33[:, knee]).mT
+    lowest_T = skeleton.keypoints(local_TJ33)[..., 1].amin(dim=1)
+    place_T3 = torch.stack((0 * time_T, -lowest_T, speed * time_T), dim=1)
+    return still.changed(local_TJ33=local_TJ33, root_position_T3=place_T3)
+
+
+def _pitch(angle_T: Tensor) -> Tensor:
+    return rotation.axis_angle_to_matrix(torch.stack((angle_T, 0 * angle_T, 0 * angle_T), dim=1))
 
 
 def _standing(bend_T: Tensor, lean_T: Tensor, rate: float, above: Tensor | float) -> Motion:

@@ -1,0 +1,131 @@
+"""A robot with feet follows a person with a root: soles on the floor, planted feet in their places."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from mrhubo import rotation
+from mrhubo.body import BodyPrior
+from mrhubo.errors import UserError
+from mrhubo.evaluation.whole_body import score_whole_body
+from mrhubo.frames import human_to_world
+from mrhubo.motion import Motion
+from mrhubo.retargeter import Retargeter
+from mrhubo.retargeter.nearest import NearestJoints
+from mrhubo.streaming import Stream, StreamSettings
+from tests.reference.standing.steppers import jump, moved, squat, walk
+from tests.reference.walkers import walker
+
+SETTINGS = StreamSettings(avoid_collisions=False)
+
+
+@pytest.fixture(scope="module")
+def biped(tmp_path_factory: pytest.TempPathFactory) -> Retargeter:
+    """A robot with legs that nothing was trained for."""
+    body_map = walker(tmp_path_factory.mktemp("walker"))
+    return Retargeter(NearestJoints(body_map), body_map, BodyPrior.open(), None, phi_threshold=0.01)
+
+
+def followed(retargeter: Retargeter, motion: Motion, **options: object) -> tuple[Tensor, Tensor, Tensor]:
+    """Joint angles, places and rotations of the base of a motion that is followed."""
+    found = Stream(retargeter, motion.frame_rate, settings=SETTINGS, **options).retarget(motion)  # pyright: ignore
+    assert found.root_position is not None and found.root_quaternion_wxyz is not None
+    return found.q, found.root_position, rotation.quaternion_to_matrix(found.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+
+
+@pytest.fixture(scope="module")
+def squatting(biped: Retargeter) -> tuple[Motion, tuple[Tensor, Tensor, Tensor]]:
+    motion = squat(48, sway=0.1)
+    return motion, followed(biped, motion)
+
+
+def soles(retargeter: Retargeter, answer: tuple[Tensor, Tensor, Tensor]) -> tuple[np.ndarray, np.ndarray]:
+    """Places of the points of soles (T, P, 3), and heights of what can touch the floor (T, K) [m]."""
+    legs = Stream(retargeter)._legs
+    found = legs.on_floor(retargeter.body_map.robot.forward(answer[0]), *answer[1:])
+    return found.point_BP3.numpy(), (found.ball_BK3[..., 2] - legs.radius_K).numpy()
+
+
+def test_planted_feet_stay_and_no_sole_is_under_the_floor(biped: Retargeter, squatting) -> None:  # noqa: ANN001
+    motion, answer = squatting
+    point_TP3, height_TK = soles(biped, answer)
+    assert height_TK.min() > -1e-5
+    # The middle of what is planted, here all points of both soles, does not move at all.
+    assert np.abs(point_TP3[1:].mean(axis=1) - point_TP3[0].mean(axis=0))[:, :2].max() < 1e-5
+    assert np.linalg.norm(point_TP3[1:] - point_TP3[0], axis=-1).max() < 0.03
+    score = score_whole_body(biped.body_map, motion, *answer)
+    assert score.speed_max <= 1 and score.outside == 0 and score.sunk == 0 and score.floating == 0
+    assert score.slide_cm_s < 1 and score.heading_deg < 0.1 and score.parts_deg["knee"] < 4
+
+
+def test_who_jumps_flies_as_high_as_the_person(biped: Retargeter) -> None:
+    motion = jump(48, rate=60.0)
+    answer = followed(biped, motion)
+    _, height_TK = soles(biped, answer)
+    lowest_T = height_TK.min(axis=1)
+    assert lowest_T.min() > -1e-5 and lowest_T[:15].max() < 0.01 and lowest_T[-9:].max() < 0.02
+    assert lowest_T.max() == pytest.approx(0.15 * Stream(biped)._legs.scale, rel=0.3)
+
+
+@pytest.mark.parametrize("rate", [24.0, 60.0])
+def test_a_person_elsewhere_who_looks_elsewhere_is_followed_there(biped: Retargeter, rate: float) -> None:
+    motion = squat(16, rate)
+    stream = Stream(biped, settings=SETTINGS)
+    here, there = stream.retarget_all([motion, moved(motion, 1.0, (0.4, -0.7, 2.0))])
+    assert here.root_position is not None and there.root_position is not None
+    torch.testing.assert_close(there.q, here.q, atol=3e-4, rtol=0)
+    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, 1.0]))
+    away_3 = stream._legs.scale * human_to_world(torch.tensor([0.4, 0.0, 2.0]))
+    torch.testing.assert_close(there.root_position, here.root_position @ turn_33.T + away_3, atol=1e-3, rtol=0)
+
+
+def test_a_walk_goes_as_far_as_the_person_and_its_feet_keep_still(biped: Retargeter) -> None:
+    motion = walk(150)
+    answer = followed(biped, motion)
+    score = score_whole_body(biped.body_map, motion, *answer)
+    assert motion.root_position_T3 is not None
+    gone = float((answer[1][-1] - answer[1][0])[0])
+    assert gone == pytest.approx(1.49 * Stream(biped)._legs.scale, rel=0.06)
+    assert score.path_cm_m < 5 and score.slide_cm_s < max(2.0, score.human_slide_cm_s) and score.sunk == 0
+
+
+def test_frames_one_by_one_are_answered_as_the_motion(biped: Retargeter) -> None:
+    motion = squat(12, 60.0)
+    whole = Stream(biped, settings=SETTINGS).retarget(motion)
+    stream = Stream(biped, settings=SETTINGS)
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    for t, root in enumerate(zip(motion.root_rotation_T33, motion.root_position_T3, strict=True)):
+        answer = stream(motion.local_TJ33[t], root=root)
+        assert whole.root_position is not None and answer.root_position is not None and answer.contact is not None
+        torch.testing.assert_close(answer.q, whole.q[t], atol=1e-5, rtol=0)
+        torch.testing.assert_close(answer.root_position, whole.root_position[t], atol=1e-5, rtol=0)
+        assert answer.contact_names == ("left_foot", "right_foot") and bool(answer.contact.all())
+    stands = answer.root_position
+    for _ in range(6):  # who is not seen leaves the robot where it stands
+        answer = stream(None)
+    assert answer.root_position is not None and stands is not None and float(answer.confidence) == 0
+    assert float((answer.root_position - stands).norm()) < 0.02
+
+
+def test_roots_and_contacts_that_make_no_sense_are_refused(biped: Retargeter) -> None:
+    pose, eye, zero = squat(2).local_TJ33[0], torch.eye(3), torch.zeros(3)
+    stream = Stream(biped, settings=SETTINGS)
+    assert stream.contact_points == ("left_heel", "left_toe", "right_heel", "right_toe")
+    for root, message in (((eye, torch.zeros(2)), r"a root is a rotation \(3, 3\)"), ((2 * eye, zero), "no rotation")):
+        with pytest.raises(UserError, match=message):
+            stream(pose, root=root)
+    with pytest.raises(UserError, match="expected contacts of 4 points: left_heel"):
+        stream(pose, root=(eye, zero), contacts=[True, False])
+    assert stream(pose, root=(eye, zero), contacts=[True] * 4).root_position is not None
+    assert float(stream(pose, root=(eye, torch.full((3,), torch.nan))).confidence) == 0
+    with pytest.raises(UserError, match="earlier poses came with a root"):
+        stream(pose)
+    stream.reset()
+    assert stream(pose).root_position is None
+    with pytest.raises(UserError, match="earlier poses came without a root"):
+        stream(pose, root=(eye, zero))
+    with pytest.raises(UserError, match="the floor's height must be a number"):
+        Stream(biped, floor=float("nan"))
