@@ -30,6 +30,8 @@ def build_parser() -> CommandParser[None]:
     parser.add_argument("--out", metavar="OUT", help=out)
     tree = "print the joints as a tree, with axes, positions and limits, and nothing else; works for any URDF"
     parser.add_argument("--tree", action="store_true", help=tree)
+    whole = "legs, feet and waist too, for `mrhubo retarget`; fits are of arms, hands and head (docs/whole-body.md)"
+    parser.add_argument("--whole-body", action="store_true", help=whole)
     parser.add_argument("--force", action="store_true", help="replace files that are there already")
     return parser
 
@@ -45,14 +47,19 @@ def main(argv: list[str]) -> int:
     if options.tree:
         return _show_tree(word)
     if is_config(word):
+        if options.whole_body:
+            raise UserError("command line: --whole-body: a config says itself what of a body it has")
         return _draw_config(word, out, options.force)
     from mrhubo.describing.run import describe_model
+    from mrhubo.describing.yaml_file import next_command
     from mrhubo.robot.unsure import needed_answers
 
-    described = describe_model(word, out, options.force)
+    described = describe_model(word, out, options.force, options.whole_body)
     status = tell(described)
     answer = ", answer what is not decided" if needed_answers(described.doubts) else ""
-    print(f"next:     look at the picture{answer}, then  mrhubo fit {described.file}")
+    print(f"next:     look at the picture{answer}, then  {next_command(described.found, described.file)}")
+    if described.more:
+        print(f"          {' and '.join(described.more)} move too with  mrhubo describe {word} --whole-body")
     return status
 
 
