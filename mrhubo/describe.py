@@ -19,6 +19,10 @@ DESCRIPTION = (
 )
 
 
+_OPEN = 3
+"""What the command returns where all is written, and guesses are left which a fit refuses until they are answered."""
+
+
 def build_parser() -> CommandParser[None]:
     """The command's arguments."""
     file = (
@@ -37,7 +41,9 @@ def build_parser() -> CommandParser[None]:
 
 
 def main(argv: list[str]) -> int:
-    """The command; 2 where a config was written, or drawn, that a fit would refuse as it stands."""
+    """The command; 2 where a config was written, or drawn, that cannot be right, 3 where it leaves open what must be
+    answered before a fit.
+    """
     options = build_parser().parse_args(argv)
     word, out = options.word, None if options.out is None else Path(options.out)
     kinds = (".png",) if is_config(word) else (".yaml", ".yml")
@@ -55,8 +61,9 @@ def main(argv: list[str]) -> int:
     from mrhubo.robot.unsure import needed_answers
 
     described = describe_model(word, out, options.force, options.whole_body)
-    status = tell(described)
-    answer = ", answer what is not decided" if needed_answers(described.doubts) else ""
+    open_ = needed_answers(described.doubts)
+    status = tell(described) or _OPEN * bool(open_)
+    answer = ", answer what is not decided" if open_ else ""
     print(f"next:     look at the picture{answer}, then  {next_command(described.found, described.file)}")
     if described.more:
         print(f"          {' and '.join(described.more)} move too with  mrhubo describe {word} --whole-body")
@@ -93,7 +100,13 @@ def _draw_config(word: str, out: Path | None, force: bool) -> int:
     if not force and picture.exists() and not is_our_picture(picture):
         refuse_existing(picture)
     print(f"picture:  {picture}")
-    return _draw(file, picture)
+    status = _draw(file, picture)
+    from mrhubo.robot.unsure import needed_answers
+
+    if status == 0 and (open_ := needed_answers(load_config(file).robot.unsure)):
+        print(f"open:     {', '.join(open_)}: answer these before a fit, and take their names out of `unsure`")
+        return _OPEN
+    return status
 
 
 def _draw(file: Path, picture: Path) -> int:

@@ -84,7 +84,7 @@ def main(argv: list[str]) -> int:
     print(answerer.described)
     outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
     if outcome.summaries:
-        print(f"\n{table(outcome.summaries)}")
+        print(f"\n{table(outcome.summaries, is_told=options.retargeter is None)}")
     if not outcome.failures:
         return 0
     sentences = list(outcome.failures.values())

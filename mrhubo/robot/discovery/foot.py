@@ -42,12 +42,10 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
     down = -float(unit(leg.ankle.point_3 - leg.hip.point_3) @ heading.up_3)
     if how is None:
         how, sure = "as it stands at the zero pose", 0.7
-        if down < _STANDING:
+        if down < _STANDING or leg.ankle_at is None:
             sure = 0.4
-            doubt = (
-                "the leg does not stand at the zero pose, so nothing tells how its foot lies on a floor; taken: "
-                "upright as the robot is there"
-            )
+            why = "no joint turns it against the shin" if leg.ankle_at is None else "the leg does not stand at zero"
+            doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
     forward_3 = heading.forward_3
     if leg.straight and leg.ankle_at is not None:
         axis_3 = leg.chain[leg.ankle_at].hinge.line.axis_3

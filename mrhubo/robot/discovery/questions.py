@@ -15,6 +15,8 @@ from mrhubo.robot.soles import sole_balls
 
 _SURE = 0.5
 """Confidence under which the user is asked."""
+_BACK = 3
+"""Joints of a waist at most, where no legs tell that it is one."""
 
 Named = tuple[str, Spot, tuple[Candidate, ...]]
 """A point by its name, and where else it may lie."""
@@ -50,6 +52,10 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
         first = tuple(chain[0].hinge.name for chain in roles.legs.chains)
         yield Question("pelvis", "of the limbs below it no knee could be told, so they are left out: if they are legs, "
                        "write hips, knees, ankles and feet by hand, with their joints", first)  # fmt: skip
+    turning = tuple(step.hinge.name for step in roles.waist if step.hinge.rotary)
+    if roles.legs is None and len(turning) > _BACK:
+        yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
+                       "which may be a tail or an arm", turning)  # fmt: skip
 
 
 def coupled(limbs: Limbs) -> Iterator[Question]:
