@@ -3,11 +3,11 @@ random humanoids, and on other URDF files.
 
     python benchmarks/discovery.py [--seeds 0-1000] [--strange 0-100] [--urdfs FOLDER]
 
-The shipped robots' hand-written configs are the measure of theirs. A random humanoid counts as right when its joints,
-points (2 cm on an arm of half a metre), up, forward and hands are; where something is wrong, it counts whether a
-question asks about it. The strange ones are random humanoids too, each with something that only some robots have, and
-some of them are to be refused. Of other files only what was found is printed, as nobody wrote down what is true of
-them.
+The shipped robots' hand-written configs, with legs and waist where they have them, are the measure of theirs. A random
+humanoid counts as right when its joints, points (2 cm on an arm of half a metre), up, forward, hands and feet are;
+where something is wrong, it counts whether a question asks about it. The strange ones are random humanoids too, each
+with something that only some robots have, and some of them are to be refused. Of other files only what was found is
+printed, as nobody wrote down what is true of them.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.robot import read_keypoints
 from mrhubo.robot.discovery import Discovery, discover
-from mrhubo.robot.generator import humanoid
-from mrhubo.robot.generator.score import asked, mistakes
+from mrhubo.robot.generator import Humanoid, humanoid
+from mrhubo.robot.generator.score import asked, mistakes, region
 from mrhubo.robot.generator.strange import STRANGE
 from mrhubo.robot.generator.variants import variant
 from mrhubo.robot.urdf import describe
@@ -68,7 +68,7 @@ def _range(text: str) -> range:
 def shipped() -> None:
     """The shipped robots in every form."""
     rows = []
-    for robot in ("nao", "coman", "reachy"):
+    for robot in ("nao-whole-body", "coman-whole-body", "reachy"):
         config = load_config(project_root() / f"conf/{robot}.yaml").robot
         points = read_keypoints(config.keypoints).points
         description = describe(config.urdf)
@@ -77,7 +77,7 @@ def shipped() -> None:
                 path = Path(folder) / "robot.urdf"
                 text, names = variant(config.urdf, seed=1, **changes)
                 path.write_text(text)
-                found = discover(path)
+                found = discover(path, whole_body=True)
                 new = {joint: names.get(joint, joint) for joint in description.joints}
                 missing = {new[joint] for joint in config.joints} - set(found.joints)
                 scale = float(changes.get("scale", 1.0))
@@ -116,6 +116,7 @@ def position(description, link: str, offset_3: np.ndarray) -> np.ndarray:
 def made(title: str, seeds: list[tuple[int, str | None]]) -> None:
     """Random humanoids: how many are right, and of what kind those are that are not."""
     groups: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+    parts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
     faults: collections.Counter[str] = collections.Counter()
     silent: list[str] = []
     seconds = 0.0
@@ -126,8 +127,9 @@ def made(title: str, seeds: list[tuple[int, str | None]]) -> None:
             path.write_text(truth.urdf)
             start = time.perf_counter()
             try:
-                found = discover(path)
+                found = discover(path, whole_body=True)
             except UserError:
+                found = None
                 wrong, told = ["refused"] if truth.mappable else [], True
             else:
                 wrong = mistakes(found, truth, path) if truth.mappable else ["two arms: not refused"]
@@ -136,10 +138,31 @@ def made(title: str, seeds: list[tuple[int, str | None]]) -> None:
             outcome = "right" if not wrong else "asks" if told else "wrong"
             for group in ("all", *(truth.told if kind is None else [kind])):
                 groups[group][outcome] += 1
+            for part in _parts(truth):
+                there = [phrase for phrase in wrong if region(phrase) == part]
+                if found is not None:
+                    parts[part]["right" if not there else "asks" if asked(found, there) else "wrong"] += 1
             faults.update({phrase.split(":")[0].removeprefix("left_").removeprefix("right_") for phrase in wrong})
             if outcome == "wrong":
                 silent.append(f"{seed}{f', {kind}' if kind else ''}: {'; '.join(wrong)[:160]}")
-    rows = [
+    heads = ["count", "right [%]", "wrong, asks [%]", "wrong, silent [%]"]
+    print_table([title, *heads], _shares(groups))
+    print()
+    print_table([f"{title}, by part", *heads], _shares(parts))
+    print(f"\n{1000 * seconds / max(len(seeds), 1):.0f} ms each; wrong parts: {dict(faults.most_common())}")
+    for line in silent[:_MOST_TOLD]:
+        print(f"silent {line}")
+    print()
+
+
+def _parts(truth: Humanoid) -> list[str]:
+    """What of a body a robot has."""
+    has = {"legs": bool(truth.chains["left_leg"]), "waist": bool(truth.chains["waist"])}
+    return ["arms and head", *(part for part, there in has.items() if there)]
+
+
+def _shares(groups: dict[str, collections.Counter[str]]) -> list[list[str]]:
+    return [
         [
             group,
             str(sum(counts.values())),
@@ -147,11 +170,6 @@ def made(title: str, seeds: list[tuple[int, str | None]]) -> None:
         ]
         for group, counts in sorted(groups.items())
     ]
-    print_table([title, "count", "right [%]", "wrong, asks [%]", "wrong, silent [%]"], rows)
-    print(f"\n{1000 * seconds / max(len(seeds), 1):.0f} ms each; wrong parts: {dict(faults.most_common())}")
-    for line in silent[:_MOST_TOLD]:
-        print(f"silent {line}")
-    print()
 
 
 def others(folder: Path) -> None:

@@ -6,7 +6,8 @@
 A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
 planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
 than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
-conf/ROBOT-whole-body.yaml. The picture shows moments of the first clip, the person above the robots.
+conf/ROBOT-whole-body.yaml. Of a robot without feet, whose base stays where it is, there are angles, speeds, steps and
+time alone. The picture shows moments of the first clip, the person above the robots.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
 from mrhubo.frames import human_to_world
 from mrhubo.motion import Motion, motion_files, read_motion, resample
 from mrhubo.reference import OptimizationResult, OptimizationRetargeter
+from mrhubo.reference.metrics import direction_error
 from mrhubo.retargeter import RetargetResult
 from mrhubo.robot import Robot
 from mrhubo.streaming import Stream, StreamSettings
@@ -61,6 +63,10 @@ def main(argv: list[str]) -> None:
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
             retargeter = OptimizationRetargeter(Robot.from_config(f"conf/{name}-whole-body.yaml"))
         motions = [_motion(path, options["rate"]) for path in _paths(options["clips"])]
+        if not retargeter.body_map.keypoints.standing:
+            for way in ways:
+                _print_without_feet(name, way, retargeter, motions, bool(options["collisions"]))
+            continue
         if options["picture"]:
             rows_of_pictures.setdefault("person", _person(motions[0]))
             rows_of_pictures[name] = _robot(retargeter, motions[0])
@@ -162,6 +168,46 @@ def _measure(
     score = score_whole_body(retargeter.body_map, motion, result.q, result.root_position, base_T33)
     touches = float("nan") if result.collision is None else float(result.collision.float().mean())
     return score, touches, 1000 * seconds / len(motion)
+
+
+def _print_without_feet(
+    name: str, way: str, retargeter: OptimizationRetargeter, motions: list[Motion], avoid: bool
+) -> None:
+    """The table of a robot with arms, head and waist alone."""
+    body_map, answers = retargeter.body_map, _WAYS[way](retargeter, avoid)
+    answers(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+    regions = {
+        "chest": "chest_", "upper arm": "_elbow", "forearm": "_wrist", "hand": "_hand_", "head": "head_",
+    }  # fmt: skip
+    columns = {
+        region: [i for i, direction in enumerate(body_map.measured_names) if word in direction]
+        for region, word in regions.items()
+    }
+    columns = {region: found for region, found in columns.items() if found}
+    rows: list[list[float]] = []
+    for motion in motions:
+        start = time.process_time()
+        q_TN = answers(motion).q
+        seconds = time.process_time() - start
+        off_TD = direction_error(body_map, q_TN, motion.for_skeleton(body_map.skeleton).local_TJ33)
+        change_TN = q_TN.diff(dim=0).abs() * motion.frame_rate
+        rows.append([
+            *(float(off_TD[:, found].mean()) for found in columns.values()),
+            float((change_TN / body_map.robot.velocity_N).max()),
+            float((change_TN / 24 > 0.5).any(dim=1).sum()),
+            1000 * seconds / len(motion),
+        ])  # fmt: skip
+    print(f"## {name}, as a {way}: {len(motions)} clips, {sum(map(len, motions)):,} frames, no feet\n")
+    means = [*np.mean(rows, axis=0)]
+    means[-3:-1] = [max(row[-3] for row in rows), sum(row[-2] for row in rows)]
+    print_table(
+        ["clip", *(f"{region} [deg]" for region in columns), "speed", "jumps", "ms a frame"],
+        [
+            [clip, *(f"{angle:.1f}" for angle in row[:-3]), f"{row[-3]:.2f}", f"{row[-2]:.0f}", f"{row[-1]:.1f}"]
+            for clip, row in zip([*(motion.name for motion in motions), "mean"], [*rows, means], strict=True)
+        ],
+    )
+    print()
 
 
 def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: list[str]) -> list[str]:

@@ -19,6 +19,10 @@ DESCRIPTION = (
 )
 
 
+_OPEN = 3
+"""What the command returns where all is written, and guesses are left which a fit refuses until they are answered."""
+
+
 def build_parser() -> CommandParser[None]:
     """The command's arguments."""
     file = (
@@ -30,12 +34,16 @@ def build_parser() -> CommandParser[None]:
     parser.add_argument("--out", metavar="OUT", help=out)
     tree = "print the joints as a tree, with axes, positions and limits, and nothing else; works for any URDF"
     parser.add_argument("--tree", action="store_true", help=tree)
+    whole = "legs, feet and waist too, for `mrhubo retarget`; fits are of arms, hands and head (docs/whole-body.md)"
+    parser.add_argument("--whole-body", action="store_true", help=whole)
     parser.add_argument("--force", action="store_true", help="replace files that are there already")
     return parser
 
 
 def main(argv: list[str]) -> int:
-    """The command; 2 where a config was written, or drawn, that a fit would refuse as it stands."""
+    """The command; 2 where a config was written, or drawn, that cannot be right, 3 where it leaves open what must be
+    answered before a fit.
+    """
     options = build_parser().parse_args(argv)
     word, out = options.word, None if options.out is None else Path(options.out)
     kinds = (".png",) if is_config(word) else (".yaml", ".yml")
@@ -45,14 +53,20 @@ def main(argv: list[str]) -> int:
     if options.tree:
         return _show_tree(word)
     if is_config(word):
+        if options.whole_body:
+            raise UserError("command line: --whole-body: a config says itself what of a body it has")
         return _draw_config(word, out, options.force)
     from mrhubo.describing.run import describe_model
+    from mrhubo.describing.yaml_file import next_command
     from mrhubo.robot.unsure import needed_answers
 
-    described = describe_model(word, out, options.force)
-    status = tell(described)
-    answer = ", answer what is not decided" if needed_answers(described.doubts) else ""
-    print(f"next:     look at the picture{answer}, then  mrhubo fit {described.file}")
+    described = describe_model(word, out, options.force, options.whole_body)
+    open_ = needed_answers(described.doubts)
+    status = tell(described) or _OPEN * bool(open_)
+    answer = ", answer what is not decided" if open_ else ""
+    print(f"next:     look at the picture{answer}, then  {next_command(described.found, described.file)}")
+    if described.more:
+        print(f"          {' and '.join(described.more)} move too with  mrhubo describe {word} --whole-body")
     return status
 
 
@@ -86,7 +100,13 @@ def _draw_config(word: str, out: Path | None, force: bool) -> int:
     if not force and picture.exists() and not is_our_picture(picture):
         refuse_existing(picture)
     print(f"picture:  {picture}")
-    return _draw(file, picture)
+    status = _draw(file, picture)
+    from mrhubo.robot.unsure import needed_answers
+
+    if status == 0 and (open_ := needed_answers(load_config(file).robot.unsure)):
+        print(f"open:     {', '.join(open_)}: answer these before a fit, and take their names out of `unsure`")
+        return _OPEN
+    return status
 
 
 def _draw(file: Path, picture: Path) -> int:

@@ -28,6 +28,8 @@ def build_parser() -> CommandParser[None]:
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
     robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
+    whole = "with the URDF of --robot: its legs, feet and waist move too, and not its arms and head alone"
+    parser.add_argument("--whole-body", action="store_true", help=whole)
     method = (
         "with --robot: `universal`, the network for every robot (default), or `reference`, the optimiser alone, which"
         " tells too where a robot with feet goes (default for those)"
@@ -62,9 +64,11 @@ def main(argv: list[str]) -> int:
     """The command; 2 where some of the motions could not be retargeted."""
     options = build_parser().parse_args(argv)
     from mrhubo.motion import ReadOptions
-    from mrhubo.retargeting import Request, find_files, plan_places, retarget_files, table
+    from mrhubo.retargeting import Request, find_files, of_package, plan_places, retarget_files, table
 
     _check_method(options.method, options.retargeter)
+    if options.whole_body and options.retargeter is not None:
+        raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
     files = find_files([Path(name) for name in options.motion])
     places = plan_places(options.out, options.format, files)
     bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
@@ -76,11 +80,14 @@ def main(argv: list[str]) -> int:
         mirrored=options.mirror,
         joint_order=None if options.joint_order is None else read_joint_order(Path(options.joint_order)),
     )
-    answerer = _answerer(options.retargeter, options.robot, options.method, options.avoid_collisions)
+    if options.retargeter is not None:
+        answerer = of_package(options.retargeter, options.avoid_collisions)
+    else:
+        answerer = _of_robot(options.robot, options.whole_body, options.method, options.avoid_collisions)
     print(answerer.described)
     outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
     if outcome.summaries:
-        print(f"\n{table(outcome.summaries)}")
+        print(f"\n{table(outcome.summaries, is_told=options.retargeter is None)}")
     if not outcome.failures:
         return 0
     sentences = list(outcome.failures.values())
@@ -101,14 +108,11 @@ def _check_method(method: str | None, package: str | None) -> None:
         raise UserError("command line: --method goes with --robot alone; a package answers by the networks it has")
 
 
-def _answerer(package: str | None, name: str | None, method: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
-    from mrhubo.retargeting import of_package, of_reference, of_universal
-
-    if package is not None:
-        return of_package(package, avoid_collisions)
+def _of_robot(name: str, whole_body: bool, method: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
     from mrhubo.describing.run import open_robot
+    from mrhubo.retargeting import of_reference, of_universal
 
-    robot = open_robot(str(name))
+    robot = open_robot(name, whole_body)
     stands = robot.keypoints is not None and bool(robot.keypoints.standing)
     of_robot = {"universal": of_universal, "reference": of_reference}[method or _METHODS[stands]]
     return of_robot(robot, avoid_collisions)

@@ -16,6 +16,7 @@ from mrhubo.cli import dispatch
 from mrhubo.config import load_config
 from mrhubo.describe import _try as try_config
 from mrhubo.errors import UserError
+from mrhubo.robot.generator import humanoid
 from tests.robot.two_arms import PAIR
 
 
@@ -68,6 +69,30 @@ def test_a_config_that_a_fit_would_refuse_is_drawn_with_status_2(capsys: pytest.
     assert "error: conf/my.yaml, line 2" in capsys.readouterr().err
 
 
+def test_what_must_be_answered_before_a_fit_is_status_3(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("bare.urdf").write_text(humanoid(3, "neither shapes nor masses").urdf)  # nothing tells where forearms end
+    assert dispatch(["describe", "bare.urdf"]) == 3
+    assert "answer what is not decided" in capsys.readouterr().out
+    assert dispatch(["describe", "conf/bare.yaml"]) == 3
+    assert "open:     left_wrist, right_wrist: answer these before a fit" in capsys.readouterr().out
+    text = Path("conf/bare.yaml").read_text()
+    Path("conf/bare.yaml").write_text(re.sub(r"unsure: \[.*\]", "unsure: [left_hand]", text))
+    assert dispatch(["describe", "conf/bare.yaml"]) == 0, "a fit warns of a hand, and goes on"
+
+
+def test_legs_and_waist_are_described_too(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(root / "data/robots/nao/nao.urdf", "nao.urdf")
+    assert dispatch(["describe", "nao.urdf"]) == 0
+    assert "legs move too with  mrhubo describe nao.urdf --whole-body" in capsys.readouterr().out
+    assert dispatch(["describe", "nao.urdf", "--whole-body"]) == 0
+    shown = capsys.readouterr().out
+    assert "left leg 6" in shown and "mrhubo retarget --robot conf/nao-whole-body.yaml" in shown
+    whole, upper = (load_config(f"conf/{name}.yaml").robot for name in ("nao-whole-body", "nao"))
+    assert set(upper.joints) < set(whole.joints) and "left_foot" in whole.keypoints
+    with pytest.raises(UserError, match="a config says itself what of a body it has"):
+        dispatch(["describe", "conf/nao.yaml", "--whole-body"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -112,7 +137,7 @@ def test_the_page_about_a_robot_of_ones_own_is_done_as_it_stands(
     """Each command of it, in order; the training alone is stood in for."""
     page = (root / "docs" / "your-robot.md").read_text()
     commands = re.findall(r"^    ((?:cp|mrhubo) .*)$", page, re.M)
-    assert len(commands) == 7 and commands[0].startswith("cp ")
+    assert len(commands) == 9 and commands[0].startswith("cp ")
     (folder / "data").symlink_to(root / "data")
     seen = []
     stand_in = SimpleNamespace(fit=lambda config, report: seen.append(config.robot))
@@ -126,4 +151,7 @@ def test_the_page_about_a_robot_of_ones_own_is_done_as_it_stands(
     shown = capsys.readouterr().out
     (quoted,) = re.findall(r"```\n(.*?)```", page, re.S)
     assert quoted in shown and Path("wave.csv").is_file() and Path("conf/my.png").is_file()
+    assert (
+        Path("wave-whole.npz").is_file() and load_config("conf/my-whole-body.yaml").robot.keypoints["pelvis"] == "Waist"
+    )
     assert [robot.name for robot in seen] == ["my", "my"] and set(seen[0].unsure) == {"left_hand", "right_hand"}

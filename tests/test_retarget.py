@@ -114,6 +114,22 @@ def test_a_whole_bodys_base_is_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.root_quaternion_wxyz, np.tile([1, 0, 0, 0], (6, 1)), atol=1e-5)
 
 
+def test_a_whole_body_needs_no_config(root: Path, tmp_path: Path) -> None:
+    motion = squat(frames=3)
+    turns_TJ3 = rotation.matrix_to_axis_angle(motion.local_TJ33).flatten(1).numpy()
+    place_T3 = motion.arrays.root_position_T3
+    write_motion(tmp_path / "squat.npz", turns_TJ3, 0 * place_T3, place_T3, 24.0, "squats")
+    given = ["--motion", str(tmp_path / "squat.npz"), "--no-avoid-collisions", "--quiet"]
+    urdf = str(root / "data/robots/nao/nao.urdf")
+    for name, robot in (("yaml", ["nao-whole-body"]), ("urdf", [urdf, "--whole-body"])):
+        assert main(["--robot", *robot, *given, "--out", str(tmp_path / f"{name}.npz")]) == 0
+    by_hand, found = (read_robot_motion(tmp_path / f"{name}.npz") for name in ("yaml", "urdf"))
+    assert found.root_position is not None and set(by_hand.joint_names) < set(found.joint_names)
+    legs = [name for name in by_hand.joint_names if "Hip" in name or "Knee" in name]
+    q_by_hand, q_found = (m.q[:, [m.joint_names.index(name) for name in legs]] for m in (by_hand, found))
+    np.testing.assert_allclose(q_found, q_by_hand, atol=0.02)
+
+
 def test_a_bad_file_among_several_is_told_at_the_end(
     package: Path, wave: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -154,6 +170,8 @@ def test_the_robot_gives_way_unless_told_otherwise(root: Path, tmp_path: Path) -
         ),
         (["--robot", "nao", "--motion", "a", "--out", "b", "--method", "refrence"], "nearest: 'reference'"),
         (["--retargeter", "x", "--motion", "a", "--out", "b", "--method", "reference"], "goes with --robot alone"),
+        (["--robot", "nao", "--whole-body", "--motion", "a.npz", "--out", "b.npz"], "says itself what of a body"),
+        (["--retargeter", "x", "--whole-body", "--motion", "a", "--out", "b"], "--whole-body goes with --robot alone"),
         (["--robot", "nobody", "--motion", "a.npz", "--out", "a.csv"], "'nobody' is no file"),
         (["--retargeter", "nobody", "--motion", "a.npz", "--out", "a.csv"], "nobody: is no package"),
     ],

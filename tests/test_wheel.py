@@ -81,9 +81,9 @@ from mrhubo.runtime.provenance import git_commit
 site, here = Path({str(installed)!r}), Path.cwd()
 assert Path(mrhubo.__file__).is_relative_to(site)
 configs = [path for path in (shipped_root() / "conf").glob("**/*.yaml") if "robot:" in path.read_text()]
-assert len(configs) == 9
-elsewhere = [path.stem for path in configs if "data/external" in path.read_text()]
-assert elsewhere == ["g1-whole-body"], "which tells where its URDF is to be had"
+assert len(configs) == 11
+elsewhere = {{path.stem for path in configs if "data/external" in path.read_text()}}
+assert elsewhere == {{f"{{name}}-whole-body" for name in ("g1", "pepper", "romeo")}}, "docs tell where their URDFs are to be had"
 for config in map(load_config, (path for path in configs if path.stem not in elsewhere)):
     assert config.robot.urdf.is_file() and config.robot.urdf.is_relative_to(site), config.robot.urdf
 assert find_motions(locations.default_motions()) == site / "mrhubo" / "data" / "motions"

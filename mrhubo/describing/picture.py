@@ -16,15 +16,18 @@ import torch
 from PIL import Image, UnidentifiedImageError
 
 from mrhubo.describing.figures import Figure, FigureMaker
-from mrhubo.describing.poses import POSES, human_poses
+from mrhubo.describing.poses import POSES, human_poses, pose_names
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.metrics import direction_error
 from mrhubo.robot import BodyMap, Limb
-from mrhubo.view import Camera, contact_sheet, render, save_png
+from mrhubo.robot.parts import PELVIS
+from mrhubo.view import Camera, common_cameras, contact_sheet, render, save_png
 
 _MAKER = "mrhubo describe"
-_CELL, _DETAIL = (350, 300), (225, 235)
-"""Pixels of a figure, and of a joint centre."""
+_CELL, _WHOLE_CELL, _DETAIL = (350, 300), (350, 430), (225, 235)
+"""Pixels of a figure, of one with legs or a waist, and of a joint centre."""
+_IN_A_ROW = 8
+"""Pictures of joint centres beside each other."""
 _NEAR_M = 0.30
 """Width [m] of the picture of a joint centre, at the human's size."""
 _WIDE_M, _BELOW_M = (1.62, 2.2), 0.14
@@ -39,16 +42,32 @@ _CAPTION = (
 
 def draw(body_map: BodyMap) -> Image.Image:
     """The sheet of a body map, which need not make sense."""
-    maker, poses_PJ33 = FigureMaker(body_map), human_poses()
+    whole_body = PELVIS.name in body_map.shared.views
+    maker, poses_PJ33 = FigureMaker(body_map), human_poses(whole_body)
     q_PN, _ = OptimizationRetargeter(body_map).solve_frames(poses_PJ33)
     humans = [maker.human(pose_J33) for pose_J33 in poses_PJ33]
     robots = [maker.robot_figure(q_N) for q_N in q_PN]
-    wide = _width((*humans, *robots))
-    rows = [[_render(figure, _CELL, _upper_body(figure, wide)) for figure in row] for row in (humans, robots)]
-    titles = [f"{name}\n{off}" for name, off in zip(POSES, _errors(body_map, q_PN, poses_PJ33), strict=True)]
+    rows = _whole_rows(humans, robots) if whole_body else _upper_rows(humans, robots)
+    names, errors = pose_names(whole_body), _errors(body_map, q_PN, poses_PJ33)
+    titles = [f"{name}\n{off}" for name, off in zip(names, errors, strict=True)]
     figures = contact_sheet(rows, titles, ["human", body_map.robot.name])
     details = _details(body_map, maker, q_PN[_DETAIL_POSE])
     return contact_sheet([[figures], [details]], caption=_CAPTION, gap=4)
+
+
+def _upper_rows(*rows: Sequence[Figure]) -> list[list[Image.Image]]:
+    """Arms and heads from near."""
+    wide = _width([figure for row in rows for figure in row])
+    return [[_render(figure, _CELL, _upper_body(figure, wide)) for figure in row] for row in rows]
+
+
+def _whole_rows(*rows: Sequence[Figure]) -> list[list[Image.Image]]:
+    """Figures from head to foot, those of a row at one scale."""
+    found = []
+    for row in rows:
+        cameras = common_cameras([figure.body for figure in row], _WHOLE_CELL)
+        found.append([_render(figure, _WHOLE_CELL, camera) for figure, camera in zip(row, cameras, strict=True)])
+    return found
 
 
 def save_picture(sheet: Image.Image, path: Path) -> None:
@@ -105,7 +124,13 @@ def _details(body_map: BodyMap, maker: FigureMaker, q_N: torch.Tensor) -> Image.
         pictures.append(_render(figure, _DETAIL, camera, None))
         shown = name.replace("_", " ")
         titles.append(f"{shown}\n{1000 * away[name]:.0f} mm from its axes" if name in away else shown)
-    return contact_sheet([pictures], titles, font_size=15)
+    rows = -(-len(pictures) // _IN_A_ROW)
+    count = -(-len(pictures) // rows)
+    parts = [
+        [contact_sheet([pictures[i : i + count]], titles[i : i + count], font_size=15)]
+        for i in range(0, len(pictures), count)
+    ]
+    return parts[0][0] if rows == 1 else contact_sheet(parts, gap=4)
 
 
 def _distances(body_map: BodyMap) -> Mapping[str, float]:

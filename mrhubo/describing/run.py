@@ -46,6 +46,13 @@ class Described:
         """The entries that are guesses, and what was asked about each."""
         return unsure(self.found)
 
+    @property
+    def more(self) -> list[str]:
+        """What of the body the robot has, and this config leaves out."""
+        chains = self.found.chains
+        parts = {"legs": chains.get("left_leg"), "waist": chains.get("waist")}
+        return [] if self.found.whole_body else [name for name, joints in parts.items() if joints]
+
 
 def read_model(word: str) -> Description:
     """The links and joints of the model that a word names.
@@ -62,21 +69,22 @@ def read_model(word: str) -> Description:
         return read_urdf(urdf)
 
 
-def describe_model(word: str, out: Path | None = None, force: bool = False) -> Described:
+def describe_model(word: str, out: Path | None = None, force: bool = False, whole_body: bool = False) -> Described:
     """Finds out what a robot's links stand for, and writes its config, and its URDF where the model is MuJoCo's.
 
     Args:
         word: the model: a file, or the name of a robot of robot_descriptions.
-        out: the config to write; default: `conf/NAME.yaml`.
+        out: the config to write; default: `conf/NAME.yaml`, or `conf/NAME-whole-body.yaml`.
         force: whether a file that is there already may be replaced.
+        whole_body: whether legs and waist move too.
 
     Raises:
         UserError: the model cannot be read or is no robot with arms, or a file is there already.
     """
     path = find_model(word)
-    with model_named(), _as_urdf(path, out, force) as (urdf, notes):
-        found = _discover(read_urdf(urdf))
-        file = out or default_config(path)
+    file = out or default_config(path, whole_body)
+    with model_named(), _as_urdf(path, file, force) as (urdf, notes):
+        found = _discover(read_urdf(urdf), whole_body)
         check_name("the config's file name", file.stem)
         picture = file.with_suffix(".png")
         if not force:
@@ -108,26 +116,35 @@ def config_of(word: str) -> tuple[Path, Described | None]:
     return file, None
 
 
-def open_robot(word: str) -> Robot:
+def open_robot(word: str, whole_body: bool = False) -> Robot:
     """The robot of a config, or of a model whose config nobody has written: what is a guess is told.
 
+    Args:
+        word: a config or a model.
+        whole_body: whether legs and waist of a model move too.
+
     Raises:
-        UserError: the config or the model cannot be used.
+        UserError: the config or the model cannot be used; or `whole_body` is said of a config.
     """
     if is_config(word):
+        if whole_body:
+            raise UserError(
+                f"command line: --whole-body goes with a URDF or a MuJoCo model; the config '{word}' says itself what "
+                "of a body it has"
+            )
         return Robot.from_config(word)
     description = read_model(word)
     with model_named():
-        found = _discover(description)
+        found = _discover(description, whole_body)
         robot = _robot(description, found, _file_name(find_model(word)))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
     return robot
 
 
-def default_config(path: Path) -> Path:
+def default_config(path: Path, whole_body: bool = False) -> Path:
     """Where the config of a model goes if nobody says it."""
-    return DEFAULT_FOLDER / f"{_file_name(path)}.yaml"
+    return DEFAULT_FOLDER / f"{_file_name(path)}{'-whole-body' if whole_body else ''}.yaml"
 
 
 def draw_config(file: Path, picture: Path) -> str | None:
@@ -154,7 +171,7 @@ def refuse_existing(file: Path) -> None:
         raise UserError(f"{file} is there already, and may hold work of yours; name another by --out, or give --force")
 
 
-def _discover(description: Description) -> Discovery:
+def _discover(description: Description, whole_body: bool = False) -> Discovery:
     """What the links of a robot stand for; where joints cannot be used, and no whole robot is left, they are to blame.
 
     Raises:
@@ -167,7 +184,7 @@ def _discover(description: Description) -> Discovery:
             "make those fixed that belong to no humanoid"
         )
     try:
-        found = discover(description)
+        found = discover(description, whole_body)
         if description.faults:
             with warnings.catch_warnings(action="ignore"):
                 BodyMap.of(_robot(description, found, "robot"))
@@ -187,14 +204,14 @@ def _robot(description: Description, found: Discovery, name: str) -> Robot:
 
 
 @contextlib.contextmanager
-def _as_urdf(path: Path, out: Path | None, force: bool) -> Iterator[tuple[Path, tuple[str, ...]]]:
+def _as_urdf(path: Path, file: Path, force: bool) -> Iterator[tuple[Path, tuple[str, ...]]]:
     """The model's URDF, and what was left out of it. One that is made of MuJoCo's model lies beside the config to be;
     it goes away again where the work in here fails.
     """
     if not is_mjcf(path):
         yield path, ()
         return
-    urdf = (out or default_config(path)).with_suffix(".urdf")
+    urdf = file.with_suffix(".urdf")
     made = urdf_of_mjcf(path, urdf.parent)
     if not force:
         refuse_existing(urdf)

@@ -17,7 +17,7 @@ from mrhubo.errors import listed, printable
 from mrhubo.robot.discovery import Discovery, FoundEnd
 from mrhubo.robot.entries import DEFAULT_AXES
 from mrhubo.robot.keypoints import entry_names
-from mrhubo.robot.parts import CHEST, UPPER_BODY
+from mrhubo.robot.parts import CHEST, PARTS, UPPER_BODY, BodyPart
 
 _WIDTH = 120
 _FINE = 1e5
@@ -25,9 +25,9 @@ _FINE = 1e5
 _HEAD = """\
 # What `mrhubo describe` found in {source}. Look at {picture}, beside this file, first. Every entry may be changed:
 #   mrhubo describe {file}  # draws the picture anew
-#   mrhubo fit {file}
+#   {next}
 #
-# Shoulders, elbows and wrists are joint centres, where axes meet: {{link: NAME, offset: [x, y, z]}} is a point [m] in
+# {points} are joint centres, where axes meet: {{link: NAME, offset: [x, y, z]}} is a point [m] in
 # the frame of that link, and a link's name alone is the origin of its frame. Directions are in the frame of their link.
 # With every entry: how sure it is, from 0 to 1, and what told it.
 """
@@ -43,7 +43,8 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
         picture: where its picture is going to be.
         source: what the user named, for the comment at the top.
     """
-    words = {"source": source, "picture": picture.name, "file": str(file)}
+    words = {"source": source, "picture": picture.name, "file": str(file), "next": next_command(found, file)}
+    words["points"] = "Hips, knees, elbows, ..." if found.whole_body else "Shoulders, elbows and wrists"
     head = _HEAD.format(**{word: printable(text) for word, text in words.items()})
     lines = [*head.splitlines(), *_questions(found), "robot:"]
     lines += [f"  name: {flow_yaml(file.stem)}", f"  urdf: {flow_yaml(relative(urdf, file))}"]
@@ -59,13 +60,25 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
     return "\n".join([*lines, *_others(found)]) + "\n"
 
 
+def next_command(found: Discovery, file: Path) -> str:
+    """What makes a robot of this config move: a fit, or, as that is of arms and heads, the optimiser."""
+    if found.whole_body:
+        return f"mrhubo retarget --robot {file} --motion walk.npz --out robot.npz"
+    return f"mrhubo fit {file}"
+
+
+def _table(found: Discovery) -> tuple[BodyPart, ...]:
+    """The rows of the table of body parts that a config is about."""
+    return PARTS if found.whole_body else UPPER_BODY
+
+
 def unsure(found: Discovery) -> dict[str, str]:
     """The entries of the config that are guesses, and what was asked about each."""
-    ours, theirs = set(entry_names(UPPER_BODY)), {*found.points, *found.ends, *found.chains}
+    ours, theirs = set(entry_names(_table(found))), {*found.points, *found.ends, *found.chains}
     chains = {chain for chain, joints in found.chains.items() if set(joints) & set(found.joints)}
     doubts: dict[str, list[str]] = {}
     for question in found.questions:
-        if question.about in ours | chains or question.about not in theirs:  # of legs, nothing is read yet
+        if question.about in ours | chains or question.about not in theirs:
             about = CHEST.name if question.about in CHEST.words else question.about
             doubts.setdefault(about, []).append(question.text)
     return {about: " ".join(texts) for about, texts in doubts.items()}
@@ -75,7 +88,7 @@ def keypoint_entries(found: Discovery) -> dict[str, Any]:
     """What was found, as `robot.keypoints` of a config."""
     ends = {name: end_entry(end) for name, end in found.ends.items()}
     entries = {name: point_entry(point.link, point.offset_3) for name, point in found.points.items()} | ends
-    return {name: entries[name] for name in entry_names(UPPER_BODY) if name in entries}
+    return {name: entries[name] for name in entry_names(_table(found)) if name in entries}
 
 
 def relative(path: Path, file: Path) -> str:
@@ -104,7 +117,8 @@ def _joints(found: Discovery) -> Iterator[str]:
         moved = [joint for joint in members if joint in rest]
         rest = [joint for joint in rest if joint not in moved]
         if moved:
-            yield f"    # {printable(chain.replace('_', ' '))}, from the body outwards"
+            way = "from the pelvis to the chest" if chain == "waist" else "from the body outwards"
+            yield f"    # {printable(chain.replace('_', ' '))}, {way}"
             yield from _wrapped("    ", map(flow_yaml, moved), ",")
     yield from _wrapped("    ", map(flow_yaml, rest), ",") if rest else ()
     yield "  ]"

@@ -58,7 +58,9 @@ _HEADS = {
 _UNKNOWN = "whether it touches itself is unknown: collision shapes of links that move are missing"
 
 
-def table(summaries: Sequence[Summary]) -> str:
-    """A row a motion; what is known of none has no column, and self-collision a sentence."""
-    unknown = [] if any(row.collision == row.collision for row in summaries) else [_UNKNOWN]
+def table(summaries: Sequence[Summary], is_told: bool = False) -> str:
+    """A row a motion; what is known of none has no column, and self-collision a sentence, unless it is told already
+    which shapes are missing.
+    """
+    unknown = [] if is_told or any(row.collision == row.collision for row in summaries) else [_UNKNOWN]
     return "\n".join([*aligned("motion", summaries, _HEADS), *unknown])

@@ -19,7 +19,6 @@ Legend: B batch, C capsules, P pairs of them, X pairs in some pose, A driven joi
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
@@ -27,10 +26,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from mrhubo.errors import InputWarning
-from mrhubo.robot.capsules import SHORT, Capsule, capsules, closest_points
+from mrhubo.robot.capsules import SHORT, closest_points
+from mrhubo.robot.link_capsules import link_capsules
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.urdf import link_poses
 
 _SAMPLES = 2_000
 _FEW_SAMPLES = 100
@@ -40,8 +38,6 @@ _CHUNK = 1024
 """Most poses at a time."""
 _AT_ONCE = 2**24
 """Most pairs of capsules, over all poses, whose rough distance is in memory; a sixteenth of them with what is exact."""
-_MOST = 2_000
-"""Most capsules."""
 _MOST_LISTED = 5
 
 
@@ -125,12 +121,7 @@ class SelfCollision(nn.Module):
 
     def _read_capsules(self) -> None:
         urdf = self.robot.description.parsed
-        rest = link_poses(urdf, self.robot.configuration(self.robot.home().cpu().numpy()))
-        solids, found = self.robot.description.solids, dict[str, list[Capsule]]()
-        for shape in solids.shapes:
-            pose_44 = np.linalg.inv(rest[self._body(shape.link)]) @ rest[shape.link] @ shape.origin_44
-            found.setdefault(shape.link, []).extend(capsules(shape, pose_44))
-        self._leave_out(found)
+        solids, found = self.robot.description.solids, link_capsules(self.robot, self._body)
         unread = self.robot.description.unread_collisions
         solid = (link.name for link in urdf.robot.links if link.collisions or link.name in unread)
         self.uncovered = tuple(name for name in solid if name not in found or name in solids.gaps)
@@ -148,22 +139,6 @@ class SelfCollision(nn.Module):
         self._keep("_ends_C23", torch.tensor(np.array(ends, dtype=np.float32).reshape(-1, 2, 3)))
         self._keep("_radius_C", torch.tensor(radii, dtype=torch.float32))
         self._keep("_reach_C", (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C)
-
-    def _leave_out(self, found: dict[str, list[Capsule]]) -> None:
-        """Takes away the capsules of the links with most, until there are few enough."""
-        count = sum(map(len, found.values()))
-        left_out = []
-        for link in sorted(found, key=lambda link: len(found[link]), reverse=True):
-            if sum(map(len, found.values())) > _MOST:
-                left_out.append(link)
-                del found[link]
-        if left_out:
-            warnings.warn(
-                f"robot.urdf: {self.robot.urdf}: has {count:,} collision shapes, more than {_MOST:,}; those of "
-                f"{', '.join(left_out)} are not looked at",
-                InputWarning,
-                stacklevel=2,
-            )
 
     def _choose_pairs(self, neighbours: set[frozenset[str]]) -> None:
         """All pairs of capsules of different bodies that can be kept apart; `neighbours` share a joint."""

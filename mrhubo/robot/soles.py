@@ -63,7 +63,7 @@ def _sole(part: OrientedPart, end: End, description: Description) -> Sole:
         places_23 = np.stack((-back * forward_3, ahead * forward_3)) - below * up_3
         balls_K4, known = np.concatenate((places_23, np.zeros((2, 1))), axis=1), True
     else:
-        balls_K4, known = _balls(end.link, description)
+        balls_K4, known = sole_balls(end.link, description)
     height_K = balls_K4[:, :3] @ up_3 - balls_K4[:, 3]
     low = float(height_K.min())
     flat_K = height_K <= low + _FLAT_M
@@ -73,7 +73,7 @@ def _sole(part: OrientedPart, end: End, description: Description) -> Sole:
     return Sole(part, end.link, balls_K4[flat_K | (height_K <= _SIDES * low)], rear_3, front_3, known)
 
 
-def _balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
+def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
     """Balls (K, 4) of all that is fixed to a link, in its frame: of collision shapes, or of looks where there are none,
     or the links' origins; and whether shapes told.
     """

@@ -120,7 +120,8 @@ def test_discovery(run: Run, tmp_path: Path) -> None:
     (tmp_path / "nothing.urdf").write_text("<robot name='a'><link name='b'/></robot>")
     text = run("discovery", "--seeds", "600-603", "--strange", "600-601", "--urdfs", tmp_path)
     assert "| all " in text and "| clavicles " in text and "no body of the robot carries two limbs" in text
-    assert len(re.findall(r"^\| (nao|coman|reachy) ", text, re.M)) == 18
+    assert len(re.findall(r"^\| (nao-whole-body|coman-whole-body|reachy) ", text, re.M)) == 18
+    assert {row[0] for row in rows(text, "random humanoids, by part")} <= {"arms and head", "legs", "waist"}
 
 
 def test_every_benchmark_has_a_test(root: Path) -> None:

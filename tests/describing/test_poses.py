@@ -6,7 +6,7 @@ import torch
 
 from mrhubo.body import KEYPOINT_NAMES, Skeleton
 from mrhubo.body.skeleton import mirror_rotations
-from mrhubo.describing.poses import POSES, human_poses
+from mrhubo.describing.poses import POSES, human_poses, pose_names
 
 LEFT, UP, FORWARD = torch.eye(3)
 LIMBS = {  # upper arm, forearm
@@ -28,4 +28,21 @@ def test_limbs_point_where_the_name_says() -> None:
 
 
 def test_both_sides_do_the_same() -> None:
-    assert torch.allclose(mirror_rotations(human_poses()), human_poses(), atol=1e-6)
+    for whole_body in (False, True):
+        poses = human_poses(whole_body)
+        assert torch.allclose(mirror_rotations(poses), poses, atol=1e-6)
+
+
+def test_legs_and_back_do_what_the_name_says() -> None:
+    points = Skeleton().keypoints(human_poses(whole_body=True))
+    place = {name: points[:, KEYPOINT_NAMES.index(name)] for name in KEYPOINT_NAMES}
+    rows = {name.partition(", ")[2]: row for row, name in enumerate(pose_names(whole_body=True))}
+    thigh, foot = (
+        torch.nn.functional.normalize(place[f"left_{end}"] - place[f"left_{start}"], dim=-1)
+        for start, end in (("hip", "knee"), ("heel", "toe"))
+    )
+    assert thigh[rows["legs apart"]] @ LEFT > 0.3 and thigh[rows["squatting"]] @ FORWARD > 0.6
+    assert thigh[rows["standing"]] @ UP < -0.95 and foot[rows["feet out"]] @ LEFT > foot[rows["standing"]] @ LEFT + 0.3
+    assert abs(foot[rows["squatting"]] @ UP - foot[rows["standing"]] @ UP) < 0.05, "soles stay flat"
+    back = place["neck"] - place["pelvis"]
+    assert (back[rows["back bent"]] - back[rows["standing"]]) @ FORWARD > 0.1

@@ -106,6 +106,7 @@ def test_a_summary_is_of_limbs_alone(answerer: Answerer, files: list[Path]) -> N
     assert head.split()[:2] == ["motion", "frames"] and row.split() == ["wave", "15", "30", "1.5", "0.50", "6.7%"]
     bare = Summary.of(RobotMotion([[0.0]], ("a",), name="bare"), ())
     assert table([bare]).splitlines()[1].split() == ["bare", "1"]
+    assert "self is unknown" in table([bare]) and "unknown" not in table([bare], is_told=True)
     assert table([summary, bare]).splitlines()[2].split() == ["bare", "1", "-", "-", "-", "-"]
 
 

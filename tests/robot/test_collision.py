@@ -16,7 +16,15 @@ from hypothesis import strategies as st
 
 from mrhubo.config import RobotConfig, load_config
 from mrhubo.errors import InputWarning
-from mrhubo.robot import LinkGeometry, Robot, SelfCollision, build_body_map, collision, read_collision_geometry
+from mrhubo.robot import (
+    LinkGeometry,
+    Robot,
+    SelfCollision,
+    build_body_map,
+    collision,
+    link_capsules,
+    read_collision_geometry,
+)
 from mrhubo.robot.capsules import capsules, closest_points
 from mrhubo.robot.shapes import Kind
 from mrhubo.robot.solid_shapes import SolidShapes
@@ -261,7 +269,7 @@ def test_how_many_are_looked_at_together_does_not_matter(
 
 
 def test_too_many_shapes_are_left_out_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collision, "_MOST", 20)
+    monkeypatch.setattr(link_capsules, "_MOST", 20)
     robot = toy(tmp_path, "<sphere radius='0.05'/>", middle=spheres(30))
     with pytest.warns(
         InputWarning, match=r"toy.urdf: has 32 collision shapes, more than 20; those of upper are not looked at"

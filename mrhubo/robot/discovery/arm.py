@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.elbow import find_elbow, rival
+from mrhubo.robot.discovery.elbow import elbow_and_rival
 from mrhubo.robot.discovery.gripper import without_hand
 from mrhubo.robot.discovery.limbs import ways_on
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine, unit
@@ -86,9 +86,10 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     """Roles and points of an arm's joints; None if it has no elbow."""
     branches = long_branches(bodies, chain, _FINGER)
     chain, left_out = without_hand(bodies, chain)
-    elbow_at = find_elbow(bodies, chain)
-    if elbow_at is None:
+    found = elbow_and_rival(bodies, chain)
+    if found is None:
         return None
+    elbow_at, other = found
     lines = lines_of(chain)
     twist_at = _twist(lines, elbow_at)
     shoulder, clavicles = _shoulder(chain, lines, elbow_at, twist_at)
@@ -112,7 +113,6 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < LEAST * bodies.size:
         return None
-    other = rival(bodies, chain, elbow_at)
     if other is not None:
         why = f"; '{other}' may as well be the elbow"
         shoulder, elbow, wrist = (doubted(spot, why) for spot in (shoulder, elbow, wrist))

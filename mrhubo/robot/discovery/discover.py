@@ -9,12 +9,15 @@ import numpy as np
 
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands
-from mrhubo.robot.discovery.arm import Spot, read_arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Step
+from mrhubo.robot.discovery.arm import read_arm
+from mrhubo.robot.discovery.bodies import Bodies, Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
+from mrhubo.robot.discovery.foot import read_foot
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
-from mrhubo.robot.discovery.ranges import driver, find_ranges
+from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.questions import Named, coupled, notes, questions
+from mrhubo.robot.discovery.ranges import find_ranges
 from mrhubo.robot.discovery.reading import read_bodies
 from mrhubo.robot.discovery.result import (
     Candidate,
@@ -22,25 +25,23 @@ from mrhubo.robot.discovery.result import (
     FoundAxis,
     FoundEnd,
     FoundPoint,
-    Question,
     Vector,
 )
 from mrhubo.robot.discovery.roles import Roles, find_roles
 from mrhubo.robot.discovery.symmetry import find_pairs
-from mrhubo.robot.limits import beyond_turns
 from mrhubo.robot.urdf import Description, describe
 
 SIDES = ("left", "right")
-_SURE = 0.5
-"""Confidence under which the user is asked."""
 _ZERO = 1e-5
 
 
-def discover(robot: Description | Path | str) -> Discovery:
+def discover(robot: Description | Path | str, whole_body: bool = False) -> Discovery:
     """Which link and point of a robot stands for which part of a human body.
 
     Args:
         robot: a URDF file, or what `mrhubo.robot.urdf.describe` made of it.
+        whole_body: whether joints of legs and waist are to move too, and what they leave open is asked; points, parts
+            and chains of them are told either way.
 
     Raises:
         UserError: the file is no robot (as `describe`), or it has no two arms that could be told; says what it has.
@@ -48,13 +49,13 @@ def discover(robot: Description | Path | str) -> Discovery:
     description = robot if isinstance(robot, Description) else describe(Path(robot))
     bodies = read_bodies(description)
     roles = find_roles(bodies, find_pairs(bodies))
-    return _Finder(bodies, roles).found()
+    return _Finder(bodies, roles, whole_body).found()
 
 
 class _Finder:
     """Puts together what the parts of this package find."""
 
-    def __init__(self, bodies: Bodies, roles: Roles) -> None:
+    def __init__(self, bodies: Bodies, roles: Roles, whole_body: bool) -> None:
         arms = [arm for chain in roles.arms.chains if (arm := read_arm(bodies, chain)) is not None]
         legs = [
             leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None
@@ -74,32 +75,35 @@ class _Finder:
             if hand is not None:
                 hands[side] = hand
         self.hands = agreeing_hands(hands, self.heading.left_3)
+        self.feet = {side: read_foot(bodies, leg, self.heading) for side, leg in self.legs.items()}
+        self.limbs = Limbs(bodies, roles, self.heading, self.arms, self.legs, self.hands, whole_body)
 
     def found(self) -> Discovery:
         """The result."""
-        ranges, asked = find_ranges(self.bodies, self.arms, self.roles.neck, self.heading.forward_3)
-        joints = self._joints()
-        held = dict(self._held(joints))
-        questions = [*self._questions(), *asked, *self._coupled()]
-        points = dict(self._points())
+        limbs, spots = self.limbs, list(self._spots())
+        ranges, asked = find_ranges(self.bodies, self.arms, limbs.moving.values(), self.heading.forward_3)
+        joints = limbs.moved()
+        held = dict(limbs.held(joints))
+        points = dict(self._points(spots))
         return Discovery(
             name=_short_name(self.bodies.description),
             forward=FoundAxis(_vector(self.heading.forward_3), self.heading.forward_sure, self.heading.forward_cue),
             up=FoundAxis(_vector(self.heading.up_3), self.heading.up_sure, self.heading.up_cue),
             points=points,
             ends=dict(self._ends()),
-            chains=self._chains(),
+            chains={name: tuple(step.hinge.name for step in chain) for name, chain in limbs.chains.items()},
             joints=joints,
             held=held,
-            left_out=dict(self._left_out({*joints, *held})),
+            left_out=dict(limbs.left_out({*joints, *held})),
             ranges={name: found for name, found in ranges.items() if name in joints},
-            key_links=self._key_links(),
-            questions=tuple(questions),
-            notes=tuple(self._notes()),
+            key_links=limbs.key_links(),
+            questions=(*questions(limbs, spots, self.feet), *asked, *coupled(limbs)),
+            notes=tuple(notes(limbs)),
             geometric={name: point for name, point in points.items() if point.confidence >= 0.75},
+            whole_body=limbs.whole_body,
         )
 
-    def _spots(self) -> Iterator[tuple[str, Spot, tuple[Candidate, ...]]]:
+    def _spots(self) -> Iterator[Named]:
         for side, arm in self.arms.items():
             yield f"{side}_shoulder", arm.shoulder, ()
             apart = float(np.linalg.norm(arm.hinge_3 - arm.elbow.point_3))
@@ -116,8 +120,8 @@ class _Finder:
             if sole is not None:
                 yield f"{side}_sole", sole, ()
 
-    def _points(self) -> Iterator[tuple[str, FoundPoint]]:
-        for name, spot, candidates in self._spots():
+    def _points(self, spots: list[Named]) -> Iterator[tuple[str, FoundPoint]]:
+        for name, spot, candidates in spots:
             offsets = {link: self._offset(link, spot.point_3) for link in spot.links}
             exact = [link for link, offset in offsets.items() if max(map(abs, offset)) < _ZERO]
             link = exact[0] if exact else spot.links[0]
@@ -137,12 +141,9 @@ class _Finder:
                 chest, {"forward": forward_3, "up": up_3}, min(sure, roles.sure), "the body that carries both arms"
             ),
         )
-        if roles.legs is not None and self.legs:
-            pelvis = self._main_link(roles.legs.body, [chain[0] for chain in roles.legs.chains])
-            yield (
-                "pelvis",
-                self._end(pelvis, {"forward": forward_3, "up": up_3}, sure, "the body that carries both legs"),
-            )
+        if (pelvis := self._pelvis()) is not None:
+            cue = "the body that carries both legs" if self.legs else "where the waist begins, as there are no legs"
+            yield "pelvis", self._end(pelvis, {"forward": forward_3, "up": up_3}, sure, cue)
         if roles.neck:
             link = roles.neck[-1].outer_link
             cue = "the end of the longest chain in the middle above the chest; it faces ahead at the zero pose"
@@ -153,6 +154,16 @@ class _Finder:
         for side, hand in self.hands.items():
             axes = {"fingers": hand.fingers_3, "thumb": hand.thumb_3}
             yield f"{side}_hand", self._end(hand.link, axes, hand.confidence, hand.cue)
+        for side, foot in self.feet.items():
+            axes = {"forward": foot.forward_3, "up": foot.up_3}
+            yield f"{side}_foot", self._end(foot.link, axes, min(sure, foot.confidence), foot.cue)
+
+    def _pelvis(self) -> str | None:
+        """The link that carries both legs, or, without legs, the one on which the waist turns the chest."""
+        if self.roles.legs is not None:
+            return self._main_link(self.roles.legs.body, [chain[0] for chain in self.roles.legs.chains])
+        turning = [step for step in self.roles.waist if step.hinge.rotary]
+        return turning[0].inner_link if turning else None
 
     def _end(self, link: str, axes: Mapping[str, np.ndarray], confidence: float, cue: str) -> FoundEnd:
         turn_33 = self.bodies.pose_44[link][:3, :3].T
@@ -167,105 +178,6 @@ class _Finder:
         ]
         shared = [link for link in above[0] if link in inside and all(link in other for other in above)]
         return shared[0] if shared else steps[0].inner_link
-
-    def _chains(self) -> dict[str, tuple[str, ...]]:
-        chains: dict[str, Chain] = {f"{side}_arm": arm.chain for side, arm in self.arms.items()}
-        chains |= {f"{side}_leg": leg.chain for side, leg in self.legs.items()}
-        chains |= {"neck": self.roles.neck, "waist": self.roles.waist}
-        return {name: tuple(step.hinge.name for step in chain) for name, chain in chains.items()}
-
-    def _joints(self) -> tuple[str, ...]:
-        moved = [arm.chain if side in self.hands else arm.chain[: arm.elbow_at + 1] for side, arm in self.arms.items()]
-        steps = [step for chain in (*moved, self.roles.neck) for step in chain]
-        found = [hinge.name for step in steps if (hinge := driver(self.bodies, step)) is not None and hinge.rotary]
-        return tuple(dict.fromkeys(found))
-
-    def _held(self, joints: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-        for step in self.roles.waist:
-            yield step.hinge.name, "it turns the chest against the base, and directions are seen from the chest"
-        for leg in self.legs.values():
-            for step in leg.chain:
-                yield step.hinge.name, "it belongs to a leg, and no direction of the table tells legs"
-        for arm in self.arms.values():
-            for step in arm.chain:
-                if step.hinge.name not in joints:
-                    yield (
-                        step.hinge.name,
-                        "it belongs to an arm, but "
-                        + (
-                            "slides"
-                            if not step.hinge.rotary
-                            else "mimics another joint"
-                            if not step.hinge.free
-                            else "turns nothing that can be told"
-                        ),
-                    )
-
-    def _left_out(self, used: set[str]) -> Iterator[tuple[str, str]]:
-        cut = {name: why for arm in self.arms.values() for name, why in arm.left_out}
-        where = {}
-        for side, arm in self.arms.items():
-            where |= {
-                h.name: f"beyond the {side} wrist: a finger or gripper" for h in self.bodies.beyond(arm.chain[-1])[1]
-            }
-        for side, leg in self.legs.items():
-            where |= {h.name: f"beyond the {side} ankle" for h in self.bodies.beyond(leg.chain[-1])[1]}
-        if self.roles.neck:
-            where |= {h.name: "on the head: an eye, jaw or antenna" for h in self.bodies.beyond(self.roles.neck[-1])[1]}
-        for hinge in self.bodies.hinges:
-            if hinge.name in used:
-                continue
-            why = cut.get(hinge.name) or where.get(hinge.name)
-            if why is None:
-                why = "it mimics another joint" if not hinge.free else "on no limb: a wheel, sensor or linkage"
-            yield hinge.name, why
-
-    def _questions(self) -> Iterator[Question]:
-        heading, roles = self.heading, self.roles
-        if heading.forward_sure < _SURE:
-            yield Question("forward", "it is not clear where the robot faces, nor therefore which side is left; "
-                           f"taken by: {heading.forward_cue}")  # fmt: skip
-        if heading.up_sure < _SURE:
-            yield Question("up", f"it is not clear where the robot's up is; taken by: {heading.up_cue}")
-        if roles.sure < _SURE:
-            first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
-            yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
-        for name, spot, _ in self._spots():
-            if spot.confidence < _SURE:
-                yield Question(
-                    name, f"the {name.replace('_', ' ')} was taken as {spot.cue}; give its point", spot.links
-                )
-        for side, hand in self.hands.items():
-            if hand.doubt is not None:
-                yield Question(f"{side}_hand", f"{hand.doubt}; taken: {hand.cue}", (hand.link,))
-
-    def _coupled(self) -> Iterator[Question]:
-        """Joints of arms and neck that mimic others of them: as a file may have it that is for a show of one arm."""
-        chains = [*(arm.chain for arm in self.arms.values()), self.roles.neck]
-        whole = {step.hinge.name for chain in chains for step in chain}
-        for step in (step for chain in chains for step in chain if not step.hinge.free):
-            source = driver(self.bodies, step)
-            if source is not None and source.name in whole:
-                name = step.hinge.name
-                yield Question(name, f"'{name}' mimics '{source.name}', so neither follows a person by itself; if they "
-                               f"can on the robot, take the <mimic> element of '{name}' out of the URDF and "
-                               "describe it anew")  # fmt: skip
-
-    def _notes(self) -> Iterator[str]:
-        if self.bodies.degrees:
-            joint = next(j for j in self.bodies.description.joints.values() if j.kind == "revolute" and beyond_turns(j))
-            yield (
-                f"the limits of most joints, as {joint.lower:g} .. {joint.upper:g} of '{joint.name}', can only be "
-                "degrees, where a URDF has radians; robot.ranges holds them in radians, and nothing else need be done "
-                "here, but other programs need a URDF with every limit times 0.0174533"
-            )
-        for what in self.heading.contradicted:
-            yield f"against where the robot was found to face speaks: {what}"
-
-    def _key_links(self) -> tuple[str, ...]:
-        steps = [step for arm in self.arms.values() for step in arm.chain]
-        links = [step.outer_link for step in (*steps, *self.roles.neck[-1:])]
-        return tuple(dict.fromkeys(links))
 
 
 def _vector(numbers_3: np.ndarray) -> Vector:

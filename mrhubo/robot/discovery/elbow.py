@@ -23,11 +23,29 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
     chain is too short to have one.
     """
     scores = _elbow_scores(bodies, chain)
+    return None if scores is None else _best(scores)
+
+
+def elbow_and_rival(bodies: Bodies, chain: Chain) -> tuple[int, str | None] | None:
+    """`find_elbow`, and the joint that may be the elbow as well, if one has stretches about as long on either side.
+    Beyond an elbow that has a whole shoulder before it, a wrist with a long hand is none.
+    """
+    scores = _elbow_scores(bodies, chain)
     if scores is None:
         return None
+    elbow_at = _best(scores)
+    if elbow_at >= _BEFORE:
+        scores[elbow_at + 1 :] = 0.0
+    best = float(scores[elbow_at])
+    scores[elbow_at] = 0.0
+    other = int(np.argmax(scores))
+    return elbow_at, chain[other].hinge.name if scores[other] > _CLOSE * best else None
+
+
+def _best(scores: np.ndarray) -> int:
     near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
     # Of those about as good, one with a whole shoulder before it, and no more beyond it than a wrist has.
-    return max(near, key=lambda i: (min(i, _BEFORE), len(chain) - i - 1 <= WRIST_JOINTS, scores[i]))
+    return max(near, key=lambda i: (min(i, _BEFORE), len(scores) - i - 1 <= WRIST_JOINTS, scores[i]))
 
 
 def elbow_reach(bodies: Bodies, chain: Chain) -> float:
@@ -70,18 +88,3 @@ def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> floa
     own_3 = bodies.position(last.outer_link)
     corners = corners[np.linalg.norm(corners - own_3, axis=-1) > ON * bodies.size]
     return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
-
-
-def rival(bodies: Bodies, chain: Chain, elbow_at: int) -> str | None:
-    """The joint that may be the elbow as well, if one has stretches about as long on either side. Beyond an elbow
-    that has a whole shoulder before it, a wrist with a long hand is none.
-    """
-    scores = _elbow_scores(bodies, chain)
-    if scores is None:
-        return None
-    if elbow_at >= _BEFORE:
-        scores[elbow_at + 1 :] = 0.0
-    best = float(scores[elbow_at])
-    scores[elbow_at] = 0.0
-    other = int(np.argmax(scores))
-    return chain[other].hinge.name if scores[other] > _CLOSE * best else None

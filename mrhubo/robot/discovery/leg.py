@@ -24,6 +24,8 @@ _TILTED = 0.6
 """The same of a hip's pitch, which some robots tilt by up to 30 degrees."""
 _TOES = 0.15
 """How far toes reach at most, as a share of the leg along its axes."""
+_OFF = 0.1
+"""How far toes' axis is from the ankle's at least, as a share of the shank."""
 _APART = 0.15
 """How far hip, knee and ankle are at least from each other, as a share of the leg."""
 
@@ -33,6 +35,7 @@ class Leg:
     """A leg whose joints have their roles."""
 
     chain: Chain
+    """Its rotary joints, without toes."""
     hip_at: int | None
     """Position of the hip's pitch in the chain."""
     knee_at: int
@@ -82,7 +85,21 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         return None
     if branches := long_branches(bodies, chain, _TOES):
         ankle = doubted(ankle, branches)
-    return Leg(rotary, hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None)
+    return Leg(
+        _without_toes(rotary, lines, knee_at, ankle_at), hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None
+    )
+
+
+def _without_toes(chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None) -> Chain:
+    """The chain as far as the ankle: toes turn about one more axis parallel to the ankle's, some way off."""
+    if ankle_at is None:
+        return chain
+    least = _OFF * lines[ankle_at].distance(lines[knee_at].point_3)
+    toes = (
+        i for i in range(ankle_at + 1, len(chain))
+        if _parallel(lines[i], lines[ankle_at]) and lines[i].distance(lines[ankle_at].point_3) > least
+    )  # fmt: skip
+    return chain[: next(toes, len(chain))]
 
 
 def _parallel(one: Line, other: Line) -> bool:

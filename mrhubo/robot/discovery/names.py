@@ -18,7 +18,7 @@ _WORDS = {
     "face": r"jaw|chin|mouth|lip(_|s|$)|brow|eyelid|(^|_)lid|(^|^[lr]|[^a-z])eye|cheek|tongue|antenna|(^|_)ear(_|s|$)",
     "sensor": r"lidar|laser|radar|scanner|spin|rotor|propeller",
     "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
-    "tool": r"tool|tcp|ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
+    "tool": r"tool|tcp|(^|_)ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
 }
 _PATTERNS = {kind: re.compile(text, re.IGNORECASE) for kind, text in _WORDS.items()}
 

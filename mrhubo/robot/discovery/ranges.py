@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -23,19 +23,19 @@ _MOST = 14.0
 
 
 def find_ranges(
-    bodies: Bodies, arms: Mapping[str, Arm], neck: Chain, forward_3: np.ndarray
+    bodies: Bodies, arms: Mapping[str, Arm], chains: Iterable[Chain], forward_3: np.ndarray
 ) -> tuple[dict[str, FoundRange], list[Question]]:
     """Ranges by joint where the URDF gives none, or degrees, or lets an elbow bend backwards; and what they leave open.
 
     Args:
         bodies: the robot.
         arms: by side.
-        neck: its neck.
+        chains: what moves, arms among it.
         forward_3: where it faces.
     """
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
-    for step in (step for chain in (*(arm.chain for arm in arms.values()), neck) for step in chain):
+    for step in (step for chain in chains for step in chain):
         hinge = driver(bodies, step)
         if hinge is None or not hinge.rotary:
             continue

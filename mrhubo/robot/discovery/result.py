@@ -42,7 +42,7 @@ class FoundPoint:
 
 @dataclass(frozen=True)
 class FoundEnd:
-    """An oriented part: chest, pelvis, head or a hand."""
+    """An oriented part: chest, pelvis, head, a hand or a foot."""
 
     link: str
     axes: Mapping[str, Vector]
@@ -97,14 +97,14 @@ class Discovery:
     """By human keypoint: `left_shoulder`, `left_elbow`, `left_wrist`, `left_hip`, `left_knee`, `left_ankle`,
     `left_sole`, and the right ones; those that the robot has."""
     ends: Mapping[str, FoundEnd]
-    """By part: `chest`, `pelvis`, `head`, `left_hand`, `right_hand`; those that the robot has."""
+    """By part: `chest`, `pelvis`, `head`, `left_hand`, `left_foot`, and the right ones; those that the robot has."""
     chains: Mapping[str, tuple[str, ...]]
     """Joints from the body outwards, by chain: `left_arm`, `right_arm`, `left_leg`, `right_leg`, `neck`, and `waist`
     (from the pelvis to the chest). Without fingers, toes, and all that does not belong."""
     joints: tuple[str, ...]
     """The joints to move (`robot.joints`): those of the chains that turn a row of the table of body parts."""
     held: Mapping[str, str]
-    """Joints of the body that are held, and why: waist and legs, where no row of the table is turned by them."""
+    """Joints of the body that are held, and why: waist and legs, if not the whole body was asked for."""
     left_out: Mapping[str, str]
     """Joints that are no part of the body, and why: fingers, grippers, wheels, antennas, mimics, linkages."""
     ranges: Mapping[str, FoundRange]
@@ -116,6 +116,8 @@ class Discovery:
     geometric: Mapping[str, FoundPoint] = field(default_factory=dict)
     """Joint centres as the axes alone tell them, by human keypoint: where `points` may take what a link's name or a
     frame says, these do not. The yardstick for points that were written by hand."""
+    whole_body: bool = False
+    """Whether legs and waist move too."""
 
     @property
     def sure(self) -> bool:

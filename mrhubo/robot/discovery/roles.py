@@ -122,6 +122,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     used = {chain[0].hinge.name for pair in same for chain in pair.chains}
     if legs is None and any(names.speaks_of(step.hinge.name, "head") for step in waist):
         waist = ()  # the root is the head
+    if {step.hinge for step in waist} & {step.hinge for chain in arms.chains for step in chain}:
+        waist = ()  # the root is a hand
     used |= {step.hinge.name for step in waist}
     necks = find_necks(bodies, arms, used)
     arm = arms.chains[0]

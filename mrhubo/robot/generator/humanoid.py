@@ -27,13 +27,13 @@ class Humanoid:
     joints: frozenset[str]
     """Those of arms and neck, without fingers."""
     chains: Mapping[str, tuple[str, ...]]
-    """Joints by chain: arms, legs, neck."""
+    """Joints by chain: arms, legs without toes, neck, waist."""
     points: Mapping[str, np.ndarray]
     """True joint centres by human keypoint."""
     carriers: Mapping[str, str]
     """The link that carries each of them."""
     directions: Mapping[str, np.ndarray]
-    """`left_fingers`, `left_thumb`, ..."""
+    """`left_fingers`, `left_thumb`, `left_toes`, `left_foot_up`, ..."""
     chest: str
     """The link that carries the arms."""
     head: str | None
@@ -122,6 +122,7 @@ def humanoid(seed: int, kind: str | None = None) -> Humanoid:
             for name in SIDES
         },
         "neck": [j.role for j in posed.joints if j.role.startswith("neck")],
+        "waist": [j.role for j in posed.joints if j.role.startswith("waist")],
     }
     chains = {name: tuple(written.joints[role] for role in found) for name, found in roles.items()}
     beyond = sum(_beyond(role) for role in roles["left_arm"])
@@ -141,8 +142,14 @@ def humanoid(seed: int, kind: str | None = None) -> Humanoid:
         wrist_joints=beyond,
         wrist_swings=shape.wrist_swings,
         told=frozenset(
-            {f"names: {style}", f"base: {base}", f"frames: {'tidy' if tidy else 'by chance'}", f"hand: {hands.kind}"}
-        ),
+            {
+                f"names: {style}",
+                f"base: {base}",
+                f"frames: {'tidy' if tidy else 'by chance'}",
+                f"hand: {hands.kind}",
+                *([f"joints of an ankle: {len(legs.ankle.split())}"] if base == "legs" else []),
+            }
+        ),  # fmt: skip
         mappable=strange.mappable,
     )
 

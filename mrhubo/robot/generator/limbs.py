@@ -2,7 +2,8 @@
 
 Arms: with and without clavicles, shoulders whose axes cross or do not, two orders of the swings and one of an
 industrial arm, twists at the shoulder or none, elbows before or on the arm's line, none to three joints at the wrist.
-Legs: the common orders of the hip, thighs and knees before the line. All in the planning frame, arms hanging (`plan`).
+Legs: the common orders of the hip, thighs and knees before the line, ankles of two joints, one or none. All in the
+planning frame, arms hanging (`plan`).
 """
 
 from __future__ import annotations
@@ -171,10 +172,12 @@ class LegShape:
         )
         self.apart = scale * chance.shift(0.4, 0.02, 0.08)
         self.knee_ahead = scale * chance.either(0.0, 0.0, 0.02, 0.04)
-        self.ankle = chance.either("pitch roll", "roll pitch", "pitch roll", "pitch")
+        self.ankle = chance.either(
+            "pitch roll", "roll pitch", "pitch roll", "pitch", "pitch roll", "roll pitch", "pitch", ""
+        )
         self.sole = scale * chance.between(0.04, 0.1)
         self.width = scale * chance.between(0.07, 0.13)
-        self.toes = chance.maybe(0.1)
+        self.toes = chance.maybe(0.1) and self.ankle != ""
         self.knee_back = chance.either(0.0, 0.05, 0.15)
 
     @property
@@ -212,6 +215,7 @@ def leg(plan: Plan, pelvis: int, shape: LegShape, name: str) -> None:
     plan.points[f"{name}_ankle"] = (shank, mirrored(ankle_3, side))
     for kind in shape.ankle.split():
         add(f"ankle_{kind}", ankle_3, axes[kind], -0.7, 0.7)
+    plan.directions[f"{name}_toes"], plan.directions[f"{name}_foot_up"] = (body, X), (body, Z)
     sole_3 = ankle_3 - shape.sole * Z
     length = 0.2 * shape.scale
     plan.solid(

@@ -15,10 +15,16 @@ _NEAR = 0.02
 """Metres by which a point may be off on an arm of half a metre."""
 _UPRIGHT, _POINTING, _ACROSS = 3.0, 10.0, 15.0
 """Degrees by which up and forward, fingers, and a thumb may be off."""
+_STANDING = 5.0
+"""Degrees by which a foot's directions may be off."""
 _ALONG = 5.0
 """Degrees by which a forearm may be off whose wrist no joint tells."""
-_CHAINS = {"left_arm": "left_hand", "right_arm": "right_hand", "neck": "neck"}
-"""The part that a question about a chain's joints names."""
+_CHAINS = {
+    "left_arm": "left_hand", "right_arm": "right_hand", "neck": "neck",
+    "left_leg": "left_leg", "right_leg": "right_leg", "waist": "waist",
+}  # fmt: skip
+"""What a mistake about a chain's joints is called."""
+_LEG = ("hip", "knee", "ankle", "foot", "leg")
 _ELBOWS = {f"{side}_wrist": f"{side}_elbow" for side in ("left", "right")}
 
 
@@ -31,7 +37,14 @@ def mistakes(found: Discovery, truth: Humanoid, urdf: Path) -> list[str]:
         *_joints(found, truth),
         *_points(found, truth),
         *_hands(found, truth, describe(urdf)),
+        *_feet(found, truth, describe(urdf)),
     ]
+
+
+def region(phrase: str) -> str:
+    """What of the body a mistake is about: `arms and head`, `legs`, `waist`."""
+    part = phrase.partition(":")[0].rpartition("_")[2]
+    return "waist" if part == "waist" else "legs" if part in _LEG else "arms and head"
 
 
 def asked(found: Discovery, wrong: list[str]) -> bool:
@@ -41,6 +54,9 @@ def asked(found: Discovery, wrong: list[str]) -> bool:
         return True
     # What asks about an elbow names the joints at which its arm was taken to end.
     about |= {f"{side}_hand" for side in ("left", "right") if f"{side}_elbow" in about}
+    about |= {f"{side}_leg" for side in ("left", "right") if {f"{side}_{part}" for part in _LEG} & about}
+    if "pelvis" in about:
+        about |= {"waist", *(f"{side}_{part}" for side in ("left", "right") for part in _LEG)}
     return all(any(phrase.startswith(name) for name in about) for phrase in wrong)
 
 
@@ -52,7 +68,11 @@ def _heading(found: Discovery, truth: Humanoid) -> Iterator[str]:
 
 def _joints(found: Discovery, truth: Humanoid) -> Iterator[str]:
     for chain, part in _CHAINS.items():
+        if not found.whole_body and region(part) != "arms and head":
+            continue
         chosen, right = found.chains.get(chain, ()), truth.chains[chain]
+        if chain == "waist":
+            chosen = tuple(joint for joint in chosen if joint in found.joints)  # what slides is held
         # Without a joint beyond the elbow that turns a hand, nothing is lost by one.
         if set(chosen) != set(right):
             yield f"{part}: {sorted(set(chosen) ^ set(right))}"
@@ -83,9 +103,7 @@ def _hands(found: Discovery, truth: Humanoid, description: Description) -> Itera
             if truth.wrist_joints:
                 yield f"{side}_hand: not found"
             continue
-        pose_33 = np.eye(3)
-        for joint in reversed(description.joints_above(end.link)):
-            pose_33 = pose_33 @ joint.origin_44[:3, :3]
+        pose_33 = _turn(description, end.link)
         fingers, thumb = (
             _degrees(pose_33 @ np.array(end.axes[word]), truth.directions[f"{side}_{word}"])
             for word in ("fingers", "thumb")
@@ -96,6 +114,29 @@ def _hands(found: Discovery, truth: Humanoid, description: Description) -> Itera
             yield f"{side}_hand: thumb {thumb:.0f} degrees off"
         elif "jaw" in truth.hand and min(thumb, 180 - thumb) > _ACROSS:
             yield f"{side}_hand: jaws {thumb:.0f} degrees off"
+
+
+def _feet(found: Discovery, truth: Humanoid, description: Description) -> Iterator[str]:
+    if not found.whole_body:
+        return
+    for side in ("left", "right"):
+        end, true = found.ends.get(f"{side}_foot"), truth.directions.get(f"{side}_toes")
+        if (end is None) != (true is None):
+            yield f"{side}_foot: {'not found' if end is None else 'there is none'}"
+        if end is None or true is None:
+            continue
+        for word, name in (("forward", "toes"), ("up", "foot_up")):
+            axis_3 = _turn(description, end.link) @ np.array(end.axes[word])
+            if (off := _degrees(axis_3, truth.directions[f"{side}_{name}"])) > _STANDING:
+                yield f"{side}_foot: {word} {off:.0f} degrees off"
+
+
+def _turn(description: Description, link: str) -> np.ndarray:
+    """The rotation (3, 3) of a link at zero, in the root's frame."""
+    pose_33 = np.eye(3)
+    for joint in reversed(description.joints_above(link)):
+        pose_33 = pose_33 @ joint.origin_44[:3, :3]
+    return pose_33
 
 
 def _degrees(a_3: np.ndarray, b_3: np.ndarray) -> float:

@@ -37,7 +37,7 @@ def test_detection_is_right_or_asks(tmp_path: Path) -> None:
         truth, path = humanoid(seed), tmp_path / "made.urdf"
         path.write_text(truth.urdf)
         try:
-            found = discover(path)
+            found = discover(path, whole_body=True)
         except UserError as refusal:
             wrong.append((seed, str(refusal)))
             continue

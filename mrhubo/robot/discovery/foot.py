@@ -1,0 +1,70 @@
+"""How a foot points: by the ankle's axis and the flat of its shape, else as it stands at the zero pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.robot.discovery.bodies import Bodies
+from mrhubo.robot.discovery.facing import Heading
+from mrhubo.robot.discovery.leg import Leg
+from mrhubo.robot.discovery.lines import cross, unit
+
+_FLAT, _TILTED = 0.9, 0.9998
+"""Cosines of how far the flat of a foot's box may be from the robot's up to be its sole (25 degrees), and within which
+it stands flat at the zero pose (1 degree)."""
+_AHEAD = 0.85
+"""Cosine of how far from the robot's front a foot may point (30 degrees)."""
+_STANDING = 0.8
+"""Cosine of how far from downwards a leg may run at the zero pose for its foot to stand on a floor there."""
+
+
+@dataclass(frozen=True)
+class Foot:
+    """A foot's link and directions at the zero pose, root's frame."""
+
+    link: str
+    forward_3: np.ndarray
+    up_3: np.ndarray
+    confidence: float
+    cue: str
+    doubt: str | None
+    """What could not be told, if anything."""
+
+
+def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
+    """The foot at the end of a leg."""
+    last = leg.chain[-1]
+    link = last.outer_link
+    up_3, how, sure = _up(bodies, last.end, heading.up_3)
+    doubt = None
+    down = -float(unit(leg.ankle.point_3 - leg.hip.point_3) @ heading.up_3)
+    if how is None:
+        how, sure = "as it stands at the zero pose", 0.7
+        if down < _STANDING or leg.ankle_at is None:
+            sure = 0.4
+            why = "no joint turns it against the shin" if leg.ankle_at is None else "the leg does not stand at zero"
+            doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
+    forward_3 = heading.forward_3
+    if leg.straight and leg.ankle_at is not None:
+        axis_3 = leg.chain[leg.ankle_at].hinge.line.axis_3
+        ahead_3 = unit(cross(axis_3, up_3))
+        ahead_3 = ahead_3 * np.sign(ahead_3 @ heading.forward_3)
+        if float(ahead_3 @ heading.forward_3) > _AHEAD:
+            forward_3, how = ahead_3, f"{how}; across the ankle's pitch axis"
+    forward_3 = unit(forward_3 - up_3 * (up_3 @ forward_3))
+    return Foot(link, forward_3, up_3, sure, how, doubt)
+
+
+def _up(bodies: Bodies, foot: int, up_3: np.ndarray) -> tuple[np.ndarray, str | None, float]:
+    """Where a foot's sole faces away from, by its largest box: up_3 itself, and no cue, where there is none near it."""
+    boxes = [shape for shape in bodies.shapes_of[foot] if shape.kind == "box"]
+    if boxes:
+        box = max(boxes, key=lambda shape: float(np.prod(shape.size)))
+        axes_33 = (bodies.pose_44[box.link] @ box.origin_44)[:3, :3].T
+        near = max((sign * axis_3 for axis_3 in axes_33 for sign in (1.0, -1.0)), key=lambda a_3: float(a_3 @ up_3))
+        cosine = float(near @ up_3)
+        if cosine > _FLAT:
+            return (up_3 if cosine > _TILTED else unit(near)), "flat as its box is", 0.9
+    return up_3, None, 0.0

@@ -1,0 +1,106 @@
+"""What could not be decided, for the user to answer; and what a user should know of the whole robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from mrhubo.robot.discovery.arm import Spot
+from mrhubo.robot.discovery.bodies import Chain
+from mrhubo.robot.discovery.foot import Foot
+from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.ranges import driver
+from mrhubo.robot.discovery.result import Candidate, Question
+from mrhubo.robot.limits import beyond_turns
+from mrhubo.robot.soles import sole_balls
+
+_SURE = 0.5
+"""Confidence under which the user is asked."""
+_BACK = 3
+"""Joints of a waist at most, where no legs tell that it is one."""
+
+Named = tuple[str, Spot, tuple[Candidate, ...]]
+"""A point by its name, and where else it may lie."""
+
+
+def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) -> Iterator[Question]:
+    """About directions, limbs, points, hands and feet."""
+    heading, roles = limbs.heading, limbs.roles
+    if heading.forward_sure < _SURE:
+        yield Question("forward", "it is not clear where the robot faces, nor therefore which side is left; "
+                       f"taken by: {heading.forward_cue}")  # fmt: skip
+    if heading.up_sure < _SURE:
+        yield Question("up", f"it is not clear where the robot's up is; taken by: {heading.up_cue}")
+    if roles.sure < _SURE:
+        first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
+        yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
+    for name, spot, _ in spots:
+        if spot.confidence < _SURE:
+            yield Question(name, f"the {name.replace('_', ' ')} was taken as {spot.cue}; give its point", spot.links)
+    for side, hand in limbs.hands.items():
+        if hand.doubt is not None:
+            yield Question(f"{side}_hand", f"{hand.doubt}; taken: {hand.cue}", (hand.link,))
+    if not limbs.whole_body:
+        return
+    for side, foot in feet.items():
+        if foot.doubt is not None:
+            yield Question(f"{side}_foot", foot.doubt, (foot.link,))
+        if not sole_balls(foot.link, limbs.bodies.description)[1]:
+            yield Question(f"{side}_foot", "no shape tells where its sole is; give how far it reaches backwards, "
+                           "forwards and down from the link's origin [m], as in sole: [0.05, 0.12, 0.035]",
+                           (foot.link,))  # fmt: skip
+    if roles.legs is not None and not limbs.legs:
+        first = tuple(chain[0].hinge.name for chain in roles.legs.chains)
+        yield Question("pelvis", "of the limbs below it no knee could be told, so they are left out: if they are legs, "
+                       "write hips, knees, ankles and feet by hand, with their joints", first)  # fmt: skip
+    turning = tuple(step.hinge.name for step in roles.waist if step.hinge.rotary)
+    if roles.legs is None and len(turning) > _BACK:
+        yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
+                       "which may be a tail or an arm", turning)  # fmt: skip
+
+
+def coupled(limbs: Limbs) -> Iterator[Question]:
+    """Joints of moving limbs that mimic others of them: as a file may have it that is for a show of one side."""
+    moving = [step for chain in limbs.moving.values() for step in chain]
+    whole = {step.hinge.name for step in moving}
+    for step in (step for step in moving if not step.hinge.free and step.hinge.name not in shared_hips(limbs)):
+        source = driver(limbs.bodies, step)
+        if source is not None and source.name in whole:
+            name = step.hinge.name
+            yield Question(name, f"'{name}' mimics '{source.name}', so neither follows a person by itself; if they "
+                           f"can on the robot, take the <mimic> element of '{name}' out of the URDF and "
+                           "describe it anew")  # fmt: skip
+
+
+def shared_hips(limbs: Limbs) -> dict[str, str]:
+    """Where one joint alone of a leg mimics the same of the other leg, as one motor may drive both: by its name, its
+    source.
+    """
+    found: dict[str, str] = {}
+    legs: list[Chain] = [leg.chain for leg in limbs.legs.values()]
+    for chain, other in (legs, legs[::-1]) if len(legs) == 2 else ():
+        names = [step.hinge.name for step in other]
+        driven = [(step, driver(limbs.bodies, step)) for step in chain if not step.hinge.free]
+        sources = {step.hinge.name: hinge.name for step, hinge in driven if hinge is not None and hinge.name in names}
+        if len(sources) == 1:
+            found |= sources
+    return found
+
+
+def notes(limbs: Limbs) -> Iterator[str]:
+    """Sentences about the whole robot."""
+    bodies = limbs.bodies
+    if bodies.degrees:
+        joint = next(j for j in bodies.description.joints.values() if j.kind == "revolute" and beyond_turns(j))
+        yield (
+            f"the limits of most joints, as {joint.lower:g} .. {joint.upper:g} of '{joint.name}', can only be "
+            "degrees, where a URDF has radians; robot.ranges holds them in radians, and nothing else need be done "
+            "here, but other programs need a URDF with every limit times 0.0174533"
+        )
+    for what in limbs.heading.contradicted:
+        yield f"against where the robot was found to face speaks: {what}"
+    if not limbs.whole_body:
+        return
+    for name, source in shared_hips(limbs).items():
+        yield f"'{name}' mimics '{source}' of the other leg, so the two legs share that joint"
+    if not limbs.legs and not any(step.hinge.rotary for step in limbs.roles.waist):
+        yield "neither legs nor a waist were found: what moves is arms and head, as without a whole body"
