@@ -28,6 +28,7 @@ from mrhubo.robot import build_body_map
 SCRIPTS = [
     "collisions",
     "confidence",
+    "continuity",
     "discovery",
     "files",
     "inference",
@@ -337,6 +338,17 @@ def test_stream(run: Run, package: Path, clips: Path) -> None:
     found = rows(text, "motion")
     assert [row[1] for row in found[:3]] == ["networks", "`retarget`", "stream"]
     assert all(row[4] == "0" and row[5] == "0.0%" for row in found if row[1] == "stream")
+
+
+def test_continuity(run: Run, package: Path, clips: Path) -> None:
+    text = run("continuity", package, "--motions", clips)
+    found = rows(text, "motion")
+    names = ["frame by frame", "whole motions", "stream"]
+    assert [row[:2] for row in found] == [[motion, name] for motion in ("boxing", "wave") for name in names]
+    assert all(row[3] == "0" and row[4] == "0.00%" for row in found if row[1] != "frame by frame")
+    for name, of, jerk, *_ in rows(text, "answers"):
+        jerks = [float(row[2]) for row in found if row[1] == name]
+        assert float(jerk) == pytest.approx(max(jerks) if of == "highest" else sum(jerks) / 2, abs=0.011)
 
 
 def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
