@@ -149,13 +149,15 @@ class CompiledEngine:
     def problem(self) -> Problem:
         """As `Engine.problem`."""
         blocks = len(self.description.cost.cell_CU)
-        return make_problem(self.description, self._models(self._motion_kernels.quadratic, blocks), self._factor)
+        return make_problem(
+            self.description, self._models(self._motion_kernels.quadratic, blocks), self._turning, self._factor
+        )
 
     @cached_property
     def giving_way(self) -> GivingWay:
         """As `Engine.giving_way`."""
         together = Avoidance(self.description).description
-        problem = make_problem(together, self._models(self._motion_kernels.whole, 1), self._factor)
+        problem = make_problem(together, self._models(self._motion_kernels.whole, 1), self._turning, self._factor)
 
         def close(q_BN: np.ndarray) -> np.ndarray:
             close_B = np.empty(len(q_BN), np.bool_)
@@ -179,16 +181,26 @@ class CompiledEngine:
 
         return quadratic
 
+    def _turning(self, q_BN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`Directions` by a compiled function."""
+        (frames, joints), directions = q_BN.shape, len(self.description.human.seen_D)
+        q_BN = np.ascontiguousarray(q_BN)
+        found = np.empty((frames, directions, 3)), np.empty((frames, directions, 3, joints))
+        self._shared(
+            frames, lambda rows: self._motion_kernels.turning(self._tables, q_BN[rows], *(part[rows] for part in found))
+        )
+        return found
+
     def _factor(self, system: Banded) -> Solve:
         """Solves systems of whole motions by compiled functions."""
         frames, joints = system.diagonal_TM.shape
-        coupling_KTM = np.zeros((len(system.couplings_TM), frames, joints))
-        for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
-            coupling_KTM[lag - 1, : frames - lag] = coupling_TM
-        lower_RW = np.empty((frames * joints, len(coupling_KTM) * joints + 1))
+        coupling_KTMM = np.zeros((len(system.couplings_TMM), frames, joints, joints))
+        for lag, coupling_TMM in enumerate(system.couplings_TMM, start=1):
+            coupling_KTMM[lag - 1, : frames - lag] = coupling_TMM
+        lower_RW = np.empty((frames * joints, (len(coupling_KTMM) + 1) * joints))
         # In one order of memory: for each other one, numba compiles anew.
         within_TMM, diagonal_TM = np.ascontiguousarray(system.within_TMM), np.ascontiguousarray(system.diagonal_TM)
-        self._motion_kernels.factor(within_TMM, diagonal_TM, coupling_KTM, lower_RW)
+        self._motion_kernels.factor(within_TMM, diagonal_TM, coupling_KTMM, lower_RW)
 
         def solve(right_TM: np.ndarray) -> np.ndarray:
             found_R = right_TM.flatten()
@@ -215,6 +227,7 @@ class CompiledEngine:
         if not is_kept(self._unroll is not None):
             nobody_0N, nothing_0D3 = np.zeros((0, len(self.description.cost.lower_N))), np.zeros((0, 1, 3))
             self.giving_way.problem.quadratic(nobody_0N, nothing_0D3)
+            self.giving_way.problem.directions(nobody_0N)
             self.giving_way.close(nobody_0N)
             self.avoid(nobody_0N, nothing_0D3)
             kernels = [*self._kernels, *self._motion_kernels]

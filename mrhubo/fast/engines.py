@@ -77,12 +77,15 @@ class NumpyEngine:
     @cached_property
     def problem(self) -> Problem:
         """As `Engine.problem`."""
-        return make_problem(self.description, steps.quadratic, halve)
+        return make_problem(self.description, steps.quadratic, self._turning, halve)
+
+    def _turning(self, q_BN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return robot.turning(self.description.kinematics, self.description.human.seen_D, q_BN)
 
     @cached_property
     def giving_way(self) -> GivingWay:
         """As `Engine.giving_way`."""
-        return make_giving_way(self._avoidance, halve, self.avoid)
+        return make_giving_way(self._avoidance, self._turning, halve, self.avoid)
 
     def answer(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool, shake_BX: np.ndarray | None

@@ -15,12 +15,13 @@ def factor(system: Banded) -> Solve:
     """Solves by a Cholesky factor in lower banded form."""
     frames, joints = system.diagonal_TM.shape
     # Row k holds the entries k below the diagonal; the next frame's same joint is `joints` below.
-    banded = np.zeros((len(system.couplings_TM) * joints + 1, frames, joints))
+    banded = np.zeros(((len(system.couplings_TMM) + 1) * joints, frames, joints))
     banded[0] = system.diagonal_TM
     for k in range(1, joints):
         banded[k, :, : joints - k] = np.diagonal(system.within_TMM, offset=-k, axis1=1, axis2=2)
-    for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
-        banded[lag * joints, : frames - lag] = coupling_TM
+    for lag, coupling_TMM in enumerate(system.couplings_TMM, start=1):
+        for n in range(joints):
+            banded[lag * joints - n : (lag + 1) * joints - n, : frames - lag, n] = coupling_TMM[..., n].T
     lower = cholesky_banded(banded.reshape(len(banded), -1), overwrite_ab=True, lower=True, check_finite=False)
 
     def solve(right_TM: np.ndarray) -> np.ndarray:

@@ -50,22 +50,22 @@ def refine(
 
     With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad.
     """
-    model = _motion_quadratic(problem, q_TN, target_TD3, smoothness)
-    cost_C = model.cost_BC.double().sum(0)
-    damping_TC = torch.full_like(model.cost_BC, DAMPING)
+    model = _motion_model(problem, q_TN, target_TD3, smoothness)
+    cost_C = model.frames.cost_BC.double().sum(0)
+    damping_TC = torch.full_like(model.frames.cost_BC, DAMPING)
     failures_C = torch.zeros_like(cost_C)
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
         trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
         trial_TN = torch.clamp(trial_TN, problem.lower_N, problem.upper_N)
         trial_TN = torch.where(running_C[problem.blocks.block_N], trial_TN, q_TN)
-        trial = _motion_quadratic(problem, trial_TN, target_TD3, smoothness)
-        trial_cost_C = trial.cost_BC.double().sum(0)
+        trial = _motion_model(problem, trial_TN, target_TD3, smoothness)
+        trial_cost_C = trial.frames.cost_BC.double().sum(0)
         better_C = trial_cost_C < cost_C
         moved_C = ((trial_TN - q_TN).abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
         settled_C = better_C & (moved_C < tolerance)
         failures_C = torch.where(better_C, torch.where(settled_C, PATIENCE, 0), failures_C + 1)
-        factor_TC = torch.where(trial.cost_BC > model.cost_BC, HARDER, torch.where(better_C, EASIER, 1.0))
+        factor_TC = torch.where(trial.frames.cost_BC > model.frames.cost_BC, HARDER, torch.where(better_C, EASIER, 1.0))
         damping_TC = (damping_TC * factor_TC).clamp(LEAST, MOST)
         q_TN = torch.where(better_C[problem.blocks.block_N], trial_TN, q_TN)
         cost_C = torch.where(better_C, trial_cost_C, cost_C)
@@ -105,24 +105,45 @@ def widen(mask_T: Tensor, frames: int) -> Tensor:
 
 def motion_cost(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, smoothness: Smoothness) -> Tensor:
     """What each block of joints costs (C,) in a motion (T, N) [rad]."""
-    return _motion_quadratic(problem, q_TN, target_TD3, smoothness).cost_BC.double().sum(0)
+    return _motion_model(problem, q_TN, target_TD3, smoothness).frames.cost_BC.double().sum(0)
 
 
-def _motion_quadratic(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, smoothness: Smoothness) -> Quadratic:
-    """The model of each frame, with what couples it to others in gradients and in costs."""
+@dataclass(frozen=True)
+class _MotionModel:
+    """The model of a motion around some joint angles."""
+
+    frames: Quadratic
+    """Of each frame, with what couples it to others in gradients and in costs."""
+    jacobian_TD3N: Tensor | None
+    """How its directions turn [1/rad]; None where their jerk costs nothing."""
+
+    def where(self, better_C: Tensor, block_N: Tensor, other: _MotionModel) -> _MotionModel:
+        """`other` in the blocks that are better."""
+        jacobian_TD3N = other.jacobian_TD3N
+        if self.jacobian_TD3N is not None and jacobian_TD3N is not None:
+            jacobian_TD3N = torch.where(better_C[block_N], jacobian_TD3N, self.jacobian_TD3N)
+        return _MotionModel(self.frames.where(better_C, block_N, other.frames), jacobian_TD3N)
+
+
+def _motion_model(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, smoothness: Smoothness) -> _MotionModel:
     chunks = zip(q_TN.split(problem.chunk), target_TD3.split(problem.chunk), strict=True)
-    parts = [problem.quadratic(*chunk) for chunk in chunks]
-    return Quadratic(
-        torch.cat([part.cost_BC for part in parts]) + smoothness.costs(q_TN, problem.blocks.joints_NC),
-        torch.cat([part.gradient_BN for part in parts]) + smoothness.gradient(q_TN),
-        torch.cat([part.hessian_BNN for part in parts]),
-    )
+    states = [problem.state(*chunk) for chunk in chunks]
+    parts, jacobian_TD3N = [problem.quadratic_at(s) for s in states], None
+    cost_TC = torch.cat([part.cost_BC for part in parts]) + smoothness.costs(q_TN, problem.blocks.joints_NC)
+    gradient_TN = torch.cat([part.gradient_BN for part in parts]) + smoothness.gradient(q_TN)
+    if smoothness.directions is not None and len(q_TN) > smoothness.reach:
+        direction_TD3 = torch.cat([s.direction_BD3 for s in states])
+        jacobian_TD3N = torch.cat([s.jacobian_BD3N for s in states])
+        cost_TC = cost_TC + smoothness.directions.costs(direction_TD3, problem.blocks.directions_DC)
+        gradient_TN = gradient_TN + smoothness.directions.gradient(direction_TD3, jacobian_TD3N)
+    hessian_TNN = torch.cat([part.hessian_BNN for part in parts])
+    return _MotionModel(Quadratic(cost_TC, gradient_TN, hessian_TNN), jacobian_TD3N)
 
 
 def _motion_step(
     problem: DirectionProblem,
     q_TN: Tensor,
-    model: Quadratic,
+    model: _MotionModel,
     damping_TC: Tensor,
     running_C: Tensor,
     smoothness: Smoothness,
@@ -130,32 +151,52 @@ def _motion_step(
     bound: StepBound | None,
 ) -> Tensor:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
-    free_TN = torch.ones_like(q_TN, dtype=torch.bool) if bound else ~problem.frozen(q_TN, model.gradient_BN)
+    gradient_TN = model.frames.gradient_BN
+    free_TN = torch.ones_like(q_TN, dtype=torch.bool) if bound else ~problem.frozen(q_TN, gradient_TN)
     if fixed_T is not None:
         free_TN &= ~fixed_T[:, None]
-    bands, damping_TN = smoothness.hessian(q_TN), damping_TC[:, problem.blocks.block_N]
-    diagonal_TN = model.hessian_BNN.diagonal(dim1=-2, dim2=-1) + bands[0]
-    diagonal_TN = diagonal_TN + damping_TN * (diagonal_TN + FLOOR)
-    diagonal_TN = torch.where(free_TN, diagonal_TN, torch.ones_like(diagonal_TN))
-    couplings = [band * (free_TN[lag:] & free_TN[:-lag]) for lag, band in enumerate(bands[1:], start=1)]
-    right_TN = -model.gradient_BN * free_TN
-    step_TN = torch.zeros_like(q_TN)
+    bands, step_TN = smoothness.hessian(q_TN), torch.zeros_like(q_TN)
     for block, running in enumerate(running_C.tolist()):
         if running:
             joints_M = torch.nonzero(problem.blocks.block_N == block)[:, 0]
-            both_TMM = free_TN[:, joints_M, None] & free_TN[:, None, joints_M]
-            within_TMM = model.hessian_BNN[:, joints_M[:, None], joints_M] * both_TMM
-            right_TM, diagonal_TM, *couplings_TM = (
-                _array(part[:, joints_M]) for part in (right_TN, diagonal_TN, *couplings)
+            entries = _coupled(problem, model, smoothness, block, joints_M, bands)
+            free_TM, right_TM = free_TN[:, joints_M], -gradient_TN[:, joints_M] * free_TN[:, joints_M]
+            diagonal_TM = entries[0].diagonal(dim1=-2, dim2=-1)
+            diagonal_TM = diagonal_TM + damping_TC[:, block, None] * (diagonal_TM + FLOOR)
+            diagonal_TM = torch.where(free_TM, diagonal_TM, torch.ones_like(diagonal_TM))
+            within_TMM, *couplings_TMM = (
+                _array(entry * (free_TM[lag:, :, None] & free_TM[: len(free_TM) - lag, None]))
+                for lag, entry in enumerate(entries)
             )
-            system = Banded(_array(within_TMM), diagonal_TM, couplings_TM)
+            system = Banded(within_TMM, _array(diagonal_TM), couplings_TMM)
             if bound is None:
-                step_TM = factor(system)(right_TM)
+                step_TM = factor(system)(_array(right_TM))
             else:
                 bounds = _bounds(problem, q_TN, free_TN[:, 0], bound, joints_M)
-                step_TM = bounded_minimum(system, right_TM, bounds, factor)
+                step_TM = bounded_minimum(system, _array(right_TM), bounds, factor)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
+
+
+def _coupled(
+    problem: DirectionProblem,
+    model: _MotionModel,
+    smoothness: Smoothness,
+    block: int,
+    joints_M: Tensor,
+    bands: list[Tensor],
+) -> list[Tensor]:
+    """Half of a block's Hessian: entries within a frame (T, M, M), and those between frames (T - 1, M, M), (T - 2, M,
+    M) ...
+    """
+    entries = [band_XN[:, joints_M].diag_embed() for band_XN in bands]
+    entries[0] += model.frames.hessian_BNN[:, joints_M[:, None], joints_M]
+    if smoothness.directions is not None and model.jacobian_TD3N is not None:
+        columns_E = torch.nonzero(problem.blocks.directions_DC[:, block])[:, 0]
+        jacobian_TE3M = model.jacobian_TD3N[:, columns_E][..., joints_M]
+        more = smoothness.directions.hessian(jacobian_TE3M, columns_E)
+        entries = [entry + other for entry, other in zip(entries, more, strict=True)]
+    return entries
 
 
 def _bounds(problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, bound: StepBound, joints_M: Tensor) -> Bounds:

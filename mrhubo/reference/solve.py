@@ -61,7 +61,15 @@ class DirectionProblem(nn.Module):
 
     def quadratic(self, q_BN: Tensor, target_BD3: Tensor) -> Quadratic:
         """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
-        state = State(q_BN, self.robot.forward(q_BN), target_BD3)
+        return self.quadratic_at(self.state(q_BN, target_BD3))
+
+    def state(self, q_BN: Tensor, target_BD3: Tensor) -> State:
+        """What terms are asked for at joint angles (B, N) [rad] for human directions (B, D, 3)."""
+        poses = self.robot.forward(q_BN)
+        return State(q_BN, poses, target_BD3, *self.kinematics.at(poses))
+
+    def quadratic_at(self, state: State) -> Quadratic:
+        """As `quadratic`."""
         model: Quadratic | None = None
         for term in self.terms:
             assert isinstance(term, Term)

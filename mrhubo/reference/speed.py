@@ -3,7 +3,8 @@
     |q_t - q_(t-1)| <= step        for every joint, from each frame to the next
 
 First the nearest motion that keeps to it, then the best one near that (`mrhubo.fast.together.bounded`), whose last
-millionths the nearest motion takes away again.
+millionths the nearest motion takes away again. Where joints run through a wide angle, the jerk of directions is far
+from its model, and a few steps from the nearest motion end half way; so they begin where the joints' own terms lead.
 
 Legend: T frames, N joints, D directions.
 """
@@ -79,7 +80,9 @@ def keep_speed(
     free_T = widen(changed_TN.any(dim=1), around)
     if fixed_T is not None:
         free_T = free_T & ~fixed_T
-    found_TN = refine_around(problem, nearest_TN, target_TD3, smoothness, free_T, SWEEPS, TOLERANCE, step_N)
+    found_TN = nearest_TN
+    for terms in (smoothness,) if smoothness.directions is None else (smoothness.of_joints, smoothness):
+        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, SWEEPS, TOLERANCE, step_N)
     found_TN = nearest_slow(found_TN, step_N, fixed_T)
     concerned_C = changed_TN.any(dim=0).to(q_TN) @ problem.blocks.joints_NC > 0
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)

@@ -30,6 +30,7 @@ SCRIPTS = [
     "camera",
     "collisions",
     "confidence",
+    "continuity",
     "discovery",
     "files",
     "inference",
@@ -363,6 +364,17 @@ def test_live(run: Run, package: Path, clips: Path) -> None:
     assert [row[0] for row in rows(text, "time")] == ["the clock's", "the thread's own"]
     (minute,) = rows(text, "minute")
     assert minute[-1] == "0" and "malformed" in text
+
+
+def test_continuity(run: Run, package: Path, clips: Path) -> None:
+    text = run("continuity", package, "--motions", clips)
+    found = rows(text, "motion")
+    names = ["frame by frame", "whole motions", "stream"]
+    assert [row[:2] for row in found] == [[motion, name] for motion in ("boxing", "wave") for name in names]
+    assert all(row[3] == "0" and row[4] == "0.00%" for row in found if row[1] != "frame by frame")
+    for name, of, jerk, *_ in rows(text, "answers"):
+        jerks = [float(row[2]) for row in found if row[1] == name]
+        assert float(jerk) == pytest.approx(max(jerks) if of == "highest" else sum(jerks) / 2, abs=0.011)
 
 
 def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -120,7 +120,7 @@ def factors(make: Callable[[str], Retargeter]) -> list[Callable]:
     engine: Engine = FastRetargeter(make("nao").describe(), "compiled").engine
     found = [halve, engine.problem.factor]
     for factor in found:  # is compiled by now
-        factor(Banded(np.zeros((2, 1, 1)), np.ones((2, 1)), [np.zeros((1, 1))]))(np.ones((2, 1)))
+        factor(Banded(np.zeros((2, 1, 1)), np.ones((2, 1)), [np.zeros((1, 1, 1))]))(np.ones((2, 1)))
     return found
 
 
@@ -130,12 +130,12 @@ def test_banded_systems(factors: list[Callable], frames: int, joints: int, seed:
     generator = np.random.default_rng(seed)
     reach = min(3, frames - 1)
     within_TMM = generator.normal(size=(frames, joints, joints))
-    couplings = [generator.normal(size=(frames - lag, joints)) for lag in range(1, reach + 1)]
+    couplings = [generator.normal(size=(frames - lag, joints, joints)) for lag in range(1, reach + 1)]
     dense = np.zeros((frames, joints, frames, joints))
     for t in range(frames):
         dense[t, :, t] = np.tril(within_TMM[t], -1)
         for lag, coupling in enumerate(couplings[: frames - 1 - t], start=1):
-            dense[t + lag, range(joints), t, range(joints)] = coupling[t]
+            dense[t + lag, :, t] = coupling[t]
     dense = dense.reshape(frames * joints, -1)
     dense += dense.T
     diagonal = np.abs(dense).sum(axis=1) + 0.1

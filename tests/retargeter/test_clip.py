@@ -14,7 +14,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion import Motion, read_motion
 from mrhubo.reference import OptimizationRetargeter, count_jumps, direction_error, direction_jerk
 from mrhubo.retargeter import Retargeter, build_network
-from mrhubo.retargeter.clip import jerk_weights, join_frames
+from mrhubo.retargeter.clip import calmness, join_frames
 from mrhubo.robot import BodyMap, build_body_map
 
 
@@ -72,12 +72,12 @@ def test_a_jerky_human_is_followed(optimizer: OptimizationRetargeter) -> None:
     q_TN = problem.robot.home().repeat(40, 1)
     arm = [n for n, name in enumerate(problem.robot.joint_names) if name.startswith("L")]
     q_TN[:, arm] += 0.1 * torch.randn(40, 1, generator=torch.Generator().manual_seed(0))
-    weight_YN = jerk_weights(problem, body_map.robot_directions(problem.robot.forward(q_TN)), 30.0)
-    assert weight_YN.shape == (37, 8)
-    others = [n for n in range(8) if n not in arm]
-    assert float(weight_YN[:, arm].max()) < 0.1 * float(weight_YN[:, others].min())
+    calm_YC = calmness(problem, body_map.robot_directions(problem.robot.forward(q_TN)), 30.0)
+    assert calm_YC.shape == (37, 2)
+    left = int(problem.blocks.block_N[arm[0]])
+    assert float(calm_YC[:, left].max()) < 0.1 * float(calm_YC[:, 1 - left].min())
     few_TD3 = body_map.robot_directions(problem.robot.forward(q_TN[:3]))
-    assert jerk_weights(problem, few_TD3, 30.0).shape == (0, 8)
+    assert calmness(problem, few_TD3, 30.0).shape == (0, 2)
     for frames in (0, 1, 2, 3, 4):
         target_TD3 = body_map.robot_directions(problem.robot.forward(q_TN[:frames])) if frames else few_TD3[:0]
         assert join_frames(problem, q_TN[:frames], target_TD3, 30.0).shape == (frames, 8)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import avoidance, collision, steps, tables
+from mrhubo.fast.compiled import avoidance, collision, human, steps, tables
 from mrhubo.fast.compiled import robot as robots
 from mrhubo.fast.kept import checksum
 
@@ -23,6 +23,7 @@ class MotionKernels(NamedTuple):
 
     quadratic: Callable[..., Any]
     whole: Callable[..., Any]
+    turning: Callable[..., Any]
     close: Callable[..., Any]
     factor: Callable[..., Any]
     solve: Callable[..., Any]
@@ -66,6 +67,22 @@ def make_motion_kernels() -> MotionKernels:
                     hessian_BNN[b, n, m] = hessian_BNN[b, m, n] = work.next_hessian_NN[n, m]
 
     @njit(cache=True, **tables.COMPILED)
+    def turning(t, q_BN, direction_BD3, jacobian_BD3N):
+        """Directions of frames and their Jacobian, both in the axes of the parts that see them."""
+        _ = version
+        work = robots.make_work(t)
+        for b in range(len(q_BN)):
+            robots.place(t, work, q_BN[b])
+            robots.jacobian(t, work)
+            for d in range(direction_BD3.shape[1]):
+                view = tables.whole(t, tables.SEEN_D, d)
+                x, y, z = human.turn_back(work.view_V33, view, human.row(work.direction_D3, d))
+                direction_BD3[b, d, 0], direction_BD3[b, d, 1], direction_BD3[b, d, 2] = x, y, z
+                for n in range(q_BN.shape[1]):
+                    x, y, z = human.turn_back(work.view_V33, view, human.row3(work.jacobian_DN3, d, n))
+                    jacobian_BD3N[b, d, 0, n], jacobian_BD3N[b, d, 1, n], jacobian_BD3N[b, d, 2, n] = x, y, z
+
+    @njit(cache=True, **tables.COMPILED)
     def close(t, q_BN, close_B):
         """Which frames have a pair of capsules nearer than its clearance."""
         _ = version
@@ -75,28 +92,30 @@ def make_motion_kernels() -> MotionKernels:
             close_B[b] = collision.touches(t, work, True)
 
     @njit(cache=True, **tables.COMPILED)
-    def factor(within_TMM, diagonal_TM, coupling_KTM, lower_RW):
+    def factor(within_TMM, diagonal_TM, coupling_KTMM, lower_RW):
         """Cholesky factor of a `Banded`, row after row; the last entry of a row is the reciprocal of its diagonal."""
         _ = version
         frames, joints = diagonal_TM.shape
-        reach, width = len(coupling_KTM), lower_RW.shape[1] - 1
+        reach, width = len(coupling_KTMM), lower_RW.shape[1] - 1
         for t in range(frames):
+            earlier = min(reach, t)
             for m in range(joints):
-                r = t * joints + m
+                r, first = t * joints + m, width - m - earlier * joints
                 row_W = lower_RW[r]
                 row_W[:] = 0.0
-                for lag in range(1, min(reach, t) + 1):
-                    row_W[width - lag * joints] = coupling_KTM[lag - 1, t - lag, m]
+                for lag in range(1, earlier + 1):
+                    for n in range(joints):
+                        row_W[width - m - lag * joints + n] = coupling_KTMM[lag - 1, t - lag, m, n]
                 for n in range(m):
                     row_W[width - m + n] = within_TMM[t, m, n]
-                for y in range(max(0, width - r), width):
+                for y in range(first, width):
                     other_W = lower_RW[r - width + y]
                     found = row_W[y]
-                    for k in range(y):  # what lies before the first row is 0
+                    for k in range(first, y):  # what lies before the first entry is 0
                         found -= row_W[k] * other_W[width - y + k]
                     row_W[y] = found * other_W[width]
                 found = diagonal_TM[t, m]
-                for k in range(width):
+                for k in range(first, width):
                     found -= row_W[k] * row_W[k]
                 row_W[width] = 1 / math.sqrt(found)
 
@@ -122,4 +141,4 @@ def make_motion_kernels() -> MotionKernels:
             for k in range(len(before_X)):
                 before_X[k] -= row_W[width - len(before_X) + k] * found
 
-    return MotionKernels(quadratic, whole, close, factor, solve)
+    return MotionKernels(quadratic, whole, turning, close, factor, solve)

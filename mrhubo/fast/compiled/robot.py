@@ -160,7 +160,8 @@ def place(t, work, q_N):
 
 
 @njit(**INNER)
-def _jacobian(t, work):
+def jacobian(t, work):
+    """How directions change by joints [1/rad], as they are seen from their parts, base frame."""
     pairs = size(t, DIRECTION_Q)
     jacobian_DN3 = work.jacobian_DN3
     for p in range(pairs):
@@ -185,7 +186,7 @@ def _jacobian(t, work):
 def quadratic(t, work, q_N, cost_C, gradient_N, hessian_NN):
     """Cost and Gauss-Newton model at joint angles, for the goal in `work`."""
     place(t, work, q_N)
-    _jacobian(t, work)
+    jacobian(t, work)
     for c in range(len(cost_C)):
         first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
         found = 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.together.banded import Factor
-from mrhubo.fast.together.problem import Problem, make_problem
+from mrhubo.fast.together.problem import Directions, Problem, make_problem
 from mrhubo.fast.together.refine import refine_around, widen
 from mrhubo.fast.together.smoothness import Smoothness
 from mrhubo.fast.together.speed import keep_speed
@@ -54,7 +54,9 @@ class GivingWay:
 
 
 def make_giving_way(
-    avoidance: Avoidance, factor: Factor, alone: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    avoidance: Avoidance, directions: Directions, factor: Factor, alone: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> GivingWay:
     """That of a robot, with what solves systems and makes single frames give way."""
-    return GivingWay(make_problem(avoidance.description, avoidance.quadratic, factor), avoidance.close, alone)
+    return GivingWay(
+        make_problem(avoidance.description, avoidance.quadratic, directions, factor), avoidance.close, alone
+    )

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mrhubo.fast.plain.steps import diagonal
+
 Solve = Callable[[np.ndarray], np.ndarray]
 """The solution (T, M) for a right side (T, M)."""
 
@@ -21,23 +23,30 @@ class Banded:
     within_TMM: np.ndarray
     """Entries between joints of one frame; its diagonal does not count."""
     diagonal_TM: np.ndarray
-    couplings_TM: list[np.ndarray]
-    """Entries between a joint and the same joint one, two ... frames later (T - 1, M), (T - 2, M) ..."""
+    couplings_TMM: list[np.ndarray]
+    """Entries between the joints one, two ... frames later, the rows, and those of a frame, the columns:
+    (T - 1, M, M), (T - 2, M, M) ..."""
 
     def plus(self, diagonal_TM: np.ndarray, next_XM: np.ndarray) -> Banded:
-        """The same with something added to the diagonal and to the first coupling."""
-        first_XM, *others = self.couplings_TM
-        return replace(self, diagonal_TM=self.diagonal_TM + diagonal_TM, couplings_TM=[first_XM + next_XM, *others])
+        """The same with something added to the diagonal, and to what couples joints with themselves a frame later."""
+        first_XMM, *others = self.couplings_TMM
+        first_XMM, diagonal_TM = first_XMM.copy(), self.diagonal_TM + diagonal_TM
+        diagonal(first_XMM)[:] += next_XM
+        return replace(self, diagonal_TM=diagonal_TM, couplings_TMM=[first_XMM, *others])
 
     def times(self, x_TM: np.ndarray) -> np.ndarray:
         """The product (T, M) with moves (T, M)."""
         found_TM = self.diagonal_TM * x_TM
         lower_TMM = np.tril(self.within_TMM, -1)
-        found_TM += np.einsum("tmn,tn->tm", lower_TMM, x_TM) + np.einsum("tnm,tn->tm", lower_TMM, x_TM)
-        for lag, coupling_TM in enumerate(self.couplings_TM, start=1):
-            found_TM[lag:] += coupling_TM * x_TM[:-lag]
-            found_TM[:-lag] += coupling_TM * x_TM[lag:]
+        found_TM += _times(lower_TMM + lower_TMM.swapaxes(-1, -2), x_TM)
+        for lag, coupling_TMM in enumerate(self.couplings_TMM, start=1):
+            found_TM[lag:] += _times(coupling_TMM, x_TM[:-lag])
+            found_TM[:-lag] += _times(coupling_TMM.swapaxes(-1, -2), x_TM[lag:])
         return found_TM
+
+
+def _times(matrix_TMM: np.ndarray, x_TM: np.ndarray) -> np.ndarray:
+    return (matrix_TMM @ x_TM[..., None])[..., 0]
 
 
 Factor = Callable[[Banded], Solve]
@@ -91,7 +100,7 @@ def _grouped(system: Banded) -> tuple[np.ndarray, np.ndarray]:
     each group and the next (G - 1, E, E). Rows that fill up the last group are those of the identity.
     """
     frames, joints = system.diagonal_TM.shape
-    size = max(1, len(system.couplings_TM))
+    size = max(1, len(system.couplings_TMM))
     groups = -(-frames // size)
 
     def filled(value_TX: np.ndarray, fill: float) -> np.ndarray:
@@ -107,13 +116,14 @@ def _grouped(system: Banded) -> tuple[np.ndarray, np.ndarray]:
     for i in range(size):
         own[:, i, :, i] = within_GSMM[:, i]
         own[:, i, joint_M, i, joint_M] = diagonal_GSM[:, i]
-    for lag, coupling_TM in enumerate(system.couplings_TM, start=1):
-        coupling_GSM = filled(coupling_TM, 0.0)
+    for lag, coupling_TMM in enumerate(system.couplings_TMM, start=1):
+        coupling_GSMM = filled(coupling_TMM, 0.0)
         for i in range(size):
             inside, j = divmod(i + lag, size)
             if inside == 0:
-                own[:, i, joint_M, j, joint_M] = own[:, j, joint_M, i, joint_M] = coupling_GSM[:, i]
+                own[:, j, :, i] = coupling_GSMM[:, i]
+                own[:, i, :, j] = coupling_GSMM[:, i].swapaxes(-1, -2)
             else:
-                following[:, i, joint_M, j, joint_M] = coupling_GSM[:, i]
+                following[:, i, :, j] = coupling_GSMM[:, i].swapaxes(-1, -2)
     rows = size * joints
     return own.reshape(groups, rows, rows), following[:-1].reshape(groups - 1, rows, rows)

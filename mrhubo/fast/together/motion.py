@@ -14,7 +14,7 @@ from mrhubo.fast.description import Description
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.problem import Problem
 from mrhubo.fast.together.refine import refine
-from mrhubo.fast.together.smoothness import SMOOTHNESS, Smoothness, jerk_weights, pull_at
+from mrhubo.fast.together.smoothness import Smoothness, smoothness_of
 from mrhubo.fast.together.speed import keep_speed, nearest_slow, speed_bound
 
 SWEEPS, TOLERANCE = 20, 2e-3
@@ -48,7 +48,7 @@ def join_frames(
     """
     if len(q_TN) < 2:
         return q_TN if giving_way is None else giving_way.alone(q_TN, target_TD3)
-    smoothness = Smoothness(pull_at(SMOOTHNESS, frame_rate), jerk_weights(description, target_TD3, frame_rate))
+    smoothness = smoothness_of(description, target_TD3, frame_rate)
     task = Task(target_TD3, smoothness, *speed_bound(problem.cost.velocity_N, frame_rate), giving_way)
     return smooth_motion(problem, q_TN, task)
 

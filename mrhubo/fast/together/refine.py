@@ -47,25 +47,25 @@ def refine(
     `blocks_C`: the blocks that may move; None: all.
     """
     cost = problem.cost
-    model = _motion_quadratic(problem, q_TN, target_TD3, smoothness)
-    cost_C, damping_TC = model.cost_BC.sum(axis=0), np.full_like(model.cost_BC, DAMPING)
+    model = _motion_model(problem, q_TN, target_TD3, smoothness)
+    cost_C, damping_TC = model.frames.cost_BC.sum(axis=0), np.full_like(model.frames.cost_BC, DAMPING)
     failures_C = np.zeros(len(cost_C), int) if blocks_C is None else np.where(blocks_C, 0, PATIENCE)
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
         step_TN = _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
         trial_TN = np.clip(q_TN + step_TN, cost.lower_N, cost.upper_N)
         trial_TN = np.where(running_C[cost.block_N], trial_TN, q_TN)
-        trial = _motion_quadratic(problem, trial_TN, target_TD3, smoothness)
-        trial_cost_C = trial.cost_BC.sum(axis=0)
+        trial = _motion_model(problem, trial_TN, target_TD3, smoothness)
+        trial_cost_C = trial.frames.cost_BC.sum(axis=0)
         better_C = trial_cost_C < cost_C
         moved_N = np.abs(trial_TN - q_TN).max(axis=0)
         settled_C = better_C & ((moved_N[:, None] * cost.joints_NC).max(axis=0) < tolerance)
         failures_C = np.where(better_C, np.where(settled_C, PATIENCE, 0), failures_C + 1)
-        factor_TC = np.where(trial.cost_BC > model.cost_BC, HARDER, np.where(better_C, EASIER, 1.0))
+        factor_TC = np.where(trial.frames.cost_BC > model.frames.cost_BC, HARDER, np.where(better_C, EASIER, 1.0))
         damping_TC = np.clip(damping_TC * factor_TC, LEAST, MOST)
         q_TN = np.where(better_C[cost.block_N], trial_TN, q_TN)
         cost_C = np.where(better_C, trial_cost_C, cost_C)
-        model = model.where(np.broadcast_to(better_C, damping_TC.shape), cost.block_N, trial)
+        model = model.where(better_C, cost.block_N, trial)
         if (failures_C >= PATIENCE).all():
             break
     return q_TN, cost_C
@@ -109,18 +109,38 @@ def widen(mask_T: np.ndarray, frames: int) -> np.ndarray:
     return total_X[np.minimum(place_T + frames + 1, len(mask_T))] > total_X[np.maximum(place_T - frames, 0)]
 
 
-def _motion_quadratic(problem: Problem, q_TN: np.ndarray, target_TD3: np.ndarray, smoothness: Smoothness) -> Model:
-    """The model of each frame, with what couples it to others in gradients and in costs."""
-    model = problem.quadratic(q_TN, target_TD3)
+@dataclass(frozen=True)
+class _MotionModel:
+    """The model of a motion around some joint angles."""
+
+    frames: Model
+    """Of each frame, with what couples it to others in gradients and in costs."""
+    jacobian_TD3N: np.ndarray | None
+    """How its directions turn [1/rad]; None where their jerk costs nothing."""
+
+    def where(self, better_C: np.ndarray, block_N: np.ndarray, other: _MotionModel) -> _MotionModel:
+        """`other` in the blocks that are better."""
+        frames = self.frames.where(np.broadcast_to(better_C, self.frames.cost_BC.shape), block_N, other.frames)
+        if self.jacobian_TD3N is None or other.jacobian_TD3N is None:
+            return _MotionModel(frames, None)
+        return _MotionModel(frames, np.where(better_C[block_N], other.jacobian_TD3N, self.jacobian_TD3N))
+
+
+def _motion_model(problem: Problem, q_TN: np.ndarray, target_TD3: np.ndarray, smoothness: Smoothness) -> _MotionModel:
+    model, jacobian_TD3N = problem.quadratic(q_TN, target_TD3), None
     model.cost_BC += smoothness.costs(q_TN, problem.cost.joints_NC)
     model.gradient_BN += smoothness.gradient(q_TN)
-    return model
+    if smoothness.directions is not None and len(q_TN) > smoothness.reach:
+        direction_TD3, jacobian_TD3N = problem.directions(q_TN)
+        model.cost_BC += smoothness.directions.costs(direction_TD3, problem.cost.directions_DC)
+        model.gradient_BN += smoothness.directions.gradient(direction_TD3, jacobian_TD3N)
+    return _MotionModel(model, jacobian_TD3N)
 
 
 def _motion_step(
     problem: Problem,
     q_TN: np.ndarray,
-    model: Model,
+    model: _MotionModel,
     damping_TC: np.ndarray,
     running_C: np.ndarray,
     smoothness: Smoothness,
@@ -128,28 +148,44 @@ def _motion_step(
     bound: StepBound | None,
 ) -> np.ndarray:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
-    cost, gradient_TN = problem.cost, model.gradient_BN
+    cost, gradient_TN = problem.cost, model.frames.gradient_BN
     free_TN = np.broadcast_to(~fixed_T[:, None], q_TN.shape)
     if bound is None:
         low_TN, high_TN = q_TN <= cost.lower_N, q_TN >= cost.upper_N
         free_TN = free_TN & ~((low_TN & (gradient_TN > 0)) | (high_TN & (gradient_TN < 0)))
-    bands, damping_TN = smoothness.hessian(q_TN), damping_TC[:, cost.block_N]
-    diagonal_TN = diagonal(model.hessian_BNN) + bands[0]
-    diagonal_TN = np.where(free_TN, diagonal_TN + damping_TN * (diagonal_TN + FLOOR), 1.0)
-    couplings = [band * (free_TN[lag:] & free_TN[:-lag]) for lag, band in enumerate(bands[1:], start=1)]
-    right_TN, step_TN = -gradient_TN * free_TN, np.zeros_like(q_TN)
+    bands, step_TN = smoothness.hessian(q_TN), np.zeros_like(q_TN)
     for block in np.flatnonzero(running_C):
         joints_M = np.flatnonzero(cost.block_N == block)
-        both_TMM = free_TN[:, joints_M, None] & free_TN[:, None, joints_M]
-        within_TMM = model.hessian_BNN[:, joints_M[:, None], joints_M] * both_TMM
-        right_TM, diagonal_TM, *couplings_TM = (part[:, joints_M] for part in (right_TN, diagonal_TN, *couplings))
-        system = Banded(within_TMM, diagonal_TM, couplings_TM)
+        entries = _coupled(model, smoothness, np.flatnonzero(cost.block_D == block), joints_M, bands)
+        free_TM, right_TM = free_TN[:, joints_M], -gradient_TN[:, joints_M] * free_TN[:, joints_M]
+        within_TMM, *couplings_TMM = (
+            entry * (free_TM[lag:, :, None] & free_TM[: len(free_TM) - lag, None]) for lag, entry in enumerate(entries)
+        )
+        diagonal_TM = diagonal(entries[0])
+        diagonal_TM = np.where(free_TM, diagonal_TM + damping_TC[:, block, None] * (diagonal_TM + FLOOR), 1.0)
+        system = Banded(within_TMM, diagonal_TM, couplings_TMM)
         if bound is None:
             step_TN[:, joints_M] = problem.factor(system)(right_TM)
         else:
             bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, ~fixed_T, bound, q_TN, joints_M)
             step_TN[:, joints_M] = bounded_minimum(system, right_TM, bounds, problem.factor)
     return step_TN
+
+
+def _coupled(
+    model: _MotionModel, smoothness: Smoothness, columns_E: np.ndarray, joints_M: np.ndarray, bands: list[np.ndarray]
+) -> list[np.ndarray]:
+    """Half of a block's Hessian: entries within a frame (T, M, M), and those between frames (T - 1, M, M), (T - 2, M,
+    M) ...
+    """
+    if smoothness.directions is not None and model.jacobian_TD3N is not None:
+        entries = smoothness.directions.hessian(model.jacobian_TD3N[:, columns_E][..., joints_M], columns_E)
+    else:
+        entries = [np.zeros((len(band_XN), len(joints_M), len(joints_M))) for band_XN in bands]
+    entries[0] += model.frames.hessian_BNN[:, joints_M[:, None], joints_M]
+    for entry_XMM, band_XN in zip(entries, bands, strict=True):
+        diagonal(entry_XMM)[:] += band_XN[:, joints_M]
+    return entries
 
 
 def _bounds(

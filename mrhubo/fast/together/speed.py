@@ -69,8 +69,8 @@ def keep_speed(
         return q_TN
     free_T = widen(changed_TN.any(axis=1), around) & ~fixed_T
     concerned_C = changed_TN.any(axis=0) @ problem.cost.joints_NC > 0
-    found_TN = refine_around(
-        problem, nearest_TN, target_TD3, smoothness, free_T, SWEEPS, TOLERANCE, step_N, concerned_C
-    )
+    found_TN = nearest_TN
+    for terms in (smoothness.of_joints, smoothness):
+        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, SWEEPS, TOLERANCE, step_N, concerned_C)
     found_TN = nearest_slow(found_TN, step_N, fixed_T)
     return np.where(concerned_C[problem.cost.block_N], found_TN, q_TN)

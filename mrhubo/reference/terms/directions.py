@@ -40,11 +40,10 @@ class DirectionTerm(Term):
         """Differences of directions (B, D, 3), unweighted, their Jacobian (B, D, 3, N) [1/rad], and their weights
         (B, D).
         """
-        direction_BD3, jacobian_BD3N = self.kinematics.at(state.poses)
         target_BD3 = state.target_BD3[:, : len(self.weight_D)]  # other terms' targets come after
         length_BD = torch.where(self.partial_D > 0, target_BD3.norm(dim=-1), 1.0)
-        miss_BD3 = direction_BD3 - target_BD3 / length_BD.clamp_min(1e-6)[..., None]
-        return miss_BD3, jacobian_BD3N, self.weight_D * length_BD
+        miss_BD3 = state.direction_BD3 - target_BD3 / length_BD.clamp_min(1e-6)[..., None]
+        return miss_BD3, state.jacobian_BD3N, self.weight_D * length_BD
 
     def add_to(self, model: Quadratic | None, state: State, blocks: Blocks) -> Quadratic:
         """As `Term.add_to`."""

@@ -51,6 +51,10 @@ class State:
     """The robot's link poses there."""
     target_BD3: Tensor
     """The human's directions."""
+    direction_BD3: Tensor
+    """The robot's, as they are seen from their parts."""
+    jacobian_BD3N: Tensor
+    """How they turn [1/rad]."""
 
 
 class Term(nn.Module):

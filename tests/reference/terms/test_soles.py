@@ -8,6 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.standing import Legs
 from mrhubo.reference.terms.soles import SoleTerm
 from mrhubo.reference.terms.term import State
@@ -18,12 +19,14 @@ from tests.reference.walkers import ROOTS, walker
 def test_the_jacobian_equals_differences(tmp_path: Path, root: str) -> None:
     legs = Legs(walker(tmp_path, root))
     term, robot = SoleTerm(legs).double(), legs.body_map.robot.double()
+    kinematics = DirectionJacobian(legs.body_map).double()
     legs.double()
     q_BN = robot.sample(8, torch.Generator().manual_seed(1)).double()
     targets_BX3 = torch.zeros(8, len(legs.body_map.directions) + 8, 3, dtype=torch.float64)
 
     def places(q_BN: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        return term.residual(State(q_BN, robot.forward(q_BN), targets_BX3))
+        poses = robot.forward(q_BN)
+        return term.residual(State(q_BN, poses, targets_BX3, *kinematics.at(poses)))
 
     found_BP3N, step = places(q_BN)[1], 1e-5
     for n, offset_N in enumerate(step * torch.eye(q_BN.shape[1]).double()):

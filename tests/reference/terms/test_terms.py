@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import pytest
@@ -11,6 +12,7 @@ from torch import Tensor
 from mrhubo.reference.blocks import Blocks
 from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.terms import (
+    DirectionJerk,
     DirectionTerm,
     PostureTerm,
     SelfCollisionTerm,
@@ -25,7 +27,8 @@ STEP = 2e-3
 
 
 def state(body_map: BodyMap, q_BN: Tensor, target_BD3: Tensor) -> State:
-    return State(q_BN, body_map.robot.forward(q_BN), target_BD3)
+    poses = body_map.robot.forward(q_BN)
+    return State(q_BN, poses, target_BD3, *DirectionJacobian(body_map).at(poses))
 
 
 def problem(body_map: BodyMap, term: Term, count: int = 24) -> tuple[Blocks, Tensor, Tensor]:
@@ -148,6 +151,38 @@ def test_smoothness_of_some_frames_is_that_of_all_away_from_their_ends() -> None
     gradient_XN = whole.at(frame_X).gradient(q_TN[frame_X])
     torch.testing.assert_close(gradient_XN[inner], whole.gradient(q_TN)[frame_X][inner])
     assert len(gradient_XN[inner]) == 3
+
+
+def test_the_jerk_of_directions(body_maps: dict[str, BodyMap]) -> None:
+    """Cost, gradient and Gauss-Newton model are those of its residual by automatic differentiation."""
+    body_map, frames = copy.deepcopy(body_maps["reachy"]).double(), 6
+    kinematics, robot, generator = (
+        DirectionJacobian(body_map).double(),
+        body_map.robot,
+        torch.Generator().manual_seed(4),
+    )
+    q_TN = robot.home().double() + 0.2 * torch.randn(frames, len(robot.joint_names), generator=generator).double()
+    count = len(body_map.directions)
+    term = DirectionJerk(torch.rand(3, count).double(), torch.randn(3, count, 3).double())
+
+    def residual(q_TN: Tensor) -> Tensor:
+        third_YD3 = body_map.robot_directions(robot.forward(q_TN)).diff(n=3, dim=0)
+        return ((third_YD3 - term.goal_YD3) * term.weight_YD.sqrt()[..., None]).flatten()
+
+    direction_TD3, jacobian_TD3N = kinematics(q_TN)
+    assert float(term.costs(direction_TD3, torch.ones(count, 1).double()).sum()) == pytest.approx(
+        float(residual(q_TN).square().sum())
+    )
+    rows_RTN = torch.autograd.functional.jacobian(residual, q_TN)
+    assert isinstance(rows_RTN, Tensor)
+    gradient_TN = torch.einsum("rtn,r->tn", rows_RTN, residual(q_TN))
+    torch.testing.assert_close(term.gradient(direction_TD3, jacobian_TD3N), gradient_TN, atol=1e-5, rtol=1e-4)
+    for lag, entries_XNN in enumerate(term.hessian(jacobian_TD3N, torch.arange(count))):
+        later_RXN, now_RXN = rows_RTN[:, lag:], rows_RTN[:, : frames - lag]
+        found_XNN = torch.einsum("rxm,rxn->xmn", later_RXN, now_RXN)
+        torch.testing.assert_close(entries_XNN, found_XNN, atol=1e-5, rtol=1e-4)
+    some = term.at(torch.arange(1, 6))
+    assert torch.equal(some.weight_YD, term.weight_YD[1:]) and torch.equal(some.goal_YD3, term.goal_YD3[1:])
 
 
 def check_model(term: Term, blocks: Blocks, at: State, residual_BR: Tensor, jacobian_BRN: Tensor) -> None:
