@@ -22,7 +22,19 @@ from mrhubo.errors import UserError
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = {
     name: f"mrhubo.{name}"
-    for name in ("describe", "fit", "pair", "retarget", "evaluate", "export", "sweep", "baseline", "reproduce", "prior")
+    for name in (
+        "describe",
+        "fit",
+        "pair",
+        "retarget",
+        "show",
+        "evaluate",
+        "export",
+        "sweep",
+        "baseline",
+        "reproduce",
+        "prior",
+    )
 }
 MODULES["universal"] = "mrhubo.universal.__main__"
 SCHEMAS = {"baseline": BaselineConfig, "reproduce": BaselineConfig, "prior": PriorConfig, "universal": UniversalConfig}
@@ -216,6 +228,7 @@ NEEDED = {
     "fit": 1,
     "pair": 1,
     "retarget": 3,
+    "show": 0,
     "evaluate": 2,
     "export": 3,
     "sweep": 2,
