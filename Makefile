@@ -17,16 +17,20 @@ ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help fit test dashboard
+.PHONY: help fit demo test dashboard
 
 help:
 	@echo "make fit [CONFIG=conf/nao.yaml] [ARGS='trainer.max_steps=1000']   learn to retarget to a robot"
+	@echo "make demo                                                         two robots beside a human, in a browser"
 	@echo "make test [PYTEST_ARGS='-k config']                               lint, types, tests and docs"
 	@echo "make dashboard                                                    the runs so far, in a browser"
 	@echo "PYTHON=python3.12 chooses the interpreter of a new .venv, PIP_ARGS=... goes to pip."
 
 fit: .venv/.core
 	$(BIN)/python -m mrhubo.fit --config $(CONFIG) $(ARGS)
+
+demo: .venv/.view
+	$(BIN)/python -m mrhubo.show --motion data/motions/boxing.npz --robot nao coman --open $(ARGS)
 
 test: .venv/.test
 	$(BIN)/ruff check .
@@ -46,9 +50,13 @@ dashboard: .venv/.core
 	$(PIP_INSTALL) -e .
 	@touch $@
 
+.venv/.view: pyproject.toml .venv/.created
+	$(PIP_INSTALL) -e '.[view]'
+	@touch .venv/.core $@
+
 .venv/.test: pyproject.toml .venv/.created
 	$(PIP_INSTALL) -e '.[dev]'
-	@touch .venv/.core $@
+	@touch .venv/.core .venv/.view $@
 
 # An environment that is already there and works is kept. A new one gets the newest pip, which chooses versions in half
 # the time of one that is three years old.

@@ -22,6 +22,7 @@ VERBS = {
     "pair": Verb("mrhubo.pair", "make, check or show the pairs alone"),
     "retarget": Verb("mrhubo.retarget", "make a robot's joint angles of files of human motion"),
     "live": Verb("mrhubo.live.__main__", "let a robot follow a person who is seen now"),
+    "show": Verb("mrhubo.show", "look at a motion and what robots make of it, in the browser or as a film"),
     "evaluate": Verb("mrhubo.evaluate", "measure a trained retargeter on human motion"),
     "export": Verb("mrhubo.export", "write a retargeter's networks as ONNX, or as a file that needs NumPy alone"),
     "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit"),

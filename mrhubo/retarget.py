@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from argparse import BooleanOptionalAction
+from argparse import BooleanOptionalAction, Namespace
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mrhubo.config import CommandParser, number, print_error, run_command
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot_motion import FORMATS, read_joint_order
 from mrhubo.runtime.progress import Reporter
+
+if TYPE_CHECKING:
+    from mrhubo.retargeting import Answerer, Request
+    from mrhubo.robot import Robot
 
 DESCRIPTION = (
     "Retargets files of human motion to a robot and writes its joint angles. What is in a file, and not its ending,"
@@ -16,8 +22,12 @@ DESCRIPTION = (
     " without any training, the network that is the same for every robot. docs/formats.md specifies all formats."
 )
 
-_METHODS = ("universal", "reference")
+METHODS = ("universal", "reference")
 """The default, and that for robots that stand on feet."""
+METHOD_MEANING = (
+    "`universal`, the network for every robot (default), or `reference`, the optimiser alone, which tells too where a"
+    " robot with feet goes (default for those)"
+)
 
 
 def build_parser() -> CommandParser[None]:
@@ -28,13 +38,7 @@ def build_parser() -> CommandParser[None]:
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
     robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
-    whole = "with the URDF of --robot: its legs, feet and waist move too, and not its arms and head alone"
-    parser.add_argument("--whole-body", action="store_true", help=whole)
-    method = (
-        "with --robot: `universal`, the network for every robot (default), or `reference`, the optimiser alone, which"
-        " tells too where a robot with feet goes (default for those)"
-    )
-    parser.add_argument("--method", metavar="METHOD", help=method)
+    parser.add_argument("--method", metavar="METHOD", help=f"with --robot: {METHOD_MEANING}")
     motion = "motion files and videos, and folders of motion files"
     parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help=motion)
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
@@ -43,6 +47,13 @@ def build_parser() -> CommandParser[None]:
     parser.add_argument("--format", metavar="FORMAT", help=f"default: by the ending of --out, else npz; {formats}")
     order = "joints in the order of this file: a MuJoCo model, a URDF, or a text with a name a line"
     parser.add_argument("--joint-order", metavar="FILE", help=order)
+    add_motion_flags(parser)
+    parser.add_argument("--quiet", action="store_true", help="no progress lines")
+    return parser
+
+
+def add_motion_flags(parser: CommandParser[None]) -> None:
+    """The flags that say how human motion is read and answered: `read_request` and `choose_answerer` take them."""
     parser.add_argument("--from", metavar="SECONDS", type=number(0), help="begin there; default: at the beginning")
     parser.add_argument("--to", metavar="SECONDS", type=number(0), help="end there; default: at the end")
     parser.add_argument("--rate", metavar="HERTZ", type=number(0), help="frames per second of files that do not tell")
@@ -54,36 +65,31 @@ def build_parser() -> CommandParser[None]:
     parser.add_argument("--bvh-map", metavar="FILE", help="YAML file that says which joint of a BVH file is which")
     model = "which model finds the body in a video: lite, full (default) or heavy"
     parser.add_argument("--pose-model", metavar="MODEL", default="full", help=model)
+    whole = "with the URDF of --robot: its legs, feet and waist move too, and not its arms and head alone"
+    parser.add_argument("--whole-body", action="store_true", help=whole)
     avoid = "whether frames in which the robot would touch itself give way, by its URDF's collision shapes"
     parser.add_argument("--avoid-collisions", action=BooleanOptionalAction, default=True, help=avoid)
-    parser.add_argument("--quiet", action="store_true", help="no progress lines")
-    return parser
 
 
 def main(argv: list[str]) -> int:
     """The command; 2 where some of the motions could not be retargeted."""
     options = build_parser().parse_args(argv)
-    from mrhubo.motion import ReadOptions
-    from mrhubo.retargeting import Request, find_files, of_package, plan_places, retarget_files, table
+    from mrhubo.retargeting import find_files, of_package, plan_places, retarget_files, table
 
-    _check_method(options.method, options.retargeter)
+    if options.method is not None:
+        check_method(options.method, METHODS, options.retargeter is not None)
     if options.whole_body and options.retargeter is not None:
         raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
     files = find_files([Path(name) for name in options.motion])
     places = plan_places(options.out, options.format, files)
-    bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
-    request = Request(
-        options=ReadOptions(options.rate, options.person, bvh_map, options.pose_model),
-        start=getattr(options, "from") or 0.0,
-        end=options.to,
-        rate=options.out_rate,
-        mirrored=options.mirror,
-        joint_order=None if options.joint_order is None else read_joint_order(Path(options.joint_order)),
-    )
+    request = read_request(options, options.joint_order)
     if options.retargeter is not None:
         answerer = of_package(options.retargeter, options.avoid_collisions)
     else:
-        answerer = _of_robot(options.robot, options.whole_body, options.method, options.avoid_collisions)
+        from mrhubo.describing.run import open_robot
+
+        robot = open_robot(options.robot, options.whole_body)
+        answerer = choose_answerer(robot, options.method, options.avoid_collisions)
     print(answerer.described)
     outcome = retarget_files(files, answerer, places, request, Reporter(options.quiet or len(files) == 1))
     if outcome.summaries:
@@ -99,22 +105,36 @@ def main(argv: list[str]) -> int:
     return print_error(f"{len(sentences)} of {len(files)} motions could not be retargeted: {names}")
 
 
-def _check_method(method: str | None, package: str | None) -> None:
-    if method is None:
-        return
-    if method not in _METHODS:
-        raise UserError(f"command line: --method: {unknown_name('method', method, _METHODS)}")
-    if package is not None:
+def check_method(method: str, known: Sequence[str], of_package: bool) -> None:
+    """Refuses a method that is not among the known ones, or one beside a package."""
+    if method not in known:
+        raise UserError(f"command line: --method: {unknown_name('method', method, known)}")
+    if of_package:
         raise UserError("command line: --method goes with --robot alone; a package answers by the networks it has")
 
 
-def _of_robot(name: str, whole_body: bool, method: str | None, avoid_collisions: bool):  # noqa: ANN202 (importing its type takes torch)
-    from mrhubo.describing.run import open_robot
+def read_request(options: Namespace, joint_order: str | None = None) -> Request:
+    """What `add_motion_flags` ask of every motion."""
+    from mrhubo.motion import ReadOptions
+    from mrhubo.retargeting import Request
+
+    bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
+    return Request(
+        options=ReadOptions(options.rate, options.person, bvh_map, options.pose_model),
+        start=getattr(options, "from") or 0.0,
+        end=options.to,
+        rate=options.out_rate,
+        mirrored=options.mirror,
+        joint_order=None if joint_order is None else read_joint_order(Path(joint_order)),
+    )
+
+
+def choose_answerer(robot: Robot, method: str | None, avoid_collisions: bool) -> Answerer:
+    """Who answers for a robot without a package."""
     from mrhubo.retargeting import of_reference, of_universal
 
-    robot = open_robot(name, whole_body)
     stands = robot.keypoints is not None and bool(robot.keypoints.standing)
-    of_robot = {"universal": of_universal, "reference": of_reference}[method or _METHODS[stands]]
+    of_robot = {"universal": of_universal, "reference": of_reference}[method or METHODS[stands]]
     return of_robot(robot, avoid_collisions)
 
 

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = (
     "errors", "lazy", "rotation", "frames", "files", "robot_motion", "fast", "config", "runtime", "search", "body", "robot", "video", "motion", "reference",
-    "universal", "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "describing", "live", "callbacks", "body.prior_training", "universal.learning", "fitting",
+    "universal", "pairing", "retargeter", "streaming", "exporting", "retargeting", "evaluation", "view", "viewer", "describing", "live", "callbacks", "body.prior_training", "universal.learning", "fitting",
     "baselines", "paper", "universal.__main__", "live.__main__", "commands",
 )  # fmt: skip
 """Each may import from itself and from those before it. `commands` is everything else that lies in the package's

@@ -5,6 +5,7 @@ from mrhubo.retargeter.features import PoseFeatures
 from mrhubo.retargeter.networks import JointNetwork, RetargetNetwork
 from mrhubo.retargeter.package import POLISH, Retargeter
 from mrhubo.retargeter.result import RetargetResult, join_results
+from mrhubo.retargeter.saving import read_package_robot
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.retargeter.without_training import untrained
 
@@ -18,5 +19,6 @@ __all__ = [
     "UniversalJoints",
     "build_network",
     "join_results",
+    "read_package_robot",
     "untrained",
 ]

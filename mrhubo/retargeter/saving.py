@@ -26,7 +26,7 @@ from mrhubo.retargeter.integrity import (
     file_checksums,
 )
 from mrhubo.retargeter.networks import JointNetwork
-from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.robot import BodyMap, Robot, build_body_map
 from mrhubo.robot.solid_urdf import urdf_without_meshes
 
 SCHEMA = "mrhubo.retargeter/5"
@@ -96,9 +96,8 @@ def read_package(folder: Path) -> tuple[JointNetwork, BodyMap, BodyPrior, Config
     if metadata.get("schema") != SCHEMA:
         raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
     check_files(folder, _OTHERS, metadata)
-    config = load_config(folder / _CONFIG, environment=False)
+    config = _read_config(folder)
     body = config.body
-    check_paths(folder, {_URDF: config.robot.urdf, _PRIOR: body.prior_path, _SKELETON: body.model_path})
     prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))
     check_prior(folder, metadata, prior)
     network = build_network(config, body_map)
@@ -110,6 +109,23 @@ def read_package(folder: Path) -> tuple[JointNetwork, BodyMap, BodyPrior, Config
         raise UserError(f"{folder}: weights and settings do not fit: {said}") from error
     check_weights(folder, network.state_dict(), body_map.robot)
     return network, body_map, prior, config, threshold, check_confidence(folder, metadata)
+
+
+def read_package_robot(folder: Path) -> Robot:
+    """The robot of a package alone.
+
+    Raises:
+        UserError: its config or its URDF is missing, or cannot be used.
+    """
+    return build_body_map(_read_config(folder).robot).robot
+
+
+def _read_config(folder: Path) -> Config:
+    """The config, whose only paths are those of the package's own files."""
+    config = load_config(folder / _CONFIG, environment=False)
+    body = config.body
+    check_paths(folder, {_URDF: config.robot.urdf, _PRIOR: body.prior_path, _SKELETON: body.model_path})
+    return config
 
 
 def _portable(config: Config) -> str:

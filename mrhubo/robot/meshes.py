@@ -17,6 +17,7 @@ import yourdfpy
 
 from mrhubo.errors import UserError
 from mrhubo.files.regular import check_regular, read_regular
+from mrhubo.robot.shapes import ROBOT_COLOR, Color, visual_colors
 
 _KINDS = ("stl", "obj", "ply", "dae")
 _MOST_BYTES = 50_000_000
@@ -34,6 +35,8 @@ class LinkMesh:
     """Metres."""
     faces_F3: np.ndarray
     """Numbers of vertices."""
+    color: Color = ROBOT_COLOR
+    """RGB, 0..1: of the element's material; what colours the file itself has are not read."""
 
 
 def read_meshes(urdf: yourdfpy.URDF, path: Path, without: Collection[str] = ()) -> list[LinkMesh]:
@@ -45,10 +48,10 @@ def read_meshes(urdf: yourdfpy.URDF, path: Path, without: Collection[str] = ()) 
         without: links whose meshes are not wanted.
     """
     found: list[LinkMesh] = []
-    triangles = 0
+    triangles, colors_of = 0, visual_colors(urdf)
     for link in urdf.robot.links:
         for elements in (link.visuals, link.collisions):
-            meshes = [] if link.name in without else list(_meshes(link.name, elements, path))
+            meshes = [] if link.name in without else list(_meshes(link.name, elements, colors_of[link.name], path))
             if meshes:
                 found += meshes
                 triangles += sum(len(mesh.faces_F3) for mesh in meshes)
@@ -59,14 +62,19 @@ def read_meshes(urdf: yourdfpy.URDF, path: Path, without: Collection[str] = ()) 
 
 
 def _meshes(
-    link: str, elements: list[yourdfpy.urdf.Visual] | list[yourdfpy.urdf.Collision], path: Path
+    link: str,
+    elements: list[yourdfpy.urdf.Visual] | list[yourdfpy.urdf.Collision],
+    colors: list[Color | None],
+    path: Path,
 ) -> Iterator[LinkMesh]:
-    for element in elements:
+    named = next((color for color in colors if color is not None), ROBOT_COLOR)
+    for number, element in enumerate(elements):
         mesh = None if element.geometry is None else element.geometry.mesh
         if mesh is None or (found := read_mesh(str(mesh.filename), path, scale_of(mesh))) is None:
             continue
         place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
-        yield LinkMesh(link, found[0] @ place_44[:3, :3].T + place_44[:3, 3], found[1])
+        color = (colors[number] if isinstance(element, yourdfpy.urdf.Visual) else None) or named
+        yield LinkMesh(link, found[0] @ place_44[:3, :3].T + place_44[:3, 3], found[1], color)
 
 
 def scale_of(mesh: yourdfpy.urdf.Mesh) -> np.ndarray:

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 import yourdfpy
 
-ROBOT_COLOR: tuple[float, float, float] = (0.80, 0.83, 0.87)
+Color = tuple[float, float, float]
+"""RGB, 0..1."""
+ROBOT_COLOR: Color = (0.80, 0.83, 0.87)
 """Colour of shapes whose URDF names none."""
-
 
 Kind = Literal["sphere", "cylinder", "capsule", "box"]
 
@@ -27,20 +28,19 @@ class LinkGeometry:
     round ends); box: (x, y, z)."""
     origin_44: np.ndarray
     """Pose (4, 4) of the shape's centre in the link's frame."""
-    color: tuple[float, float, float]
+    color: Color
     """RGB, 0..1."""
 
 
-def read_geometry(urdf: yourdfpy.URDF, default_color: tuple[float, float, float] = ROBOT_COLOR) -> list[LinkGeometry]:
+def read_geometry(urdf: yourdfpy.URDF, default_color: Color = ROBOT_COLOR) -> list[LinkGeometry]:
     """The spheres, cylinders and boxes of every link, for looks: those of its visual elements, or, where these hold
     none, those of its collision elements. Meshes are skipped, and so is what has no size. URDF has no capsules: a
     cylinder with a sphere of its radius and colour at either end becomes one.
     """
-    palette = {material.name: _rgb(material) for material in urdf.robot.materials}
     shapes: list[LinkGeometry] = []
+    colors_of = visual_colors(urdf)
     for link in urdf.robot.links:
-        materials = [visual.material for visual in link.visuals]
-        colors = [_rgb(material) or palette.get(getattr(material, "name", None)) for material in materials]
+        colors = colors_of[link.name]
         named = next((color for color in colors if color is not None), default_color)
         visible = [
             _shape(link.name, item, color or default_color) for item, color in zip(link.visuals, colors, strict=True)
@@ -49,6 +49,15 @@ def read_geometry(urdf: yourdfpy.URDF, default_color: tuple[float, float, float]
         found = [shape for shape in visible if shape is not None] or [shape for shape in solid if shape is not None]
         shapes.extend(_with_capsules(found))
     return shapes
+
+
+def visual_colors(urdf: yourdfpy.URDF) -> dict[str, list[Color | None]]:
+    """The colour of each visual element, by link: its material's, or that of the robot's material of this name."""
+    palette = {material.name: _rgb(material) for material in urdf.robot.materials}
+    return {
+        link.name: [_rgb(v.material) or palette.get(getattr(v.material, "name", None)) for v in link.visuals]
+        for link in urdf.robot.links
+    }
 
 
 def read_collision_geometry(urdf: yourdfpy.URDF) -> list[LinkGeometry]:
@@ -79,21 +88,19 @@ def _with_capsules(shapes: list[LinkGeometry]) -> list[LinkGeometry]:
     return [shape for shape in kept if id(shape) not in used]
 
 
-def _rounds_off(sphere: LinkGeometry, tip_3: np.ndarray, radius: float, color: tuple[float, float, float]) -> bool:
+def _rounds_off(sphere: LinkGeometry, tip_3: np.ndarray, radius: float, color: Color) -> bool:
     apart = float(np.abs(sphere.origin_44[:3, 3] - tip_3).max())
     return apart < 1e-3 * radius + 1e-6 and abs(sphere.size[0] - radius) < 1e-3 * radius and sphere.color == color
 
 
-def _rgb(material: yourdfpy.urdf.Material | None) -> tuple[float, float, float] | None:
+def _rgb(material: yourdfpy.urdf.Material | None) -> Color | None:
     if material is None or material.color is None:
         return None
     red, green, blue = np.clip(np.asarray(material.color.rgba, float)[:3], 0.0, 1.0).tolist()
     return red, green, blue
 
 
-def _shape(
-    link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, color: tuple[float, float, float]
-) -> LinkGeometry | None:
+def _shape(link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, color: Color) -> LinkGeometry | None:
     geometry = element.geometry
     origin_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
     if geometry is None:

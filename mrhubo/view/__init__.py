@@ -2,7 +2,7 @@
 
 from mrhubo.view.camera import Camera, common_cameras
 from mrhubo.view.distributions import distributions
-from mrhubo.view.figures import figure_animation, figure_sheet, human_figure
+from mrhubo.view.figures import animated_frames, figure_animation, figure_sheet, human_figure
 from mrhubo.view.human import HUMAN_COLOR, SKIN_COLOR, human_solids
 from mrhubo.view.painter import render
 from mrhubo.view.robot import robot_solids, stick_solids
@@ -14,6 +14,7 @@ __all__ = [
     "SKIN_COLOR",
     "Camera",
     "Solids",
+    "animated_frames",
     "common_cameras",
     "contact_sheet",
     "distributions",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import torch
@@ -47,7 +47,18 @@ def figure_animation(
     captions: Sequence[str],
     size: tuple[int, int] = (200, 270),
 ) -> list[Image]:
-    """Frames of moving figures side by side, all at one scale; the camera and the floor stand still.
+    """Frames of moving figures side by side; arguments and errors as for `animated_frames`."""
+    return list(animated_frames(columns, titles, captions, size))
+
+
+def animated_frames(
+    columns: Sequence[Sequence[Solids]],
+    titles: Sequence[str],
+    captions: Sequence[str],
+    size: tuple[int, int] = (200, 270),
+) -> Iterator[Image]:
+    """Frames of moving figures side by side, all at one scale; the camera and the floor stand still. They are drawn one
+    by one, when they are asked for.
 
     Args:
         columns: the figures of each column, one a frame.
@@ -63,9 +74,7 @@ def figure_animation(
     paths = [Solids.concatenate(figures) for figures in columns]
     cameras = common_cameras(paths, size)
     floors = [path.extent(np.array([0.0, 0.0, 1.0]))[0] for path in paths]
-    frames = []
     for figures, caption in zip(zip(*columns, strict=True), captions, strict=True):
         views = zip(figures, cameras, floors, strict=True)
         row = [render(figure, size, camera, ground=floor) for figure, camera, floor in views]
-        frames.append(contact_sheet([row], titles, caption=caption))
-    return frames
+        yield contact_sheet([row], titles, caption=caption)

@@ -45,6 +45,7 @@ SCRIPTS = [
     "reference",
     "retarget",
     "scaling",
+    "show",
 ]
 SCRIPTS += ["live", "stream", "training", "universal", "whole_body", "universal_speed", "without_training"]
 LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
@@ -384,6 +385,12 @@ def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None
     found = rows(run("files", package, "--rounds", 1), "file")
     assert [row[3] for row in found] == ["PyTorch", "NumPy"]
     assert all(float(row[4]) > 0 for row in found)
+
+
+def test_show(run: Run) -> None:
+    found = rows(run("show", "--robots", "nao", "--frames", 3), "file")
+    assert [row[:2] for row in found] == [[".html", "3"], [".mp4", "3"], [".gif", "2"], [".png", "3"]]
+    assert all(float(value) > 0 for row in found for value in row[2:4])
 
 
 def test_collisions(run: Run, package: Path, clips: Path) -> None:

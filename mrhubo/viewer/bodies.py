@@ -1,0 +1,175 @@
+"""A robot as rigid bodies: all links between two joints that move are one, so that a viewer has few parts to move.
+
+Legend: T frames, N moved joints, B bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.fast.rotations import axis_angle_to_matrix
+from mrhubo.robot import Robot, read_geometry
+from mrhubo.robot.joint import Mimic, drive
+from mrhubo.robot.meshes import read_meshes
+from mrhubo.robot.urdf import Description, moved
+from mrhubo.view import stick_solids
+from mrhubo.viewer.meshing import Mesh, capsule_meshes, joined, shape_mesh
+
+_FEWEST = 1 / 3
+"""Share of links with shapes below which a robot gets sticks, so that it is seen whole (as in pictures)."""
+
+
+@dataclass
+class Body:
+    """Links that keep their places to each other. The root's body comes first, each other after the one below it."""
+
+    name: str
+    """Of its first link."""
+    parent: int | None
+    """The body that it hangs on, a number; None for the root's."""
+    origin_44: np.ndarray
+    """Its place in the frame of `parent` where its joint is at 0."""
+    axis_3: np.ndarray
+    """Of its joint, unit, in its own frame."""
+    slides: bool = False
+    """Whether the joint is prismatic."""
+    column: int = 0
+    """Which of the moved joints drives it, by `multiplier` and `offset`."""
+    multiplier: float = 0.0
+    offset: float = 0.0
+    links: dict[str, np.ndarray] = field(default_factory=dict)
+    """Places (4, 4) of links in its frame."""
+    meshes: list[Mesh] = field(default_factory=list)
+    """What it looks like, in its frame, a mesh a colour."""
+
+    def local_poses(self, q_TN: np.ndarray) -> np.ndarray:
+        """Poses (T, 4, 4) in the frame of its parent, at angles [rad] of the moved joints."""
+        value_T = self.multiplier * q_TN[:, self.column].astype(float) + self.offset
+        motion_T44 = np.tile(np.eye(4), (len(value_T), 1, 1))
+        if self.slides:
+            motion_T44[:, :3, 3] = value_T[:, None] * self.axis_3
+        else:
+            motion_T44[:, :3, :3] = axis_angle_to_matrix(value_T[:, None] * self.axis_3)
+        return self.origin_44 @ motion_T44
+
+
+def read_bodies(robot: Robot, joints: Sequence[str]) -> list[Body]:
+    """The bodies of a robot in which some joints move, and all others are held where the robot holds them.
+
+    Args:
+        robot: the robot.
+        joints: those that move; each is a joint of its URDF, and mimics none.
+
+    Raises:
+        UserError: a joint does not exist, or does not move; its angles would be of no use.
+    """
+    description = robot.description
+    for name in joints:
+        joint = description.joint(name)
+        why = "is fixed" if joint.kind == "fixed" else None if joint.mimic is None else f"mimics '{joint.mimic.joint}'"
+        if why is not None:
+            raise UserError(f"joint '{name}' {why} in {description.path}, so nothing else can move it")
+    below: dict[str, list[str]] = {}
+    for joint in description.joints.values():
+        below.setdefault(joint.parent, []).append(joint.name)
+    bodies = [Body(description.root, None, np.eye(4), np.array([1.0, 0.0, 0.0]), links={description.root: np.eye(4)})]
+    order = [(description.root, 0)]
+    for link, body in order:
+        place_44 = bodies[body].links[link]
+        for joint in (description.joints[name] for name in below.get(link, [])):
+            driver = _driver(description, joint.name)
+            if joint.kind != "fixed" and driver.joint in joints:
+                bodies.append(
+                    Body(
+                        joint.child,
+                        body,
+                        place_44 @ joint.origin_44,
+                        joint.axis_3,
+                        not joint.rotary,
+                        joints.index(driver.joint),
+                        driver.multiplier,
+                        driver.offset,
+                        {joint.child: np.eye(4)},
+                    )  # fmt: skip
+                )
+                order.append((joint.child, len(bodies) - 1))
+                continue
+            value = robot.held.get(driver.joint, 0.0) * driver.multiplier + driver.offset
+            still_44 = np.eye(4) if joint.kind == "fixed" else moved(joint.axis_3, value, not joint.rotary)
+            bodies[body].links[joint.child] = place_44 @ joint.origin_44 @ still_44
+            order.append((joint.child, body))
+    return bodies
+
+
+def _driver(description: Description, joint: str) -> Mimic:
+    try:
+        return drive(description.joints, joint)
+    except UserError:  # it mimics what is not there: it is held at 0, as no angle of it is known
+        return Mimic(joint, 1.0, 0.0)
+
+
+def dress(bodies: Sequence[Body], robot: Robot) -> None:
+    """Gives bodies their looks: the meshes and shapes of the URDF's visual elements; for a link without any that can be
+    read, its collision shapes, or the capsules that stand for collision meshes; and sticks from link to link where few
+    links have any of these.
+    """
+    parsed, path = robot.description.parsed, robot.description.path
+    found: dict[str, list[Mesh]] = {}
+    shaped = read_geometry(parsed)
+    for mesh in read_meshes(parsed, path):
+        found.setdefault(mesh.link, []).append(Mesh(mesh.vertices_V3, mesh.faces_F3, mesh.color))
+    seen = _links_with_visible_shapes(robot)
+    for shape in shaped:
+        if shape.link not in found or shape.link in seen:
+            found.setdefault(shape.link, []).append(shape_mesh(shape))
+    meshed = [shape for shape in robot.description.solids.of_meshes if shape.link not in found]
+    for shape in meshed:
+        found.setdefault(shape.link, []).append(shape_mesh(shape))
+    for body in bodies:
+        parts = [mesh.placed(pose_44) for link, pose_44 in body.links.items() for mesh in found.get(link, [])]
+        body.meshes = joined(parts)
+    if len(found) < _FEWEST * len(robot.description.links):
+        _add_sticks(bodies)
+
+
+def _links_with_visible_shapes(robot: Robot) -> set[str]:
+    """Links whose visual elements hold a primitive shape, so that their shapes belong beside their meshes."""
+    return {
+        link.name
+        for link in robot.description.parsed.robot.links
+        for visual in link.visuals
+        if visual.geometry is not None and visual.geometry.mesh is None
+    }
+
+
+def _add_sticks(bodies: Sequence[Body]) -> None:
+    """A stick from every body to those that hang on it, as thick as in pictures."""
+    still_T44 = [body.origin_44 for body in bodies]
+    poses: dict[str, np.ndarray] = {}
+    for body, pose_44 in zip(bodies, still_T44, strict=True):
+        poses[body.name] = pose_44 if body.parent is None else poses[bodies[body.parent].name] @ pose_44
+    parents = {body.name: None if body.parent is None else bodies[body.parent].name for body in bodies}
+    sticks = stick_solids(poses, parents)
+    rows = iter(capsule_meshes(sticks))
+    for body in bodies[1:]:
+        assert body.parent is not None, "only the root hangs on nothing"
+        parent = bodies[body.parent]
+        for mesh in (next(rows), next(rows)):  # the stick, and the ball at its end
+            parent.meshes += [mesh.placed(np.linalg.inv(poses[parent.name]))]
+
+
+def link_places(bodies: Sequence[Body], q_TN: np.ndarray) -> tuple[list[str], np.ndarray]:
+    """Names of all links, and their poses (T, L, 4, 4) in the frame of the root link."""
+    poses: list[np.ndarray] = []
+    for body in bodies:
+        local_T44 = body.local_poses(q_TN)
+        poses.append(local_T44 if body.parent is None else poses[body.parent] @ local_T44)
+    names = [link for body in bodies for link in body.links]
+    placed = [
+        pose_T44 @ place_44 for body, pose_T44 in zip(bodies, poses, strict=True) for place_44 in body.links.values()
+    ]
+    return names, np.stack(placed, axis=1)

@@ -1,0 +1,41 @@
+"""A viser server that only this machine reaches."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from mrhubo.viewer.extra import import_extra
+
+if TYPE_CHECKING:
+    import viser
+
+HOST = "127.0.0.1"
+DEFAULT_PORT = 8080
+
+
+@contextlib.contextmanager
+def local_server(port: int = 0) -> Iterator[viser.ViserServer]:
+    """A server, until the work in here ends.
+
+    Args:
+        port: where it listens; the next free one, if another program does already. 0: any that is free.
+
+    Raises:
+        UserError: viser is not installed.
+    """
+    library = import_extra("viser", "a viewer in the browser")
+    with contextlib.redirect_stdout(io.StringIO()):  # it tells of itself
+        server = library.ViserServer(host=HOST, port=port, verbose=False)
+    server.request_share_url = _stays_here
+    try:
+        yield server
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+def _stays_here(verbose: bool = True) -> None:
+    """Stands in for viser's tunnel through a server on the internet, for which any page that finds ours could ask."""
