@@ -54,7 +54,7 @@ def test_it_holds_what_a_command_needs_and_nothing_else(root: Path, built: Path)
     found = {name.removeprefix("mrhubo/") for name in names if not name.endswith(".py") and ".dist-info/" not in name}
     shipped = files(root, "conf/**/*.yaml") | files(root, "data/robots/*/*.urdf") | files(root, "data/motions/*.npz")
     universal = files(root / "mrhubo", "universal/weights/*")
-    assert found == shipped | {"py.typed", "body/weights/open_prior.safetensors", *universal}
+    assert found == shipped | {"py.typed", "body/weights/open_prior.safetensors", "viewer/page.js", *universal}
     assert {name.removeprefix("mrhubo/") for name in names if name.endswith(".py")} == files(root / "mrhubo", "**/*.py")
 
 
