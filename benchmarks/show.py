@@ -1,4 +1,4 @@
-"""How long `mrhubo show --save` takes for a page, a film, a GIF and a sheet of a person and robots side by side.
+"""How long what `mrhubo show` saves takes: a page, a film, a GIF and a sheet of a person and robots side by side.
 
     python benchmarks/show.py [--robots nao,coman] [--frames 100] [--motion data/motions/boxing.npz]
 

@@ -83,8 +83,6 @@ def _check(options: Namespace) -> Path | None:
     """Refuses what cannot be shown before anything takes time; the file to write, if one is asked for."""
     if not options.motion and not options.robot_motion:
         raise UserError("command line: --motion FILE is missing, or --robot-motion FILE, which can be shown alone")
-    if not options.motion and options.retargeter and options.method is None and not options.robot_motion:
-        raise UserError("command line: --retargeter needs --motion FILE, which it answers")
     if options.robot_motion and not (options.robot or options.retargeter):
         raise UserError("command line: --robot-motion needs --robot ROBOT, whose links it moves")
     for method in options.method or []:

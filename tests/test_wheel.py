@@ -55,7 +55,7 @@ def test_it_holds_what_a_command_needs_and_nothing_else(root: Path, built: Path)
     shipped = files(root, "conf/**/*.yaml") | files(root, "data/robots/*/*.urdf") | files(root, "data/motions/*.npz")
     universal = files(root / "mrhubo", "universal/weights/*")
     page = files(root / "mrhubo", "live/page/**/*")
-    assert found == shipped | {"py.typed", "body/weights/open_prior.safetensors", *universal, *page}
+    assert found == shipped | {"py.typed", "body/weights/open_prior.safetensors", "viewer/page.js", *universal, *page}
     assert {name.removeprefix("mrhubo/") for name in names if name.endswith(".py")} == files(root / "mrhubo", "**/*.py")
 
 

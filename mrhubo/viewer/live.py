@@ -8,7 +8,7 @@ from collections.abc import Callable
 from mrhubo.viewer.controls import Controls
 from mrhubo.viewer.player import Player
 from mrhubo.viewer.scene import Scene
-from mrhubo.viewer.server import DEFAULT_PORT, HOST, local_server
+from mrhubo.viewer.server import HOST, local_server
 from mrhubo.viewer.stage import Stage
 
 _TICK_S = 1 / 40
@@ -17,7 +17,7 @@ _TICK_S = 1 / 40
 
 def serve(
     stage: Stage,
-    port: int = DEFAULT_PORT,
+    port: int,
     ready: Callable[[str], None] = print,
     ended: Callable[[], bool] = lambda: False,
 ) -> None:

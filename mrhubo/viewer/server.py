@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import viser
 
 HOST = "127.0.0.1"
-DEFAULT_PORT = 8080
 
 
 @contextlib.contextmanager

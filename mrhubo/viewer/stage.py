@@ -7,7 +7,7 @@ frames of the clock.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -108,7 +108,7 @@ def arrange(person: Person | None, robots: Sequence[Performance]) -> Stage:
     rate = figures[0].frame_rate
     frames = 1 + max(int(np.floor((len(f) - 1) / f.frame_rate * rate + 1e-6)) for f in figures)
     stage = Stage(person, tuple(robots), tuple(standings), rate, frames, np.zeros((frames, 2)))
-    return Stage(person, tuple(robots), tuple(standings), rate, frames, _followed(stage, figures, bool(moving)))
+    return replace(stage, followed_F2=_followed(stage, figures, bool(moving)))
 
 
 def _still_person(person: Person, start: float, goes: bool) -> np.ndarray:
