@@ -180,7 +180,8 @@ class Ground:
         first_B3 = np.stack((np.zeros_like(begun_B), begun_B, np.zeros_like(begun_B)), axis=1)
         off_B3 = np.where(last.known_B[:, None], off_B3, first_B3)
         root_B3 = state.path_B3 + off_B3
-        state = replace(state, off_B3=off_B3, usual_B=usual_B, pointing_BP3=pointing_BP3)
+        state = replace(state, off_B3=off_B3, usual_B=usual_B, pointing_BP3=pointing_BP3,
+                        known_B=np.ones_like(last.known_B))  # fmt: skip
         wanted_BP3 = root_B3[:, None] + pointing_BP3
         under_BP = np.maximum(-wanted_BP3[..., _UP], 0.0)
         wanted_BP3[..., _UP] += under_BP
@@ -215,10 +216,7 @@ class Ground:
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         loose_BP1 = 1.0 - weight_BP[..., None]
         anchor_BP2 = anchor_BP2 + loose_BP1 * ((root_B3[:, None] + point_BP3)[..., _FLAT] - anchor_BP2)
-        return replace(
-            state, root_B3=root_B3, off_B3=root_B3 - state.path_B3, anchor_BP2=anchor_BP2,
-            known_B=np.ones_like(state.known_B),
-        )  # fmt: skip
+        return replace(state, root_B3=root_B3, off_B3=root_B3 - state.path_B3, anchor_BP2=anchor_BP2)
 
     def base(self, state: GroundState, poses: LinkPoses) -> tuple[Tensor, Tensor]:
         """Place (B, 3) [m] and rotation (B, 3, 3) of the robot's base, x forward, y left, z up."""

@@ -104,6 +104,7 @@ class Stream:
         rest_33 = torch.eye(3, device=self.retargeter.device)
         self._seen_BJ33 = rest_33.expand(self.people or 1, len(POSED_JOINT_NAMES), 3, 3)
         self._root_B33, self._place_B3 = rest_33.expand(self.people or 1, 3, 3), rest_33.new_zeros(self.people or 1, 3)
+        self._turn_B4: Tensor | None = None
         self._clock = StreamClock(self.rate)
 
     def __call__(
@@ -140,7 +141,11 @@ class Stream:
         assert self._follower.ground is not None
         base = self._follower.ground.base(ground, self.retargeter.body_map.robot.forward(q_BN))
         found = standing_fields(*base, self._follower.ground.planted(ground), self._legs)
-        return found
+        turn_B4 = found["root_quaternion_wxyz"]
+        if self._turn_B4 is not None:  # it goes on from the last one without a change of sign
+            turn_B4 = torch.where((turn_B4 * self._turn_B4).sum(-1, keepdim=True) < 0, -turn_B4, turn_B4)
+        self._turn_B4 = turn_B4
+        return {**found, "root_quaternion_wxyz": turn_B4}
 
     def joints(
         self, pose: MotionLike | None, time: float | None = None, root: Root | None = None, contacts: Any = None
@@ -161,9 +166,10 @@ class Stream:
         local_BJ33, seen_B = self._read(pose)
         root_B33, place_B3, given_BP = self._read_root(root, contacts, seen_B, pose is None)
         passed, time = self._clock.passed(time)
-        if self._state is None:
+        if self._state is None or (root is not None and self._unmet):
             self._follower = self._make(self.rate, root is not None)
-            self._state = self._follower.begin(self.people or 1, self._begin_BN)
+            at_BN = self._begin_BN if self._state is None else self._state.joints.q_BN
+            self._state = self._follower.begin(self.people or 1, at_BN)
         if passed > 0:
             target_BD3 = self.retargeter.body_map.human_directions(local_BJ33)
             seen = Seen(local_BJ33, root_B33, place_B3, given_BP)
@@ -171,6 +177,11 @@ class Stream:
         self._seen_BJ33, self._clock.time = local_BJ33, time
         self._root_B33, self._place_B3 = root_B33, place_B3
         return seen_B
+
+    @property
+    def _unmet(self) -> bool:
+        """Whether nobody has been seen, so that it is open whether roots come with poses."""
+        return self._state is not None and self._state.ground is None and bool(self._state.unseen_B.isinf().all())
 
     def _make(self, rate: float, rooted: bool) -> Follower:
         """What follows people with a root, or without."""
@@ -191,7 +202,7 @@ class Stream:
             if rooted and not nobody:
                 raise UserError("stream: earlier poses came with a root, this one has none; reset() begins anew")
             return self._root_B33, self._place_B3, None
-        if self._state is not None and not rooted:
+        if self._state is not None and not rooted and not self._unmet:
             raise UserError("stream: earlier poses came without a root; reset() begins anew")
         turn, place = (to_tensor(x).to(self.retargeter.device, torch.float32) for x in root)
         if self.people is None:

@@ -193,7 +193,7 @@ def test_the_command_measures_a_package_and_refuses_another_robots(
         main(["--config", str(root / "conf" / "coman.yaml"), *given])
     with pytest.raises(UserError, match="another robot or other joints"):
         main(["--config", str(root / "conf" / "nao.yaml"), *given, "robot.joints=[LShoulderPitch, LShoulderRoll]"])
-    with pytest.raises(UserError, match="--retargeter --predictions is required"):
+    with pytest.raises(UserError, match="--retargeter --predictions --optimiser is required"):
         main(["--config", str(root / "conf" / "nao.yaml")])
     with pytest.raises(UserError, match="is no package of a retargeter"):
         main(["--config", str(root / "conf" / "nao.yaml"), "--retargeter", str(tmp_path)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -129,3 +131,45 @@ def test_roots_and_contacts_that_make_no_sense_are_refused(biped: Retargeter) ->
         stream(pose, root=(eye, zero))
     with pytest.raises(UserError, match="the floor's height must be a number"):
         Stream(biped, floor=float("nan"))
+
+
+@pytest.mark.parametrize(("root", "waist"), [("chest", True), ("pelvis", False)])
+def test_robots_hung_up_at_the_chest_or_without_a_waist_stand_too(tmp_path: Path, root: str, waist: bool) -> None:
+    body_map, motion = walker(tmp_path, root, waist), squat(10, 24.0)
+    retargeter = Retargeter(NearestJoints(body_map), body_map, BodyPrior.open(), None, phi_threshold=0.01)
+    answer = followed(retargeter, motion)
+    point_TP3, height_TK = soles(retargeter, answer)
+    assert -1e-5 < height_TK.min() and height_TK.max() < 0.03
+    assert np.abs(point_TP3[1:].mean(axis=1) - point_TP3[0].mean(axis=0))[:, :2].max() < 1e-5
+
+
+def test_a_robot_without_feet_does_not_look_at_roots(retargeter: Retargeter) -> None:
+    pose = squat(2).local_TJ33[0]
+    stream = Stream(retargeter, settings=SETTINGS)
+    answer = stream(pose, root=(torch.eye(3), torch.zeros(3)))
+    assert answer.root_position is None and answer.contact is None and stream.contact_points == ()
+    torch.testing.assert_close(answer.q, Stream(retargeter, settings=SETTINGS)(pose).q)
+
+
+def test_people_may_come_later_than_the_stream_and_than_each_other(biped: Retargeter) -> None:
+    motion = squat(8, 60.0)
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    alone, later, both = (
+        Stream(biped, settings=SETTINGS),
+        Stream(biped, settings=SETTINGS),
+        Stream(biped, 60.0, 2, SETTINGS),
+    )
+    assert later(None).root_position is None  # nobody yet, so it is open whether roots will come
+    for t, (turn_33, place_3) in enumerate(zip(motion.root_rotation_T33, motion.root_position_T3, strict=True)):
+        pose, absent = motion.local_TJ33[t], torch.full((21, 3, 3), torch.nan)
+        found = both(torch.stack((pose, absent if t < 4 else motion.local_TJ33[t - 4])),
+                     root=(torch.stack((turn_33, turn_33)), torch.stack((place_3, motion.root_position_T3[max(t - 4, 0)]))))  # fmt: skip
+        expected = alone(pose, root=(turn_33, place_3))
+        assert later(pose, root=(turn_33, place_3)).root_position is not None
+        assert found.root_position is not None and expected.root_position is not None
+        torch.testing.assert_close(found.root_position[0], expected.root_position, atol=1e-4, rtol=0)
+        if t == 0:
+            first = expected.root_position
+    # The second one has come four frames later and stands as high as the first did.
+    assert found.root_position is not None and abs(float(found.root_position[1, 2] - first[2])) < 0.1
+    assert bool(found.contact is not None and found.contact.all())
