@@ -13,6 +13,8 @@ from mrhubo.retargeter.confidence import STANDARD
 from mrhubo.runtime.tracking import open_client
 from tests.chain import cut_motion
 
+pytestmark = pytest.mark.usefixtures("light_records")
+
 
 def test_the_command(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, one_thread: None
