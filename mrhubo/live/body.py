@@ -225,7 +225,7 @@ def _elbow_axis(arm: _Arm, elbow: str, known: bool) -> Vector:
     bend = math.atan2(norm(plane), dot(arm.upper, arm.lower))
     if known and bend > BENT:
         arm.bent = arm.upper, unit(plane)
-    shoulder = elbow.replace("elbow", "shoulder")
+    shoulder = JOINT_NAMES[PARENTS[_POSED[elbow] + 1]]
     start, own = arm.bent or (unit(minus(_REST[elbow], _REST[shoulder])), hinge_axis(elbow))
     own = unit(across(apply(shortest(start, arm.upper), own), arm.upper))
     if norm(own) < 0.5:  # the arm points to where it was opposite when the axis was known
