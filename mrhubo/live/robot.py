@@ -64,12 +64,18 @@ class LiveRobot:
         """By the universal network, without training; as `mrhubo.for_robot`.
 
         Raises:
-            UserError: the robot cannot be used.
+            UserError: the robot cannot be used, or its config moves its legs, and nothing here keeps it on its feet.
         """
         from mrhubo.describing.run import open_robot
         from mrhubo.retargeter import untrained
 
-        retargeter = untrained(open_robot(name))
+        robot = open_robot(name)
+        if robot.keypoints is not None and robot.keypoints.standing:
+            raise UserError(
+                f"--robot {name}: its config moves its legs, and mrhubo live keeps no robot on its feet; name a config"
+                " of its arms, hands and head alone"
+            )
+        retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
         return cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
 
