@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import sqlite3
 from collections.abc import Callable, Iterator
+from functools import partial
 from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,6 +54,21 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files that take longest come first."""
     order = {name: place for place, name in enumerate(_LONGEST)}
     items.sort(key=lambda item: order.get(_unit(item.nodeid.split("::")[0]), len(order)))
+    for item in items:
+        if item.path.suffix == ".ipynb":
+            item.runtest = partial(_start_again, item.runtest)
+
+
+def _start_again(run: Callable[[], None]) -> None:
+    """Jupyter chooses the ports of a notebook's process before it starts, and another process may be faster to take one:
+    then it is started once more. What cells do is not repeated.
+    """
+    try:
+        run()
+    except RuntimeError as error:
+        if "Kernel died before replying" not in str(error):
+            raise
+        run()
 
 
 def pytest_collection_finish() -> None:
