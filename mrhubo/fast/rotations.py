@@ -46,6 +46,17 @@ def matrix_to_axis_angle(matrix_X33: np.ndarray) -> np.ndarray:
     return 2 * np.where(small_X1, series_X1, half_X1 / np.where(small_X1, 1, np.sin(half_X1))) * vector_X3
 
 
+def quaternion_to_matrix(quaternion_X4: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4), w last, to (..., 3, 3)."""
+    x, y, z, w = np.moveaxis(quaternion_X4, -1, 0)
+    rows = (
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip
+    return np.stack(rows, axis=-1).reshape(*quaternion_X4.shape[:-1], 3, 3)
+
+
 def shortest_turn(start_X3: np.ndarray, end_X3: np.ndarray) -> np.ndarray:
     """The smallest rotations (..., 3, 3) between unit vectors (..., 3); none if they are opposite, where no axis is
     told.

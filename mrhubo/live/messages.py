@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mrhubo.body.joints import KEYPOINT_NAMES, POSED_JOINT_NAMES
-from mrhubo.fast.rotations import are_crooked, axis_angle_to_matrix
+from mrhubo.fast.rotations import are_crooked, axis_angle_to_matrix, quaternion_to_matrix
 from mrhubo.live.body import SeenPose
 from mrhubo.live.point_sets import POINT_SETS, PointSet
 from mrhubo.live.vectors import Vector
@@ -180,13 +180,7 @@ def of_quaternions(xyzw_J4: np.ndarray) -> np.ndarray:
     length_J1 = np.sqrt((xyzw_J4**2).sum(-1, keepdims=True))
     if not (length_J1 > 0.1).all():
         raise Refused("malformed")
-    x, y, z, w = (xyzw_J4 / length_J1).T
-    rows = (
-        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-    )  # fmt: skip
-    return np.stack(rows, axis=-1).reshape(-1, 3, 3)
+    return quaternion_to_matrix(xyzw_J4 / length_J1)
 
 
 def _heartbeat(told: dict[str, Any]) -> Heartbeat:

@@ -78,9 +78,14 @@ def find_contacts(
             # A motion that begins or ends with a foot on the floor has no touch-down or lift-off there.
             since = np.arange(1, end - start + 1) / frame_rate + (np.inf if start == 0 else 0.0)
             until = np.arange(end - start, 0, -1) / frame_rate + (np.inf if end == len(planted_TP) else 0.0)
-            share = np.minimum(np.minimum(since, until) / RAMP_S, 1.0)
-            weight_TP[start:end, point] = share**2 * (3 - 2 * share)
+            weight_TP[start:end, point] = smooth_share(np.minimum(since, until) / RAMP_S)
     return FootContacts(planted_TP, phase_TP, weight_TP, floor)
+
+
+def smooth_share(share: np.ndarray) -> np.ndarray:
+    """How much a contact counts, 0..1, some share of the way into its ramp: it begins and ends without a corner."""
+    share = np.clip(share, 0.0, 1.0)
+    return share**2 * (3 - 2 * share)
 
 
 def root_scale(from_root_TP3: np.ndarray, root_T3: np.ndarray, frame_rate: float) -> float:

@@ -24,6 +24,7 @@ from mrhubo.motion.contacts import (
     PLANTED_SPEED,
     RAMP_S,
     WANDERED_M,
+    smooth_share,
 )
 
 _SMOOTH_S = 0.02
@@ -116,7 +117,7 @@ def next_contacts(
     leaves_BP = np.minimum((LIFTED_SPEED - speed_BP) / (LIFTED_SPEED - PLANTED_SPEED),
                            (LIFTED_M - above_BP) / (LIFTED_M - PLANTED_M))  # fmt: skip
     leaves_BP = np.ones_like(leaves_BP) if given_BP is not None else leaves_BP
-    weight_BP = planted_BP * _smooth(age_BP / RAMP_S) * _smooth(leaves_BP)
+    weight_BP = planted_BP * smooth_share(age_BP / RAMP_S) * smooth_share(leaves_BP)
     start_BP3 = _chosen(began_BP, place_BP3, last.start_BP3)
     return LiveContacts(
         place_BP3, velocity_BP3, floor_B, planted_BP, began_BP, age_BP, start_BP3, weight_BP, slow_BH, from_B
@@ -155,11 +156,6 @@ def _lowest_band(slow_BH: np.ndarray) -> np.ndarray:
     half_B1 = weight_BX.sum(axis=1, keepdims=True) / 2
     median_B = (weight_BX.cumsum(axis=1) >= half_B1).argmax(axis=1)
     return np.where(most_B1[:, 0] > 0, (inside_BX[rows_B, median_B] + 0.5) * _STEP_M, np.nan)
-
-
-def _smooth(share: np.ndarray) -> np.ndarray:
-    share = np.clip(share, 0.0, 1.0)
-    return share**2 * (3 - 2 * share)
 
 
 def _chosen(chosen: np.ndarray, one: np.ndarray, other: np.ndarray) -> Any:

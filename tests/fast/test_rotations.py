@@ -52,3 +52,9 @@ def test_the_shortest_turn(axis_angles: np.ndarray) -> None:
     wanted = rotation.shortest_turn(torch.from_numpy(start), torch.from_numpy(end)).numpy()
     np.testing.assert_allclose(found, wanted, atol=1e-12)
     np.testing.assert_array_equal(rotations.shortest_turn(start, -start), np.broadcast_to(np.eye(3), found.shape))
+
+
+def test_quaternions(axis_angles: np.ndarray) -> None:
+    quaternions = rotation.matrix_to_quaternion(rotation.axis_angle_to_matrix(torch.from_numpy(axis_angles)))
+    wanted = rotation.quaternion_to_matrix(quaternions).numpy()
+    np.testing.assert_allclose(rotations.quaternion_to_matrix(quaternions.numpy()), wanted, atol=1e-12)

@@ -61,14 +61,11 @@ class Datagrams:
             self._socket = None
 
 
-class UdpSource:
-    """Messages as docs/live.md specifies them; beyond loopback each has the token as its `token`."""
-
-    has_heartbeat = True
+class DatagramSource:
+    """What sources that come by UDP share."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._datagrams = Datagrams(endpoint)
-        self.token = find_token(endpoint.host)
 
     @property
     def endpoint(self) -> Endpoint:
@@ -78,6 +75,20 @@ class UdpSource:
     def open(self) -> None:
         """Binds."""
         self._datagrams.open()
+
+    def close(self) -> None:
+        """Unbinds."""
+        self._datagrams.close()
+
+
+class UdpSource(DatagramSource):
+    """Messages as docs/live.md specifies them; beyond loopback each has the token as its `token`."""
+
+    has_heartbeat = True
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        super().__init__(endpoint)
+        self.token = find_token(endpoint.host)
 
     def read(self, inbox: Inbox, now: float) -> bool:
         """Empties the socket."""
@@ -97,7 +108,3 @@ class UdpSource:
         except (ValueError, RecursionError):
             return False
         return isinstance(told, dict) and token_fits(self.token, told.get("token"))
-
-    def close(self) -> None:
-        """Unbinds."""
-        self._datagrams.close()

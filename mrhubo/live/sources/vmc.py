@@ -21,7 +21,7 @@ from mrhubo.live.body import SeenPose
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES, Message, Refused, of_quaternions
-from mrhubo.live.sources.udp import Datagrams
+from mrhubo.live.sources.udp import DatagramSource
 
 PORT = 39_539
 """On which programs that receive VMC listen by default."""
@@ -99,7 +99,7 @@ def _osc(datagram: bytes) -> Iterator[tuple[str, list[Any]]]:
         raise Refused("malformed") from error
 
 
-class VmcSource:
+class VmcSource(DatagramSource):
     """A VMC receiver. The protocol knows no token, so it listens on loopback alone; it knows no heartbeat either."""
 
     has_heartbeat = False
@@ -119,17 +119,9 @@ class VmcSource:
                 f"--source vmc:{endpoint.shown}: VMC has no token, so it is taken on loopback alone; let a program on"
                 " this machine send it on to 127.0.0.1"
             )
-        self._datagrams, self._bones = Datagrams(endpoint), Bones()
+        super().__init__(endpoint)
+        self._bones = Bones()
         self._session, self._number = str(time.time_ns()), 0
-
-    @property
-    def endpoint(self) -> Endpoint:
-        """Where it listens."""
-        return self._datagrams.endpoint
-
-    def open(self) -> None:
-        """Binds."""
-        self._datagrams.open()
 
     def read(self, inbox: Inbox, now: float) -> bool:
         """Empties the socket; all bones that have come are one frame."""
@@ -147,7 +139,3 @@ class VmcSource:
             self._number += 1
             inbox.offer(Message(self._session, self._number, now, self._bones.pose), "vmc", now)
         return True
-
-    def close(self) -> None:
-        """Unbinds."""
-        self._datagrams.close()
