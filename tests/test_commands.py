@@ -56,6 +56,8 @@ OWN_FILE = re.compile(r"(conf/)?(my\w*|mine|config|robot)\.yaml|[A-Z]+")
 STARTS = re.compile(
     r"(?:[\w.$()/-]*/)?(?:\S+ )*?(?:-m mrhubo\.(?P<module>[a-z][\w.]*)|(?<![\w./`-])mrhubo (?P<verb>[a-z]+))(?P<rest>.*)"
 )
+MAY_SHOW = re.compile(r"-m[\s\\]+mrhubo\.|mrhubo[\s\\]+(?!import\b)[a-z]")
+"""In every text of which a part begins as `STARTS` says."""
 
 
 def command(name: str) -> Any:
@@ -84,6 +86,8 @@ def accepted(name: str) -> set[str]:
 def snippets(path: Path) -> Iterator[str]:
     """The lines of code blocks, and code between the lines, of a page, a docstring or a comment."""
     text = path.read_text()
+    if MAY_SHOW.search(text) is None:  # else every process that collects parses all modules
+        return
     if path.suffix == ".py":
         nodes = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Module | ast.FunctionDef | ast.ClassDef)]
         text = "\n\n".join(ast.get_docstring(node) or "" for node in nodes)

@@ -115,8 +115,3 @@ def _mirror_share(chains: tuple[Chain, Chain], normal_3: np.ndarray, nodes: Sequ
         a_3, b_3 = flip_33 @ one.hinge.line.axis_3, other.hinge.line.axis_3
         good += abs(float(a_3 @ b_3)) > 0.99
     return good / count
-
-
-def middle_of(pairs: Sequence[Pair]) -> np.ndarray:
-    """A point (3,) in the mirror plane: the mean of where the limbs begin."""
-    return np.mean([pair.mounts_23.mean(0) for pair in pairs], axis=0)
