@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from mrhubo.config import CommandParser, run_command, whole_number
 from mrhubo.errors import UserError, listed
+from mrhubo.lazy import import_optional
 from mrhubo.retarget import (
     METHOD_MEANING,
     METHODS,
@@ -100,9 +101,8 @@ def _check(options: Namespace) -> Path | None:
             raise UserError(f"--save {out}: is the motion itself; name another file")
         needed = {".html": "viser", ".mp4": "av"}.get(out.suffix.lower())
     if needed is not None:
-        from mrhubo.viewer.extra import import_extra
-
-        import_extra(needed, "a page in the browser" if needed == "viser" else "an .mp4 file")
+        what = "a page in the browser" if needed == "viser" else "an .mp4 file"
+        import_optional(needed, f"{what} needs the package {needed}: pip install 'mrhubo[view]'")
     return None if options.save is None else Path(options.save)
 
 

@@ -19,6 +19,7 @@ from mrhubo.exporting.meaning import compared, describe_networks, meaning
 from mrhubo.fast.description import Description
 from mrhubo.fast.sections import Part
 from mrhubo.files.atomic import atomic_path
+from mrhubo.lazy import import_optional
 from mrhubo.retargeter import Retargeter
 
 INPUTS = ("poses", "directions")
@@ -39,11 +40,9 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
         UserError: the package onnx is missing, the networks see no directions, the file's answers are others than
             PyTorch's, or the disk refuses.
     """
-    try:
-        import onnx  # pyright: ignore[reportMissingImports]
-        import onnx.reference  # pyright: ignore[reportMissingImports]
-    except ImportError as error:
-        raise UserError("an ONNX file needs the package onnx: pip install 'mrhubo[onnx]'") from error
+    missing = "an ONNX file needs the package onnx: pip install 'mrhubo[onnx]'"
+    onnx = import_optional("onnx", missing)
+    import_optional("onnx.reference", missing)
     if inputs not in INPUTS:
         raise UserError(f"inputs must be one of {', '.join(INPUTS)}, found {inputs!r}")
     description = describe_networks(retargeter)

@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
+from mrhubo.lazy import import_optional
 from mrhubo.live.endpoints import Endpoint, find_token
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
@@ -59,10 +60,9 @@ class Server:
         Raises:
             UserError: websockets is not installed, or the environment's token is too short.
         """
-        try:
-            import websockets.asyncio.server  # noqa: F401
-        except ImportError as error:
-            raise UserError("the page and WebSockets need websockets: pip install 'mrhubo[live]'") from error
+        import_optional(
+            "websockets.asyncio.server", "the page and WebSockets need websockets: pip install 'mrhubo[live]'"
+        )
         self.endpoint, self.token = endpoint, find_token(endpoint.host)
         self._page, self._certificate = page, certificate
         self._waiting: deque[tuple[str, bytes | str | None]] = deque(maxlen=_MOST_MESSAGES)

@@ -7,7 +7,6 @@ https://mujoco.readthedocs.io/en/stable/XMLreference.html
 
 from __future__ import annotations
 
-import importlib
 import os
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.errors import UserError, first_line, shortened
+from mrhubo.lazy import import_optional
 from mrhubo.robot.mjcf_bodies import Converted, UrdfWriter
 
 _TINY = 1e-3
@@ -45,12 +45,9 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
     Raises:
         UserError: MuJoCo is not installed or refuses the model, or there is no joint in it.
     """
-    try:
-        mujoco: Any = importlib.import_module("mujoco")  # an extra, whose types differ between versions
-    except ImportError as error:
-        raise UserError(
-            f"{path}: is a MuJoCo model, and MuJoCo is not installed: pip install 'mrhubo[mjcf]', or name a URDF"
-        ) from error
+    mujoco = import_optional(
+        "mujoco", f"{path}: is a MuJoCo model, and MuJoCo is not installed: pip install 'mrhubo[mjcf]', or name a URDF"
+    )
     _refuse_growing(path)
     mujoco.set_mju_user_warning(lambda _: None)  # else it writes a log file where the user happens to be
     try:

@@ -7,7 +7,6 @@ takes; the bag is what `ros2 bag play` takes. MCAP: https://mcap.dev/spec and /s
 
 from __future__ import annotations
 
-import importlib
 import json
 import warnings
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ import numpy as np
 from mrhubo.errors import InputWarning, UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import check_regular, open_regular
+from mrhubo.lazy import import_optional
 from mrhubo.robot_motion.clock import find_rate, nanoseconds
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.plain import build, short
@@ -270,7 +270,4 @@ def import_mcap() -> None:
 
 
 def _import(name: str) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise UserError("MCAP bags need mcap-ros2-support: pip install 'mrhubo[ros]'") from error
+    return import_optional(name, "MCAP bags need mcap-ros2-support: pip install 'mrhubo[ros]'")

@@ -17,6 +17,7 @@ import numpy as np
 from mrhubo.errors import UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import check_regular, read_regular
+from mrhubo.lazy import import_optional
 from mrhubo.robot_motion.columns import from_columns, to_columns
 from mrhubo.robot_motion.motion import FLAGS, RobotMotion, find_repeated
 from mrhubo.robot_motion.plain import build, facts_of
@@ -158,9 +159,5 @@ def read_table(path: Path) -> tuple[Any, Mapping[bytes, bytes]]:
 
 def import_pyarrow() -> tuple[Any, Any]:
     """pyarrow and pyarrow.parquet, which robots' computers may lack."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise UserError("Parquet files need pyarrow: pip install pyarrow") from error
-    return pyarrow, pyarrow.parquet
+    missing = "Parquet files need pyarrow: pip install pyarrow"
+    return import_optional("pyarrow", missing), import_optional("pyarrow.parquet", missing)

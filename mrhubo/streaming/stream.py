@@ -15,20 +15,17 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from mrhubo.body.skeleton import KEYPOINT_NAMES, POSED_JOINT_NAMES
+from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.fast import StreamSettings
 from mrhubo.fast.stream_clock import StreamClock
-from mrhubo.motion import Motion, MotionLike, read_poses, to_tensor
+from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.standing import (
-    CROOKED,
-    FAR_M,
     Legs,
     Standing,
     given_contacts,
@@ -40,13 +37,10 @@ from mrhubo.retargeter import Retargeter, RetargetResult, join_results
 from mrhubo.retargeter.without_training import optimised
 from mrhubo.streaming.follow import Follower, StreamState
 from mrhubo.streaming.ground import GroundState, Seen
+from mrhubo.streaming.reading import FrameReader, Root
 
-_MOST_PEOPLE = 10_000
 _PART = 8_192
 """Frames that are worked on at a time where that is possible."""
-
-
-Root = tuple[MotionLike, MotionLike]
 
 
 class Stream:
@@ -75,10 +69,6 @@ class Stream:
             UserError: the rate is not positive, the number of people none, or the floor no number.
         """
         check_frame_rate(rate, needed=True)
-        if people is not None and (type(people) is not int or not 1 <= people <= _MOST_PEOPLE):
-            raise UserError(
-                f"stream: people must be a whole number from 1 to {_MOST_PEOPLE:,}, or None, found {people}"
-            )
         if isinstance(retargeter, OptimizationRetargeter):
             retargeter = optimised(retargeter.body_map)
         self.retargeter, self.rate, self.people = retargeter, float(rate), people
@@ -86,6 +76,7 @@ class Stream:
             raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
         self.settings, self.floor = settings or StreamSettings(), floor
         self._legs = Legs(retargeter.body_map)
+        self._reader = FrameReader(retargeter.body_map, self._legs, people)
         self._standing: Standing | None = None
         self.reset()
 
@@ -98,10 +89,10 @@ class Stream:
         Raises:
             UserError: q has another shape, is no number, or lies outside the joints' limits.
         """
-        self._begin_BN = None if q is None else self._standing_at(q)
+        rest_33 = torch.eye(3, device=self.retargeter.device)
+        self._begin_BN = None if q is None else self._reader.angles(q, rest_33)
         self._state: StreamState | None = None
         """None: no frame has come, so it is not known whether roots will come with them."""
-        rest_33 = torch.eye(3, device=self.retargeter.device)
         self._seen_BJ33 = rest_33.expand(self.people or 1, len(POSED_JOINT_NAMES), 3, 3)
         self._root_B33, self._place_B3 = rest_33.expand(self.people or 1, 3, 3), rest_33.new_zeros(self.people or 1, 3)
         self._turn_B4: Tensor | None = None
@@ -158,13 +149,20 @@ class Stream:
     @property
     def contact_points(self) -> tuple[str, ...]:
         """The human keypoints of the soles on which the robot stands; none if it has no feet."""
-        return tuple(KEYPOINT_NAMES[k] for k in self._legs.contacts) if self._legs.has_feet else ()
+        return self._reader.contact_points
 
     @torch.no_grad()
     def _advance(self, pose: MotionLike | None, time: float | None, root: Root | None, contacts: Any) -> Tensor:
         """Works on a frame; who is seen (B,)."""
-        local_BJ33, seen_B = self._read(pose)
-        root_B33, place_B3, given_BP = self._read_root(root, contacts, seen_B, pose is None)
+        local_BJ33, seen_B = self._reader.poses(pose, self._seen_BJ33)
+        root_B33, place_B3, given_BP = self._root_B33, self._place_B3, None
+        if root is not None and self._legs.has_feet:
+            if self._state is not None and not self._is_rooted and not self._unmet:
+                raise UserError("stream: earlier poses came without a root; reset() begins anew")
+            root_B33, place_B3, seen_B = self._reader.roots(root, root_B33, place_B3, seen_B)
+            given_BP = self._reader.contacts(contacts)
+        elif self._is_rooted and pose is not None:
+            raise UserError("stream: earlier poses came with a root, this one has none; reset() begins anew")
         passed, time = self._clock.passed(time)
         if self._state is None or (root is not None and self._unmet):
             self._follower = self._make(self.rate, root is not None)
@@ -179,9 +177,14 @@ class Stream:
         return seen_B
 
     @property
+    def _is_rooted(self) -> bool:
+        """Whether roots come with poses, and are looked at."""
+        return self._state is not None and self._state.ground is not None
+
+    @property
     def _unmet(self) -> bool:
         """Whether nobody has been seen, so that it is open whether roots come with poses."""
-        return self._state is not None and self._state.ground is None and bool(self._state.unseen_B.isinf().all())
+        return self._state is not None and not self._is_rooted and bool(self._state.unseen_B.isinf().all())
 
     def _make(self, rate: float, rooted: bool) -> Follower:
         """What follows people with a root, or without."""
@@ -189,70 +192,6 @@ class Stream:
         if rooted and self._legs.has_feet:
             standing = self._standing = self._standing or Standing(self._legs)
         return Follower(self.retargeter, self.settings, self.settings.longest_step(rate), standing, self.floor)
-
-    def _read_root(
-        self, root: Root | None, contacts: Any, seen_B: Tensor, nobody: bool
-    ) -> tuple[Tensor, Tensor, np.ndarray | None]:
-        """Roots (B, 3, 3), (B, 3) [m], the last ones of those who are not seen, whose flags `seen_B` loses those whose
-        root is no number; and contacts (B, P), where they are given.
-        """
-        people = self.people or 1
-        rooted = self._state is not None and self._state.ground is not None
-        if root is None or not self._legs.has_feet:
-            if rooted and not nobody:
-                raise UserError("stream: earlier poses came with a root, this one has none; reset() begins anew")
-            return self._root_B33, self._place_B3, None
-        if self._state is not None and not rooted and not self._unmet:
-            raise UserError("stream: earlier poses came without a root; reset() begins anew")
-        turn, place = (to_tensor(x).to(self.retargeter.device, torch.float32) for x in root)
-        if self.people is None:
-            turn, place = turn[None], place[None]
-        if tuple(turn.shape) != (people, 3, 3) or tuple(place.shape) != (people, 3):
-            raise UserError(
-                "stream: a root is a rotation (3, 3) and a place (3,), with a leading axis if there are several people;"
-                f" found {tuple(turn.shape)} and {tuple(place.shape)}"
-            )
-        seen_B &= turn.flatten(1).isfinite().all(dim=1) & (place.abs() < FAR_M).all(dim=1)
-        crooked_B = (turn.mT @ turn - torch.eye(3).to(turn)).abs().amax(dim=(1, 2)) > CROOKED
-        if bool((crooked_B & seen_B).any()):
-            raise UserError("stream: the root's matrix is no rotation")
-        given_BP = None
-        if contacts is not None:
-            given_BP = np.asarray(contacts, dtype=bool).reshape(people, -1)
-            if given_BP.shape[1] != len(self._legs.contacts):
-                raise UserError(
-                    f"stream: expected contacts of {len(self._legs.contacts)} points: {', '.join(self.contact_points)}"
-                )
-        root_B33 = torch.where(seen_B[:, None, None], turn, self._root_B33)
-        return root_B33, torch.where(seen_B[:, None], place, self._place_B3), given_BP
-
-    def _read(self, pose: MotionLike | None) -> tuple[Tensor, Tensor]:
-        """Poses (B, 21, 3, 3), the last ones of those who are not seen, and who is seen (B,)."""
-        people = self.people or 1
-        if pose is None:
-            return self._seen_BJ33, torch.zeros(people, dtype=torch.bool, device=self.retargeter.device)
-        given = to_tensor(pose, self.retargeter.body_map.skeleton)
-        given = given[None] if self.people is None else given
-        if given.ndim < 2 or len(given) != people:
-            found, wanted = tuple(to_tensor(pose).shape), "a single one" if self.people is None else f"{people} of them"
-            raise UserError(f"stream: expected poses of one frame, {wanted}, found an array of shape {found}")
-        seen_B = given.flatten(1).isfinite().all(dim=1)
-        poses = read_poses(given[seen_B])
-        if len(poses.shape) != 1:
-            raise UserError(f"stream: expected one pose a person, found an array of shape {tuple(given.shape)}")
-        local_BJ33, seen_B = self._seen_BJ33.clone(), seen_B.to(self.retargeter.device)
-        local_BJ33[seen_B] = poses.local_TJ33.to(local_BJ33)
-        return local_BJ33, seen_B
-
-    def _standing_at(self, q: MotionLike) -> Tensor:
-        robot, people = self.retargeter.body_map.robot, self.people or 1
-        q_BN = to_tensor(q).to(self.retargeter.device, torch.float32)
-        q_BN = q_BN[None] if self.people is None else q_BN
-        if tuple(q_BN.shape) != (people, len(robot.joint_names)):
-            raise UserError(f"stream: q must have {len(robot.joint_names)} angles a robot, found {tuple(q_BN.shape)}")
-        if not bool(((q_BN >= robot.lower_N) & (q_BN <= robot.upper_N)).all()):  # nor NaN
-            raise UserError("stream: q lies outside the joints' limits")
-        return q_BN
 
     def retarget(self, motion: Motion) -> RetargetResult:
         """A motion as this stream's settings would have it: all of its frames, one after the other. The stream itself

@@ -16,6 +16,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.regular import open_regular
+from mrhubo.lazy import import_optional
 
 _MAX_SIDE = 8_192
 _MAX_PIXELS = 2**25
@@ -54,11 +55,7 @@ def frames(path: Path) -> Iterator[Frame]:
         UserError: PyAV is not installed; or the file is missing, no video, damaged, breaks off, or has frames that are
             too large or too many.
     """
-    try:
-        import av
-        from av.error import FFmpegError
-    except ImportError as error:
-        raise UserError(f"{path}: videos need PyAV: pip install 'mrhubo[video]'") from error
+    av = import_optional("av", f"{path}: videos need PyAV: pip install 'mrhubo[video]'")
     with open_regular(path, _MAX_BYTES) as handle:
         kind = video_kind(handle.read(64))
         if kind is None:
@@ -69,7 +66,7 @@ def frames(path: Path) -> Iterator[Frame]:
                 if not container.streams.video:
                     raise UserError(f"{path}: has no pictures")
                 yield from _decoded(path, container)
-        except (FFmpegError, ValueError, OverflowError, MemoryError) as error:
+        except (av.FFmpegError, ValueError, OverflowError, MemoryError) as error:
             reason = getattr(error, "strerror", None) or error
             raise UserError(f"{path}: is a damaged video, or one that cannot be read: {reason}") from error
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.regular import read_regular
+from mrhubo.lazy import import_optional
 
 _MAX_MODEL = 128 * 2**20
 
@@ -25,14 +26,14 @@ class Network:
         Raises:
             UserError: LiteRT is not installed, or the file is missing or damaged.
         """
-        try:
-            from ai_edge_litert.interpreter import Interpreter
-        except ImportError as error:
-            raise UserError("finding people in pictures needs ai-edge-litert: pip install 'mrhubo[video]'") from error
+        litert = import_optional(
+            "ai_edge_litert.interpreter",
+            "finding people in pictures needs ai-edge-litert: pip install 'mrhubo[video]'",
+        )
         self.path = path
         data = read_regular(path, _MAX_MODEL)
         try:
-            self._interpreter = Interpreter(model_content=data, num_threads=threads)
+            self._interpreter = litert.Interpreter(model_content=data, num_threads=threads)
             self._interpreter.allocate_tensors()
         except (ValueError, RuntimeError) as error:
             raise UserError(f"{path}: is no model of TensorFlow Lite, or damaged; fetch it again") from error

@@ -12,7 +12,7 @@ from PIL.Image import Image
 
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
-from mrhubo.viewer.extra import import_extra
+from mrhubo.lazy import import_optional
 
 _QUALITY = "20"
 """H.264's constant rate factor: 18 is hardly to be told from the original, 23 is usual."""
@@ -32,7 +32,7 @@ def save_mp4(frames: Iterable[Image], path: Path, frame_rate: float) -> int:
     Raises:
         UserError: PyAV is not installed or cannot write H.264, or the disk refuses.
     """
-    av = import_extra("av", "an .mp4 file")
+    av = import_optional("av", "an .mp4 file needs the package av: pip install 'mrhubo[view]'")
     with atomic_path(path) as temporary:
         count = 0
         with av.open(str(temporary), "w", format="mp4") as container:

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from mrhubo.viewer.extra import import_extra
+from mrhubo.lazy import import_optional
 
 if TYPE_CHECKING:
     import viser
@@ -25,7 +25,7 @@ def local_server(port: int = 0) -> Iterator[viser.ViserServer]:
     Raises:
         UserError: viser is not installed.
     """
-    library = import_extra("viser", "a viewer in the browser")
+    library = import_optional("viser", "a viewer in the browser needs the package viser: pip install 'mrhubo[view]'")
     with contextlib.redirect_stdout(io.StringIO()):  # it tells of itself
         server = library.ViserServer(host=HOST, port=port, verbose=False)
     server.request_share_url = _stays_here

@@ -8,7 +8,6 @@ Legend: V degrees of freedom.
 
 from __future__ import annotations
 
-import importlib
 import math
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError, first_line, listed, shortened
 from mrhubo.files.regular import check_regular
+from mrhubo.lazy import import_optional
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 
@@ -46,10 +46,7 @@ class MujocoSink:
         Raises:
             UserError: MuJoCo is not installed.
         """
-        try:
-            self._mujoco: Any = importlib.import_module("mujoco")
-        except ImportError as error:
-            raise UserError("--sink mujoco: needs MuJoCo: pip install 'mrhubo[mjcf]'") from error
+        self._mujoco = import_optional("mujoco", "--sink mujoco: needs MuJoCo: pip install 'mrhubo[mjcf]'")
         self._file, self._free = model, free
         self.model: Any = None
         self.data: Any = None

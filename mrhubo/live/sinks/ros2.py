@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 from mrhubo.config.live import LiveConfig
-from mrhubo.errors import UserError
+from mrhubo.lazy import import_optional
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.trajectory import trajectory
@@ -19,11 +18,9 @@ class Ros2Sink:
     def __init__(self, topic: str = "") -> None:
         """`topic`: default `/joint_trajectory`. Raises a UserError where ROS 2 is not there."""
         self.topic = topic or TOPIC
-        try:
-            self._rclpy: Any = importlib.import_module("rclpy")
-            self._trajectories: Any = importlib.import_module("trajectory_msgs.msg")
-        except ImportError as error:
-            raise UserError("--sink ros2: ROS 2's rclpy is not there; source its setup.bash first") from error
+        missing = "--sink ros2: ROS 2's rclpy is not there; source its setup.bash first"
+        self._rclpy = import_optional("rclpy", missing)
+        self._trajectories = import_optional("trajectory_msgs.msg", missing)
         self._node: Any = None
         self._publisher: Any = None
         self._period = 0.0

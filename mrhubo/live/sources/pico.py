@@ -7,13 +7,13 @@ its documentation says.
 
 from __future__ import annotations
 
-import importlib
 import time
 from typing import Any
 
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.lazy import import_optional
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Message, Nobody, Refused
 from mrhubo.live.point_sets import POINT_SETS
@@ -47,10 +47,9 @@ class PicoSource:
 
     def __init__(self) -> None:
         """Raises a UserError where the SDK is not installed."""
-        try:
-            self._sdk: Any = importlib.import_module("xrobotoolkit_sdk")
-        except ImportError as error:
-            raise UserError("--source pico: needs XRoboToolkit's SDK: pip install xrobotoolkit-sdk") from error
+        self._sdk = import_optional(
+            "xrobotoolkit_sdk", "--source pico: needs XRoboToolkit's SDK: pip install xrobotoolkit-sdk"
+        )
         self._session, self._number, self._stamp = str(time.time_ns()), 0, None
         self._is_open = False
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
 from mrhubo.errors import UserError
+from mrhubo.lazy import import_optional
 from mrhubo.live.body import SeenPose
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import Inbox
@@ -110,10 +111,7 @@ class VmcSource(DatagramSource):
         Raises:
             UserError: python-osc is not installed, or the host is reached by others.
         """
-        try:
-            import pythonosc.osc_packet  # noqa: F401
-        except ImportError as error:
-            raise UserError("VMC needs python-osc: pip install 'mrhubo[live]'") from error
+        import_optional("pythonosc.osc_packet", "VMC needs python-osc: pip install 'mrhubo[live]'")
         if not endpoint.is_loopback:
             raise UserError(
                 f"--source vmc:{endpoint.shown}: VMC has no token, so it is taken on loopback alone; let a program on"
