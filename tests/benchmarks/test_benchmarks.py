@@ -24,6 +24,7 @@ from mrhubo.config import load_config
 from mrhubo.pairing import lbfgs
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
+from tests.reference.walkers import entries, write_urdf
 from tests.video.films import needs_models
 
 SCRIPTS = [
@@ -47,7 +48,7 @@ SCRIPTS = [
     "scaling",
     "show",
 ]
-SCRIPTS += ["live", "stream", "training", "universal", "whole_body", "universal_speed", "without_training"]
+SCRIPTS += ["live", "physics", "stream", "training", "universal", "whole_body", "universal_speed", "without_training"]
 LIBRARIES = ["closed_form", "common", "levenberg_marquardt", "mink_loop"]
 Run = Callable[..., str]
 
@@ -203,6 +204,27 @@ def test_whole_body(run: Run, clips: Path, tmp_path: Path) -> None:
     found = rows(text, "clip")
     assert [row[0] for row in found] == ["boxing", "wave", "mean"] and "as a stream: 2 clips" in text
     assert (tmp_path / "moments.png").stat().st_size > 1000
+
+
+def test_physics(run: Run, clips: Path, tmp_path: Path) -> None:
+    """A robot that weighs something: what the floor has to do is to hold its weight."""
+    urdf = write_urdf(tmp_path / "walker.urdf")
+    inertia = (
+        '<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    weighing = re.sub(r'(<link name="[^"]*">)', rf"\1{inertia}", urdf.read_text())
+    urdf.write_text(weighing.replace('effort="1"', 'effort="300"'))
+    joints = re.findall(r'<joint name="([^"]*)"', urdf.read_text())
+    config = {"name": "walker", "urdf": str(urdf), "joints": joints, "keypoints": entries(), "key_links": ["l_foot"]}
+    (tmp_path / "walker.yaml").write_text(json.dumps({"robot": config}))
+    text = run("physics", "--robots", tmp_path / "walker.yaml", "--clips", clips, "--own", "wave", "--rate", 12)
+    found = rows(text, "clip")
+    assert [row[0] for row in found] == ["boxing", "wave", "mean"]
+    assert all(float(row[1]) < 0.1 and abs(float(row[2]) - 1) < 0.1 and row[4] == "0.0%" for row in found)
+    ((_, stands, whole),) = rows(text, "motion")
+    assert 0 < float(stands) <= float(whole)
+    with pytest.raises(SystemExit, match="tells no masses"):
+        run("physics", "--robots", "nao", "--clips", clips)
 
 
 def test_universal(run: Run, clips: Path, tmp_path: Path) -> None:

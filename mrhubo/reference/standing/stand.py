@@ -17,13 +17,14 @@ from typing import Any
 
 import numpy as np
 import torch
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from torch import Tensor, nn
 
 from mrhubo import rotation
 from mrhubo.fast.together.motion import AHEAD, WINDOW
 from mrhubo.frames import human_to_world
 from mrhubo.reference.avoidance import Avoidance
-from mrhubo.reference.refine import StepBound, refine
+from mrhubo.reference.refine import refine_around
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import nearest_slow, speed_bound
 from mrhubo.reference.standing.human import HumanSteps
@@ -35,10 +36,14 @@ from mrhubo.reference.terms.soles import SoleTerm
 PLANTED, SWINGING = 2500.0, 50.0
 """Weights [1/m^2] of a planted point's place and of a swinging one's: a millimetre costs as much as a limb that is 3
 degrees off, or 0.4."""
-SWEEPS, TOLERANCE = 30, 3e-4
+SWEEPS, TOLERANCE = 10, 3e-4
 """How long legs give way, as for `refine`."""
 UNDER_M = 0.01
 """How far under the floor [m] a swinging point counts as much as a planted one."""
+ROUNDS = 2
+"""How often the legs give way: once more where feet that stand were lifted, as others would be under the floor."""
+LIFTED_M, LIFT_S, FREE_S = 0.005, 0.1, 0.3
+"""From how far [m] on that is; and the times [s] around in which the root is lifted too, and legs are free to move."""
 _FLAT = [0, 2]
 """The horizontal axes of the world."""
 _UP = 1
@@ -108,11 +113,20 @@ class Standing(nn.Module):
             avoid_collisions: frames in which the robot would touch itself give way.
         """
         carried = self._carried(q_TN, steps)
-        extended_TX3 = self._extended(target_TD3, carried, steps)
-        q_TN = self._give_way(q_TN, extended_TX3, steps.frame_rate, smoothness, avoid_collisions)
-        after = self._carried(q_TN, steps, carried.place_K2)
-        root_T3 = torch.from_numpy(after.root_T3)
-        root_T3[:, _UP] -= torch.from_numpy(after.low_TP).amin(dim=1).clamp_max(0.0)  # no sole is under the floor
+        wanted = self._wanted(carried, steps)
+        free_T = torch.ones(len(q_TN), dtype=torch.bool, device=q_TN.device)
+        for again in range(ROUNDS):
+            if again:
+                free_T = torch.from_numpy(_around(_lift(carried) > LIFTED_M, steps.frame_rate)).to(q_TN.device)
+                if not bool(free_T.any()):
+                    break
+                carried = _lifted(carried, steps.frame_rate)
+                wanted = self._reached(carried, steps, wanted[1])
+            extended_TX3 = self._extended(target_TD3, carried, wanted, steps)
+            q_TN = self._give_way(q_TN, extended_TX3, free_T, steps.frame_rate, smoothness, avoid_collisions)
+            carried = self._carried(q_TN, steps, carried.place_K2)
+        root_T3 = torch.from_numpy(carried.root_T3)
+        root_T3[:, _UP] += torch.from_numpy(_lift(carried))  # no sole is under the floor
         turn_T33 = steps.turn_T33.to(q_TN)
         base_T3, base_T33 = self.legs.base(self.robot.forward(q_TN), human_to_world(root_T3.to(q_TN)), turn_T33)
         return Stand(q_TN, base_T3, base_T33, root_T3)
@@ -157,18 +171,37 @@ class Standing(nn.Module):
         found_TP3[..., _UP] += under_TP
         return found_TP3, np.maximum(weight_TP, np.minimum(under_TP / UNDER_M, 1.0))
 
-    def _extended(self, target_TD3: Tensor, carried: _Carried, steps: HumanSteps) -> Tensor:
+    def _reached(self, carried: _Carried, steps: HumanSteps, counted_TP: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same where legs gave way already: feet that could not be turned flat are to stand on what is lowest, and
+        what had to be kept above the floor has to be still.
+        """
+        found_TP3, counts_TP = self._wanted(carried, steps)
+        low_TS = carried.low_TP.reshape(len(carried.low_TP), -1, 2).min(axis=-1)
+        up_TP = carried.point_TP3[..., _UP] - np.repeat(low_TS, 2, axis=1)
+        there_TP = np.repeat((steps.contacts.phase_TP >= 0).reshape(*low_TS.shape, 2).any(axis=-1), 2, axis=1)
+        found_TP3[..., _UP] = np.where(there_TP, up_TP, found_TP3[..., _UP])
+        return found_TP3, np.maximum(counts_TP, counted_TP)
+
+    def _extended(
+        self, target_TD3: Tensor, carried: _Carried, wanted: tuple[np.ndarray, np.ndarray], steps: HumanSteps
+    ) -> Tensor:
         """The directions with the places of soles after them, as `SoleTerm` has it."""
-        wanted_TP3, counts_TP = self._wanted(carried, steps)
+        wanted_TP3, counts_TP = wanted
         seen_TP3 = torch.from_numpy(wanted_TP3 - carried.root_T3[:, None]).to(target_TD3)
         weight_TP3 = torch.zeros_like(seen_TP3)
         weight_TP3[..., 0] = SWINGING + (PLANTED - SWINGING) * torch.from_numpy(counts_TP).to(seen_TP3)
         return torch.cat((target_TD3, seen_TP3 @ steps.turn_T33.to(seen_TP3), weight_TP3), dim=1)
 
     def _give_way(
-        self, q_TN: Tensor, target_TX3: Tensor, frame_rate: float, smoothness: Smoothness, avoid_collisions: bool
+        self,
+        q_TN: Tensor,
+        target_TX3: Tensor,
+        free_T: Tensor,
+        frame_rate: float,
+        smoothness: Smoothness,
+        avoid_collisions: bool,
     ) -> Tensor:
-        """Joint angles (T, N) of legs whose soles are where they are to be."""
+        """Joint angles (T, N) of legs whose soles are where they are to be, in the frames that are free (T)."""
         step_N, around = speed_bound(self.robot.velocity_N, frame_rate)
         found, settled = [q_TN[:0]], 0
         while settled < len(q_TN):
@@ -176,6 +209,7 @@ class Standing(nn.Module):
             part = slice(settled - len(before_LN), settled + WINDOW)
             motion_XN = torch.cat((before_LN, q_TN[settled : settled + WINDOW]))
             fixed_X = torch.arange(len(motion_XN), device=q_TN.device) < len(before_LN)
+            fixed_X |= ~free_T[part]
             motion_XN = self._refine(motion_XN, target_TX3[part], smoothness, step_N, fixed_X)
             if avoid_collisions:
                 motion_XN = self._apart(motion_XN, target_TX3[part], smoothness, step_N, around, fixed_X)
@@ -192,8 +226,7 @@ class Standing(nn.Module):
             found_XN = self.problem.minimise(q_XN, target_XD3)[0]
         else:
             q_XN = nearest_slow(q_XN, step_N, fixed_X)
-            bound = StepBound(step_N, torch.ones(len(q_XN) - 1, dtype=torch.bool, device=q_XN.device))
-            found_XN = refine(self.problem, q_XN, target_XD3, smoothness, SWEEPS, TOLERANCE, fixed_X, bound)[0]
+            found_XN = refine_around(self.problem, q_XN, target_XD3, smoothness, ~fixed_X, SWEEPS, TOLERANCE, step_N)
             found_XN = nearest_slow(found_XN, step_N, fixed_X)
         return torch.where(self._legs_N, found_XN, q_XN)
 
@@ -204,6 +237,27 @@ class Standing(nn.Module):
         if len(q_XN) == 1:
             return self.avoidance(q_XN, target_XD3)
         return self.avoidance.in_motion(q_XN, target_XD3, smoothness, step_N, around, fixed_X)
+
+
+def _lift(carried: _Carried) -> np.ndarray:
+    """How far (T) the root is to be lifted [m] so that no sole is under the floor."""
+    return np.maximum(-carried.low_TP.min(axis=1), 0.0)
+
+
+def _around(mask_T: np.ndarray, frame_rate: float) -> np.ndarray:
+    """Frames (T) of a mask, and those within `FREE_S` of them."""
+    return maximum_filter1d(mask_T, 2 * round(FREE_S * frame_rate) + 1, mode="constant", cval=False)
+
+
+def _lifted(carried: _Carried, frame_rate: float) -> _Carried:
+    """A root that is lifted so, smoothly and by no less."""
+    width = 2 * round(LIFT_S * frame_rate) + 1
+    lift_T = uniform_filter1d(maximum_filter1d(_lift(carried), width, mode="nearest"), width, mode="nearest")
+    up_T13 = np.zeros((len(lift_T), 1, 3))
+    up_T13[:, 0, _UP] = lift_T
+    return _Carried(
+        carried.root_T3 + up_T13[:, 0], carried.place_K2, carried.point_TP3 + up_T13, carried.low_TP + lift_T[:, None]
+    )
 
 
 def standing_fields(position_T3: Tensor, rotation_T33: Tensor, planted_TS: np.ndarray, legs: Legs) -> dict[str, Any]:

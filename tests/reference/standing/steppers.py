@@ -24,6 +24,18 @@ def jump(frames: int = 48, rate: float = 24.0) -> Motion:
     return _standing(0.5 * torch.sin(torch.pi * phase_T) ** 2, 0 * phase_T, rate, 0.6 * air_T * (1 - air_T))
 
 
+def lunge(frames: int = 24, rate: float = 24.0) -> Motion:
+    """Kneels low with the left foot in front and breathes; the hind foot is flat, with the shin far over it."""
+    still = _standing(torch.zeros(frames), torch.zeros(frames), rate, 0.0)
+    bend_T, local_TJ33 = 1.15 + 0.01 * torch.linspace(0, 2 * torch.pi, frames).sin(), still.local_TJ33.clone()
+    for side, hip_T in (("left", -bend_T), ("right", 0 * bend_T)):
+        hip, knee, ankle = (POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("hip", "knee", "ankle"))
+        local_TJ33[:, hip], local_TJ33[:, knee] = _pitch(hip_T), _pitch(bend_T)
+        local_TJ33[:, ankle] = (local_TJ33[:, hip] @ local_TJ33[:, knee]).mT
+    place_T3 = -Skeleton().keypoints(local_TJ33)[:, keypoint_indices(["left_heel", "right_heel"])].mean(dim=1)
+    return still.changed(local_TJ33=local_TJ33, root_position_T3=place_T3)
+
+
 def walk(frames: int, speed: float = 0.6) -> Motion:
     """Goes straight on with bent knees [m/s]: each foot is planted for half a second and swings forward for another; at
     60 frames a second.

@@ -17,7 +17,7 @@ from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.standing import Legs
 from mrhubo.robot import Robot
-from tests.reference.standing.steppers import jump, moved, squat
+from tests.reference.standing.steppers import jump, lunge, moved, squat
 from tests.reference.walkers import ROOTS, walker
 
 
@@ -48,6 +48,16 @@ def test_planted_feet_keep_still_and_flat(retargeter: OptimizationRetargeter) ->
     assert score.over_limit == 0 and score.outside == 0
     point_TP3, _ = soles(retargeter, result)
     assert np.ptp(point_TP3[..., :2], axis=0).max() < 0.01
+
+
+def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: OptimizationRetargeter) -> None:
+    """The ankle of the hind leg ends where the person's does not: its toe is to lift the robot off neither foot."""
+    motion = lunge()
+    result = retargeter(motion)
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert score.sunk_max_cm < 0.05 and score.floating_max_cm < 0.5
+    _, low_TP = soles(retargeter, result)
+    assert low_TP[:, [2, 3]].max() > 0.01  # it is not flat
 
 
 def test_the_world_may_be_turned_and_its_floor_be_anywhere(retargeter: OptimizationRetargeter) -> None:
