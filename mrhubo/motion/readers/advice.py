@@ -26,6 +26,17 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"[\x02-\x05]P", "a C3D file", _MARKERS),
     (r"PathFileType", "a TRC file", _MARKERS),
     (
+        r'\s*\{.{0,300}"(?:people|bodies)"\s*:\s*\[',
+        "a single frame of OpenPose or CMU Panoptic",
+        "name the folder that holds them all; points in a picture (pose_keypoints_2d) have to be lifted to three"
+        " dimensions first, for instance with MMPose or MotionBERT",
+    ),
+    (r"\s*<\?xml.{0,400}<mvnx|\s*<mvnx", "an MVNX file of Xsens", "export BVH from MVN: File > Export > BVH"),
+    (r"Vocaloid Motion Data", "a VMD file of MikuMikuDance", f"play it on a model, and {_BLENDER}"),
+    (r"%YAML.{0,400}AnimationClip:", "an animation clip of Unity", "export the character as BVH or FBX first"),
+    (r"//Maya ASCII", "a scene of Maya", "export the skeleton as BVH, over FBX and Blender for instance"),
+    (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH from Motive"),
+    (
         r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b",
         "a skeleton (.asf) without a motion",
         "name the .amc file, and leave this one beside it",
