@@ -12,6 +12,7 @@ from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.humanml import read_features
 from mrhubo.motion.readers.keypoint_arrays import points_in
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
@@ -56,7 +57,12 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
     def rate(notes: list[str]) -> float:
         return _rate(path, tree, options, notes)
 
-    found = read_rows(tree, options) or read_soma(tree, rate) or read_sam3d(tree, options, rate)
+    found = (
+        read_rows(tree, options)
+        or read_features(tree, options)
+        or read_soma(tree, rate)
+        or read_sam3d(tree, options, rate)
+    )
     return found or _read_smpl(path, tree, options, rate)
 
 

@@ -90,6 +90,10 @@ _PROPORTIONS = (("knee", "hip", 1.0), ("elbow", "shoulder", 0.83), ("shoulder", 
 """Bones, by where they start, other bones, and their ratio (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
 
 
+_FLABBY = 0.2
+"""Half of the frames are farther from a bone's usual length than this share of it: of points drawn by chance."""
+
+
 def our_name(name: str) -> str | None:
     """Our name of a point that somebody calls `LShoulder`, `left shoulder`, `RIGHT_FOOT_INDEX`; None where there is
     none.
@@ -136,7 +140,9 @@ def fitting_sets(point_FK3: np.ndarray) -> list[tuple[float, str]]:
 
 
 def misfit(points: Mapping[str, np.ndarray]) -> float:
-    """How badly named points (F, 3) fit a body; infinite where limbs are never seen whole."""
+    """How badly named points (F, 3) fit a body; infinite where limbs are never seen whole, or are as long as
+    chance has it.
+    """
     found: list[float] = []
     with np.errstate(all="ignore"):
         bone = {
@@ -147,6 +153,9 @@ def misfit(points: Mapping[str, np.ndarray]) -> float:
         seen = {key: length_F[np.isfinite(length_F) & (length_F > 0)] for key, length_F in bone.items()}
         mean = {key: float(np.median(length_F)) for key, length_F in seen.items() if len(length_F)}
         found += [float(np.std(seen[key]) / mean[key]) for key in mean]
+        spread = [float(np.median(np.abs(seen[key] - mean[key])) / mean[key]) for key in mean]
+        if spread and np.mean(spread) > _FLABBY:
+            return np.inf
         for start in ("shoulder", "elbow", "hip", "knee"):
             if ("left", start) in mean and ("right", start) in mean:
                 found.append(abs(float(np.log(mean["left", start] / mean["right", start]))))

@@ -122,6 +122,11 @@ def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
     return {our: place for place, our in enumerate(SETS[name]) if our != "-"}, f"{count} points as {name} has them"
 
 
+def fits_a_body(point_TK3: np.ndarray, name: str) -> bool:
+    """Whether points in the order of a set keep the lengths of bones and have a body's proportions."""
+    return any(found == name and bad < _NONSENSE for bad, found in fitting_sets(_some(point_TK3)))
+
+
 def _refuse_flat(path: Path, found: Keypoints) -> None:
     """Refuses points in a picture, whose third number is a score."""
     known_X3 = found.point_TK3[np.isfinite(found.point_TK3).all(-1)]
