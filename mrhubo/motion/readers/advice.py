@@ -24,6 +24,7 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"PXR-USDC|#usda", "a USD file", _BLENDER),
     (r"BLENDER", "a Blender file", "export the skeleton by File > Export > Motion Capture (.bvh)"),
     (r"[\x02-\x05]P", "a C3D file", _MARKERS),
+    (r"\xff\xfe|\xfe\xff", "text in UTF-16", "save it in UTF-8"),
     (r"PathFileType", "a TRC file", _MARKERS),
     (
         r'\s*\{.{0,300}"(?:people|bodies)"\s*:\s*\[',
