@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import pickle
 import sys
 import tempfile
 import time
@@ -20,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import mrhubo
+from mrhubo.body.joints import REST_K3
 from mrhubo.body.skeleton import KEYPOINT_NAMES, Skeleton
 from mrhubo.motion import trim
 from mrhubo.motion.readers.keypoint_sets import SETS
@@ -28,7 +30,7 @@ from tests.files.bounded import bounded
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.motion.damage import altered_words, damaged_by, read_or_refused
 from tests.motion.readers import estimator_files, test_amc, test_soma_and_points
-from tests.robot_motion.motions import plain
+from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
 
 _MOTION = Path(__file__).resolve().parents[1] / "data/motions/wave.npz"
@@ -62,8 +64,21 @@ def _points_json(path: Path) -> None:
     path.write_text(json.dumps({"names": SETS["COCO"], "fps": 30, "keypoints": _points().round(3).tolist()}, indent=0))
 
 
+def _ntu(path: Path) -> None:
+    """One person, of whom COCO's points stand in for the joints."""
+    rows = [" ".join(f"{x:.4f}" for x in point) + " 1 1 1 1 1 0 0 0 2" for frame in _points() for point in frame]
+    frames = [rows[17 * t : 17 * t + 17] + rows[17 * t : 17 * t + 8] for t in range(_FRAMES)]
+    path.write_text("\n".join([str(_FRAMES), *("\n".join(["1", "7" + " 1" * 9, "25", *x]) for x in frames)]) + "\n")
+
+
+def _features(path: Path) -> None:
+    rows = np.zeros((_FRAMES, 263))
+    rows[:, 3], rows[:, 4:67] = 0.9, np.tile(REST_K3[1:22].reshape(63), (_FRAMES, 1))
+    np.save(path, rows)
+
+
 def _robot_motion(kind: str) -> Callable[[Path], None]:
-    return lambda path: write_robot_motion(plain(), path, kind)
+    return lambda path: write_robot_motion(standing(), path, kind)
 
 
 def _estimator(name: str) -> Callable[[Path], None]:
@@ -78,6 +93,9 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "amc": ("07_01.amc", _acclaim),
     "asf": ("07.asf", _acclaim),
     "points.json": ("damaged.json", _points_json),
+    "skeleton": ("damaged.skeleton", _ntu),
+    "features": ("damaged.npy", _features),
+    "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
     **{name: ("damaged", write) for name, write in test_soma_and_points.WRITERS.items()},
@@ -100,7 +118,10 @@ def fuzz(name: str, first: int, accidents: int, folder: Path) -> tuple[float, li
     file, write = READERS[name]
     path = folder / file
     write(path)
-    good, text = path.read_bytes(), not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv"}
+    good, text = (
+        path.read_bytes(),
+        not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv", ".skeleton"},
+    )
     slowest, wrong = 0.0, []
     for seed in range(first, first + accidents):
         alter = text and seed % 2

@@ -10,6 +10,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.formats import FORMATS, find_format, read_any
+from mrhubo.motion.readers.frame_folders import frame_files
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 
@@ -52,7 +53,8 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
 
 
 def motion_files(folder: Path) -> list[Path]:
-    """The files of a folder that `read_folder` would try, one at least, sorted.
+    """The files of a folder that `read_folder` would try, one at least, sorted; the folder itself, if that has a JSON
+    file a frame of one motion.
 
     Raises:
         UserError: the folder is missing or holds none.
@@ -62,6 +64,8 @@ def motion_files(folder: Path) -> list[Path]:
     if not os.path.isdir(folder):
         raise UserError(f"{folder}: there is no such folder")
     files = _motion_files(folder)
+    if not files and frame_files(folder):
+        return [folder]
     if not files:
         raise UserError(f"{folder}: holds no motion file")
     return files

@@ -12,11 +12,12 @@ from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import open_regular
 from mrhubo.robot_motion.json_file import read_json, write_json
 from mrhubo.robot_motion.lerobot import read_lerobot, write_lerobot
+from mrhubo.robot_motion.mcap import import_mcap, read_mcap, write_mcap
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.mujoco import QPOS, read_mujoco, write_mujoco
 from mrhubo.robot_motion.npz import read_npz, write_npz
 from mrhubo.robot_motion.order import JointOrder, in_order
-from mrhubo.robot_motion.ros2 import import_mcap, read_mcap, read_yaml, write_mcap, write_yaml
+from mrhubo.robot_motion.ros2 import read_yaml, write_yaml
 from mrhubo.robot_motion.tables import import_pyarrow, read_csv, read_parquet, write_csv, write_parquet
 from mrhubo.robot_motion.unitree import read_unitree, write_unitree
 

@@ -30,6 +30,8 @@ _INFO, _STATS, _TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet
 _EPISODES, _DATA = "meta/episodes/chunk-000/file-000.parquet", "data/chunk-000/file-000.parquet"
 _TEMPLATE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _STATE, _ACTION, _CONFIDENCE = "observation.state", "action", "confidence"
+_BASE = {"root_position": ("x", "y", "z"), "root_quaternion_wxyz": ("w", "x", "y", "z")}
+_CONTACT = "contact"
 _INDICES = ("frame_index", "episode_index", "index", "task_index")
 _MAX_JSON = 10_000_000
 _REMEDY = "resample them (--out-rate)"
@@ -92,9 +94,11 @@ def _frames(motions: Sequence[RobotMotion], rate: int) -> dict[str, np.ndarray]:
     frame_F = np.concatenate([np.arange(length) for length in lengths])
     q_FN = np.concatenate([motion.q for motion in motions])
     found = {_STATE: q_FN, _ACTION: q_FN}
-    trusted = [motion.confidence for motion in motions if motion.confidence is not None]
-    if len(trusted) == len(motions):
-        found[_CONFIDENCE] = np.concatenate(trusted)
+    for name in (_CONFIDENCE, *_BASE, _CONTACT):
+        told = [array for motion in motions if (array := getattr(motion, name)) is not None]
+        alike = name != _CONTACT or len({motion.contact_names for motion in motions}) == 1
+        if len(told) == len(motions) and alike:
+            found[name] = np.concatenate(told)
     return found | {
         "timestamp": (frame_F / rate).astype(np.float32),
         "frame_index": frame_F,
@@ -106,7 +110,7 @@ def _frames(motions: Sequence[RobotMotion], rate: int) -> dict[str, np.ndarray]:
 def _column(arrow: Any, array: np.ndarray) -> Any:
     if array.ndim == 1:
         return arrow.array(array)
-    return arrow.FixedSizeListArray.from_arrays(arrow.array(array.reshape(-1)), array.shape[1])
+    return arrow.FixedSizeListArray.from_arrays(arrow.array(np.ascontiguousarray(array).reshape(-1)), array.shape[1])
 
 
 def _episodes(arrow: Any, motions: Sequence[RobotMotion], names: Sequence[str]) -> Any:
@@ -155,12 +159,13 @@ def _statistics(frames: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _info(motions: Sequence[RobotMotion], frames: dict[str, np.ndarray], tasks: int) -> dict[str, Any]:
-    names = list(motions[0].joint_names)
+    joints, feet = list(motions[0].joint_names), list(motions[0].contact_names)
+    axes = {_STATE: joints, _ACTION: joints, **{name: list(xyz) for name, xyz in _BASE.items()}, _CONTACT: feet}
     features: dict[str, Any] = {}
     for name, array in frames.items():
-        kind = "int64" if name in _INDICES else "float32"
-        joints = array.ndim == 2
-        features[name] = {"dtype": kind, "shape": [len(names)] if joints else [1], "names": names if joints else None}
+        kind = "int64" if name in _INDICES else "bool" if name == _CONTACT else "float32"
+        names = axes.get(name)
+        features[name] = {"dtype": kind, "shape": [1] if names is None else [array.shape[1]], "names": names}
     return {
         "codebase_version": _VERSION,
         "robot_type": motions[0].robot.name,
@@ -187,7 +192,12 @@ def read_lerobot(folder: Path) -> list[RobotMotion]:
     folder = Path(folder)
     try:
         info = json.loads(read_regular(folder / _INFO, _MAX_JSON))
-        names, rate, version = info["features"][_ACTION]["names"], float(info["fps"]), info["codebase_version"]
+        features = info["features"]
+        names, rate, version = features[_ACTION]["names"], float(info["fps"]), info["codebase_version"]
+        feet = features[_CONTACT].get("names") if _CONTACT in features else []
+        feet = (
+            feet if isinstance(feet, list) and all(isinstance(foot, str) for foot in feet) else []
+        )  # a stranger's own
         robot = str(info.get("robot_type") or "")
     except UserError:
         raise
@@ -199,18 +209,38 @@ def read_lerobot(folder: Path) -> list[RobotMotion]:
     data, episodes = read_table(folder / _DATA)[0], read_table(folder / _EPISODES)[0]
     try:
         q_FN = data.column(_ACTION).combine_chunks().flatten().to_numpy().reshape(-1, len(names))
-        trust_F = data.column(_CONFIDENCE).to_numpy() if _CONFIDENCE in data.column_names else None
+        arrays = {"q": q_FN}
+        for name, width in (
+            (_CONFIDENCE, None),
+            *((name, len(axes)) for name, axes in _BASE.items()),
+            (_CONTACT, len(feet)),
+        ):
+            if name in features and name in data.column_names and (width is None or width > 0):
+                column = data.column(name).combine_chunks()
+                arrays[name] = _numbers(column) if width is None else _numbers(column.flatten()).reshape(-1, width)
         rows = list(zip(*(episodes.column(name).to_pylist() for name in
                           ("dataset_from_index", "dataset_to_index", "tasks")), strict=True))  # fmt: skip
+        if any(len(array) != len(q_FN) for array in arrays.values()):
+            raise ValueError("its columns have different lengths")
         if not rows or any(not 0 <= start < end <= len(q_FN) for start, end, _ in rows):
             raise ValueError("its episodes name frames that are not there")
     except Exception as error:
         raise UserError(f"{folder}: is damaged: {shortened(error, 200)}") from error
     return [
         build(
-            {"joint_names": names, "frame_rate": rate, "name": str((task or [""])[0]), "robot": robot},
-            {"q": q_FN[start:end], **({} if trust_F is None else {"confidence": trust_F[start:end]})},
+            {
+                "joint_names": names,
+                "frame_rate": rate,
+                "name": str((task or [""])[0]),
+                "robot": robot,
+                **({"contact_names": feet} if _CONTACT in arrays else {}),
+            },
+            {name: array[start:end] for name, array in arrays.items()},
             folder,
         )
         for start, end, task in rows
     ]
+
+
+def _numbers(column: Any) -> np.ndarray:
+    return np.asarray(column.to_numpy(zero_copy_only=False))

@@ -73,6 +73,17 @@ def plain(frames: int = 6, rate: float | None = 30.0, **more: Any) -> RobotMotio
     )  # fmt: skip
 
 
+def standing(frames: int = 6) -> RobotMotion:
+    """The same with a base that moves, and feet."""
+    rng = np.random.default_rng(frames)
+    angle = rng.uniform(-3, 3, frames)
+    return plain(
+        frames, contact=rng.random((frames, 2)) > 0.5, contact_names=("left_foot", "right_foot"),
+        root_position=rng.normal(size=(frames, 3)),
+        root_quaternion_wxyz=np.stack([np.cos(angle), 0 * angle, 0 * angle, np.sin(angle)], axis=1),
+    )  # fmt: skip
+
+
 def assert_same(found: RobotMotion, expected: RobotMotion, fields: Any = PER_FRAME) -> None:
     """The same numbers, bit by bit, and the same joints."""
     assert found.joint_names == expected.joint_names

@@ -20,7 +20,7 @@ from mrhubo.robot_motion import (
     write_robot_motion,
 )
 from mrhubo.robot_motion.motion import PER_FRAME
-from tests.robot_motion.motions import assert_same, motions, plain
+from tests.robot_motion.motions import assert_same, motions, plain, standing
 
 WHOLE, TABLES, ANGLES = ("npz", "json", "parquet"), ("csv",), ("mujoco", "unitree", "yaml", "mcap")
 """Formats that hold everything, every number a frame, and joint angles alone."""
@@ -55,11 +55,23 @@ def test_the_same_numbers_come_back(tmp_path: Path, name: str, motion: RobotMoti
         for field in ("lower", "upper", "velocity"):
             np.testing.assert_array_equal(getattr(found.robot, field), getattr(motion.robot, field))
     else:
-        root = ROOT if motion.root_position is not None and name in ("mujoco", "unitree") else ()
+        root = ROOT if motion.root_position is not None and name in ("mujoco", "unitree", "mcap") else ()
         assert_same(found, motion, PER_FRAME if name in TABLES else ("q", *root))
     if motion.frame_rate is not None and (len(motion) > 1 or name in (*WHOLE, "mujoco", "unitree")):
         exact = 1e-5 if name in ("yaml", "mcap") else 1e-14  # whole nanoseconds
         assert found.frame_rate == pytest.approx(motion.frame_rate, rel=exact)
+
+
+def test_a_bag_tells_base_and_contacts_frame_by_frame(tmp_path: Path) -> None:
+    need("mcap")
+    motion = standing()
+    found = there_and_back(motion, tmp_path, "mcap")
+    assert_same(found, motion, ("q", *ROOT, "contact"))
+    assert found.contact_names == motion.contact_names
+    odd = dataclasses.replace(motion, contact_names=("ein Fuß", "ein_Fu_"))  # no names that ROS has for topics
+    told = there_and_back(odd, tmp_path, "mcap")
+    assert told.contact_names == ("ein_Fu_", "ein_Fu__1")
+    assert_same(told, motion, ("contact",))
 
 
 @pytest.mark.parametrize("rate", [24.0, 29.97, 60.0, 120.0, 239.01])

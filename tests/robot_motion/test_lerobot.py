@@ -12,7 +12,7 @@ import pytest
 
 from mrhubo.errors import UserError
 from mrhubo.robot_motion import FORMATS, RobotFacts, read_lerobot, read_robot_motion, write_lerobot, write_robot_motion
-from tests.robot_motion.motions import assert_same, plain
+from tests.robot_motion.motions import assert_same, plain, standing
 
 MOTIONS = [dataclasses.replace(plain(count), name=name) for count, name in ((5, "wave"), (3, "bow"), (4, "wave"))]
 
@@ -34,6 +34,20 @@ def test_the_same_numbers_come_back(folder: Path, tmp_path: Path) -> None:
     write_robot_motion(MOTIONS[0], tmp_path / "one", "lerobot")
     assert_same(read_robot_motion(tmp_path / "one"), MOTIONS[0], ["q", "confidence"])
     assert FORMATS["lerobot"].ending == ""
+
+
+def test_base_and_contacts_come_back_where_all_motions_tell_them(tmp_path: Path) -> None:
+    whole = [standing(frames) for frames in (4, 2)]
+    write_lerobot(whole, tmp_path / "whole")
+    for found, expected in zip(read_lerobot(tmp_path / "whole"), whole, strict=True):
+        assert_same(found, expected, ["q", "root_position", "root_quaternion_wxyz", "contact"])
+        assert found.contact_names == ("left_foot", "right_foot")
+    features = json.loads((tmp_path / "whole" / "meta" / "info.json").read_text())["features"]
+    assert features["contact"] == {"dtype": "bool", "shape": [2], "names": ["left_foot", "right_foot"]}
+    data = pd.read_parquet(tmp_path / "whole" / "data" / "chunk-000" / "file-000.parquet")
+    assert data["contact"].iloc[0].dtype == bool and len(data["root_quaternion_wxyz"].iloc[0]) == 4
+    write_lerobot([whole[0], dataclasses.replace(plain(3), name="arms")], tmp_path / "some")
+    assert all(motion.contact is None and motion.root_position is None for motion in read_lerobot(tmp_path / "some"))
 
 
 def test_it_is_laid_out_as_lerobot_reads_it(folder: Path) -> None:

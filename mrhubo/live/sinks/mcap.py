@@ -10,7 +10,7 @@ from mrhubo.errors import UserError
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.trajectory import trajectory
-from mrhubo.robot_motion.ros2 import TOPIC, JointTrajectoryBag, import_mcap
+from mrhubo.robot_motion.mcap import TOPIC, JointTrajectoryBag, import_mcap
 
 
 class McapSink:

@@ -9,7 +9,7 @@ from mrhubo.lazy import import_optional
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.trajectory import trajectory
-from mrhubo.robot_motion.ros2 import TOPIC
+from mrhubo.robot_motion.mcap import TOPIC
 
 
 class Ros2Sink:

@@ -24,7 +24,19 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"PXR-USDC|#usda", "a USD file", _BLENDER),
     (r"BLENDER", "a Blender file", "export the skeleton by File > Export > Motion Capture (.bvh)"),
     (r"[\x02-\x05]P", "a C3D file", _MARKERS),
+    (r"\xff\xfe|\xfe\xff", "text in UTF-16", "save it in UTF-8"),
     (r"PathFileType", "a TRC file", _MARKERS),
+    (
+        r'\s*\{.{0,300}"(?:people|bodies)"\s*:\s*\[',
+        "a single frame of OpenPose or CMU Panoptic",
+        "name the folder that holds them all; points in a picture (pose_keypoints_2d) have to be lifted to three"
+        " dimensions first, for instance with MMPose or MotionBERT",
+    ),
+    (r"\s*<\?xml.{0,400}<mvnx|\s*<mvnx", "an MVNX file of Xsens", "export BVH from MVN: File > Export > BVH"),
+    (r"Vocaloid Motion Data", "a VMD file of MikuMikuDance", f"play it on a model, and {_BLENDER}"),
+    (r"%YAML.{0,400}AnimationClip:", "an animation clip of Unity", "export the character as BVH or FBX first"),
+    (r"//Maya ASCII", "a scene of Maya", "export the skeleton as BVH, over FBX and Blender for instance"),
+    (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH from Motive"),
     (
         r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b",
         "a skeleton (.asf) without a motion",

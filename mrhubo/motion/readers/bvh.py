@@ -12,16 +12,18 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.bvh_file import read_bvh_file
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import check_rate
+from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.tracks import Person, choose
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
+from mrhubo.motion.readers.tree.hierarchy import JointTree
+from mrhubo.motion.readers.tree.limbs import find_limbs
+from mrhubo.motion.readers.tree.shape import Shape
 
 
 def is_bvh(content: Content) -> bool:
     """Whether a file begins as a BVH file does."""
-    text = content.text
-    return text is not None and text.lstrip("\ufeff \t\r\n")[:9].upper() == "HIERARCHY"
+    return content.start.lstrip(b"\xef\xbb\xbf \t\r\n")[:9].upper() == b"HIERARCHY"
 
 
 def read_bvh(path: Path, options: ReadOptions) -> Motion:
@@ -32,12 +34,34 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
     """
     tree, seconds, notes = read_bvh_file(path)
     rate = options.rate
-    if seconds is not None:
-        check_rate(path, f"'Frame Time' is {seconds:g} s,", 1 / seconds)
+    low, high = RATES
+    if seconds is not None and not low <= 1 / seconds <= high:
+        said = f"'Frame Time' is {seconds:g} s, which makes {1 / seconds:.3g} frames per second"
+        if rate is None:
+            raise UserError(f"{path}: {said}; expected {low:g} to {high:g}; say what it is with --rate")
+        notes.append(f"{said}; {rate:g} are taken, as given")
+    elif seconds is not None:
         if rate is not None and abs(rate * seconds - 1) > 1e-3:
             notes.append(f"the file says {1 / seconds:.6g} frames per second, which is believed, and not {rate:g}")
         rate = 1 / seconds
     if rate is None:
         raise UserError(f"{path}: does not say how many frames a second it has; say so with --rate")
+    tree = _of_person(path, tree, options, notes)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     return tree_motion(tree, motion_name(path), str(path), rate, "BVH file:", given, tuple(notes))
+
+
+def _of_person(path: Path, tree: JointTree, options: ReadOptions, notes: list[str]) -> JointTree:
+    """The tree of one of the people in a file, who have a root each; the whole tree where it has one root.
+
+    Raises:
+        UserError: there is nobody whose root has the name that is asked for.
+    """
+    roots = tree.roots
+    if len(roots) < 2:
+        return tree
+    people = {tree.names[root]: under for root in roots if find_limbs(Shape(under := tree.under(root))) is not None}
+    if not people:
+        return tree
+    chosen = choose(path, [Person(name, len(tree)) for name in people], options, notes)
+    return people[chosen.person]

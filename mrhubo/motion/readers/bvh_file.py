@@ -36,7 +36,7 @@ _MAX_NUMBERS = 100_000_000
 _LARGEST = 1e7
 """No angle and no coordinate is beyond this."""
 _BLOCK = 2**24
-_MOTION = re.compile(rb"^[ \t]*MOTION\b", re.MULTILINE | re.IGNORECASE)
+_MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION\b", re.IGNORECASE)
 _FRAMES = re.compile(rb"\s*+Frames\s*+:?\s*+(\d+)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*+Frame\s*+Time\s*+:?[ \t]*+([^\s]*+)", re.IGNORECASE)
 _TOKEN = re.compile(r"[{}]|[^\s{}]+")
@@ -55,7 +55,7 @@ def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
             raise UserError(
                 f"{path}: has no line 'MOTION' in its first {_MAX_HEADER // 10**6} MB, so it is no whole BVH file"
             )
-        joints, columns = _read_hierarchy(path, start[: found.start()].decode("latin1"))
+        joints, columns = _read_hierarchy(path, _decoded(start[: found.start()]))
         after = start[found.end() :]
         frames, seconds, rest = _read_counts(path, after)
         handle.seek(found.end() + rest)
@@ -63,10 +63,19 @@ def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
     return JointTree(tuple(joints), value_TC), seconds, notes
 
 
+def _decoded(content: bytes) -> str:
+    """The hierarchy as text: names stand in UTF-8, in what programs in Japan wrote before that, or in Latin 1."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        japanese = content.decode("cp932", "replace")
+        return japanese if "\u5de6" in japanese or "\u53f3" in japanese else content.decode("latin1")  # left, right
+
+
 def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
     """The joints, parents before children, and how many channels there are."""
     lines = [line for line in text.replace("\r", "\n").split("\n") if line.strip()]
-    if not lines or lines[0].split()[0].upper().lstrip("\ufeff\xef\xbb\xbf") != "HIERARCHY":
+    if not lines or lines[0].split()[0].upper() != "HIERARCHY":
         raise UserError(f"{path}: does not begin with 'HIERARCHY', so it is no BVH file")
     joints: list[Joint] = []
     open_joints: list[int] = []
@@ -76,7 +85,9 @@ def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
         words = _TOKEN.findall(line)
         while words:
             keyword = words[0].upper()
-            if keyword == "{":
+            if keyword == "HIERARCHY" and not open_joints:  # of another person
+                words = words[1:]
+            elif keyword == "{":
                 if pending is None:
                     raise _broken(path, line, "a brace without a joint")
                 parent = open_joints[-1] if open_joints else -1
@@ -159,6 +170,7 @@ def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, in
 def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | None) -> tuple[np.ndarray, list[str]]:
     """The frames (T, C), float32, block by block; those that the file does not hold whole are left out, with a note."""
     blocks, total, left = [], 0, b""
+    notes: list[str] = []
     while True:
         block = handle.read(_BLOCK)
         text = left + block
@@ -167,23 +179,30 @@ def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | No
             text, left = text[:cut], text[cut:]
         if b"," in text:
             text = text.replace(b",", b".") if b"." not in text else text.replace(b",", b" ")
+        after = None
         if text.strip():
-            blocks.append(_numbers(path, text, total, columns))
-            total += len(blocks[-1])
+            numbers, after = _numbers(text)
+            blocks.append(numbers)
+            total += len(numbers)
         if total > _MAX_NUMBERS or total // columns > MAX_FRAMES:
             raise UserError(
                 f"{path}: has more than {min(MAX_FRAMES, _MAX_NUMBERS // columns)} frames of {columns} numbers; cut it"
             )
+        if after is not None and (not promised or total < promised * columns):
+            raise UserError(f"{path}: frame {total // columns} holds '{after}', no number")
+        if after is not None:
+            notes.append(f"what follows the frames is left out: '{after}'")
+            break
         if not block:
             break
-    frames, notes = total // columns, []
+    frames = total // columns
     if frames == 0:
         raise UserError(f"{path}: holds {total} numbers after 'MOTION', less than one frame of {columns}")
     value_TC = np.concatenate(blocks)[: frames * columns].reshape(frames, columns)
-    if promised is not None and promised < frames:
+    if promised and promised < frames:
         notes.append(f"{frames - promised} frames beyond the {promised} that the file promises are left out")
-        value_TC = value_TC[: max(promised, 1)]
-    elif (promised is not None and promised > frames) or total % columns:
+        value_TC = value_TC[:promised]
+    elif (promised and promised > frames) or total % columns:
         notes.append(f"the file promises {promised} frames and holds {frames}; it may have been cut off")
     bad_TC = ~(np.abs(value_TC) <= _LARGEST)
     if bad_TC.any():
@@ -192,21 +211,21 @@ def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | No
     return value_TC, notes
 
 
-def _numbers(path: Path, text: bytes, before: int, columns: int) -> np.ndarray:
-    """The numbers of a block of text, float32."""
+def _numbers(text: bytes) -> tuple[np.ndarray, str | None]:
+    """The numbers, float32, with which a block of text begins, and what follows that is none, if something does."""
     try:
         with warnings.catch_warnings(action="error"):
-            return np.fromstring(text.decode("latin1"), dtype=np.float64, sep=" ").astype(np.float32)
-    except (ValueError, DeprecationWarning, RuntimeWarning) as error:
-        good = 0
+            return np.fromstring(text.decode("latin1"), dtype=np.float64, sep=" ").astype(np.float32), None
+    except (ValueError, DeprecationWarning, RuntimeWarning):
+        numbers = []
         for word in text.split():
             try:
-                float(word)
+                numbers.append(float(word))
             except ValueError:
-                what = shortened(word.decode("latin1"), 30)
-                raise UserError(f"{path}: frame {(before + good) // columns} holds '{what}', no number") from error
-            good += 1
-        raise UserError(f"{path}: its numbers cannot be read") from error
+                with np.errstate(over="ignore"):
+                    return np.array(numbers, np.float64).astype(np.float32), shortened(word.decode("latin1"), 30)
+        with np.errstate(over="ignore"):
+            return np.array(numbers, np.float64).astype(np.float32), None
 
 
 def _number(path: Path, line: str, word: str) -> float:

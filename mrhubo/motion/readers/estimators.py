@@ -12,6 +12,10 @@ from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.humanml import read_features
+from mrhubo.motion.readers.keypoint_arrays import points_in
+from mrhubo.motion.readers.keypoint_files import checked
+from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, asked_rate, find_rate
@@ -53,19 +57,27 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
     def rate(notes: list[str]) -> float:
         return _rate(path, tree, options, notes)
 
-    found = read_rows(tree, options) or read_soma(tree, rate) or read_sam3d(tree, options, rate)
+    found = (
+        read_rows(tree, options)
+        or read_features(tree, options)
+        or read_soma(tree, rate)
+        or read_sam3d(tree, options, rate)
+    )
     return found or _read_smpl(path, tree, options, rate)
 
 
 def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[list[str]], float]) -> Motion:
     layout = find_layout(tree)
+    points = points_in(tree, options) if layout is None else None
+    if points is not None:
+        return motion_of_points(path, checked(path, points), options)
     if layout is None:
         content = Content.open(path)
         what = content.described if content.arrays else f"{content.described} of {tree.described}"
         raise NoMotion(
             f"{path}: is {what}, in which there is no human motion that is known here; expected what WHAM, GVHMR, GEM,"
-            " 4D-Humans, TRAM, ROMP, PyMAF-X, SAM 3D Body or another writes, or SMPL's 'poses' (frames, 72), say;"
-            " docs/formats.md says how each is laid out"
+            " 4D-Humans, TRAM, ROMP, PyMAF-X, SAM 3D Body or another writes, SMPL's 'poses' (frames, 72), say, or"
+            " 'keypoints' (frames, points, 3); docs/formats.md says how each is laid out"
         )
     notes = list(layout.notes)
     track = choose(path, layout.tracks, options, notes)

@@ -10,6 +10,7 @@ from types import ModuleType
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.advice import advice
 from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.frame_folders import frame_files, read_frames
 from mrhubo.motion.readers.options import ReadOptions
 
 
@@ -52,6 +53,7 @@ FORMATS: tuple[Format, ...] = (
     Format("AMASS and SMPL-family .npz", "amass", "is_amass", "read_amass", (".npz",)),
     Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
+    Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints (.json, .npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     Format("videos (MP4, MOV, MKV, WebM, AVI)", "video", "is_video", "read_video", ()),
     # the last row: whatever else holds arrays in dictionaries
@@ -66,12 +68,15 @@ def find_format(content: Content) -> Format | None:
 
 
 def read_any(path: Path, options: ReadOptions) -> Motion:
-    """Reads a motion by whichever reader recognises it.
+    """Reads a motion by whichever reader recognises it; of a folder, if that has a JSON file a frame.
 
     Raises:
         NoMotion: nobody does; says what the file is.
         UserError: whoever does finds it bad.
     """
+    frames = frame_files(path) if path.is_dir() else []
+    if frames:
+        return read_frames(path, frames, options)
     content = Content.open(path)
     row = find_format(content)
     if row is None and (what_to_do := advice(content)) is not None:

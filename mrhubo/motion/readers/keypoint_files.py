@@ -11,28 +11,26 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mrhubo.errors import UserError, shortened
-from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import read_regular
-from mrhubo.files.tree import Tree, read_tree
+from mrhubo.files.tree import read_tree
 from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.keypoint_arrays import (
+    CONFIDENCE_KEYS,
+    NAME_KEYS,
+    POINT_KEYS,
+    Keypoints,
+    in_array,
+    in_npz,
+)
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS
 
-POINT_KEYS = (
-    "keypoints", "keypoints_3d", "keypoints3d", "kpts", "kpts_3d", "kpts3d", "joints", "joints_3d", "joints3d",
-    "joints3D", "positions", "positions_3d", "points", "landmarks", "world_landmarks", "pose_world_landmarks",
-    "pose_landmarks",
-)  # fmt: skip
-"""What files call points, the best first."""
-NAME_KEYS = ("names", "joint_names", "keypoint_names", "landmark_names", "keypoints_names")
-CONFIDENCE_KEYS = ("confidence", "confidences", "conf", "scores", "visibility", "keypoint_scores", "presence")
 _POSE_KEYS = {
     "poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa",
     "pred_rotmat", "smpl_thetas", "poses_body", "local_rot_mats", "rotations", "pred_keypoints_3d",
@@ -42,21 +40,7 @@ _JSON = re.compile(
     r"\s*(?:\[\s*[\[{]|\{.*\"(?:" + "|".join((*POINT_KEYS, "instance_info", "frames")) + r")\"\s*:)", re.DOTALL
 )
 _MAX_JSON = 2**27
-_MAX_NAMES = 1_000_000
 _MOST_POINTS = 1_000
-
-
-@dataclass
-class Keypoints:
-    """Points, as they are in a file."""
-
-    point_TK3: np.ndarray
-    """NaN where a point is missing; float64."""
-    names: list[str] | None = None
-    confidence_TK: np.ndarray | None = None
-    rate: float | None = None
-    where: str = "the array"
-    notes: list[str] = field(default_factory=list)
 
 
 def holds_points(content: Content) -> bool:
@@ -76,37 +60,14 @@ def read_keypoints_file(path: Path, options: ReadOptions) -> Keypoints:
     """
     content = Content.open(path)
     if content.is_npy:
-        return _checked(path, Keypoints(*_split(path, read_tree(path).array(), "the array")))
+        return checked(path, in_array(path, read_tree(path)))
     if content.arrays:
-        return _checked(path, _from_arrays(path, read_tree(path)))
+        return checked(path, in_npz(path, read_tree(path)))
     try:
         value = json.loads(read_regular(path, _MAX_JSON))
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: is no JSON: {shortened(str(error), 80)}") from error
-    return _checked(path, _from_json(path, value, options))
-
-
-def _from_arrays(path: Path, tree: Tree) -> Keypoints:
-    key = next(key for key in POINT_KEYS if key in tree.keys)
-    found = Keypoints(*_split(path, tree[key].array(), f"'{key}'"), where=f"'{key}'")
-    confidence, rate = (tree.get(*keys) for keys in (CONFIDENCE_KEYS, RATE_KEYS))
-    found.names = _names(path)
-    if confidence is not None:
-        found.confidence_TK = np.asarray(confidence.array(), dtype=np.float64)
-    if rate is not None and rate.array().size == 1:
-        found.rate = float(rate.array().reshape(()))
-    return found
-
-
-def _names(path: Path) -> list[str] | None:
-    """The names in an .npz file, an array of text; None where there are none.
-
-    Raises:
-        UserError: there are some, and they are no text (pickled objects, as NumPy makes of lists of any length).
-    """
-    with open_npz(path) as file:
-        key = next((key for key in NAME_KEYS if key in file.keys), None)
-        return None if key is None else [str(name) for name in file.read(key, kinds="U", max_bytes=_MAX_NAMES).ravel()]
+    return checked(path, _from_json(path, value, options))
 
 
 def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
@@ -207,15 +168,12 @@ def _from_mmpose(path: Path, value: dict[str, Any], options: ReadOptions) -> Key
     return found
 
 
-def _split(path: Path, array: np.ndarray, where: str) -> tuple[np.ndarray, None, np.ndarray | None]:
-    """Points, and the confidence that stands beside them."""
-    if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape or array.dtype.kind not in "fiu":
-        raise UserError(f"{path}: {where} has shape {array.shape}; expected (frames, points, 3) or (frames, points, 4)")
-    array = array.astype(np.float64)
-    return array[..., :3], None, array[..., 3] if array.shape[2] == 4 else None
+def checked(path: Path, found: Keypoints) -> Keypoints:
+    """The same with a confidence (T, K) between 0 and 1.
 
-
-def _checked(path: Path, found: Keypoints) -> Keypoints:
+    Raises:
+        UserError: names or confidence do not fit the points.
+    """
     shape = found.point_TK3.shape[:2]
     if found.names is not None and len(found.names) != shape[1]:
         raise UserError(f"{path}: has {len(found.names)} names for {shape[1]} points")

@@ -4,7 +4,11 @@ Orders of the sets: COCO https://cocodataset.org/#format-data; OpenPose's BODY_2
 https://cmu-perceptual-computing-lab.github.io/openpose/web/html/doc/md_doc_02_output.html; MediaPipe
 https://ai.google.dev/edge/mediapipe/solutions/vision/pose_landmarker; Human3.6M with 17 points
 https://github.com/facebookresearch/VideoPose3D; SMPL https://smpl.is.tue.mpg.de; Halpe
-https://github.com/Fang-Haoshu/Halpe-FullBody; Kinect 2 as in NTU RGB+D https://github.com/shahroudy/NTURGB-D.
+https://github.com/Fang-Haoshu/Halpe-FullBody; Kinect 2 as in NTU RGB+D https://github.com/shahroudy/NTURGB-D; Azure
+Kinect https://learn.microsoft.com/azure/kinect-dk/body-joints; MPI-INF-3DHP https://vcai.mpi-inf.mpg.de/3dhp-dataset;
+CMU Panoptic http://domedb.perception.cs.cmu.edu; SPIN's https://github.com/nkolot/SPIN/blob/master/constants.py, of
+which 4D-Humans keeps the first 44; the 45 of the package smplx https://github.com/vchoutas/smplx. FreeMoCap and others
+put MediaPipe's points of hands and face after those of the body.
 
 Legend: F frames, K keypoints.
 """
@@ -24,6 +28,13 @@ _COCO = f"{_FACE} {_LIMBS}"
 _RIGHT_LEFT_ARMS = "right_shoulder right_elbow right_wrist left_shoulder left_elbow left_wrist"
 _RIGHT_LEG, _LEFT_LEG = "right_hip right_knee right_ankle", "left_hip left_knee left_ankle"
 _EYES_EARS = "right_eye left_eye right_ear left_ear"
+_TOES_HEELS = "left_toe - left_heel right_toe - right_heel"
+_BODY_25 = f"nose - {_RIGHT_LEFT_ARMS} - {_RIGHT_LEG} {_LEFT_LEG} {_EYES_EARS} {_TOES_HEELS}"
+_MEDIAPIPE = (
+    "nose - left_eye - - right_eye - left_ear right_ear - - left_shoulder right_shoulder left_elbow right_elbow "
+    "left_wrist right_wrist left_pinky right_pinky left_index right_index left_thumb right_thumb left_hip right_hip "
+    "left_knee right_knee left_ankle right_ankle left_heel right_heel left_toe right_toe"
+)
 
 # "-" is a point that is not used
 SETS: dict[str, tuple[str, ...]] = {
@@ -37,15 +48,27 @@ SETS: dict[str, tuple[str, ...]] = {
         "SMPL": f"{' '.join(JOINT_NAMES)} - -",
         "SMPL-H": f"{' '.join(JOINT_NAMES)}{' -' * 30}",
         "SMPL-X": f"{' '.join(JOINT_NAMES)}{' -' * 33}",
-        "OpenPose's BODY_25": f"nose - {_RIGHT_LEFT_ARMS} - {_RIGHT_LEG} {_LEFT_LEG} {_EYES_EARS} left_toe - left_heel "
-        "right_toe - right_heel",
+        "SMPL with points of the skin": f"{' '.join(JOINT_NAMES)} - - nose {_EYES_EARS} {_TOES_HEELS}"
+        f"{' -' * 10}",
+        "OpenPose's BODY_25": _BODY_25,
+        "4D-Humans' 44": f"{_BODY_25}{' -' * 19}",
+        "SPIN's 49": f"{_BODY_25}{' -' * 24}",
+        "MPI-INF-3DHP": f"head_top neck {_RIGHT_LEFT_ARMS} {_RIGHT_LEG} {_LEFT_LEG} pelvis spine2 -",
+        "Human3.6M with 32": f"pelvis {_RIGHT_LEG} - - {_LEFT_LEG} - - - spine2 - nose head_top - left_shoulder "
+        "left_elbow left_wrist - - - - - right_shoulder right_elbow right_wrist - - - -",
+        "CMU Panoptic": "neck nose pelvis left_shoulder left_elbow left_wrist left_hip left_knee left_ankle "
+        "right_shoulder right_elbow right_wrist right_hip right_knee right_ankle left_eye left_ear right_eye right_ear",
+        "Azure Kinect": "pelvis spine1 spine2 neck left_collar left_shoulder left_elbow left_wrist - - left_thumb "
+        "right_collar right_shoulder right_elbow right_wrist - - right_thumb left_hip left_knee left_ankle left_foot "
+        "right_hip right_knee right_ankle right_foot - nose left_eye left_ear right_eye right_ear",
         "Kinect 2": "pelvis spine2 - - left_shoulder left_elbow left_wrist - right_shoulder right_elbow right_wrist - "
         "left_hip left_knee left_ankle left_foot right_hip right_knee right_ankle right_foot - - - - -",
         "Halpe 26": f"{_COCO} - - - left_toe right_toe - - left_heel right_heel",
-        "MediaPipe": "nose - left_eye - - right_eye - left_ear right_ear - - left_shoulder right_shoulder left_elbow "
-        "right_elbow left_wrist right_wrist left_pinky right_pinky left_index right_index left_thumb right_thumb "
-        "left_hip right_hip left_knee right_knee left_ankle right_ankle left_heel right_heel left_toe right_toe",
-        "COCO-WholeBody": f"{_COCO} left_toe - left_heel right_toe - right_heel{' -' * 110}",
+        "MediaPipe": _MEDIAPIPE,
+        "MediaPipe with hands": f"{_MEDIAPIPE}{' -' * 42}",
+        "MediaPipe with hands and face": f"{_MEDIAPIPE}{' -' * 510}",
+        "MediaPipe with hands, face and irises": f"{_MEDIAPIPE}{' -' * 520}",
+        "COCO-WholeBody": f"{_COCO} {_TOES_HEELS}{' -' * 110}",
     }.items()
 }  # fmt: skip
 """Our names of the points of each set, in its order."""
@@ -65,6 +88,10 @@ _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _LEFT, _RIGHT = ("left", "l", "lft"), ("right", "r", "rgt")
 _PROPORTIONS = (("knee", "hip", 1.0), ("elbow", "shoulder", 0.83), ("shoulder", "hip", 0.75))
 """Bones, by where they start, other bones, and their ratio (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
+
+
+_FLABBY = 0.2
+"""Half of the frames are farther from a bone's usual length than this share of it: of points drawn by chance."""
 
 
 def our_name(name: str) -> str | None:
@@ -113,7 +140,9 @@ def fitting_sets(point_FK3: np.ndarray) -> list[tuple[float, str]]:
 
 
 def misfit(points: Mapping[str, np.ndarray]) -> float:
-    """How badly named points (F, 3) fit a body; infinite where limbs are never seen whole."""
+    """How badly named points (F, 3) fit a body; infinite where limbs are never seen whole, or are as long as
+    chance has it.
+    """
     found: list[float] = []
     with np.errstate(all="ignore"):
         bone = {
@@ -124,6 +153,9 @@ def misfit(points: Mapping[str, np.ndarray]) -> float:
         seen = {key: length_F[np.isfinite(length_F) & (length_F > 0)] for key, length_F in bone.items()}
         mean = {key: float(np.median(length_F)) for key, length_F in seen.items() if len(length_F)}
         found += [float(np.std(seen[key]) / mean[key]) for key in mean]
+        spread = [float(np.median(np.abs(seen[key] - mean[key])) / mean[key]) for key in mean]
+        if spread and np.mean(spread) > _FLABBY:
+            return np.inf
         for start in ("shoulder", "elbow", "hip", "knee"):
             if ("left", start) in mean and ("right", start) in mean:
                 found.append(abs(float(np.log(mean["left", start] / mean["right", start]))))

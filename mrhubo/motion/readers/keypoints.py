@@ -14,8 +14,9 @@ from mrhubo.body.joints import SIDES
 from mrhubo.errors import UserError, listed
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
-from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.keypoint_files import Keypoints, holds_points, read_keypoints_file
+from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
+from mrhubo.motion.readers.keypoint_files import holds_points, read_keypoints_file
 from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
@@ -37,6 +38,10 @@ _LEG_OVER_TRUNK = 1.7
 """Thigh and shin over the way from hips to shoulders (Winter, fig. 4.1: 0.49 and 0.288 of the height)."""
 _LEFT_HANDED = 0.3
 """How clearly nose and toes must point backward, of 1, to say that axes are left-handed."""
+_BESIDE, _NEARLY_ALL = 0.05, 0.9
+"""How far beside a picture, in shares of it, points are seen; and which share of them is in it."""
+_CENTRED = 0.01
+"""How far [m] from the origin the pelvis stays, in all frames, of points that are centred on it."""
 _NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
 
 
@@ -62,7 +67,16 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is damaged, it has no points of a body, which points they are or the rate is not known.
     """
-    found = read_keypoints_file(path, options)
+    return motion_of_points(path, read_keypoints_file(path, options), options)
+
+
+def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Motion:
+    """The motion of points of a body.
+
+    Raises:
+        NoMotion: they are no points of a body in the order of a set that is known, and have no names.
+        UserError: as for `read_keypoints`.
+    """
     if len(found.point_TK3) > _MAX_FRAMES:
         raise UserError(f"{path}: has {len(found.point_TK3):,} frames; at most {_MAX_FRAMES:,} are read")
     if (np.abs(np.nan_to_num(found.point_TK3)) > _LARGEST).any():
@@ -75,14 +89,16 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     rate, notes = _rate(path, found, options), found.notes
     point_TK3 = _without_missing(found)
     points = {name: point_TK3[:, place] for name, place in places.items()}
+    _refuse_shares(path, found, points)
     points, world = _to_world(points, notes)
     sure = {} if found.confidence_TK is None else {n: found.confidence_TK[:, place] for n, place in places.items()}
-    body = BodyPoints(
-        points,
-        confidence=sure,
-    )
+    body = BodyPoints(points, confidence=sure)
     source = f"keypoints {found.where}, {what}, {world}"
-    return motion_from_points(body, motion_name(path), rate, source, tuple(notes), str(path))
+    centred = _is_centred(points)
+    if centred:
+        notes.append("where the person goes is not told: the points are centred on the hips")
+    motion = motion_from_points(body, motion_name(path), rate, source, tuple(notes), str(path))
+    return motion.changed(root_position_T3=None) if centred else motion
 
 
 def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
@@ -93,7 +109,7 @@ def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
     fits = fitting_sets(_some(found.point_TK3))
     if not fits or fits[0][0] >= _NONSENSE:
         known = ", ".join(f"{name} ({len(points)})" for name, points in SETS.items())
-        raise UserError(
+        raise NoMotion(
             f"{path}: its {count} points have no names and fit no body in the order of a set that is known ({known}); "
             "save an .npz with 'keypoints' and 'names', for instance 'left_shoulder'"
         )
@@ -106,6 +122,11 @@ def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
     return {our: place for place, our in enumerate(SETS[name]) if our != "-"}, f"{count} points as {name} has them"
 
 
+def fits_a_body(point_TK3: np.ndarray, name: str) -> bool:
+    """Whether points in the order of a set keep the lengths of bones and have a body's proportions."""
+    return any(found == name and bad < _NONSENSE for bad, found in fitting_sets(_some(point_TK3)))
+
+
 def _refuse_flat(path: Path, found: Keypoints) -> None:
     """Refuses points in a picture, whose third number is a score."""
     known_X3 = found.point_TK3[np.isfinite(found.point_TK3).all(-1)]
@@ -113,8 +134,21 @@ def _refuse_flat(path: Path, found: Keypoints) -> None:
     is_score = third.min() >= 0 and third.max() <= 1 and min(spread_3[:2]) > _PIXELS
     if is_score or not spread_3[2] > 0:
         raise UserError(
-            f"{path}: {found.where} has points in a picture (x, y and {'a score' if is_score else 'no depth'}); lift "
-            "them to three dimensions first, for instance with MMPose or MotionBERT"
+            f"{path}: {found.where} has points in a picture (x, y and {'a score' if is_score else 'no depth'}); {LIFT}"
+        )
+
+
+def _refuse_shares(path: Path, found: Keypoints, points: Mapping[str, np.ndarray]) -> None:
+    """Refuses points whose x and y are shares of a picture's width and height: limbs point elsewhere in it. Nobody who
+    is told in metres is so small, and who is told in greater units not so far from the origin.
+    """
+    known_X2 = np.concatenate([x[np.isfinite(x).all(-1), :2] for x in points.values()])
+    inside = float(((known_X2 > -_BESIDE) & (known_X2 < 1 + _BESIDE)).all(-1).mean()) if len(known_X2) else 0.0
+    down_T = sum(points[f"{side}_hip"][:, 1] - points[f"{side}_shoulder"][:, 1] for side in SIDES)
+    if inside > _NEARLY_ALL and _typical(np.asarray(down_T)) > 0 and _typical(known_X2.min(axis=1)) > _BESIDE:
+        raise UserError(
+            f"{path}: {found.where} has points as shares of a picture's width and height (0 to 1, y down), whose limbs "
+            "point elsewhere than the person's; save points in space, such as MediaPipe's pose_world_landmarks"
         )
 
 
@@ -156,6 +190,13 @@ def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str
     unit, name = nearest_unit(leg)
     world_33 = to_y_up(axis)
     return {n: unit * point_T3 @ world_33.T for n, point_T3 in points.items()}, f"{name}, {axis} up"
+
+
+def _is_centred(points: Mapping[str, np.ndarray]) -> bool:
+    """Whether the pelvis, or the middle of the hips, is at the origin in all frames: somebody moved it there."""
+    middles = [(points["left_hip"] + points["right_hip"]) / 2, *([points["pelvis"]] if "pelvis" in points else [])]
+    far = [norm_T[np.isfinite(norm_T)] for norm_T in (np.linalg.norm(middle_T3, axis=-1) for middle_T3 in middles)]
+    return any(len(known_T) > 1 and known_T.max() < _CENTRED for known_T in far)
 
 
 def _forward(points: Mapping[str, np.ndarray]) -> float:

@@ -9,11 +9,13 @@ Legend: N people in a frame, D numbers of a place.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mrhubo.errors import UserError
+from mrhubo.files.regular import naming
 
 _MOST = 100
 """People in a frame."""
@@ -54,3 +56,9 @@ def link(places: Sequence[np.ndarray], reach: float) -> list[list[int]]:
             last[found[column]] = frame, place_ND[column]
         numbers.append(found)
     return numbers
+
+
+def link_in(path: Path, places: Sequence[np.ndarray], reach: float) -> list[list[int]]:
+    """The same; what is wrong is said of a file."""
+    with naming(path):
+        return link(places, reach)

@@ -4,7 +4,8 @@ Where a name is from: `pose_world` WHAM, `smpl_poses` AIST++ (https://google.git
 `smpl_thetas` ROMP, `pred_rotmat` TRAM, `pred_thetas` HybrIK (https://github.com/Jeff-sjtu/HybrIK), `body_pose` the
 package smplx (https://github.com/vchoutas/smplx), `pose_body` AMASS, `poses_body` EMDB
 (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC), `fullpose` GRAB
-(https://github.com/otaheri/GRAB), `local_rot_mats` Kimodo, `poses` and `pose` everybody.
+(https://github.com/otaheri/GRAB), `smpl_pose` GLAMR (https://github.com/NVlabs/GLAMR), `local_rot_mats` Kimodo, `poses`
+and `pose` everybody.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from mrhubo.motion.readers.tracks import SmplArrays, Track
 T = TypeVar("T")
 _WITH_ROOT, _WITHOUT = (22, 24, 52, 55), (21, 23)
 """How many joints a pose has: of body, SMPL, SMPL-H and SMPL-X; and of SMPL-X's or SMPL's body without the root."""
+_PLACES = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
 _ENTRIES = 50
 """Of a dictionary that are looked at, to tell what the others are."""
@@ -37,7 +39,15 @@ class _Names:
 
     pose: str
     root: tuple[str, ...] = ()
-    position: tuple[str, ...] = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig")
+    position: tuple[str, ...] = (
+        "trans",
+        "transl",
+        "translation",
+        "root_trans",
+        "root_trans_offset",
+        "trans_orig",
+        "global_t",
+    )
     betas: tuple[str, ...] = ("betas", "beta", "shape")
 
 
@@ -47,6 +57,12 @@ _NAMES = (
     _Names("smpl_thetas", position=("cam_trans",), betas=("smpl_betas",)),
     _Names("pred_rotmat", position=("pred_trans",), betas=("pred_shape",)),
     _Names("pred_thetas", position=("transl_camsys", "transl"), betas=("pred_betas",)),
+    _Names(
+        "smpl_pose",
+        root=("smpl_orient_world", "smpl_orient_cam"),
+        position=("root_trans_world", "root_trans_cam"),
+        betas=("smpl_beta",),
+    ),
     _Names("body_pose", root=("global_orient", "root_pose", "root_orient")),
     _Names("pose_body", root=("root_orient", "global_orient")),
     _Names("poses_body", root=("poses_root",)),
@@ -71,7 +87,9 @@ class Found:
     frames: int
     """How many frames there are."""
     people: int | None
-    """How many people there are, where the arrays have an axis for them before that of the frames."""
+    """How many people there are, where the arrays have an axis for them beside that of the frames."""
+    people_first: bool = True
+    """Whether that axis is the first; else it is the second."""
     outer: Tree | None = None
     """The dictionary around it, if that is the person's."""
 
@@ -79,7 +97,7 @@ class Found:
         """The arrays, of one of the people where there are several."""
         node, names = self.node, self.names
         pose = node[names.pose]
-        array = pose.array() if person is None else pose.array()[person]
+        array = pose.array() if person is None else self._one(pose.array(), person)
         root, position, betas = (self._array(keys, person) for keys in (names.root, names.position, names.betas))
         frames = self._array(_FRAMES, person)
         if frames is None and self.outer is not None:
@@ -99,9 +117,13 @@ class Found:
 
     def _array(self, keys: tuple[str, ...], person: int | None) -> np.ndarray | None:
         array = self.node.find_array(*keys)
-        if array is None or person is None or array.ndim < 2 or len(array) != self.people:
+        axis = 0 if self.people_first else 1
+        if array is None or person is None or array.ndim < 2 or array.shape[axis] != self.people:
             return array
-        return array[person]
+        return self._one(array, person)
+
+    def _one(self, array: np.ndarray, person: int) -> np.ndarray:
+        return array[person] if self.people_first else array[:, person]
 
 
 def find_here(node: Tree) -> Found | None:
@@ -118,8 +140,9 @@ def find_here(node: Tree) -> Found | None:
         if form is not None:
             return Found(node, names, form, shape[0], None)
         form = find_form(shape[1:], counts) if len(shape) > 2 else None
-        if form is not None:
-            return Found(node, names, form, shape[1], shape[0])
+        if form is not None:  # there are more frames than people
+            people, frames = sorted(shape[:2])
+            return Found(node, names, form, frames, people, people_first=shape[0] == people)
     return None
 
 
@@ -147,10 +170,19 @@ def people_in(node: Tree) -> list[tuple[str, Found]] | None:
     An entry has them itself, or in dictionaries one deeper, the numbers of frames beside those.
     """
     entries = list(_some(node))
-    if not entries or not all(_rank(name) == 1 and _of_person(child) for name, child in entries):
+    inner = [(name, child) for name, child in entries if child.is_mapping]
+    # beside two people or more there may be what goes for all, as the frame rate
+    if not inner or (len(inner) == 1 < len(entries)):
         return None
-    found = [(name, _of_person(child)) for name, child in node.items()]
+    if not all(_rank(name) == 1 and _of_person(child) for name, child in inner):
+        return None
+    found = [(name, _of_person(child)) for name, child in node.items() if child.is_mapping]
     return [(name, place) for name, place in found if place is not None]
+
+
+def named_tracks(people: list[tuple[str, Found]]) -> list[Track]:
+    """The tracks of people with names."""
+    return [track for name, found in people for track in found.tracks(name)]
 
 
 def _of_person(node: Tree) -> Found | None:

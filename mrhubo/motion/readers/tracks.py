@@ -85,6 +85,17 @@ class Kind:
     """Which way may be up, names of `mrhubo.motion.readers.world`."""
 
 
+@dataclass(frozen=True)
+class Layout:
+    """What a file was found to hold."""
+
+    kind: Kind
+    tracks: list[Track]
+    notes: tuple[str, ...] = ()
+    camera_beside: bool = False
+    """Whether its writer keeps the camera's way through the world in a file of its own."""
+
+
 Chosen = TypeVar("Chosen", bound=Person)
 
 
@@ -135,7 +146,7 @@ def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, not
     local_SJ33 = read_local(path, arrays.key, seen, blocks, arrays.form, arrays.first)
     root_S33 = _root(arrays, notes)
     position_S3 = _position(arrays, notes)
-    local_TJ33, root_T33, position_T3, known_T = _filled(path, arrays, local_SJ33, root_S33, position_S3)
+    local_TJ33, root_T33, position_T3, known_T = _filled(path, arrays, local_SJ33, root_S33, position_S3, notes)
     confidence_TJ = None
     if known_T is not None:
         missing, frames = int((~known_T).sum()), len(known_T)
@@ -210,7 +221,12 @@ def _betas(arrays: SmplArrays, notes: list[str]) -> tuple[float, ...] | None:
 
 
 def _filled(
-    path: Path, arrays: SmplArrays, local_SJ33: np.ndarray, root_S33: np.ndarray | None, position_S3: np.ndarray | None
+    path: Path,
+    arrays: SmplArrays,
+    local_SJ33: np.ndarray,
+    root_S33: np.ndarray | None,
+    position_S3: np.ndarray | None,
+    notes: list[str],
 ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """All frames from the first to the last, and in which (T,) somebody is seen: None where in all of them."""
     if arrays.frames is None:
@@ -221,6 +237,8 @@ def _filled(
     if not (np.abs(numbers) < 2**53).all():
         raise UserError(f"{path}: the numbers of frames are not whole numbers")
     order, places = np.unique(numbers.astype(np.int64), return_index=True)
+    if len(order) < len(numbers):
+        notes.append(f"{len(numbers) - len(order):,} poses of frames that are told before are left out")
     frames = int(order[-1] - order[0]) + 1
     if frames * _SCARCEST > len(order) or frames > MAX_FRAMES:
         raise UserError(f"{path}: somebody who is seen in {len(order):,} of {frames:,} frames makes no motion")

@@ -268,6 +268,64 @@ def smplx(path: Path, people: dict[int, np.ndarray]) -> None:
         np.savez(file, **content)
 
 
+def interhuman(path: Path, people: dict[int, np.ndarray]) -> None:
+    """People as two more entries beside what goes for all."""
+    content: dict[Any, Any] = {"mocap_framerate": 30.0, "frames": max(map(len, people.values()))}
+    for person, pose in people.items():
+        content[person] = {
+            "trans": np.ones((len(pose), 3)),
+            "root_orient": pose[:, 0],
+            "pose_body": pose[:, 1:].reshape(len(pose), 63),
+            "gender": "male",
+        }
+    path.write_bytes(pickle.dumps(content))
+
+
+def glamr(path: Path, people: dict[int, np.ndarray]) -> None:
+    persons = {
+        person: {
+            "smpl_pose": padded(pose, 24)[:, 3:],
+            "smpl_orient_world": pose[:, 0],
+            "smpl_orient_cam": np.zeros((len(pose), 3)),
+            "root_trans_world": np.ones((len(pose), 3)),
+            "root_trans_cam": np.zeros((len(pose), 3)),
+            "smpl_beta": np.zeros((len(pose), 10)),
+            "frames": np.arange(len(pose)),
+        }
+        for person, pose in people.items()
+    }
+    joblib.dump({"meta": {"algo": "glamr"}, "person_data": persons}, path)
+
+
+def cliff(path: Path, people: dict[int, np.ndarray]) -> None:
+    """A row a detection; in every second frame people come in the other order."""
+    frames = max(map(len, people.values()))
+    rows = [(t, p) for t in range(frames) for p in list(people)[:: 1 if t % 2 else -1] if t < len(people[p])]
+    content = {
+        "imgname": np.array([f"{t:06}.jpg" for t, _ in rows]),
+        "pose": np.stack([padded(people[p][t : t + 1], 24)[0] for t, p in rows]),
+        "shape": np.zeros((len(rows), 10)),
+        "global_t": np.ones((len(rows), 3)),
+        "detection_all": np.array([(t, 300 * p, 100, 300 * p + 100, 400, 1, 1, 0) for t, p in rows], np.float64),
+    }
+    with path.open("wb") as file:
+        np.savez(file, **content)
+
+
+def frame_list(path: Path, people: dict[int, np.ndarray]) -> None:
+    """What HMR2 answers to each picture, appended."""
+    ((_, pose),) = people.items()
+    turned = matrices(padded(pose, 24).reshape(len(pose), 24, 3))
+    frames = [
+        {
+            "pred_smpl_params": {"global_orient": turn[:1], "body_pose": turn[1:], "betas": np.zeros(10)},
+            "pred_cam_t": np.ones(3),
+        }
+        for turn in turned
+    ]
+    path.write_bytes(pickle.dumps(frames))
+
+
 @dataclass(frozen=True)
 class Writer:
     """A way of writing files, and what is known of them."""
@@ -299,5 +357,9 @@ WRITERS: dict[str, Writer] = {
     "slahmr": Writer(slahmr, ".npz", "SMPL parameters", "", many=True),
     "phc": Writer(phc, ".pkl", "SMPL parameters of people", "smpl", many=True),
     "emdb": Writer(emdb, ".pkl", "SMPL parameters", "smpl"),
+    "interhuman": Writer(interhuman, ".pkl", "SMPL parameters", "", many=True),
+    "glamr": Writer(glamr, ".pkl", "SMPL parameters of people", "smpl", many=True),
+    "cliff": Writer(cliff, ".npz", "CLIFF", "smpl", camera=True, many=True),
+    "frame_list": Writer(frame_list, ".pkl", "SMPL parameters, frame by frame", "smpl", camera=True),
     "smplx": Writer(smplx, ".npz", "SMPL parameters", "smplx"),
 }

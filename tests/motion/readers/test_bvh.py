@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 import mrhubo
+import mrhubo.rotation
 from mrhubo import UserError
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton
 from mrhubo.motion import Motion
@@ -116,6 +118,56 @@ def test_limbs_point_as_in_the_file_whoever_wrote_it(motion: Motion, style: Styl
     assert found.root_position_T3 is not None and motion.root_position_T3 is not None
     height_T = found.root_position_T3[:, 1]
     torch.testing.assert_close(height_T, motion.root_position_T3[:, 1], atol=2e-3, rtol=0)
+
+
+QUIRKS = {
+    "line ends of old Macs": lambda text: text.replace("\n", "\r").encode(),
+    "a byte order mark": lambda text: b"\xef\xbb\xbf" + text.encode(),
+    "small letters": lambda text: text.replace("HIERARCHY", "hierarchy").replace("JOINT", "joint").encode(),
+    "names in Shift JIS": lambda text: text.replace("Left", "左").replace("Right", "右").encode("cp932"),
+    "names in UTF-8": lambda text: text.replace("Left", "左").replace("Right", "右").encode(),
+    "names in Latin 1": lambda text: text.replace("Head", "Schädel").encode("latin1"),
+    "what old systems end files with": lambda text: text.encode() + b"\n\x1a",
+    "zeros of a disk": lambda text: text.encode() + b"\0\0\0",
+    "words after the frames": lambda text: text.encode() + b"END OF FILE",
+    "no number of frames": lambda text: re.sub(r"Frames: \d+", "Frames: 0", text).encode(),
+    "another person": lambda text: _twice(text).encode(),
+}
+
+
+def _twice(text: str) -> str:
+    """The file with a second person, of the same joints, who moves as the first one backward in time."""
+    hierarchy, motion = text.removeprefix("HIERARCHY\n").split("MOTION\n")
+    frames, time, *rows = motion.splitlines()
+    both = "\n".join(f"{row} {other}" for row, other in zip(rows, rows[::-1], strict=True))
+    other = hierarchy.replace("ROOT ", "ROOT other:")
+    return f"HIERARCHY\n{hierarchy}HIERARCHY\n{other}MOTION\n{frames}\n{time}\n{both}\n"
+
+
+@pytest.mark.parametrize("quirk", QUIRKS)
+def test_how_the_text_is_written_does_not_matter(motion: Motion, quirk: str, tmp_path: Path) -> None:
+    path = tmp_path / "motion.bvh"
+    path.write_bytes(QUIRKS[quirk](write_bvh(motion, Style(fingers=False))))
+    found = mrhubo.read_motion(path)
+    assert len(found) == len(motion) and float(limb_error(found.local_TJ33, motion.local_TJ33).max()) < 0.1
+    if quirk == "another person":
+        other = mrhubo.read_motion(path, ReadOptions(person="other:mixamorig:Hips"))
+        assert float(limb_error(other.local_TJ33, motion.local_TJ33.flip(0)).max()) < 0.1
+
+
+@pytest.mark.parametrize("what", ["on the back", "on all fours"])
+def test_who_never_stands_is_upright_all_the_same(motion: Motion, what: str, tmp_path: Path) -> None:
+    """By the skeleton at rest and the floor; the axis along which they lie is none."""
+    lies = what == "on the back"
+    turn = mrhubo.rotation.axis_angle_to_matrix(torch.tensor([(-1.0 if lies else 1.0) * torch.pi / 2, 0.0, 0.0]))
+    way = torch.linspace(0, 0 if lies else 6, len(motion))
+    lying = motion.changed(
+        root_rotation_T33=turn.expand(len(motion), 3, 3),
+        root_position_T3=torch.stack([0 * way, 0 * way + (0.15 if lies else 0.5), way], dim=1),
+    )
+    found = read(lying, Style(axes="world"), tmp_path)
+    assert found.root_rotation_T33 is not None and torch.allclose(found.root_rotation_T33, turn, atol=1e-3)
+    assert "lies along" in " ".join(found.notes)
 
 
 @pytest.mark.parametrize("axes", ["world", "hanging"])

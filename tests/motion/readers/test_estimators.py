@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from mrhubo.body.joints import REST_K3
 from mrhubo.body.rest_directions import from_family
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, ReadOptions, read_folder, read_motion
@@ -21,7 +22,7 @@ from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.linking import link
 from tests.files.test_safe_pickle import attacks
 from tests.motion.damage import damaged_by, read_or_refused
-from tests.motion.readers.estimator_files import WRITERS, made_up, matrices, padded, phalp, pymaf, romp, wham
+from tests.motion.readers.estimator_files import WRITERS, cliff, made_up, matrices, padded, phalp, pymaf, romp, wham
 
 RATE = ReadOptions(rate=30)
 FRAMES = 6
@@ -52,12 +53,44 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
     assert (motion.root_position_T3 is None) == (writer.position is None)
     if motion.root_position_T3 is not None:
         assert float(motion.root_position_T3[-1, 0]) == pytest.approx(writer.position)
-    if name != "phc":
+    if name not in ("phc", "interhuman"):
         with pytest.raises(UserError, match="--rate"):
             read_motion(path)
 
 
-@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many and name != "pymaf"])
+def test_people_may_be_the_second_axis(tmp_path: Path) -> None:
+    people = [made_up(FRAMES, seed=seed) for seed in range(2)]
+    poses = np.stack([padded(pose, 24) for pose in people], axis=1)  # (T, 2, 72)
+    np.savez(tmp_path / "a.npz", poses=poses, trans=np.stack([np.ones((FRAMES, 3)), np.zeros((FRAMES, 3))], axis=1))
+    for person, pose in enumerate(people):
+        motion = read_motion(tmp_path / "a.npz", ReadOptions(rate=30, person=str(person)))
+        assert close(motion, pose, "smpl") and motion.root_position_T3 is not None
+        assert float(motion.root_position_T3[0, 0]) == 1 - person
+
+
+def test_features_of_humanml3d_tell_where_joints_are(tmp_path: Path) -> None:
+    """Somebody at rest who walks forward and turns: the first number is half of the turn."""
+    rest = REST_K3[:22].astype(np.float64)
+    rows = np.zeros((9, 263))
+    rows[:, 0], rows[:, 2], rows[:, 3] = 0.05, 0.1, 0.9
+    rows[:, 4:67] = (rest[1:] - rest[0] + [0, 0.9, 0]).reshape(63)
+    np.save(tmp_path / "walk.npy", rows)
+    motion = read_motion(tmp_path / "walk.npy")
+    assert motion.frame_rate == 20 and "HumanML3D" in motion.notes[0] and len(motion) == 9
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    turned = Rotation.from_matrix(motion.root_rotation_T33.numpy()).as_rotvec()
+    np.testing.assert_allclose(turned[:, 1], -0.1 * np.arange(9), atol=1e-3)
+    ways = np.diff(motion.root_position_T3.numpy(), axis=0)
+    headings = motion.root_rotation_T33.numpy()[1:, :, 2]
+    np.testing.assert_allclose(ways, 0.1 * headings, atol=2e-3)
+    np.save(tmp_path / "walk.npy", np.random.default_rng(0).normal(size=(9, 263)))
+    with pytest.raises(NoMotion, match="normalised"):
+        read_motion(tmp_path / "walk.npy")
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, writer in WRITERS.items() if writer.many and name not in ("pymaf", "cliff")]
+)
 def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, name: str) -> None:
     writer = WRITERS[name]
     lengths = (FRAMES, FRAMES) if name == "slahmr" else (4, FRAMES)
@@ -154,7 +187,7 @@ def test_old_bodies_of_phalps_tracks_are_passed_over(tmp_path: Path) -> None:
     assert motion.confidence_TJ is not None and motion.confidence_TJ[:, 0].tolist() == [1, 1, 0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("write", [pymaf, lambda path, people: romp(path, people, tracked=False)])
+@pytest.mark.parametrize("write", [pymaf, cliff, lambda path, people: romp(path, people, tracked=False)])
 def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
     """They come in turns: in the first frame the second person first."""
     people = {0: made_up(FRAMES, camera=True), 1: made_up(4, seed=1, camera=True)}

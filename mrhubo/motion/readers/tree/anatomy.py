@@ -66,8 +66,8 @@ def find_anatomy(tree: JointTree, given: Mapping[str, int] | None = None, what: 
     limbs = find_limbs(shape)
     if limbs is None:
         raise UserError(
-            f"{what}: no arms and legs are found among its {len(tree.joints)} joints; name them in a YAML file with "
-            "--bvh-map"
+            f"{what}: no arms and legs, of which two each are needed, are found among its {len(tree.joints)} joints; "
+            "name them in a YAML file with --bvh-map"
         )
     notes: list[str] = []
     shoulders, hips = ([triple[0] for triple in pair] for pair in (limbs.arms, limbs.legs))

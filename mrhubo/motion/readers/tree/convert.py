@@ -65,7 +65,7 @@ def tree_motion(
         remarks.append("the first frame is a pose at rest from which the motion jumps away: left out")
     frames = np.unique(np.linspace(0, len(tree) - 1, _SAMPLES).astype(int))
     pose = tree.pose(frames, list(place.values()))
-    axis, why = up_axis(pose, place, reference, given.up)
+    axis, why = up_axis(pose, place, reference, given.up, remarks)
     unit, unit_name = unit_of(pose, place, given.unit)
     world_33 = to_y_up(axis)
     spine = [above for above in tree.above(place["spine3"]) if place["pelvis"] in tree.above(above)[1:]]

@@ -7,7 +7,7 @@ world and unit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -66,6 +66,18 @@ class JointTree:
             chain.append(place)
             place = self.joints[place].parent
         return chain
+
+    @property
+    def roots(self) -> list[int]:
+        """The joints without a parent."""
+        return [place for place, joint in enumerate(self.joints) if joint.parent < 0]
+
+    def under(self, root: int) -> JointTree:
+        """The tree of a joint and all that hang on it."""
+        kept = [place for place in range(len(self.joints)) if root in self.above(place)]
+        moved = {place: number for number, place in enumerate(kept)}
+        joints = [replace(self.joints[place], parent=moved.get(self.joints[place].parent, -1)) for place in kept]
+        return JointTree(tuple(joints), self.value_TC)
 
     def pose(self, frames: slice | np.ndarray, places: Sequence[int] | None = None) -> Pose:
         """Some joints, or all, in some frames."""

@@ -31,10 +31,30 @@ _CLEAR = 0.7
 """Share of a mean upward vector along one axis, from which on the axis is up."""
 _STEADY = 0.5
 """Length of the mean of upward unit vectors from which on people stand more than they lie."""
+_UPS = ("y", "z", "-y")
+"""Axes that are up in some files: -y in what a camera sees."""
+_FLOOR, _RISES = 0.35, 0.25
+"""How far from 0 the lowest joint may be to be on a floor; and how much its height varies at most, of anybody who is
+not carried about; in lengths of a leg.
+"""
 
 
-def up_axis(pose: Pose, place: Mapping[str, int], reference: Reference | None, given: str | None) -> tuple[str, str]:
-    """Which axis is up, for instance `z` or `-y`, and in words how that is known."""
+def up_axis(
+    pose: Pose, place: Mapping[str, int], reference: Reference | None, given: str | None, notes: list[str]
+) -> tuple[str, str]:
+    """Which axis is up, for instance `z` or `-y`, and in words how that is known.
+
+    It is that along which people stand on the mean, but for those who lie or crawl throughout a motion. These stand
+    along an axis that is up in no file, or along which the lowest joint goes up and down as that of nobody who walks;
+    then it is the axis along which the skeleton stands at rest, or y or z, if there is a floor at 0 across it.
+
+    Args:
+        pose: some frames.
+        place: which joint is which.
+        reference: the pose at rest, if there is one.
+        given: what the user says.
+        notes: is told where motion and rest disagree.
+    """
     if given is not None:
         return given, "as the map says"
     up_F3 = sum(
@@ -42,11 +62,43 @@ def up_axis(pose: Pose, place: Mapping[str, int], reference: Reference | None, g
     )
     mean_3 = mean_direction(np.asarray(up_F3))
     length = float(np.linalg.norm(mean_3))
-    if length < _STEADY or np.abs(mean_3).max() < _CLEAR * length:
-        if reference is None:
-            return "y", "a guess, as the body lies"
-        mean_3 = reference.axes_33[:, 1]
-    return named_axis(mean_3), "by how the body stands"
+    stands = length >= _STEADY and np.abs(mean_3).max() >= _CLEAR * length
+    found = named_axis(mean_3) if stands else None
+    resting = None if reference is None else named_axis(reference.axes_33[:, 1])
+    if found is not None and found == resting:
+        return found, "by how the body stands"
+    floor = {axis: _floor(pose, place, axis) for axis in (("y", "z") if resting is None else (resting,))}
+    best = min(floor, key=lambda axis: sum(floor[axis]))
+    has_floor = floor[best][0] < _FLOOR and floor[best][1] < _RISES
+    if found is None and resting is not None:
+        return resting, "by its pose at rest, as the body lies"
+    if found is None:
+        return (best, "by where the floor is") if has_floor else ("y", "a guess, as the body lies")
+    doubtful = found not in _UPS or (resting is not None and _floor(pose, place, found)[1] > _RISES)
+    if doubtful and has_floor:
+        notes.append(
+            f"the body lies along {found}, as the floor is across {best}, which is taken to be up ('up: {found}' in "
+            "--bvh-map if it is not)"
+        )
+        return best, "by where the floor is"
+    if resting is not None:
+        notes.append(
+            f"the body stands along {found}, and at rest along {resting}: {found} is taken to be up ('up: {resting}' in"
+            " --bvh-map if it is not)"
+        )
+    return found, "by how the body stands"
+
+
+def _floor(pose: Pose, place: Mapping[str, int], axis: str) -> tuple[float, float]:
+    """How far from height 0 the lowest joint is, and how much its height varies, if an axis is up; in lengths of a leg:
+    the median, and the range of the middle half.
+    """
+    up_3 = to_y_up(axis)[1]
+    low_F = np.min([pose.point[joint] @ up_3 for joint in place.values()], axis=0)
+    hip, knee, ankle = (pose.point[place[f"left_{name}"]][0] for name in ("hip", "knee", "ankle"))
+    leg = max(float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)), 1e-9)
+    low, middle, high = np.percentile(low_F, (25, 50, 75))
+    return abs(float(middle)) / leg, float(high - low) / leg
 
 
 def mean_direction(vector_F3: np.ndarray) -> np.ndarray:

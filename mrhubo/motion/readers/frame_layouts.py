@@ -1,0 +1,193 @@
+"""How estimators lay out files that go frame by frame: what they tell of whoever is seen in each.
+
+Where each layout is defined is said at its function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.files.tree import Tree
+from mrhubo.motion.readers.linking import LINKED, link_in
+from mrhubo.motion.readers.rotations import Form, find_form
+from mrhubo.motion.readers.smpl_names import named_tracks, people_in
+from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
+from mrhubo.motion.readers.world import CAMERAS
+
+_SMALL = 1_000
+"""Numbers that an array of one person in one frame has at most."""
+_METRES = 1.0
+"""How far [m] anybody gets from one frame to the next, with the noise of a depth that is guessed."""
+
+
+def read_phalp(tree: Tree) -> Layout | None:
+    """4D-Humans and PHALP: a dictionary of frames, each with lists that have an entry a person.
+
+    `joblib.dump(final_visuals_dic, ...)` of
+    https://github.com/brjathu/PHALP/blob/master/phalp/trackers/PHALP.py; `smpl` has `global_orient` (1, 3, 3),
+    `body_pose` (23, 3, 3) and `betas` (10,), `tid` the number of the track, `tracked_time` how many frames ago the
+    person was seen, `time` the number of the frame.
+    """
+    if not tree.is_mapping or not len(tree):
+        return None
+    seen: dict[str, list[tuple[int, Tree]]] = {}
+    for number, (_, frame) in enumerate(tree.items()):
+        people, names = frame.get("smpl"), [frame.get(key) for key in ("tid", "tracked_ids")]
+        if people is None or not people.is_list or not any(names):
+            return None
+        ages = frame.get("tracked_time")
+        ids = next((list(given) for given in names if given is not None and len(given) == len(people)), None)
+        if ids is None:
+            raise UserError(
+                f"{frame.named}: has {len(people)} bodies, and numbers of tracks for another number of people"
+            )
+        old = (
+            [float(age.array()) > 0 for age in ages]
+            if ages is not None and len(ages) == len(ids)
+            else [False] * len(ids)
+        )
+        time = frame.get("time")
+        place = number if time is None or time.shape() != () else int(time.array())
+        for person, body, is_old in zip(ids, people, old, strict=True):
+            if not is_old and body.is_mapping:
+                seen.setdefault(f"{float(person.array()):g}", []).append((place, body))
+    tracks = [Track(person, len(found), _phalp_reader(found)) for person, found in seen.items()]
+    return Layout(Kind("4D-Humans or PHALP", "smpl", CAMERAS), tracks)
+
+
+def _phalp_reader(found: list[tuple[int, Tree]]) -> Callable[[], SmplArrays]:
+    def read() -> SmplArrays:
+        pose, root, betas = (
+            _stack([body[key] for _, body in found]) for key in ("body_pose", "global_orient", "betas")
+        )
+        frames = np.array([place for place, _ in found])
+        form = _needed_form(pose, found[0][1]["body_pose"], (21, 23))
+        return SmplArrays("smpl[body_pose]", pose, form, 0, root, None, betas, frames)
+
+    return read
+
+
+def read_romp(tree: Tree) -> Layout | None:
+    """ROMP and BEV: an .npz file whose `results` is a dictionary of frames, each with arrays that have a row a person;
+    of people that were tracked, `sequence_results` is one of tracks.
+
+    `save_video_results` of https://github.com/Arthur151/ROMP/blob/master/simple_romp/romp/utils.py: `smpl_thetas` (N,
+    72), `smpl_betas`, `cam_trans` (N, 3). A picture's file has the arrays of one frame as its `results`.
+    """
+    results = tree.get("results")
+    if results is None or not results.is_mapping:
+        return None
+    kind = Kind("ROMP or BEV", "smpl", CAMERAS)
+    tracked = tree.get("sequence_results")
+    people = None if tracked is None else people_in(tracked)
+    if tracked is not None and people:
+        return Layout(kind, named_tracks(people))
+    frames = [results] if "smpl_thetas" in results.keys else [frame for _, frame in results.items()]
+    if not frames or not any("smpl_thetas" in frame.keys for frame in frames):
+        return None
+    rows = [_rows(frame, "smpl_thetas") for frame in frames]
+    places = [_places(frame, "cam_trans", count) for frame, count in zip(frames, rows, strict=True)]
+    seen: dict[int, list[tuple[int, Tree, int]]] = {}
+    for number, people in enumerate(link_in(tree.path, places, _METRES)):
+        for row, person in enumerate(people):
+            seen.setdefault(person, []).append((number, frames[number], row))
+    tracks = [Track(str(person), len(found), _romp_reader(found)) for person, found in seen.items()]
+    return Layout(kind, tracks, (LINKED,) if max(rows) > 1 else ())
+
+
+def _romp_reader(found: list[tuple[int, Tree, int]]) -> Callable[[], SmplArrays]:
+    def read() -> SmplArrays:
+        pose, betas, position = (
+            _stack_rows([(frame, row) for _, frame, row in found], key)
+            for key in ("smpl_thetas", "smpl_betas", "cam_trans")
+        )
+        if pose is None:
+            raise UserError(f"{found[0][1].named}: 'smpl_thetas' is missing in some frame, or not always as long")
+        form = _needed_form(pose, found[0][1]["smpl_thetas"], (22, 24))
+        frames = np.array([number for number, _, _ in found])
+        return SmplArrays("smpl_thetas", pose, form, 1, None, position, betas, frames)
+
+    return read
+
+
+def _needed_form(array: np.ndarray | None, node: Tree, counts: tuple[int, ...]) -> Form:
+    form = None if array is None else find_form(array.shape, counts)
+    if form is None:
+        raise UserError(f"{node.named} is {node.described}, and no pose of SMPL's")
+    return form
+
+
+def _rows(node: Tree, key: str) -> int:
+    """How many rows an array of a frame has; none where it is missing."""
+    shape = node[key].shape() if key in node.keys else None
+    return shape[0] if shape is not None and len(shape) == 2 else 0
+
+
+def _places(node: Tree, key: str, people: int) -> np.ndarray:
+    """Where the people of a frame are (N, 3); at one place where it does not tell."""
+    shape = node[key].shape() if key in node.keys else None
+    return node[key].array().astype(np.float64) if shape == (people, 3) else np.zeros((people, 3))
+
+
+def _stack(nodes: list[Tree]) -> np.ndarray:
+    """Small arrays of one shape as one, with a new first axis."""
+    arrays = [node.array() for node in nodes]
+    odd = next((n for n, array in enumerate(arrays) if array.shape != arrays[0].shape or array.size > _SMALL), None)
+    if odd is not None:
+        raise UserError(f"{nodes[odd].named} has shape {arrays[odd].shape}; others have {arrays[0].shape}")
+    return np.stack(arrays)
+
+
+def _stack_rows(places: list[tuple[Tree, int]], key: str) -> np.ndarray | None:
+    """A row of an array of each of some frames; None where some have none, or others."""
+    rows = []
+    for frame, row in places:
+        array = frame.find_array(key)
+        if array is None or array.ndim != 2 or len(array) <= row or array.shape[1] > _SMALL:
+            return None
+        rows.append(array[row])
+    return np.stack(rows) if len({row.shape for row in rows}) == 1 else None
+
+
+def read_frame_list(tree: Tree) -> Layout | None:
+    """A list of frames, each a dictionary with SMPL parameters of one person, perhaps in one deeper, as who calls an
+    estimator on each picture and appends what it answers gets: `global_orient` (1, 3, 3) and `body_pose` (23, 3, 3) of
+    4D-Humans' HMR2, say. What sees nobody is `None` or an empty dictionary.
+    """
+    if not tree.is_list or len(tree) < 2:
+        return None
+    found: list[tuple[int, Tree, Tree]] = []
+    for number, frame in enumerate(tree):
+        if frame.is_list and len(frame) == 1:
+            frame = next(iter(frame))
+        nodes = [frame, *(child for _, child in frame.items() if child.is_mapping)]
+        body = next((node for node in nodes if "body_pose" in node.keys), None)
+        if body is not None:
+            found.append((number, frame, body))
+        elif found and frame.is_mapping and len(frame):
+            return None
+    if len(found) < 2:
+        return None
+    first = found[0][2]["body_pose"]
+    form = find_form((1, *(first.shape() or ())), (21, 23)) or find_form(first.shape() or (), (21, 23))
+    if form is None:
+        raise UserError(f"{first.named} is {first.described}, and no pose of SMPL's")
+
+    def read() -> SmplArrays:
+        def stacked(keys: tuple[str, ...]) -> np.ndarray | None:
+            both = [(body.get(*keys), frame.get(*keys)) for _, frame, body in found]
+            nodes = [inner if inner is not None else outer for inner, outer in both]
+            told = [node for node in nodes if node is not None]
+            return _stack(told) if len(told) == len(nodes) else None
+
+        pose, frames = stacked(("body_pose",)), np.array([number for number, _, _ in found])
+        assert pose is not None
+        root, position = stacked(("global_orient", "root_orient")), stacked(("transl", "trans", "pred_cam_t", "cam_t"))
+        key = f"[][{first.where.rpartition('[')[2]}"
+        return SmplArrays(key, pose, form, 0, root, position, stacked(("betas", "shape")), frames)
+
+    family = "smpl" if form.joints == 23 else "smplx"
+    return Layout(Kind("SMPL parameters, frame by frame", family, CAMERAS), [Track("", len(found), read)])
