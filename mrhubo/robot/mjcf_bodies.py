@@ -21,6 +21,8 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = range(2, 7)
 """mjtGeom; a plane, a field of heights, and what only pictures use have other numbers."""
 _JOINT_EQUALITY = 2
 """mjtEq: one joint's position as a polynomial of another's."""
+_BESIDE = 0.5
+"""Share of the robot's joints that a body beside it carries at least that belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +62,17 @@ class UrdfWriter:
 
     def converted(self) -> Converted:
         """The whole robot."""
-        root = self._root_body()
-        first, count = int(self.model.body_jntadr[root]), int(self.model.body_jntnum[root])
-        if any(self.model.jnt_type[first : first + count] != _FREE):  # its base is the world
-            frames = {root: self._body(root, _Frame(self._link("base")))}
+        root, *beside = self._root_bodies()
+        if beside or any(kind != _FREE for kind in self._joint_kinds(root)):  # its base is the world
+            base = _Frame(self._link("base"))
+            frames = {body: self._body(body, base) for body in (root, *beside)}
         else:
             frames = {root: _Frame(self._link(self._body_name(root)))}
-        self._shapes(root, frames[root])
-        for body in range(root + 1, self.model.nbody):
+        for body, frame in frames.items():
+            self._shapes(body, frame)
+        for body in range(1, self.model.nbody):
             parent = frames.get(int(self.model.body_parentid[body]))
-            if parent is not None:
+            if parent is not None and body not in frames:
                 frames[body] = self._body(body, parent)
                 self._shapes(body, frames[body])
         self._mimics()
@@ -78,8 +81,14 @@ class UrdfWriter:
         text = f'<?xml version="1.0" encoding="utf-8"?>\n{head}{text}'
         return Converted(str(self.robot.get("name")), text, tuple(self.notes))
 
-    def _root_body(self) -> int:
-        """The body on the world that carries most joints: floors, tables and balls carry fewer."""
+    def _joint_kinds(self, body: int) -> np.ndarray:
+        first, count = int(self.model.body_jntadr[body]), int(self.model.body_jntnum[body])
+        return self.model.jnt_type[first : first + count]
+
+    def _root_bodies(self) -> list[int]:
+        """The body on the world that carries most joints: floors, tables and balls carry fewer. Where it does not
+        float, also those beside it that carry at least half as many, as two arms on a table do.
+        """
         model, counts = self.model, {}
         top = {0: 0}
         for body in range(1, model.nbody):
@@ -89,10 +98,13 @@ class UrdfWriter:
         if not counts or max(counts.values()) == 0:
             raise UserError(f"{self.path}: has no joint, so it is no robot")
         root = max(counts, key=lambda body: (counts[body], -body))
-        others = [self._body_name(body) for body in counts if body != root]
+        floats = {body for body in counts if _FREE in self._joint_kinds(body)}
+        least = max(_BESIDE * counts[root], 2)
+        beside = [body for body in counts if counts[body] >= least and not {root, body} & floats and body != root]
+        others = [self._body_name(body) for body in counts if body not in (root, *beside)]
         if others:
             self.notes.append(f"bodies beside the robot are left out: {listed(others)}")
-        return root
+        return [root, *beside]
 
     def _body_name(self, body: int) -> str:
         return self.model.body(body).name or f"body_{body}"
