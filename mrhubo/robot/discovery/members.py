@@ -87,7 +87,7 @@ class Limbs:
                 continue
             why = cut.get(hinge.name) or where.get(hinge.name)
             if why is None:
-                why = "it mimics another joint" if not hinge.free else "on no limb: a wheel, sensor or linkage"
+                why = "it mimics another joint" if not hinge.free else "on no limb: a base, wheel, sensor or linkage"
             yield hinge.name, why
 
     def key_links(self) -> tuple[str, ...]:
