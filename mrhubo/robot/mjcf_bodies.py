@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,8 +50,8 @@ class UrdfWriter:
     each at its joint's anchor, since a URDF's link hangs on one joint, about its own origin.
     """
 
-    def __init__(self, path: Path, model: Any, meshes: dict[str, tuple[str, str]]) -> None:
-        self.path, self.model, self.meshes = path, model, meshes
+    def __init__(self, path: Path, model: Any, meshes: dict[str, tuple[str, str]], weighed: Collection[int]) -> None:
+        self.path, self.model, self.meshes, self.weighed = path, model, meshes, weighed
         name = model.names[: model.names.index(b"\0")].decode(errors="replace")
         self.robot = etree.Element("robot", name=path.stem if name in ("", "MuJoCo Model") else name)
         self.notes: list[str] = []
@@ -69,11 +69,13 @@ class UrdfWriter:
         else:
             frames = {root: _Frame(self._link(self._body_name(root)))}
         for body, frame in frames.items():
+            self._mass(body, frame)
             self._shapes(body, frame)
         for body in range(1, self.model.nbody):
             parent = frames.get(int(self.model.body_parentid[body]))
             if parent is not None and body not in frames:
                 frames[body] = self._body(body, parent)
+                self._mass(body, frames[body])
                 self._shapes(body, frames[body])
         self._mimics()
         text = etree.tostring(self.robot, pretty_print=True, encoding="unicode")
@@ -191,6 +193,16 @@ class UrdfWriter:
             )  # fmt: skip
         if loops:
             self.notes.append(f"constraints that no URDF can tell (loops, curves) are left out: {loops}")
+
+    def _mass(self, body: int, frame: _Frame) -> None:
+        """Mass and its centre, where the model gives them; what MuJoCo works out of shapes hangs on meshes."""
+        if body not in self.weighed:
+            return
+        model, element = self.model, etree.SubElement(self.links[frame.link], "inertial")
+        _origin(element, frame.body_44 @ _pose(model.body_ipos[body], model.body_iquat[body]))
+        etree.SubElement(element, "mass", value=_number(model.body_mass[body]))
+        x, y, z = map(_number, model.body_inertia[body])
+        etree.SubElement(element, "inertia", ixx=x, iyy=y, izz=z, ixy="0", ixz="0", iyz="0")
 
     def _shapes(self, body: int, frame: _Frame) -> None:
         model, link = self.model, self.links[frame.link]

@@ -118,6 +118,25 @@ def test_limits_and_shapes_are_kept(tmp_path: Path) -> None:
     assert looks.origin[:3, 3] == pytest.approx([0, 0, 0.1])
 
 
+def test_masses_are_those_that_the_model_gives(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
+    given = '<inertial pos="0.01 0.2 0.3" quat="0.7 0 0.7 0.1" mass="1.5" diaginertia="0.1 0.2 0.25"/>'
+    text = MODEL.replace('<geom class="looks"', f'{given}<geom class="looks"').replace(
+        '<geom type="cylinder"', f'{given}<geom type="cylinder"'
+    )
+    description, _ = converted(tmp_path, text)
+    assert set(description.masses) == {"pelvis", "fore"}
+    anchor_3 = np.array(
+        mujoco.MjModel.from_xml_string(
+            re.sub("<asset>.*</asset>|<keyframe>.*</keyframe>|<geom class.*?/>", "", text, flags=re.S)
+        )
+        .joint("elbow")
+        .pos
+    )
+    assert description.masses["pelvis"] == pytest.approx((1.5, 0.01, 0.2, 0.3))
+    assert description.masses["fore"] == pytest.approx((1.5, *(np.array([0.01, 0.2, 0.3]) - anchor_3)))
+
+
 def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
     description, _ = converted(

@@ -68,6 +68,8 @@ class Limbs:
         what = f"it belongs to {'an arm' if part == 'arm' else f'the {part}' if part in ('waist', 'neck') else 'a leg'}"
         if not step.hinge.rotary:
             return f"{what}, but slides"
+        if step.hinge.motor is not None:
+            return f"{what}, and is moved by '{step.hinge.motor}'"
         return f"{what}, but {'turns nothing that can be told' if step.hinge.free else 'mimics another joint'}"
 
     def left_out(self, used: set[str]) -> Iterator[tuple[str, str]]:

@@ -85,6 +85,25 @@ def gears(chance: Chance, plan: Plan, places: Places) -> Angles:
     return {}
 
 
+def geared_twists(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Twists, wrists and a neck's first joint that follow motors drawn beside them, on the link before or behind."""
+    roles = ["neck_yaw"]
+    for name in SIDES:
+        roles += [f"{name}_{role}" for role in ("shoulder_twist", "forearm_twist", "wrist_pitch", "hip_yaw")]
+    behind, ratio = chance.maybe(0.5), chance.either(-1.0, -0.9, 1.0)
+    for number, role in enumerate(roles):
+        joint = _joint(plan, role)
+        if joint is None or joint.lower is None or joint.upper is None:
+            continue
+        at_3 = joint.point_3 + 0.02 * places.scale * (X if abs(joint.axis_3[0]) < 0.5 else Y)
+        limits = sorted((joint.lower / ratio, joint.upper / ratio))
+        start = joint.child if behind else joint.parent
+        motor = f"motor_{number}"
+        plan.join(motor, start, at_3, joint.axis_3, (limits[0], limits[1]))
+        plan.change(role, mimics=(motor, ratio))
+    return {}
+
+
 def mimicking_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
     """A right arm that follows the left one, joint by joint."""
     first, second = (f"{name}_" for name in SIDES)

@@ -86,6 +86,7 @@ STRANGE: dict[str, Strange] = {
     "pistons": Strange(build=odd_parts.pistons),
     "elbows of two hinges": Strange(build=odd_parts.two_hinges),
     "elbows behind gears": Strange(build=odd_parts.gears),
+    "twists behind gears": Strange(build=odd_parts.geared_twists),
     "one arm mimics the other": Strange(build=odd_parts.mimicking_arm, mappable=False),
     "a face": Strange(build=odd_parts.face),
     "a tail": Strange(build=odd_parts.tail),
