@@ -18,6 +18,9 @@ from mrhubo.robot.discovery.lines import Line
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import Description
 
+FULL_TURN = 6.2
+"""Range of a joint that is no limit, as about a full turn is none [rad]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hinge:
@@ -55,7 +58,7 @@ class Hinge:
     @property
     def limited(self) -> bool:
         """Whether its limits mean something: less than a full turn."""
-        return self.lower is not None and self.upper is not None and 0 < self.upper - self.lower < 6.2
+        return self.lower is not None and self.upper is not None and 0 < self.upper - self.lower < FULL_TURN
 
 
 @dataclass(frozen=True)

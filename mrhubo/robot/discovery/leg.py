@@ -26,6 +26,8 @@ _TOES = 0.15
 """How far toes reach at most, as a share of the leg along its axes."""
 _OFF = 0.1
 """How far toes' axis is from the ankle's at least, as a share of the shank."""
+_FOURTH = 0.05
+"""How far from hip, knee and ankle an axis lies that bends a leg as well, as a share of the leg."""
 _SQUARE = 0.999
 """Sine over which an axis lies in the plane in which a knee moves the shank: 87 degrees."""
 _MEET = 0.05
@@ -94,6 +96,9 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         return None
     if branches := long_branches(bodies, chain, _TOES):
         ankle = doubted(ankle, branches)
+    if places is not None and (more := _more_hinges(lines, places)):
+        names = " and ".join(f"'{rotary[i].hinge.name}'" for i in more)
+        hip, knee = (doubted(spot, f", though {names} bends the leg as well, some way off") for spot in (hip, knee))
     return Leg(
         _without_toes(rotary, lines, knee_at, ankle_at), hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None
     )
@@ -149,6 +154,18 @@ def _three(lines: list[Line]) -> tuple[int, int, int] | None:
         if min(thighs[i], shank) > best:
             best, found = min(thighs[i], shank), (i, j, k)
     return found
+
+
+def _more_hinges(lines: list[Line], places: tuple[int, int, int]) -> list[int]:
+    """Further axes down to the ankle's that are parallel to the knee's and lie away from hip, knee and ankle: a leg of
+    four parts, as of a bird.
+    """
+    length = sum(lines[i].distance(lines[j].point_3) for i, j in itertools.pairwise(places))
+    return [
+        i for i in range(places[2])
+        if i not in places and _parallel(lines[i], lines[places[1]])
+        and all(lines[i].distance(lines[j].point_3) > _FOURTH * length for j in places)
+    ]  # fmt: skip
 
 
 def _tilt(one: Line, other: Line) -> float:

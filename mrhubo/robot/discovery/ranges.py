@@ -20,6 +20,9 @@ from mrhubo.robot.joint import drive
 _ELBOW, _KNEE = 0.1, 0.35
 """How far an elbow, and a knee, must bend the other way [rad] for their range to be narrowed. A knee stands behind the
 line from hip to ankle on some robots, which then stand on it bent that way."""
+_TIED, _CLEAR = 0.1, 0.3
+"""How much further one way a joint bends than the other, as a share, that tells nothing; and from which on it does, as
+the cosine of where the limb goes."""
 _TURN = math.pi
 _MOST = 14.0
 """Limits wider than that mean none (`robot.limits`)."""
@@ -67,6 +70,9 @@ def find_ranges(
             continue
         if bodies.degrees and hinge.lower is not None and hinge.upper is not None:
             found[hinge.name] = FoundRange(hinge.lower, hinge.upper, "the URDF's limits, which are in degrees")
+        if bodies.description.joints[hinge.name].kind == "continuous" and hinge.limited:
+            why = "the URDF calls it continuous, and gives it these limits all the same"
+            found[hinge.name] = FoundRange(float(hinge.lower or 0.0), float(hinge.upper or 0.0), why)
         if not _limits_meant(hinge.lower, hinge.upper):
             found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
     for bend in _bends(arms, legs, forward_3):
@@ -102,16 +108,20 @@ def _human_range(
     axis_3 = bend.step.sign * hinge.line.axis_3
     straight = straight_angle(axis_3, bend.lower_3, upper_3) / bodies.gains.get(name, 1.0)
     straight = min((straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper))
+    share = bend_side(lower, upper, straight)
+    ahead = float(cross(axis_3, upper_3) @ bend.human_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
+    if bend.what == "knee" and share * ahead < 0 and min(abs(share), abs(ahead)) > _CLEAR:
+        return None, Question(
+            bend.about, f"'{name}' bends further forwards than backwards, as no human knee does: either its limits are "
+            "wrong, or the robot faces the other way, or its leg is no human's", (name,),
+        )  # fmt: skip
     if min(straight - lower, upper - straight) < bend.least:
         return None, None
-    share = bend_side(lower, upper, straight)
     above = share > 0
     question = None
-    if abs(share) < 0.1:
-        moved_3 = cross(axis_3, upper_3)
-        ahead = float(moved_3 @ bend.human_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
+    if abs(share) < _TIED:
         above = ahead > 0
-        if abs(ahead) < 0.3:
+        if abs(ahead) < _CLEAR:
             limb = "arm" if bend.what == "elbow" else "leg"
             question = Question(
                 bend.about,

@@ -9,9 +9,9 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.robot.discovery.bodies import Bodies, Hinge, Step
+from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Hinge, Step
 from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
-from mrhubo.robot.joint import ROTARY, drive
+from mrhubo.robot.joint import ROTARY, Joint, drive
 from mrhubo.robot.limits import in_degrees
 from mrhubo.robot.urdf import Description
 
@@ -96,12 +96,20 @@ def _read(
                 continue
             body_of[joint.child] = max(body_of.values()) + 1
             line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
-            limits = [_radians(end) if degrees and joint.rotary else end for end in (joint.lower, joint.upper)]
+            limits = [_radians(end) if degrees and joint.rotary else end for end in _limits(description, joint)]
             hinges.append(Hinge(
                 name, line, joint.rotary, (body_of[link], body_of[joint.child]), limits[0], limits[1],
                 joint.mimic is None, name in sources, (link, joint.child), (motors or {}).get(name),
             ))  # fmt: skip
     return Bodies(description, pose_44, body_of, tuple(hinges), degrees, gains)
+
+
+def _limits(description: Description, joint: Joint) -> tuple[float | None, float | None]:
+    """Limits of a joint; of a continuous one those that some files give it all the same."""
+    given = description.parsed.joint_map[joint.name].limit if joint.kind == "continuous" else None
+    if given is None or given.lower is None or given.upper is None:
+        return joint.lower, joint.upper
+    return (given.lower, given.upper) if 0.0 < given.upper - given.lower < FULL_TURN else (None, None)
 
 
 def _radians(degrees: float | None) -> float | None:

@@ -130,7 +130,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     arm = arms.chains[0]
     if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
         raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
-    others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
+    taken = {chain[0].hinge for pair in (arms, legs) if pair is not None for chain in pair.chains}
+    others = tuple(pair for pair in pairs if not taken & {chain[0].hinge for chain in pair.chains})
     if legs is None:
         waist = without_base(waist, bodies.size)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)

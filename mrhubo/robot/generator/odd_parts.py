@@ -255,8 +255,9 @@ def askew_hips(chance: Chance, plan: Plan, places: Places) -> Angles:
 
 def free_knees(chance: Chance, plan: Plan, places: Places) -> Angles:
     """Knees that bend as far forwards as backwards."""
-    for joint in [joint for joint in plan.joints if joint.role.endswith("_knee")]:
-        plan.change(joint.role, lower=-2.2, upper=2.2)
+    for name in SIDES:
+        if _joint(plan, f"{name}_knee") is not None:
+            plan.change(f"{name}_knee", lower=-2.2, upper=2.2)
     return {}
 
 
