@@ -60,7 +60,8 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
         raise UserError(f"{path}: MuJoCo refuses the model: {shortened(first_line(error), 300)}") from error
     finally:
         mujoco.set_mju_user_warning(None)
-    return UrdfWriter(path, model, meshes).converted()
+    weighed = {body.id for body in spec.bodies if body.explicitinertial}
+    return UrdfWriter(path, model, meshes, weighed).converted()
 
 
 def _refuse_growing(path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,8 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = range(2, 7)
 """mjtGeom; a plane, a field of heights, and what only pictures use have other numbers."""
 _JOINT_EQUALITY = 2
 """mjtEq: one joint's position as a polynomial of another's."""
+_BESIDE = 0.5
+"""Share of the robot's joints that a body beside it carries at least that belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +50,8 @@ class UrdfWriter:
     each at its joint's anchor, since a URDF's link hangs on one joint, about its own origin.
     """
 
-    def __init__(self, path: Path, model: Any, meshes: dict[str, tuple[str, str]]) -> None:
-        self.path, self.model, self.meshes = path, model, meshes
+    def __init__(self, path: Path, model: Any, meshes: dict[str, tuple[str, str]], weighed: Collection[int]) -> None:
+        self.path, self.model, self.meshes, self.weighed = path, model, meshes, weighed
         name = model.names[: model.names.index(b"\0")].decode(errors="replace")
         self.robot = etree.Element("robot", name=path.stem if name in ("", "MuJoCo Model") else name)
         self.notes: list[str] = []
@@ -60,17 +62,20 @@ class UrdfWriter:
 
     def converted(self) -> Converted:
         """The whole robot."""
-        root = self._root_body()
-        first, count = int(self.model.body_jntadr[root]), int(self.model.body_jntnum[root])
-        if any(self.model.jnt_type[first : first + count] != _FREE):  # its base is the world
-            frames = {root: self._body(root, _Frame(self._link("base")))}
+        root, *beside = self._root_bodies()
+        if beside or any(kind != _FREE for kind in self._joint_kinds(root)):  # its base is the world
+            base = _Frame(self._link("base"))
+            frames = {body: self._body(body, base) for body in (root, *beside)}
         else:
             frames = {root: _Frame(self._link(self._body_name(root)))}
-        self._shapes(root, frames[root])
-        for body in range(root + 1, self.model.nbody):
+        for body, frame in frames.items():
+            self._mass(body, frame)
+            self._shapes(body, frame)
+        for body in range(1, self.model.nbody):
             parent = frames.get(int(self.model.body_parentid[body]))
-            if parent is not None:
+            if parent is not None and body not in frames:
                 frames[body] = self._body(body, parent)
+                self._mass(body, frames[body])
                 self._shapes(body, frames[body])
         self._mimics()
         text = etree.tostring(self.robot, pretty_print=True, encoding="unicode")
@@ -78,8 +83,14 @@ class UrdfWriter:
         text = f'<?xml version="1.0" encoding="utf-8"?>\n{head}{text}'
         return Converted(str(self.robot.get("name")), text, tuple(self.notes))
 
-    def _root_body(self) -> int:
-        """The body on the world that carries most joints: floors, tables and balls carry fewer."""
+    def _joint_kinds(self, body: int) -> np.ndarray:
+        first, count = int(self.model.body_jntadr[body]), int(self.model.body_jntnum[body])
+        return self.model.jnt_type[first : first + count]
+
+    def _root_bodies(self) -> list[int]:
+        """The body on the world that carries most joints: floors, tables and balls carry fewer. Where it does not
+        float, also those beside it that carry at least half as many, as two arms on a table do.
+        """
         model, counts = self.model, {}
         top = {0: 0}
         for body in range(1, model.nbody):
@@ -89,10 +100,13 @@ class UrdfWriter:
         if not counts or max(counts.values()) == 0:
             raise UserError(f"{self.path}: has no joint, so it is no robot")
         root = max(counts, key=lambda body: (counts[body], -body))
-        others = [self._body_name(body) for body in counts if body != root]
+        floats = {body for body in counts if _FREE in self._joint_kinds(body)}
+        least = max(_BESIDE * counts[root], 2)
+        beside = [body for body in counts if counts[body] >= least and not {root, body} & floats and body != root]
+        others = [self._body_name(body) for body in counts if body not in (root, *beside)]
         if others:
             self.notes.append(f"bodies beside the robot are left out: {listed(others)}")
-        return root
+        return [root, *beside]
 
     def _body_name(self, body: int) -> str:
         return self.model.body(body).name or f"body_{body}"
@@ -179,6 +193,16 @@ class UrdfWriter:
             )  # fmt: skip
         if loops:
             self.notes.append(f"constraints that no URDF can tell (loops, curves) are left out: {loops}")
+
+    def _mass(self, body: int, frame: _Frame) -> None:
+        """Mass and its centre, where the model gives them; what MuJoCo works out of shapes hangs on meshes."""
+        if body not in self.weighed:
+            return
+        model, element = self.model, etree.SubElement(self.links[frame.link], "inertial")
+        _origin(element, frame.body_44 @ _pose(model.body_ipos[body], model.body_iquat[body]))
+        etree.SubElement(element, "mass", value=_number(model.body_mass[body]))
+        x, y, z = map(_number, model.body_inertia[body])
+        etree.SubElement(element, "inertia", ixx=x, iyy=y, izz=z, ixy="0", ixz="0", iyz="0")
 
     def _shapes(self, body: int, frame: _Frame) -> None:
         model, link = self.model, self.links[frame.link]

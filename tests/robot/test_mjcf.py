@@ -118,6 +118,25 @@ def test_limits_and_shapes_are_kept(tmp_path: Path) -> None:
     assert looks.origin[:3, 3] == pytest.approx([0, 0, 0.1])
 
 
+def test_masses_are_those_that_the_model_gives(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
+    given = '<inertial pos="0.01 0.2 0.3" quat="0.7 0 0.7 0.1" mass="1.5" diaginertia="0.1 0.2 0.25"/>'
+    text = MODEL.replace('<geom class="looks"', f'{given}<geom class="looks"').replace(
+        '<geom type="cylinder"', f'{given}<geom type="cylinder"'
+    )
+    description, _ = converted(tmp_path, text)
+    assert set(description.masses) == {"pelvis", "fore"}
+    anchor_3 = np.array(
+        mujoco.MjModel.from_xml_string(
+            re.sub("<asset>.*</asset>|<keyframe>.*</keyframe>|<geom class.*?/>", "", text, flags=re.S)
+        )
+        .joint("elbow")
+        .pos
+    )
+    assert description.masses["pelvis"] == pytest.approx((1.5, 0.01, 0.2, 0.3))
+    assert description.masses["fore"] == pytest.approx((1.5, *(np.array([0.01, 0.2, 0.3]) - anchor_3)))
+
+
 def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
     description, _ = converted(
@@ -126,6 +145,35 @@ def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
         + "</mujoco>",
     )
     assert description.root == "base" and description.joints["turn"].child == "pelvis"
+
+
+def test_two_arms_beside_each_other_on_the_world_are_one_robot(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
+    arm = (
+        '<body name="{0}" pos="0 {1} 1" euler="0 0 {1}"><body name="{0}_upper"><joint name="{0}_a" axis="0 1 0"/>'
+        '<geom size="0.1"/><body name="{0}_fore" pos="0.3 0 0"><joint name="{0}_b" axis="0 0 1"/><geom size="0.1"/>'
+        "</body></body></body>"
+    )
+    text = (
+        f"<mujoco><worldbody>{arm.format('l', 0.3)}<body name='drawer'><joint type='slide'/><geom size='1'/></body>"
+        f"{arm.format('r', -0.3)}<body name='cup' pos='1 0 0'><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
+    )
+    description, notes = converted(tmp_path, text)
+    assert set(description.joints) >= {"l_a", "l_b", "r_a", "r_b"} and description.root == "base"
+    assert len(notes) == 1 and notes[0].endswith("left out: cup, drawer")
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    for name in ("l_a", "r_b"):
+        data.joint(name).qpos = 0.4
+    mujoco.mj_kinematics(model, data)
+    poses = link_poses(description.parsed, {"l_a": 0.4, "r_b": 0.4})
+    for body in ("l_fore", "r_fore"):
+        assert np.allclose(poses[body][:3, :3], data.body(body).xmat.reshape(3, 3), atol=1e-7)
+        assert np.allclose(poses[body][:3, 3], data.body(body).xpos, atol=1e-7)
+    floating, _ = converted(tmp_path, text.replace(
+        "<body name=\"r\" pos=\"0 -0.3 1\" euler=\"0 0 -0.3\">", '<body name="r" pos="0 0 1"><freejoint/><geom size="1"/>'
+    ))  # fmt: skip
+    assert not {"l_a", "r_a"} <= set(floating.joints)
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,9 @@ from mrhubo.robot.discovery.lines import Line
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
 from mrhubo.robot.urdf import Description
 
+FULL_TURN = 6.2
+"""Range of a joint that is no limit, as about a full turn is none [rad]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hinge:
@@ -36,6 +39,13 @@ class Hinge:
     """Whether others mimic it."""
     links: tuple[str, str]
     """Parent and child link."""
+    motor: str | None = None
+    """The joint of the motor that it mimics, if that carries nothing and is no part of the tree."""
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is driven by itself, or by a motor of its own."""
+        return self.free or self.motor is not None
 
     def other(self, body: int) -> int:
         """The body on the other side."""
@@ -48,7 +58,7 @@ class Hinge:
     @property
     def limited(self) -> bool:
         """Whether its limits mean something: less than a full turn."""
-        return self.lower is not None and self.upper is not None and 0 < self.upper - self.lower < 6.2
+        return self.lower is not None and self.upper is not None and 0 < self.upper - self.lower < FULL_TURN
 
 
 @dataclass(frozen=True)
@@ -118,9 +128,10 @@ class Bodies:
 
     @cached_property
     def steps_from(self) -> list[list[Step]]:
-        """The joints at each body, passed from there."""
+        """The joints at each body, passed from there, without those of motors beside the ones that they drive."""
         found: list[list[Step]] = [[] for _ in self.links_of]
-        for hinge in self.hinges:
+        motors = {hinge.motor for hinge in self.hinges}
+        for hinge in (hinge for hinge in self.hinges if hinge.name not in motors):
             for body in hinge.bodies:
                 found[body].append(Step(hinge, body))
         return found
@@ -222,6 +233,11 @@ class Bodies:
             ]
             self._extents[key_of(here)] = max([own, *further])
         return self._extents[key_of(step)]
+
+    def span(self, step: Step) -> float:
+        """How far from its joint a branch reaches, by links and shapes [m]."""
+        corners = np.concatenate([self.corners(body) for body in self.beyond(step)[0]])
+        return float(np.linalg.norm(corners - self.position(step.outer_link), axis=-1).max())
 
     def path(self, start: int, end: int) -> Chain:
         """The joints from one body to another."""

@@ -81,7 +81,8 @@ class _Finder:
     def found(self) -> Discovery:
         """The result."""
         limbs, spots = self.limbs, list(self._spots())
-        ranges, asked = find_ranges(self.bodies, self.arms, limbs.moving.values(), self.heading.forward_3)
+        legs = self.legs if limbs.whole_body else {}
+        ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading.forward_3)
         joints = limbs.moved()
         held = dict(limbs.held(joints))
         points = dict(self._points(spots))

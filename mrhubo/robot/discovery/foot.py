@@ -18,6 +18,8 @@ _AHEAD = 0.85
 """Cosine of how far from the robot's front a foot may point (30 degrees)."""
 _STANDING = 0.8
 """Cosine of how far from downwards a leg may run at the zero pose for its foot to stand on a floor there."""
+_SPREAD = 0.2
+"""Sine of how far outwards or inwards it may run there for its foot to be flat (12 degrees)."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,14 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
     link = last.outer_link
     up_3, how, sure = _up(bodies, last.end, heading.up_3)
     doubt = None
-    down = -float(unit(leg.ankle.point_3 - leg.hip.point_3) @ heading.up_3)
+    along_3 = unit(leg.ankle.point_3 - leg.hip.point_3)
+    down, aside = -float(along_3 @ heading.up_3), abs(float(along_3 @ heading.left_3))
     if how is None:
         how, sure = "as it stands at the zero pose", 0.7
-        if down < _STANDING or leg.ankle_at is None:
+        if down < _STANDING or aside > _SPREAD or leg.ankle_at is None:
             sure = 0.4
-            why = "no joint turns it against the shin" if leg.ankle_at is None else "the leg does not stand at zero"
+            why = "the leg is spread at zero" if aside > _SPREAD else "the leg does not stand at zero"
+            why = "no joint turns it against the shin" if leg.ankle_at is None else why
             doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
     forward_3 = heading.forward_3
     if leg.straight and leg.ankle_at is not None:

@@ -29,7 +29,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
     for i in range(first, len(chain)):
         step = chain[i]
         # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
-        if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.free):
+        if all(_driven(on) for on in chain[i:]) and (i >= _SHORT or not step.hinge.alone):
             end = i
         elif i - first >= WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
@@ -79,4 +79,4 @@ def without_gripper(bodies: Bodies, chain: Chain) -> Chain:
 
 
 def _driven(step: Step) -> bool:
-    return not step.hinge.rotary or step.hinge.drives or not step.hinge.free
+    return not step.hinge.rotary or step.hinge.drives or not step.hinge.alone

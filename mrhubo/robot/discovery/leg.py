@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import Spot, doubted, limb_end, long_branches
+from mrhubo.robot.discovery.arm import GUESS, Spot, doubted, limb_end, long_branches
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine
@@ -26,6 +26,12 @@ _TOES = 0.15
 """How far toes reach at most, as a share of the leg along its axes."""
 _OFF = 0.1
 """How far toes' axis is from the ankle's at least, as a share of the shank."""
+_FOURTH = 0.05
+"""How far from hip, knee and ankle an axis lies that bends a leg as well, as a share of the leg."""
+_SQUARE = 0.999
+"""Sine over which an axis lies in the plane in which a knee moves the shank: 87 degrees."""
+_MEET = 0.05
+"""How near axes of a hip pass each other that are meant to cross, as a share of the thigh."""
 _APART = 0.15
 """How far hip, knee and ankle are at least from each other, as a share of the leg."""
 
@@ -60,21 +66,26 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         ankle_at = knee_at + 1 if knee_at + 1 < len(rotary) else None
     else:
         hip_at, knee_at, ankle_at = places
-    across = _across(lines, knee_at, hip_at, ankle_at)
-    aside_3 = across if across is not None else bodies.position(rotary[knee_at].outer_link)
+    ball_3 = _ball(lines[:knee_at], lines[knee_at])
+    aside_3 = _across(lines, knee_at, hip_at, ankle_at, _SQUARE)
+    if aside_3 is None:
+        aside_3 = ball_3 if ball_3 is not None else _across(lines, knee_at, hip_at, ankle_at, _PARALLEL)
+    if aside_3 is None:
+        aside_3 = bodies.position(rotary[knee_at].outer_link)
     knee_3 = lines[knee_at].nearest(aside_3)
     ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at, knee_3)
-    if hip_at is not None:
+    if hip_at is not None and (ball_3 is None or _parallel(lines[hip_at], lines[knee_at])):
         between = lines[hip_at + 1 : knee_at]
         crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > _TILTED
         hip_3 = feet(lines[hip_at], between[-1])[0] if crossing else lines[hip_at].nearest(knee_3)
         cue, sure = f"the axis of '{rotary[hip_at].hinge.name}' above the knee", 0.9
+    elif ball_3 is not None:
+        hip_3, cue, sure = ball_3, "where the axes before the knee cross", 0.8
     else:
-        hip_3 = lines[max(knee_at - 1, 0)].nearest(knee_3)
-        cue, sure = "the last axis before the knee", 0.5
+        hip_3, cue, sure = lines[knee_at - 1].nearest(knee_3), "the point of the last axis before the knee", GUESS
     step = rotary[knee_at]
     links = [step.inner_link]
-    for i in reversed(range(hip_at if hip_at is not None else max(knee_at - 1, 0), knee_at)):
+    for i in reversed(range(hip_at if hip_at is not None else 0, knee_at)):
         if lines[i].distance(hip_3) > ON * bodies.size:
             break
         links.append(rotary[i].outer_link)
@@ -85,9 +96,21 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         return None
     if branches := long_branches(bodies, chain, _TOES):
         ankle = doubted(ankle, branches)
+    if places is not None and (more := _more_hinges(lines, places)):
+        names = " and ".join(f"'{rotary[i].hinge.name}'" for i in more)
+        hip, knee = (doubted(spot, f", though {names} bends the leg as well, some way off") for spot in (hip, knee))
     return Leg(
         _without_toes(rotary, lines, knee_at, ankle_at), hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None
     )
+
+
+def _ball(lines: list[Line], knee: Line) -> np.ndarray | None:
+    """The point (3,) in which all axes before a knee cross, as those of a hip do that is mounted askew."""
+    if len(lines) < 2 or sine(lines[-2].axis_3, lines[-1].axis_3) < _TILTED:
+        return None
+    point_3 = feet(lines[-2], lines[-1])[1]
+    near = _MEET * knee.distance(point_3)
+    return point_3 if all(line.distance(point_3) < near for line in lines) else None
 
 
 def _without_toes(chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None) -> Chain:
@@ -133,22 +156,38 @@ def _three(lines: list[Line]) -> tuple[int, int, int] | None:
     return found
 
 
+def _more_hinges(lines: list[Line], places: tuple[int, int, int]) -> list[int]:
+    """Further axes down to the ankle's that are parallel to the knee's and lie away from hip, knee and ankle: a leg of
+    four parts, as of a bird.
+    """
+    length = sum(lines[i].distance(lines[j].point_3) for i, j in itertools.pairwise(places))
+    return [
+        i for i in range(places[2])
+        if i not in places and _parallel(lines[i], lines[places[1]])
+        and all(lines[i].distance(lines[j].point_3) > _FOURTH * length for j in places)
+    ]  # fmt: skip
+
+
 def _tilt(one: Line, other: Line) -> float:
     return sine(one.axis_3, other.axis_3)
 
 
-def _across(lines: list[Line], knee_at: int, hip_at: int | None, ankle_at: int | None) -> np.ndarray | None:
-    """A point (3,) that tells how far from the middle a leg runs: where an axis that is not lateral meets one that is.
-    None if there is no such axis.
+def _across(
+    lines: list[Line], knee_at: int, hip_at: int | None, ankle_at: int | None, least: float
+) -> np.ndarray | None:
+    """A point (3,) that tells how far from the middle a leg runs: where an axis that lies about in the plane in which
+    the knee moves the shank meets one that is lateral. None if there is none: `least` is the sine of the angle that the
+    two must have.
     """
-    if hip_at is not None:
-        between = [line for line in lines[hip_at + 1 : knee_at] if not _parallel(line, lines[knee_at])]
-        if between:
-            return feet(between[-1], lines[knee_at])[0]
-    if ankle_at is not None:
-        others = [line for line in lines[knee_at + 1 :] if not _parallel(line, lines[ankle_at])]
-        if others:
-            return feet(lines[ankle_at], others[0])[0]
+
+    def upright(between: list[Line], lateral: int) -> list[Line]:
+        return [line for line in between if sine(line.axis_3, lines[lateral].axis_3) > least]
+
+    first = hip_at + 1 if hip_at is not None else 0
+    if above := upright(lines[first:knee_at], knee_at):
+        return feet(above[-1], lines[knee_at])[0]
+    if ankle_at is not None and (others := upright(lines[knee_at + 1 :], ankle_at)):
+        return feet(lines[ankle_at], others[0])[0]
     before = [line for line in lines[: hip_at or 0] if _tilt(line, lines[knee_at]) > 0.9]
     return feet(lines[hip_at], before[-1])[0] if before and hip_at is not None else None
 

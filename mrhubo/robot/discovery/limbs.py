@@ -55,16 +55,10 @@ def _motors(bodies: Bodies, onward: list[Step]) -> dict[Step, Step]:
             motor is not None
             and driven.count(motor.hinge.name) == 1
             and _idle(bodies, on)
-            and _span(bodies, on) > _DOMINANT * _span(bodies, motor)
+            and bodies.span(on) > _DOMINANT * bodies.span(motor)
         ):
             found[motor] = on
     return found
-
-
-def _span(bodies: Bodies, step: Step) -> float:
-    """How far from its joint a branch reaches, by links and shapes [m]."""
-    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(step)[0]])
-    return float(np.linalg.norm(corners - bodies.position(step.outer_link), axis=-1).max())
 
 
 def _drives(bodies: Bodies, rod: Step, other: Step, before: Step) -> bool:
@@ -98,4 +92,4 @@ def _reach(bodies: Bodies, last: Step, on: Step) -> float:
 
 def _idle(bodies: Bodies, step: Step) -> bool:
     """Whether a branch has no rotary joint driven by itself: a linkage, mimicking fingers, a sliding jaw."""
-    return not any(hinge.free and hinge.rotary for hinge in bodies.beyond(step)[1])
+    return not any(hinge.alone and hinge.rotary for hinge in bodies.beyond(step)[1])

@@ -68,6 +68,8 @@ class Limbs:
         what = f"it belongs to {'an arm' if part == 'arm' else f'the {part}' if part in ('waist', 'neck') else 'a leg'}"
         if not step.hinge.rotary:
             return f"{what}, but slides"
+        if step.hinge.motor is not None:
+            return f"{what}, and is moved by '{step.hinge.motor}'"
         return f"{what}, but {'turns nothing that can be told' if step.hinge.free else 'mimics another joint'}"
 
     def left_out(self, used: set[str]) -> Iterator[tuple[str, str]]:
@@ -87,7 +89,7 @@ class Limbs:
                 continue
             why = cut.get(hinge.name) or where.get(hinge.name)
             if why is None:
-                why = "it mimics another joint" if not hinge.free else "on no limb: a wheel, sensor or linkage"
+                why = "it mimics another joint" if not hinge.free else "on no limb: a base, wheel, sensor or linkage"
             yield hinge.name, why
 
     def key_links(self) -> tuple[str, ...]:

@@ -39,7 +39,9 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
         todo, beside = [step], bodies.steps_from[arms.body]
         while todo:
             fitting = [
-                s for s in todo if s.hinge.rotary and s.hinge.free and in_plane(s, arms.normal_3, middle_3, bodies.size)
+                s
+                for s in todo
+                if s.hinge.rotary and s.hinge.alone and in_plane(s, arms.normal_3, middle_3, bodies.size)
             ]
             twins = [s for s in beside if _has_twin(s, beside, arms.normal_3, middle_3, ON * bodies.size)]
             fitting = [s for s in fitting if not _is_sensor(bodies, s) and s not in twins]
@@ -83,8 +85,8 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
 
 
 def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
-    """Whether a joint above a neck's is one of the face, as a jaw's or an eye's: by its name, or as a single one beside
-    pairs, or as one that carries little of the head's weight.
+    """Whether a joint above a neck's is one of the face, as a jaw's or an eye's, or of a linkage: by its name, or as a
+    single one beside pairs, or as one that carries little of the head's weight.
     """
     if _is_face(step):
         return True
@@ -92,7 +94,7 @@ def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
     if paired and len(hinges) == 1:
         return True
     weights = [sum(map(bodies.weight, part)) for part in (inside, {step.start})]
-    return len(hinges) == 1 and 0 < weights[0] < _LIGHT * weights[1]
+    return 0 < weights[0] < _LIGHT * weights[1]
 
 
 def _is_face(step: Step) -> bool:

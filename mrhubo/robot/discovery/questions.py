@@ -10,6 +10,7 @@ from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
 from mrhubo.robot.discovery.ranges import driver
 from mrhubo.robot.discovery.result import Candidate, Question
+from mrhubo.robot.discovery.roles import Roles
 from mrhubo.robot.limits import beyond_turns
 from mrhubo.robot.soles import sole_balls
 
@@ -17,6 +18,9 @@ _SURE = 0.5
 """Confidence under which the user is asked."""
 _BACK = 3
 """Joints of a waist at most, where no legs tell that it is one."""
+
+_LEG = 0.6
+"""Length of a further leg at least, as a share of that of the legs."""
 
 Named = tuple[str, Spot, tuple[Candidate, ...]]
 """A point by its name, and where else it may lie."""
@@ -52,10 +56,22 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
         first = tuple(chain[0].hinge.name for chain in roles.legs.chains)
         yield Question("pelvis", "of the limbs below it no knee could be told, so they are left out: if they are legs, "
                        "write hips, knees, ankles and feet by hand, with their joints", first)  # fmt: skip
+    if roles.legs is not None and (more := _more_legs(roles)):
+        yield Question("pelvis", "it carries more than two limbs that may be legs; those were taken that are like a "
+                       "human's, or longest, and the others stay as they are", more)  # fmt: skip
     turning = tuple(step.hinge.name for step in roles.waist if step.hinge.rotary)
     if roles.legs is None and len(turning) > _BACK:
         yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
                        "which may be a tail or an arm", turning)  # fmt: skip
+
+
+def _more_legs(roles: Roles) -> tuple[str, ...]:
+    """First joints of further pairs of limbs on the body that carries the legs, about as long as these."""
+    legs = roles.legs
+    if legs is None:
+        return ()
+    pairs = [pair for pair in roles.others if pair.body == legs.body and pair.size > _LEG * legs.size]
+    return tuple(chain[0].hinge.name for pair in pairs for chain in pair.chains)
 
 
 def coupled(limbs: Limbs) -> Iterator[Question]:

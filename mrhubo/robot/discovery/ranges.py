@@ -1,35 +1,64 @@
-"""Ranges of joints: where a URDF gives no limits, gives degrees, or lets an elbow bend as no human one does."""
+"""Ranges of joints: where a URDF gives no limits, or degrees, or lets an elbow or a knee bend as no human one does."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
+from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
 from mrhubo.robot.discovery.result import FoundRange, Question
 from mrhubo.robot.joint import drive
 
-_BENDS = 0.1
-"""How far an elbow must bend the other way [rad] for its range to be narrowed."""
+_ELBOW, _KNEE = 0.1, 0.35
+"""How far an elbow, and a knee, must bend the other way [rad] for their range to be narrowed. A knee stands behind the
+line from hip to ankle on some robots, which then stand on it bent that way."""
+_TIED, _CLEAR = 0.1, 0.3
+"""How much further one way a joint bends than the other, as a share, that tells nothing; and from which on it does, as
+the cosine of where the limb goes."""
 _TURN = math.pi
 _MOST = 14.0
 """Limits wider than that mean none (`robot.limits`)."""
 
 
+@dataclass(frozen=True)
+class _Bend:
+    """An elbow or a knee."""
+
+    about: str
+    """What a question is about: `left_elbow`."""
+    step: Step
+    upper_3: np.ndarray
+    """From where the upper limb starts to where it ends, at the zero pose."""
+    lower_3: np.ndarray
+    human_3: np.ndarray
+    """Where a human's lower limb goes as it bends, with the limb hanging."""
+    least: float
+    """How far it must bend the other way."""
+
+    @property
+    def what(self) -> str:
+        """`elbow` or `knee`."""
+        return self.about.rpartition("_")[2]
+
+
 def find_ranges(
-    bodies: Bodies, arms: Mapping[str, Arm], chains: Iterable[Chain], forward_3: np.ndarray
+    bodies: Bodies, arms: Mapping[str, Arm], legs: Mapping[str, Leg], chains: Iterable[Chain], forward_3: np.ndarray
 ) -> tuple[dict[str, FoundRange], list[Question]]:
-    """Ranges by joint where the URDF gives none, or degrees, or lets an elbow bend backwards; and what they leave open.
+    """Ranges by joint where the URDF gives none, or degrees, or lets an elbow or a knee bend backwards; and what they
+    leave open.
 
     Args:
         bodies: the robot.
         arms: by side.
+        legs: by side, if they move.
         chains: what moves, arms among it.
         forward_3: where it faces.
     """
@@ -41,45 +70,67 @@ def find_ranges(
             continue
         if bodies.degrees and hinge.lower is not None and hinge.upper is not None:
             found[hinge.name] = FoundRange(hinge.lower, hinge.upper, "the URDF's limits, which are in degrees")
+        if bodies.description.joints[hinge.name].kind == "continuous" and hinge.limited:
+            why = "the URDF calls it continuous, and gives it these limits all the same"
+            found[hinge.name] = FoundRange(float(hinge.lower or 0.0), float(hinge.upper or 0.0), why)
         if not _limits_meant(hinge.lower, hinge.upper):
             found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
-    for side, arm in arms.items():
-        narrowed, question = _elbow_range(bodies, forward_3, side, arm, found)
+    for bend in _bends(arms, legs, forward_3):
+        narrowed, question = _human_range(bodies, bend, found)
         if narrowed is not None:
-            found[arm.chain[arm.elbow_at].hinge.name] = narrowed
+            found[bend.step.hinge.name] = narrowed
         if question is not None:
             asked.append(question)
     return found, asked
 
 
-def _elbow_range(
-    bodies: Bodies, forward_3: np.ndarray, side: str, arm: Arm, known: Mapping[str, FoundRange]
+def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarray) -> Iterator[_Bend]:
+    for side, arm in arms.items():
+        ends = [spot.point_3 for spot in (arm.shoulder, arm.elbow, arm.wrist)]
+        yield _Bend(
+            f"{side}_elbow", arm.chain[arm.elbow_at], ends[1] - ends[0], ends[2] - ends[1], forward_3, _ELBOW
+        )  # fmt: skip
+    for side, leg in legs.items():
+        ends = [spot.point_3 for spot in (leg.hip, leg.knee, leg.ankle)]
+        yield _Bend(f"{side}_knee", leg.chain[leg.knee_at], ends[1] - ends[0], ends[2] - ends[1], -forward_3, _KNEE)
+
+
+def _human_range(
+    bodies: Bodies, bend: _Bend, known: Mapping[str, FoundRange]
 ) -> tuple[FoundRange | None, Question | None]:
-    """The human side of an elbow that bends both ways."""
-    step = arm.chain[arm.elbow_at]
-    name = step.hinge.name
+    """The human side of an elbow or a knee that bends both ways."""
+    hinge, upper_3 = bend.step.hinge, bend.upper_3
+    name = hinge.name
     if name in known:
         lower, upper = known[name].lower, known[name].upper
     else:
-        lower, upper = float(step.hinge.lower or 0.0), float(step.hinge.upper or 0.0)
-    axis_3 = step.sign * step.hinge.line.axis_3
-    upper_3, fore_3 = arm.elbow.point_3 - arm.shoulder.point_3, arm.wrist.point_3 - arm.elbow.point_3
-    straight = straight_angle(axis_3, fore_3, upper_3) / bodies.gains.get(name, 1.0)
+        lower, upper = float(hinge.lower or 0.0), float(hinge.upper or 0.0)
+    axis_3 = bend.step.sign * hinge.line.axis_3
+    straight = straight_angle(axis_3, bend.lower_3, upper_3) / bodies.gains.get(name, 1.0)
     straight = min((straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper))
-    if min(straight - lower, upper - straight) < _BENDS:
-        return None, None
     share = bend_side(lower, upper, straight)
+    ahead = float(cross(axis_3, upper_3) @ bend.human_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
+    if bend.what == "knee" and share * ahead < 0 and min(abs(share), abs(ahead)) > _CLEAR:
+        return None, Question(
+            bend.about, f"'{name}' bends further forwards than backwards, as no human knee does: either its limits are "
+            "wrong, or the robot faces the other way, or its leg is no human's", (name,),
+        )  # fmt: skip
+    if min(straight - lower, upper - straight) < bend.least:
+        return None, None
     above = share > 0
     question = None
-    if abs(share) < 0.1:
-        moved_3 = cross(axis_3, upper_3)
-        ahead = float(moved_3 @ forward_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
+    if abs(share) < _TIED:
         above = ahead > 0
-        if abs(ahead) < 0.3:
-            text = f"'{name}' bends as far one way as the other, and nothing tells which is a human's; narrow it in "
-            question = Question(f"{side}_elbow", f"{text}robot.ranges if the arm bends backwards", (name,))
+        if abs(ahead) < _CLEAR:
+            limb = "arm" if bend.what == "elbow" else "leg"
+            question = Question(
+                bend.about,
+                f"'{name}' bends as far one way as the other, and nothing tells which is a human's; narrow it in "
+                f"robot.ranges if the {limb} bends backwards",
+                (name,),
+            )
     ends = (straight, upper) if above else (lower, straight)
-    why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human elbow one way; straight is at {straight:.2f}"
+    why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human {bend.what} one way; straight is at {straight:.2f}"
     return FoundRange(float(ends[0]), float(ends[1]), why), question
 
 

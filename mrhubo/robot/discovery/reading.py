@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import collections
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.robot.discovery.bodies import Bodies, Hinge, Step
+from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Hinge, Step
 from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
-from mrhubo.robot.joint import ROTARY, drive
+from mrhubo.robot.joint import ROTARY, Joint, drive
 from mrhubo.robot.limits import in_degrees
 from mrhubo.robot.urdf import Description
 
 _LIMB = 0.1
 """How far a limb reaches beyond the second of two hinges that turn as one, as a share of the robot; no finger does."""
+_MOTOR = 2.5
+"""How many times farther what a motor drives reaches than the motor itself; jaws reach as far as each other."""
 
 
 def read_bodies(description: Description) -> Bodies:
     """The bodies of a robot. Joints whose numbers cannot be used are taken as fixed where they stand, and so is the
-    second of two parallel hinges one after the other that turn as one, as in some elbows.
+    second of two parallel hinges one after the other that turn as one, as in some elbows. A motor that is drawn beside
+    the joint that it drives is no branch.
     """
     bodies = _read(description, {})
+    motors = _find_motors(bodies)
+    bodies = _read(description, {}, motors=motors) if motors else bodies
     turning = {hinge.name: hinge for hinge in bodies.hinges}
     gains: dict[str, float] = {}
     seconds: set[str] = set()
@@ -41,10 +47,33 @@ def read_bodies(description: Description) -> Bodies:
             gains[first.name] = gains.get(first.name, 1.0) + along * mimic.multiplier
             seconds.add(step.hinge.name)
     gains = {name: gain for name, gain in gains.items() if gain > 0.0}
-    return _read(description, gains, seconds) if gains else bodies
+    return _read(description, gains, seconds, motors) if gains else bodies
 
 
-def _read(description: Description, gains: dict[str, float], fixed: Collection[str] = ()) -> Bodies:
+def _find_motors(bodies: Bodies) -> dict[str, str]:
+    """The motors of joints that mimic one: by such a joint, the motor's, which carries nothing, sits on a link beside
+    the joint, and reaches nowhere as far as what it drives.
+    """
+    mimics = {name: joint.mimic.joint for name, joint in bodies.description.joints.items() if joint.mimic is not None}
+    counts = collections.Counter(mimics.values())
+    steps = {hinge.name: Step(hinge, hinge.bodies[0]) for hinge in bodies.hinges if hinge.rotary}
+    found: dict[str, str] = {}
+    for name, source in mimics.items():
+        if name not in steps or source not in steps or counts[source] > 1 or not steps[source].hinge.free:
+            continue
+        follower, motor = steps[name], steps[source]
+        if motor.start in follower.hinge.bodies and len(bodies.beyond(motor)[1]) == 1:
+            further = bodies.beyond(follower)[1] if motor.start == follower.start else ()
+            carries = any(hinge.name not in (name, *mimics.values()) for hinge in further)
+            if carries or bodies.span(follower) > _MOTOR * bodies.span(motor):
+                found[name] = source
+    return found
+
+
+def _read(
+    description: Description, gains: Mapping[str, float], fixed: Collection[str] = (),
+    motors: Mapping[str, str] | None = None,
+) -> Bodies:  # fmt: skip
     below: dict[str, list[str]] = {}
     for joint in description.joints.values():
         below.setdefault(joint.parent, []).append(joint.name)
@@ -67,12 +96,20 @@ def _read(description: Description, gains: dict[str, float], fixed: Collection[s
                 continue
             body_of[joint.child] = max(body_of.values()) + 1
             line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
-            limits = [_radians(end) if degrees and joint.rotary else end for end in (joint.lower, joint.upper)]
+            limits = [_radians(end) if degrees and joint.rotary else end for end in _limits(description, joint)]
             hinges.append(Hinge(
                 name, line, joint.rotary, (body_of[link], body_of[joint.child]), limits[0], limits[1],
-                joint.mimic is None, name in sources, (link, joint.child),
+                joint.mimic is None, name in sources, (link, joint.child), (motors or {}).get(name),
             ))  # fmt: skip
     return Bodies(description, pose_44, body_of, tuple(hinges), degrees, gains)
+
+
+def _limits(description: Description, joint: Joint) -> tuple[float | None, float | None]:
+    """Limits of a joint; of a continuous one those that some files give it all the same."""
+    given = description.parsed.joint_map[joint.name].limit if joint.kind == "continuous" else None
+    if given is None or given.lower is None or given.upper is None:
+        return joint.lower, joint.upper
+    return (given.lower, given.upper) if 0.0 < given.upper - given.lower < FULL_TURN else (None, None)
 
 
 def _radians(degrees: float | None) -> float | None:

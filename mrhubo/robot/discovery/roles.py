@@ -10,6 +10,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import GUESS, read_arm
+from mrhubo.robot.discovery.bases import without_base
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
@@ -129,7 +130,10 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     arm = arms.chains[0]
     if any(len(neck) == len(arm) == alike(measure(lines_of(neck)), measure(lines_of(arm))) for neck in necks):
         raise UserError(f"{path}: has three limbs or more that are alike, as a hand has; a humanoid is needed")
-    others = tuple(pair for pair in pairs if pair is not arms and pair is not legs)
+    taken = {chain[0].hinge for pair in (arms, legs) if pair is not None for chain in pair.chains}
+    others = tuple(pair for pair in pairs if not taken & {chain[0].hinge for chain in pair.chains})
+    if legs is None:
+        waist = without_base(waist, bodies.size)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.robot.generator.limbs import SIDES, Chance
-from mrhubo.robot.generator.plan import Plan, X, Y, Z, mirrored
+from mrhubo.robot.generator.plan import Plan, X, Y, Z, about, mirrored
 
 Angles = dict[str, float]
 
@@ -82,6 +82,25 @@ def gears(chance: Chance, plan: Plan, places: Places) -> Angles:
         at_3 = joint.point_3 + 0.08 * places.scale * Z
         plan.join(f"{name}_motor", joint.parent, at_3, joint.axis_3, (joint.lower, joint.upper))
         plan.change(f"{name}_elbow", mimics=(f"{name}_motor", 1.0))
+    return {}
+
+
+def geared_twists(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Twists, wrists and a neck's first joint that follow motors drawn beside them, on the link before or behind."""
+    roles = ["neck_yaw"]
+    for name in SIDES:
+        roles += [f"{name}_{role}" for role in ("shoulder_twist", "forearm_twist", "wrist_pitch", "hip_yaw")]
+    behind, ratio = chance.maybe(0.5), chance.either(-1.0, -0.9, 1.0)
+    for number, role in enumerate(roles):
+        joint = _joint(plan, role)
+        if joint is None or joint.lower is None or joint.upper is None:
+            continue
+        at_3 = joint.point_3 + 0.02 * places.scale * (X if abs(joint.axis_3[0]) < 0.5 else Y)
+        limits = sorted((joint.lower / ratio, joint.upper / ratio))
+        start = joint.child if behind else joint.parent
+        motor = f"motor_{number}"
+        plan.join(motor, start, at_3, joint.axis_3, (limits[0], limits[1]))
+        plan.change(role, mimics=(motor, ratio))
     return {}
 
 
@@ -217,6 +236,48 @@ def one_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
     while more := {joint.child for joint in plan.joints if joint.parent in gone} - gone:
         gone |= more
     plan.remove(gone)
+    return {}
+
+
+def askew_hips(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Hips whose axes cross in one point, and are turned so that none of them need be parallel to the knee's."""
+    axis_3 = np.array([chance.between(-1.0, 1.0), chance.between(-1.0, 1.0), chance.between(-1.0, 1.0)])
+    turn_33 = about(np.zeros(3), axis_3, chance.between(0.3, 1.2))[:3, :3]
+    angles: Angles = {}
+    for name, side in SIDES.items():
+        flip_33 = np.diag([1.0, side, 1.0])
+        for joint in [joint for joint in plan.joints if joint.role.startswith(f"{name}_hip_")]:
+            at_3 = plan.points[f"{name}_hip"][1]
+            plan.change(joint.role, point_3=at_3, axis_3=flip_33 @ turn_33 @ flip_33 @ joint.axis_3)
+        angles |= {f"{name}_{role}": 0.0 for role in ("hip_pitch", "knee", "ankle_pitch")}
+    return angles
+
+
+def free_knees(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Knees that bend as far forwards as backwards."""
+    for name in SIDES:
+        if _joint(plan, f"{name}_knee") is not None:
+            plan.change(f"{name}_knee", lower=-2.2, upper=2.2)
+    return {}
+
+
+def floating_base(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Three joints that slide and three that turn, by which the pelvis floats in the world."""
+    body, at_3 = places.pelvis, _at(plan, places.pelvis)
+    for word, axis_3 in zip("zyx", (Z, Y, X), strict=True):
+        body = plan.join(f"floating_turn_{word}", body, at_3, axis_3, (-3.2, 3.2))
+    for word, axis_3 in zip("zyx", (Z, Y, X), strict=True):
+        body = plan.join(f"floating_{word}", body, at_3, axis_3, (-5.0, 5.0), "prismatic")
+    return {}
+
+
+def planar_base(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Two joints that slide and one that turns, by which the pelvis moves over the ground."""
+    body, at_3 = places.pelvis, _at(plan, places.pelvis) * np.array([1.0, 1.0, 0.0])
+    kinds = [("turn", Z, "revolute"), ("y", Y, "prismatic"), ("x", X, "prismatic")]
+    for word, axis_3, kind in kinds if chance.maybe(0.7) else kinds[1:] + kinds[:1]:
+        limits = None if kind == "revolute" else (-5.0, 5.0)
+        body = plan.join(f"floating_{word}", body, at_3, axis_3, limits, kind)
     return {}
 
 

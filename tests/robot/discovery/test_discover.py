@@ -132,9 +132,17 @@ def test_an_elbow_that_bends_both_ways_is_narrowed(pair, tmp_path: Path) -> None
 
 
 def test_joints_without_limits_get_a_range(pair) -> None:
-    config = pair(('<joint name="l_yaw" type="revolute">', '<joint name="l_yaw" type="continuous">'))
-    found = discover(config.urdf)
-    assert (found.ranges["l_yaw"].lower, found.ranges["l_yaw"].upper) == pytest.approx((-math.pi, math.pi))
+    yaw = '<joint name="l_yaw" type="revolute">'
+    free = yaw.replace("revolute", "continuous")
+    whole = discover(pair((yaw, f'{free}<limit effort="1" velocity="1"/>')).urdf).ranges["l_yaw"]
+    assert (whole.lower, whole.upper) == pytest.approx((-math.pi, math.pi))
+    # A URDF that calls a joint continuous and gives it limits means these.
+    given = discover(pair((yaw, free)).urdf).ranges["l_yaw"]
+    assert (given.lower, given.upper) == (-1.5, 1.5) and "continuous" in given.why
+    wide = discover(pair((yaw, f'{free}<limit lower="-3.14" upper="3.14" effort="1" velocity="1"/>')).urdf).ranges[
+        "l_yaw"
+    ]
+    assert (wide.lower, wide.upper) == pytest.approx((-math.pi, math.pi))
 
 
 def test_a_joint_behind_a_gear_is_moved_by_what_drives_it(pair) -> None:

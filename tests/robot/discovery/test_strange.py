@@ -13,6 +13,7 @@ from mrhubo.robot.discovery import Discovery, discover
 from mrhubo.robot.generator import Humanoid, humanoid
 from mrhubo.robot.generator.score import asked, mistakes
 from mrhubo.robot.generator.strange import STRANGE
+from mrhubo.robot.urdf import describe
 
 SEEDS = (1, 4)
 """Of each kind; one stands on legs with fingers, one on a pedestal."""
@@ -70,6 +71,31 @@ def _bent(truth: Humanoid) -> tuple[float, float]:
     ends = [truth.points[f"left_{name}"] for name in ("shoulder", "elbow", "wrist")]
     upper_3, fore_3 = ends[1] - ends[0], ends[2] - ends[1]
     return float(np.linalg.norm(np.cross(upper_3, fore_3))), float(upper_3 @ fore_3)
+
+
+def test_knees_that_bend_both_ways_bend_as_a_humans(tmp_path: Path) -> None:
+    for seed in (1, 2):
+        truth, path = made(seed, "knees both ways", tmp_path)
+        found = discover(path, whole_body=True)
+        path.write_text(humanoid(seed).urdf)
+        usual = describe(path).joints
+        knees = [joint for joint, limits in found.ranges.items() if "human knee" in limits.why]
+        assert len(knees) == 2 and set(knees) <= {*truth.chains["left_leg"], *truth.chains["right_leg"]}
+        for knee in knees:
+            assert (
+                usual[knee].lower - 0.2 < found.ranges[knee].lower < found.ranges[knee].upper < usual[knee].upper + 0.2
+            )
+        assert not set(knees) & set(discover(path).ranges)  # of arms alone, a leg's range is no matter
+
+
+def test_a_base_that_drives_or_floats_is_no_waist(tmp_path: Path) -> None:
+    for kind, joints in (("planar base of three joints", 3), ("floating base of six joints", 6)):
+        truth, path = made(4, kind, tmp_path)
+        found = discover(path, whole_body=True)
+        assert truth.told & {"base: wheels", "base: pedestal"}
+        left_out = [why for why in found.left_out.values() if "a base" in why]
+        assert set(found.chains["waist"]) >= set(truth.chains["waist"]) and len(left_out) >= joints
+        assert not [joint for joint in found.joints if joint in found.left_out]
 
 
 def test_limits_in_degrees_are_told_and_made_radians(tmp_path: Path) -> None:
