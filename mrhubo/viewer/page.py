@@ -56,6 +56,18 @@ def save_page(stage: Stage, path: Path, title: str) -> Path:
     Raises:
         UserError: viser is not installed, or the disk refuses.
     """
+    text = page_text(stage, title)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
+def page_text(stage: Stage, title: str) -> str:
+    """The page itself, HTML; arguments as for `save_page`.
+
+    Raises:
+        UserError: viser is not installed.
+    """
     with local_server() as server:
         scene = Scene(server, stage)
         recording = server.get_scene_serializer()
@@ -65,10 +77,7 @@ def save_page(stage: Stage, path: Path, title: str) -> Path:
         page = recording.as_html()
     page = page.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>")
     body_end = page.rindex("</body>")
-    text = page[:body_end] + _panels(stage, title) + page[body_end:]
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path
+    return page[:body_end] + _panels(stage, title) + page[body_end:]
 
 
 def _panels(stage: Stage, title: str) -> str:
