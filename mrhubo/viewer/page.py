@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.files.atomic import atomic_path
-from mrhubo.viewer.controls import about
+from mrhubo.viewer.controls import CONTACTS, about
 from mrhubo.viewer.panels import (
     AT_END,
     AT_LIMIT,
@@ -23,6 +23,7 @@ from mrhubo.viewer.panels import (
     LEFT,
     RIGHT,
     confidence_strip,
+    contact_strips,
     joint_bars,
     joint_curve,
     range_of,
@@ -101,6 +102,8 @@ def _section(robot: Performance) -> str:
     parts = [f'<section><p>{html.escape(about(robot))}</p><p class="time"></p>']
     if motion.confidence is not None:
         parts.append(f"<p>confidence (red: not to be trusted)</p>{confidence_strip(motion.confidence)}")
+    if motion.contact is not None and motion.contact_names:
+        parts.append(f"<p>{CONTACTS}</p>{contact_strips(motion.contact, motion.contact_names)}")
     names = "".join(f'<option value="{n}">{html.escape(name)}</option>' for n, name in enumerate(motion.joint_names))
     parts.append(f'<select class="joint">{names}</select>')
     for column in range(len(motion.joint_names)):
