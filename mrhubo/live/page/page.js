@@ -48,7 +48,7 @@ function show(message) {
 const live = new Live({
   joints: show,
   open: () => tell("connected", "Nothing has come yet."),
-  closed: (reason) => { release(false); tell("closed", `Not connected: ${reason}.`); },
+  closed: (reason) => { release(); tell("closed", `Not connected: ${reason}.`); },
 });
 release = deadman(live, at("hold"));
-new Camera(at("stage"), live, () => release(false));
+new Camera(at("stage"), live, () => release());
