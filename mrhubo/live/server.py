@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import socket
 import threading
@@ -24,7 +25,7 @@ from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
-from mrhubo.live.visitors import SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
+from mrhubo.live.visitors import ROBOT_PATH, SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -66,6 +67,8 @@ class Server:
         self.endpoint, self.token = endpoint, find_token(endpoint.host)
         self._page, self.certificate = page, certificate
         self._waiting: deque[tuple[str, bytes | str | None]] = deque(maxlen=_MOST_MESSAGES)
+        self.figure: bytes | None = None
+        """How the robot looks (`mrhubo.live.figure`), JSON."""
         self._lost = 0
         self._faults: deque[str] = deque(maxlen=1_000)
         self._thread: threading.Thread | None = None
@@ -169,6 +172,8 @@ class Server:
             return _response(403, b"refused\n", "text/plain")
         if urlsplit(request.path).path == SOCKET_PATH:
             return None if len(self._clients) < _MOST_CLIENTS else _response(503, b"too many\n", "text/plain")
+        if urlsplit(request.path).path == ROBOT_PATH and self.figure is not None:
+            return _response(200, self.figure, "application/json")
         found = find_file(self._page, request.path) or find_model(request.path)
         if found is None:
             return _response(404, b"no such file\n", "text/plain")
@@ -255,6 +260,9 @@ class PageSink:
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Listens."""
         self._every = max(1, round(config.rate / _SHOWN_RATE))
+        if robot.figure is not None:
+            with contextlib.suppress(UserError):  # a robot that cannot be drawn can be moved all the same
+                self.server.figure = json.dumps(robot.figure(), separators=(",", ":")).encode()
         self.server.open()
 
     def send(self, output: Output) -> None:

@@ -18,6 +18,7 @@ from mrhubo.live.endpoints import Endpoint, token_fits
 from mrhubo.video.models import FILES, models_folder
 
 SOCKET_PATH = "/live"
+ROBOT_PATH = "/robot.json"
 POSE_PATH = "/pose/"
 _TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm", ".html": "text/html",
           ".css": "text/css", ".json": "application/json", ".tflite": "application/octet-stream"}  # fmt: skip
@@ -56,7 +57,7 @@ class Visitors:
             return "host"
         if origin is not None and origin not in self._origins(host):
             return "origin"
-        if urlsplit(path).path != SOCKET_PATH:
+        if urlsplit(path).path not in (SOCKET_PATH, ROBOT_PATH):
             return None
         told = parse_qs(urlsplit(path).query).get("token", [given])
         return None if token_fits(self.token, told[0]) else "token"

@@ -17,11 +17,8 @@ export class Live {
   }
 
   connect() {
-    const url = new URL("live", location.href);
+    const url = withToken("live"), token = url.searchParams.get("token");
     url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
-    url.hash = "";
-    const token = new URLSearchParams(location.hash.slice(1)).get("token");
-    if (token) url.searchParams.set("token", token);
     this.socket = new WebSocket(url);
     this.socket.onopen = () => this.on.open?.();
     this.socket.onmessage = (event) => {
@@ -63,6 +60,14 @@ export class Live {
       visibility: points.map(({ visibility }) => visibility ?? 1),
     }, time);
   }
+}
+
+// An address of the server, with the token that the page's own address has behind its mark.
+export function withToken(path) {
+  const url = new URL(path, location.href), token = new URLSearchParams(location.hash.slice(1)).get("token");
+  url.hash = "";
+  if (token) url.searchParams.set("token", token);
+  return url;
 }
 
 function isLoopback() {
