@@ -114,8 +114,9 @@ def test_the_run_holds_everything(fitted: tuple[Path, str]) -> None:
         "config.yaml", "pairs/phi_histogram.png", "pairs/feasible_and_extreme.png", "test/clips.json",
         "test/key_poses_wave.png", "package/retargeter.safetensors", "package/robot.urdf", "checkpoint/best.ckpt",
     }  # fmt: skip
-    (animation,) = [name for name in names if name.endswith(".gif")]
-    assert animation.startswith("test/") and (artifacts / animation).stat().st_size < 1_500_000
+    (page,) = [name for name in names if name.endswith(".html")]
+    assert page.startswith("test/") and 500_000 < (artifacts / page).stat().st_size < 5_000_000
+    assert not any(name.endswith(".gif") for name in names), "the page is there in place of the GIF"
 
 
 def test_a_model_version_leads_back_to_run_pairs_prior_urdf_and_motions(

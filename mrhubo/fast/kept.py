@@ -21,6 +21,7 @@ import xxhash
 
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
+from mrhubo.files.cache import user_cache
 
 _SOURCES = ("compiled", "plain")
 
@@ -58,5 +59,4 @@ def note_kept(folders: Iterable[str], universal: bool = False) -> None:
 
 def _note(universal: bool) -> Path:
     told = (universal, checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
-    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(cache) / "mrhubo" / f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"
+    return user_cache() / f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"

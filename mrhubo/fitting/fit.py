@@ -101,7 +101,7 @@ def _run_steps(
         retargeter.confidence = calibrate(retargeter)
         measured = measure(training.prepared, report, retargeter, test)
         log_measures(recording, measured, training.best_link_cm)
-        log_answers(recording, test, measured.predictions)
+        log_answers(recording, report, test, measured.predictions)
         robot = training.prepared.body_map.robot
         remedy = f"a lower trainer.lr than {prepared.config.trainer.lr:g} helps"
         refuse_useless(test, measured.predictions, robot, remedy)

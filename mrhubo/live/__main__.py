@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from mrhubo.config import CommandParser, parse_arguments, run_command
 from mrhubo.config.arguments import number
 from mrhubo.config.live import LiveConfig
+from mrhubo.errors import UserError
 
 DESCRIPTION = (
     "A robot's arms, hands and head follow a person who is seen now: frames come in, joint angles go out at a fixed"
@@ -32,6 +35,12 @@ def build_parser() -> CommandParser[LiveConfig]:
         " printed, or that of the environment variable MRHUBO_LIVE_TOKEN"
     )
     parser.add_argument("--host", metavar="HOST", default="127.0.0.1", help=host)
+    https = (
+        "the page by https, which browsers want before they give a camera to a page of another machine, as to a phone's"
+    )
+    parser.add_argument("--https", action="store_true", help=https)
+    own = "with --https: your own certificate, a PEM file of it and its key; default: one that is made for this machine"
+    parser.add_argument("--certificate", metavar="FILE", help=own)
     parser.add_argument("--seconds", metavar="SECONDS", type=number(0), help="end after so long; default: never")
     form = "compiled (default where numba is installed; the first start ever takes a minute) or numpy"
     parser.add_argument("--form", choices=("compiled", "numpy"), help=form)
@@ -47,11 +56,20 @@ def main(argv: list[str]) -> int:
     from mrhubo.live.loop import Session, run_session
     from mrhubo.live.plan import Plan
 
-    plan = Plan(options.host)
+    certificate = None
+    if options.certificate is not None and not options.https:
+        raise UserError("--certificate goes with --https")
+    if options.https:
+        from mrhubo.live.certificate import open_certificate
+
+        certificate = open_certificate(options.certificate and Path(options.certificate), options.host)
+    plan = Plan(options.host, certificate)
     for text in options.source:
         plan.add_source(text)
     for text in options.sink:
         plan.add_sink(text)
+    if certificate is not None and not plan.has_page:
+        raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
     if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
         print("compiling, which takes a minute, once for all sessions", flush=True)
     make = LiveRobot.of_robot if options.retargeter is None else LiveRobot.of_package

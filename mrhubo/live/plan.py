@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mrhubo.errors import UserError, shortened, unknown_name
+from mrhubo.live.certificate import ServerCertificate
 from mrhubo.live.endpoints import LOOPBACK, Endpoint
 from mrhubo.live.loop import Sink, Source
 from mrhubo.live.server import PORT, PageSink, PageSource, Server
@@ -18,16 +19,24 @@ Part = TypeVar("Part")
 class Plan:
     """The sources and sinks of one session, which share one server where both are on one port."""
 
-    def __init__(self, host: str = LOOPBACK) -> None:
-        """`host`: where to listen."""
-        self._host = host
+    def __init__(self, host: str = LOOPBACK, certificate: ServerCertificate | None = None) -> None:
+        """`host`: where to listen; `certificate`: pages are served by https."""
+        self._host, self._certificate = host, certificate
         self._servers: dict[int, Server] = {}
         self.sources: list[Source] = []
         self.sinks: list[Sink] = []
 
+    @property
+    def has_page(self) -> bool:
+        """Whether anything is served to browsers."""
+        return bool(self._servers)
+
     def told(self) -> list[str]:
         """Where it listens once all is open, a sentence each."""
         said = [f"page: {server.url}" for server in self._servers.values()]
+        if self._servers and self._certificate is not None:
+            made = "made for this machine, so that browsers warn of it" if self._certificate.ours else "your own"
+            said.append(f"certificate: {made}; SHA-256 {self._certificate.fingerprint}")
         for source in self.sources:
             endpoint = getattr(source, "endpoint", None)
             if isinstance(endpoint, Endpoint):
@@ -72,7 +81,7 @@ class Plan:
 
     def _server(self, where: str, text: str) -> Server:
         endpoint = Endpoint.read(where, text, PORT, self._host)
-        return self._servers.setdefault(endpoint.port, Server(endpoint))
+        return self._servers.setdefault(endpoint.port, Server(endpoint, certificate=self._certificate))
 
     def _udp_source(self, where: str) -> Source:
         from mrhubo.live.sources.udp import UdpSource

@@ -6,8 +6,9 @@ Legend: N joints, X branches (an arm, the head), J = 21 human joints.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,8 @@ class LiveRobot:
     """To a pose (21, 3, 3), or to nobody, at a time [s]."""
     urdf: Path | None = None
     """Its model, where it is known; a package does not tell."""
+    figure: Callable[[], dict[str, Any]] | None = None
+    """How it looks on the page (`mrhubo.live.figure`); None: nobody knows."""
 
     @classmethod
     def of_package(cls, source: str, config: LiveConfig, form: str | None = None) -> LiveRobot:
@@ -57,7 +60,16 @@ class LiveRobot:
         """
         import mrhubo
 
-        return cls.of_retargeter(mrhubo.load_fast(mrhubo.package_folder(source), form), config)
+        folder = mrhubo.package_folder(source)
+        found = cls.of_retargeter(mrhubo.load_fast(folder, form), config)
+
+        def figure() -> dict[str, Any]:
+            from mrhubo.live.figure import figure_of
+            from mrhubo.retargeter import read_package_robot
+
+            return figure_of(read_package_robot(folder), found.joint_names)
+
+        return replace(found, figure=figure)
 
     @classmethod
     def of_robot(cls, name: str, config: LiveConfig, form: str | None = None) -> LiveRobot:
@@ -77,7 +89,14 @@ class LiveRobot:
             )
         retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
-        return cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
+        found = cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
+
+        def figure() -> dict[str, Any]:
+            from mrhubo.live.figure import figure_of
+
+            return figure_of(robot, found.joint_names)
+
+        return replace(found, figure=figure)
 
     @classmethod
     def of_retargeter(cls, retargeter: FastRetargeter, config: LiveConfig, urdf: Path | None = None) -> LiveRobot:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import socket
-import ssl
 import threading
 from collections import deque
 from pathlib import Path
@@ -20,12 +20,13 @@ from urllib.parse import urlsplit
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
+from mrhubo.live.certificate import ServerCertificate
 from mrhubo.live.endpoints import Endpoint, find_token
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
-from mrhubo.live.visitors import SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
+from mrhubo.live.visitors import ROBOT_PATH, SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -49,13 +50,13 @@ _LOGGER.setLevel(logging.CRITICAL)  # what strangers send is counted, and not to
 class Server:
     """Serves a folder of files, takes messages, and tells outputs."""
 
-    def __init__(self, endpoint: Endpoint, page: Path = PAGE, certificate: ssl.SSLContext | None = None) -> None:
+    def __init__(self, endpoint: Endpoint, page: Path = PAGE, certificate: ServerCertificate | None = None) -> None:
         """Where to listen.
 
         Args:
             endpoint: with port 0 any free port.
             page: the folder.
-            certificate: for https.
+            certificate: for https; None: http.
 
         Raises:
             UserError: websockets is not installed, or the environment's token is too short.
@@ -64,8 +65,10 @@ class Server:
             "websockets.asyncio.server", "the page and WebSockets need websockets: pip install 'mrhubo[live]'"
         )
         self.endpoint, self.token = endpoint, find_token(endpoint.host)
-        self._page, self._certificate = page, certificate
+        self._page, self.certificate = page, certificate
         self._waiting: deque[tuple[str, bytes | str | None]] = deque(maxlen=_MOST_MESSAGES)
+        self.figure: bytes | None = None
+        """How the robot looks (`mrhubo.live.figure`), JSON."""
         self._lost = 0
         self._faults: deque[str] = deque(maxlen=1_000)
         self._thread: threading.Thread | None = None
@@ -78,7 +81,7 @@ class Server:
     @property
     def url(self) -> str:
         """Of the page; beyond loopback it holds the token, behind a mark that browsers do not send."""
-        scheme = "http" if self._certificate is None else "https"
+        scheme = "http" if self.certificate is None else "https"
         endpoint = self.endpoint
         if endpoint.host in ("0.0.0.0", "::"):  # everywhere: no address that a browser could open
             endpoint = Endpoint(socket.gethostname(), endpoint.port)
@@ -132,11 +135,14 @@ class Server:
         from websockets.asyncio.server import serve
 
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        secure = {} if self.certificate is None else {
+            "ssl": self.certificate.context, "ssl_handshake_timeout": 5, "ssl_shutdown_timeout": 1
+        }  # fmt: skip
         try:
             async with serve(
-                self._meet, self.endpoint.host, self.endpoint.port, process_request=self._answer, ssl=self._certificate,
+                self._meet, self.endpoint.host, self.endpoint.port, process_request=self._answer,
                 max_size=MAX_BYTES, max_queue=4, compression=None, open_timeout=5, ping_interval=2, ping_timeout=4,
-                close_timeout=1, server_header=None, write_limit=2**15, logger=_LOGGER,
+                close_timeout=1, server_header=None, write_limit=2**15, logger=_LOGGER, **secure,
             ) as server:  # fmt: skip
                 port = next(iter(server.sockets)).getsockname()[1]
                 self.endpoint = Endpoint(self.endpoint.host, port)
@@ -156,7 +162,7 @@ class Server:
         headers = request.headers
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         given = (headers.get("Authorization") if len(headers.get_all("Authorization")) == 1 else "") or ""
-        visitors = Visitors(self.endpoint, self.token)
+        visitors = Visitors(self.endpoint, self.token, self.certificate is not None)
         alone = len(hosts) == 1 and len(origins) <= 1
         origin = origins[0] if origins else None
         bearer = given.removeprefix("Bearer ") or None
@@ -166,6 +172,8 @@ class Server:
             return _response(403, b"refused\n", "text/plain")
         if urlsplit(request.path).path == SOCKET_PATH:
             return None if len(self._clients) < _MOST_CLIENTS else _response(503, b"too many\n", "text/plain")
+        if urlsplit(request.path).path == ROBOT_PATH and self.figure is not None:
+            return _response(200, self.figure, "application/json")
         found = find_file(self._page, request.path) or find_model(request.path)
         if found is None:
             return _response(404, b"no such file\n", "text/plain")
@@ -252,6 +260,9 @@ class PageSink:
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Listens."""
         self._every = max(1, round(config.rate / _SHOWN_RATE))
+        if robot.figure is not None:
+            with contextlib.suppress(UserError):  # a robot that cannot be drawn can be moved all the same
+                self.server.figure = json.dumps(robot.figure(), separators=(",", ":")).encode()
         self.server.open()
 
     def send(self, output: Output) -> None:

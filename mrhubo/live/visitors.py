@@ -18,6 +18,7 @@ from mrhubo.live.endpoints import Endpoint, token_fits
 from mrhubo.video.models import FILES, models_folder
 
 SOCKET_PATH = "/live"
+ROBOT_PATH = "/robot.json"
 POSE_PATH = "/pose/"
 _TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm", ".html": "text/html",
           ".css": "text/css", ".json": "application/json", ".tflite": "application/octet-stream"}  # fmt: skip
@@ -40,6 +41,8 @@ class Visitors:
 
     endpoint: Endpoint
     token: str | None
+    encrypted: bool = False
+    """Whether the endpoint itself is one of https; if not, a proxy before it may be."""
 
     def fault(self, path: str, host: str | None, origin: str | None, given: str | None = None) -> str | None:
         """The kind of fault for which a request is refused; None: it is answered.
@@ -52,12 +55,16 @@ class Visitors:
         """
         if host is None or not self._is_ours(host):
             return "host"
-        if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
+        if origin is not None and origin not in self._origins(host):
             return "origin"
-        if urlsplit(path).path != SOCKET_PATH:
+        if urlsplit(path).path not in (SOCKET_PATH, ROBOT_PATH):
             return None
         told = parse_qs(urlsplit(path).query).get("token", [given])
         return None if token_fits(self.token, told[0]) else "token"
+
+    def _origins(self, host: str) -> tuple[str, ...]:
+        """What our own page's origin may be."""
+        return (f"https://{host}",) if self.encrypted else (f"http://{host}", f"https://{host}")
 
     def _is_ours(self, host: str) -> bool:
         """Whether a Host names this machine by an address or a name of its own, and not by a stranger's."""

@@ -23,6 +23,7 @@ from mrhubo.robot.standing import StandingRobot
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
+    from mrhubo.robot.keypoints import Keypoints
     from mrhubo.robot.urdf import Description
 
 _RIM = 8
@@ -52,8 +53,12 @@ class Sole:
 
 def find_soles(body_map: BodyMap) -> tuple[Sole, ...]:
     """The soles of the parts that stand on the floor, in the table's order."""
-    ends, description = body_map.keypoints.ends, body_map.robot.description
-    return tuple(_sole(part, ends[part.name], description) for part in body_map.keypoints.standing)
+    return soles_of(body_map.keypoints, body_map.robot.description)
+
+
+def soles_of(keypoints: Keypoints, description: Description) -> tuple[Sole, ...]:
+    """As `find_soles`, of a robot's keypoints and its description."""
+    return tuple(_sole(part, keypoints.ends[part.name], description) for part in keypoints.standing)
 
 
 def _sole(part: OrientedPart, end: End, description: Description) -> Sole:

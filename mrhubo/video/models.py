@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from mrhubo.errors import UserError, listed
+from mrhubo.files.cache import user_cache
 from mrhubo.files.regular import read_regular
 from mrhubo.video.registry import download, registry_url
 
@@ -52,8 +53,7 @@ def models_folder() -> Path:
     """Where the models are kept: the folder that the environment names, else one in the user's cache."""
     if named := os.environ.get(FOLDER_VARIABLE):
         return Path(named).expanduser()
-    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(cache) / "mrhubo" / "pose" / VERSION
+    return user_cache() / "pose" / VERSION
 
 
 def find_models() -> Path:

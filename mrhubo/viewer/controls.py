@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mrhubo.viewer.panels import confidence_strip, joint_bars, joint_curve
+from mrhubo.viewer.panels import confidence_strip, contact_strips, joint_bars, joint_curve
 from mrhubo.viewer.performance import Performance
 from mrhubo.viewer.player import SPEEDS, Player
 from mrhubo.viewer.scene import Scene
@@ -21,6 +21,8 @@ _PANEL_S = 0.1
 
 _STEP_S = 0.01
 """Of the timeline [s]."""
+CONTACTS = "contacts (orange: the foot is planted)"
+"""What stands above the strips of a robot's feet."""
 
 
 class Controls:
@@ -83,6 +85,11 @@ class Controls:
             gui.add_html(_note("confidence (red: not to be trusted)"))
             strip = gui.add_html(confidence_strip(confidence_T))
             self.panels.append(lambda time: _draw(strip, confidence_strip(confidence_T, self._share(robot, time))))
+        if motion.contact is not None and motion.contact_names:
+            contact_TF, names = motion.contact, motion.contact_names
+            gui.add_html(_note(CONTACTS))
+            feet = gui.add_html(contact_strips(contact_TF, names))
+            self.panels.append(lambda time: _draw(feet, contact_strips(contact_TF, names, self._share(robot, time))))
         joint = gui.add_dropdown("joint", list(motion.joint_names), initial_value=motion.joint_names[0])
         curve, bars = gui.add_html(""), gui.add_html("")
 

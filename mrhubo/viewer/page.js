@@ -1,5 +1,6 @@
 // The panels beside a recorded stage. viser's page has the timeline, play and speed; where it is stands in its slider.
 (() => {
+  const NARROW = 760; // pixels of a page, as of a frame in another, in which the panel would hide the figures
   const robots = JSON.parse(document.getElementById("mrhubo-robots").textContent);
   const panel = document.getElementById("mrhubo-panel");
   const chosen = panel.querySelector("select.robot");
@@ -15,6 +16,7 @@
     pick();
   }
   panel.querySelector("button").addEventListener("click", () => panel.classList.toggle("closed"));
+  panel.classList.toggle("closed", innerWidth < NARROW);
   let shown = null;
   const draw = () => {
     const slider = document.querySelector('[role="slider"]');

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.files.atomic import atomic_path
-from mrhubo.viewer.controls import about
+from mrhubo.viewer.controls import CONTACTS, about
 from mrhubo.viewer.panels import (
     AT_END,
     AT_LIMIT,
@@ -23,6 +23,7 @@ from mrhubo.viewer.panels import (
     LEFT,
     RIGHT,
     confidence_strip,
+    contact_strips,
     joint_bars,
     joint_curve,
     range_of,
@@ -56,6 +57,18 @@ def save_page(stage: Stage, path: Path, title: str) -> Path:
     Raises:
         UserError: viser is not installed, or the disk refuses.
     """
+    text = page_text(stage, title)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
+def page_text(stage: Stage, title: str) -> str:
+    """The page itself, HTML; arguments as for `save_page`.
+
+    Raises:
+        UserError: viser is not installed.
+    """
     with local_server() as server:
         scene = Scene(server, stage)
         recording = server.get_scene_serializer()
@@ -65,10 +78,7 @@ def save_page(stage: Stage, path: Path, title: str) -> Path:
         page = recording.as_html()
     page = page.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>")
     body_end = page.rindex("</body>")
-    text = page[:body_end] + _panels(stage, title) + page[body_end:]
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path
+    return page[:body_end] + _panels(stage, title) + page[body_end:]
 
 
 def _panels(stage: Stage, title: str) -> str:
@@ -92,6 +102,8 @@ def _section(robot: Performance) -> str:
     parts = [f'<section><p>{html.escape(about(robot))}</p><p class="time"></p>']
     if motion.confidence is not None:
         parts.append(f"<p>confidence (red: not to be trusted)</p>{confidence_strip(motion.confidence)}")
+    if motion.contact is not None and motion.contact_names:
+        parts.append(f"<p>{CONTACTS}</p>{contact_strips(motion.contact, motion.contact_names)}")
     names = "".join(f'<option value="{n}">{html.escape(name)}</option>' for n, name in enumerate(motion.joint_names))
     parts.append(f'<select class="joint">{names}</select>')
     for column in range(len(motion.joint_names)):

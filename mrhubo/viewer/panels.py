@@ -1,7 +1,8 @@
-"""What stands beside the figures, as SVG: how sure the answer is over time, and joint angles against their limits.
+"""What stands beside the figures, as SVG: how sure the answer is over time, when feet are planted, and joint
+angles against their limits.
 
 A line of class `now` marks the moment, and dots of class `mark` the angles at it, so that a saved page moves both
-without Python. Legend: T frames, N joints.
+without Python. Legend: T frames, N joints, F feet.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ AT_LIMIT = 0.01
 """Share of its range within which an angle is at a limit."""
 INSIDE, AT_END = "#3b76af", "#d9822b"
 """Colours of an angle inside its limits, and of one at a limit."""
-_GRID, _INK = "#d9dde3", "#4a515c"
+_GRID, _INK, _DARK = "#d9dde3", "#4a515c", "#1c2026"
 _LOW, _MIDDLE, _HIGH = np.array([192, 57, 43]), np.array([232, 178, 60]), np.array([79, 154, 87])
 """Colours of confidence 0, 0.5 and 1."""
 
@@ -44,6 +45,27 @@ def confidence_strip(confidence_T: np.ndarray, now: float = 0.0) -> str:
         for n, value in enumerate(least)
     )
     return _svg(_STRIP, cells + _line(now, _STRIP))
+
+
+def contact_strips(contact_TF: np.ndarray, names: Sequence[str], now: float = 0.0) -> str:
+    """A strip a foot, orange where it is planted.
+
+    Args:
+        contact_TF: whether each foot is planted (T, F).
+        names: of the feet.
+        now: share of the time that has gone.
+    """
+    parts, width = list[str](), WIDTH / len(contact_TF)
+    for row, name in enumerate(names):
+        top = row * (_STRIP + 2)
+        parts.append(f'<rect x="0" y="{top}" width="{WIDTH}" height="{_STRIP}" fill="{_GRID}"/>')
+        edges = np.diff(contact_TF[:, row].astype(np.int8), prepend=0, append=0)
+        for start, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+            place = f'x="{start * width:.2f}" y="{top}" width="{(end - start) * width:.2f}"'
+            parts.append(f'<rect {place} height="{_STRIP}" fill="{AT_END}"/>')
+        parts.append(f'<text x="4" y="{top + _STRIP - 4.5}" fill="{_DARK}">{html.escape(_short(name))}</text>')
+    height = len(names) * (_STRIP + 2) - 2
+    return _svg(height, "".join(parts) + _line(now, height))
 
 
 def _shade(confidence: float) -> str:
@@ -117,7 +139,7 @@ def _short(name: str, most: int = 22) -> str:
 
 def _line(now: float, height: int) -> str:
     x = WIDTH * float(np.clip(now, 0, 1))
-    return f'<line class="now" x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{height}" stroke="#1c2026" stroke-width="1.5"/>'
+    return f'<line class="now" x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{height}" stroke="{_DARK}" stroke-width="1.5"/>'
 
 
 def _svg(height: float, content: str) -> str:

@@ -19,6 +19,7 @@ from mrhubo.view import Solids, animated_frames, figure_sheet, human_solids, rob
 from mrhubo.viewer.film import save_mp4
 from mrhubo.viewer.performance import Performance
 from mrhubo.viewer.person import Person
+from mrhubo.viewer.spots import SPOT_COLOR, SPOT_HEIGHT_M, spots_of
 from mrhubo.viewer.stage import Stage, Standing
 
 FILM_RATE = 30.0
@@ -37,7 +38,26 @@ def columns(stage: Stage, times: Sequence[float]) -> list[list[Solids]]:
     for figure, standing in zip(figures, stage.standings, strict=True):
         frames = [stage.frame_of(figure, time) for time in times]
         draw = _person_solids if isinstance(figure, Person) else _robot_solids
-        found.append(draw(figure, standing, frames))  # pyright: ignore[reportArgumentType]
+        solids = draw(figure, standing, frames)  # pyright: ignore[reportArgumentType]
+        spots = _spots(figure, standing, frames)
+        found.append([Solids.concatenate(pair) for pair in zip(solids, spots, strict=True)])
+    return found
+
+
+def _spots(figure: Person | Performance, standing: Standing, frames: Sequence[int]) -> list[Solids]:
+    """Discs under planted feet."""
+    spots = spots_of(figure, standing)
+    if spots is None:
+        return [Solids.empty() for _ in frames]
+    half_3, found = np.array([0.0, 0.0, SPOT_HEIGHT_M / 2]), list[Solids]()
+    for frame in frames:
+        seen_P = spots.planted_TP[frame]
+        place_P3 = spots.place_TP3[frame, seen_P] - standing.pose_T44[frame, :3, 3] * [1.0, 1.0, 0.0]
+        radius_P, count = spots.radius_P[seen_P], int(seen_P.sum())
+        color_P3 = np.tile(SPOT_COLOR, (count, 1))
+        found.append(
+            Solids(place_P3 - half_3, place_P3 + half_3, radius_P, color_P3, radius_P, np.ones(count, dtype=bool))
+        )
     return found
 
 

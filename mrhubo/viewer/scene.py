@@ -1,8 +1,8 @@
 """The stage as a tree of nodes in viser, which moves to any moment of it.
 
 Names of nodes: `/world` carries everything and moves where the camera follows; below it `floor`, `person` with a mesh a
-colour, `contacts`, and for each robot `robot_K` (its base) with a node for every body, below that which it hangs on.
-https://viser.studio documents the library.
+colour, `contacts`, and for each robot `robot_K` (its base) with a node for every body, below that which it hangs on,
+and `contacts_K`. https://viser.studio documents the library.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ import numpy as np
 from mrhubo.body import JOINT_NAMES
 from mrhubo.viewer.meshing import Mesh
 from mrhubo.viewer.performance import Performance
-from mrhubo.viewer.person import SOLE_POINTS, Person
+from mrhubo.viewer.person import Person
 from mrhubo.viewer.poses import to_wxyz
 from mrhubo.viewer.skin import human_skins
+from mrhubo.viewer.spots import SPOT_COLOR, SPOT_HEIGHT_M, spots_of
 from mrhubo.viewer.stage import Stage, Standing
 
 if TYPE_CHECKING:
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 
 WORLD = "/world"
 _FLOOR_M, _FLOOR_COLOR, _LINE, _SECTION = 40.0, (238, 240, 243), (214, 218, 224), (188, 194, 202)
-_CONTACT_COLOR, _CONTACT_M = (217, 130, 43), 0.045
-"""Colour and radius of the disc under a planted point of a sole."""
 _LABEL_M = 0.12
 """How far labels are above heads."""
 _FOV, _AZIMUTH, _ELEVATION, _MARGIN = np.radians(36.0), np.radians(16.0), np.radians(9.0), 1.22
@@ -60,9 +59,12 @@ class Scene:
         )  # fmt: skip
         standings = iter(stage.standings)
         if stage.person is not None:
-            self._add_person(stage.person, next(standings))
+            standing = next(standings)
+            self._add_person(stage.person, standing)
+            self._add_spots(f"{WORLD}/contacts", stage.person, standing)
         for number, (robot, standing) in enumerate(zip(stage.robots, standings, strict=True)):
             self._add_robot(f"{WORLD}/robot_{number}", robot, standing)
+            self._add_spots(f"{WORLD}/contacts_{number}", robot, standing)
         self._place_camera()
         self.show(0.0)
 
@@ -112,30 +114,26 @@ class Scene:
                 self._send(handle, bone_T3[frame], bone_T4[frame])
 
         self._moves.append(move)
-        if person.planted_TP is not None:
-            self._add_contacts(person, standing, person.planted_TP)
 
-    def _add_contacts(self, person: Person, standing: Standing, planted_TP: np.ndarray) -> None:
-        """A disc on the floor under every planted point of the soles."""
+    def _add_spots(self, name: str, figure: Person | Performance, standing: Standing) -> None:
+        """A disc on the floor for every spot of a figure, which is seen while its foot is planted."""
+        spots = spots_of(figure, standing)
+        if spots is None:
+            return
         discs = [
             self._add(
-                f"{WORLD}/contacts/{name}", self._scene.add_cylinder, radius=_CONTACT_M, height=0.004,
-                color=_CONTACT_COLOR, visible=False, cast_shadow=False,
+                f"{name}/{spot}", self._scene.add_cylinder, radius=float(radius), height=SPOT_HEIGHT_M,
+                color=_bytes(SPOT_COLOR), visible=False, cast_shadow=False,
             )
-            for name in SOLE_POINTS
+            for spot, radius in zip(spots.names, spots.radius_P, strict=True)
         ]  # fmt: skip
-        pelvis_T44 = standing.pose_T44
-        turn_T33 = pelvis_T44[:, :3, :3] @ person.root_T33.swapaxes(-1, -2)
-        apart_TP3 = person.soles_TP3 - person.root_T3[:, None]
-        place_TP3 = pelvis_T44[:, None, :3, 3] + apart_TP3 @ turn_T33.swapaxes(-1, -2)
-        place_TP3[..., 2] = 0.002
 
         def move(time: float) -> None:
-            frame = self.stage.frame_of(person, time)
-            for point, disc in enumerate(discs):
-                self._send(disc, place_TP3[frame, point], None)
-                if disc.visible != bool(planted_TP[frame, point]):
-                    disc.visible = bool(planted_TP[frame, point])
+            frame = self.stage.frame_of(figure, time)
+            for spot, disc in enumerate(discs):
+                self._send(disc, spots.place_TP3[frame, spot], None)
+                if disc.visible != bool(spots.planted_TP[frame, spot]):
+                    disc.visible = bool(spots.planted_TP[frame, spot])
 
         self._moves.append(move)
 

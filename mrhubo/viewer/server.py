@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
 
 if TYPE_CHECKING:
@@ -23,11 +24,14 @@ def local_server(port: int = 0) -> Iterator[viser.ViserServer]:
         port: where it listens; the next free one, if another program does already. 0: any that is free.
 
     Raises:
-        UserError: viser is not installed.
+        UserError: viser is not installed, or nothing can listen on 127.0.0.1.
     """
     library = import_optional("viser", "a viewer in the browser needs the package viser: pip install 'mrhubo[view]'")
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells of itself
-        server = library.ViserServer(host=HOST, port=port, verbose=False)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # it tells of itself
+            server = library.ViserServer(host=HOST, port=port, verbose=False)
+    except OSError as error:
+        raise UserError(f"{HOST}: nothing can listen there: {error.strerror or error}") from error
     server.request_share_url = _stays_here
     try:
         yield server

@@ -50,15 +50,15 @@ def write_y4m(path: Path, images: list[np.ndarray], rate: int = 15) -> Path:
 class Browser:
     """One page in a browser whose camera is a file."""
 
-    def __init__(self, folder: Path, camera: Path) -> None:
-        """`folder`: for its profile; `camera`: a .y4m file."""
+    def __init__(self, folder: Path, camera: Path | None = None) -> None:
+        """`folder`: for its profile; `camera`: a .y4m file; None: the browser's own test picture."""
         self._process = subprocess.Popen(
             [
                 find_browser(), "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--remote-debugging-port=0",
                 "--remote-allow-origins=*", f"--user-data-dir={folder}", "--window-size=1200,800", "--no-first-run",
                 "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
                 "--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
-                f"--use-file-for-fake-video-capture={camera}", "about:blank",
+                *([] if camera is None else [f"--use-file-for-fake-video-capture={camera}"]), "about:blank",
             ],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
@@ -133,9 +133,9 @@ class Browser:
         """Waits until an expression is true."""
         return self._wait(lambda: self.ask(script), f"never true: {script}", seconds)
 
-    def key(self, kind: str) -> None:
-        """Presses (`keyDown`) or lets go of (`keyUp`) the space bar."""
-        self.call("Input.dispatchKeyEvent", type=kind, code="Space", key=" ", windowsVirtualKeyCode=32)
+    def key(self, kind: str, code: str = "Space", repeat: bool = False) -> None:
+        """Presses (`keyDown`) or lets go of (`keyUp`) the space bar; `repeat`: it is held, and the system presses again."""
+        self.call("Input.dispatchKeyEvent", type=kind, code=code, key=" ", windowsVirtualKeyCode=32, autoRepeat=repeat)
 
     def picture(self, path: Path) -> None:
         """A screenshot."""

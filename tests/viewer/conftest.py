@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -45,3 +46,16 @@ def stage(nao: Robot, boxing: Motion) -> Stage:
     sure = random_motion(nao, confidence=np.linspace(1, 0, FRAMES))
     robots = [perform("nao", nao, sure), perform("walker", nao, walk(nao))]
     return arrange(read_person(boxing), robots)
+
+
+@pytest.fixture(scope="session")
+def walker(root: Path) -> Robot:
+    """A robot whose keypoints tell of its feet."""
+    return Robot.from_config(root / "conf" / "nao-whole-body.yaml")
+
+
+def steps(robot: Robot, frames: int = FRAMES) -> RobotMotion:
+    """As `walk`; the left foot is planted in even frames, the right one in the last."""
+    told = [[frame % 2 == 0, frame == frames - 1] for frame in range(frames)]
+    motion = walk(robot, frames)
+    return dataclasses.replace(motion, contact=np.array(told), contact_names=("left_foot", "right_foot"))

@@ -6,7 +6,6 @@ Legend: T frames, N robot joints.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -17,10 +16,11 @@ from torch import Tensor
 from mrhubo.evaluation import Clip, Evaluation
 from mrhubo.fitting.first_look import FirstLook
 from mrhubo.fitting.measurement import Measured
+from mrhubo.fitting.record.moving import log_moving
 from mrhubo.fitting.record.predictions import log_predictions
 from mrhubo.fitting.record.recording import Recording
-from mrhubo.runtime.runs import log_file
-from mrhubo.view import pictures, save_gif
+from mrhubo.runtime.progress import Reporter
+from mrhubo.view.pictures import liveliness
 
 _TABLE = "test/clips.json"
 _DIGITS = 10
@@ -62,15 +62,12 @@ def _written(value: Any) -> Any:
     return value
 
 
-def log_answers(recording: Recording, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
-    """Joint angles (T, N) [rad] of the test clips, a picture a clip of human, reference and prediction, and a GIF of
-    the liveliest.
+def log_answers(recording: Recording, report: Reporter, clips: Sequence[Clip], predictions: Sequence[Tensor]) -> None:
+    """Joint angles (T, N) [rad] of the test clips, a picture a clip of human, reference and prediction, and the
+    liveliest in motion.
     """
     log_predictions(recording.client, recording.run_id, clips, predictions)
     for clip, q_TN in zip(clips, predictions, strict=True):
         sheet = recording.artist.key_poses(clip, {"mrhubo": q_TN})
         recording.log_picture(sheet, f"test/key_poses_{clip.name}.png")
-    clip, q_TN = max(zip(clips, predictions, strict=True), key=lambda pair: pictures.liveliness(pair[0]))
-    frames = recording.artist.animation(clip, {"mrhubo": q_TN})
-    write = functools.partial(save_gif, frames, frame_rate=pictures.GIF_RATE)
-    log_file(recording.client, recording.run_id, f"test/{clip.name}.gif", write)
+    log_moving(recording, report, *max(zip(clips, predictions, strict=True), key=lambda pair: liveliness(pair[0])))

@@ -8,8 +8,9 @@ const make = (tag, more = {}) => Object.assign(document.createElement(tag), more
 
 export class Camera {
   // stage: the element that it fills; live: where points go, `live.landmarks(points, time)`; release: lets go of the
-  // button, as nobody steers a robot by a camera that is gone.
-  constructor(stage, live, release) {
+  // button, as nobody steers a robot by a camera that is gone; mirrored: told whether a picture is shown as by a mirror.
+  constructor(stage, live, release, mirrored = () => {}) {
+    this.mirrored = mirrored;
     this.live = live;
     this.release = release;
     this.run = 0; // another one with every start and stop
@@ -36,7 +37,10 @@ export class Camera {
     this.turn();
   }
 
-  turn() { this.canvas.classList.toggle("mirrored", this.mirror.checked); }
+  turn() {
+    this.canvas.classList.toggle("mirrored", this.mirror.checked);
+    this.mirrored(this.mirror.checked && Boolean(this.stream));
+  }
 
   say(text) { this.notice.textContent = text; }
 
@@ -54,6 +58,7 @@ export class Camera {
       const stream = await navigator.mediaDevices.getUserMedia({ video: { ...size, ...which }, audio: false });
       if (run !== this.run) return stream.getTracks().forEach((track) => track.stop());
       this.stream = stream;
+      this.turn();
       stream.getVideoTracks()[0].addEventListener("ended", () => { this.stop(); this.say("the camera is gone"); });
       this.video.srcObject = stream;
       await this.video.play();
@@ -74,6 +79,7 @@ export class Camera {
     this.stream?.getTracks().forEach((track) => track.stop());
     if (this.stream) this.live.landmarks(null, performance.now() / 1000);
     this.stream = null;
+    this.turn();
     this.button.textContent = "Start the camera";
     this.figures.textContent = "";
     this.say("");

@@ -17,11 +17,8 @@ export class Live {
   }
 
   connect() {
-    const url = new URL("live", location.href);
+    const url = withToken("live"), token = url.searchParams.get("token");
     url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
-    url.hash = "";
-    const token = new URLSearchParams(location.hash.slice(1)).get("token");
-    if (token) url.searchParams.set("token", token);
     this.socket = new WebSocket(url);
     this.socket.onopen = () => this.on.open?.();
     this.socket.onmessage = (event) => {
@@ -46,9 +43,11 @@ export class Live {
 
   beat() { this.send("heartbeat", { held: this.held }); }
 
+  // Whether the button is held from now on: without a connection it is not.
   hold(held) {
+    held = held && this.socket.readyState === WebSocket.OPEN;
     if (held === this.held) return;
-    this.held = held && this.socket.readyState === WebSocket.OPEN;
+    this.held = held;
     this.beat();
   }
 
@@ -63,20 +62,53 @@ export class Live {
   }
 }
 
+// An address of the server, with the token that the page's own address has behind its mark.
+export function withToken(path) {
+  const url = new URL(path, location.href), token = new URLSearchParams(location.hash.slice(1)).get("token");
+  url.hash = "";
+  if (token) url.searchParams.set("token", token);
+  return url;
+}
+
 function isLoopback() {
   return ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
 }
 
+const SPACE = (event) => event.code === "Space" || event.key === " "; // remote and virtual keyboards tell no code
+
 // The button moves the robot while it is pressed, and so does the space bar; whatever takes the page's attention away lets go.
+// Where a press does not count, or no more (it came before the connection, or the connection, the camera or the keyboard has
+// gone since), the button says that it takes another one: a robot never begins to move because something comes back.
+// Gives a function that lets go.
 export function deadman(live, button) {
-  const set = (held) => { live.hold(held); button.classList.toggle("held", live.held); button.setAttribute("aria-pressed", live.held); };
-  button.addEventListener("pointerdown", (event) => { button.setPointerCapture(event.pointerId); set(true); });
-  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(name, () => set(false));
+  const hint = button.querySelector("small"), usual = hint.textContent;
+  let pressed = false; // whether a key or a pointer is down, as far as the page knows
+  const show = () => {
+    button.classList.toggle("held", live.held);
+    button.classList.toggle("again", pressed && !live.held);
+    button.setAttribute("aria-pressed", live.held);
+    hint.textContent = !pressed && !document.hasFocus() ? "click on the page first: the keyboard is elsewhere"
+      : pressed && !live.held ? "does not count: let go, and press again" : usual;
+  };
+  const press = () => { pressed = true; live.hold(true); show(); };
+  const release = () => { pressed = false; live.hold(false); show(); };
+  const drop = () => { live.hold(false); show(); };
+  button.addEventListener("pointerdown", (event) => { press(); button.setPointerCapture(event.pointerId); });
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(name, release);
   button.addEventListener("contextmenu", (event) => event.preventDefault());
-  addEventListener("keydown", (event) => { if (event.code === "Space") { event.preventDefault(); if (!event.repeat) set(true); } });
-  addEventListener("keyup", (event) => { if (event.code === "Space") set(false); });
-  addEventListener("blur", () => set(false));
-  addEventListener("pagehide", () => set(false));
-  document.addEventListener("visibilitychange", () => { if (document.hidden) set(false); });
-  return set;
+  addEventListener("keydown", (event) => {
+    if (!SPACE(event)) return;
+    event.preventDefault();
+    if (!event.repeat) return press();
+    pressed = true; // held since before the page could know
+    show();
+  });
+  // Firefox clicks what has the focus when the space bar is let go of, whatever became of the press.
+  addEventListener("keyup", (event) => { if (SPACE(event)) { event.preventDefault(); release(); } });
+  addEventListener("blur", release);
+  addEventListener("focus", show);
+  addEventListener("pagehide", release);
+  document.addEventListener("visibilitychange", () => { if (document.hidden) release(); });
+  show();
+  return drop;
 }

@@ -2,6 +2,7 @@
 
 import { Camera } from "./camera.js";
 import { Live, deadman } from "./live.js";
+import { RobotView } from "./robot.js";
 
 const at = (id) => document.getElementById(id);
 const make = (tag, text = "") => Object.assign(document.createElement(tag), { textContent: text });
@@ -24,6 +25,7 @@ function tell(state, why) {
 
 function show(message) {
   tell(message.state, WHY[message.state] ?? "");
+  robot.show(message.angles);
   if (rows.length !== message.names.length) {
     rows = message.names.map((name) => { const row = make("tr"); row.append(make("td", name), make("td"), make("td")); return row; });
     at("joints").replaceChildren(...rows);
@@ -45,10 +47,11 @@ function show(message) {
   }
 }
 
+const robot = new RobotView(at("robot"), at("figure"));
 const live = new Live({
   joints: show,
   open: () => tell("connected", "Nothing has come yet."),
-  closed: (reason) => { release(false); tell("closed", `Not connected: ${reason}.`); },
+  closed: (reason) => { release(); tell("closed", `Not connected: ${reason}.`); },
 });
 release = deadman(live, at("hold"));
-new Camera(at("stage"), live, () => release(false));
+new Camera(at("stage"), live, () => release(), (mirrored) => at("figure").classList.toggle("mirrored", mirrored));

@@ -1,0 +1,76 @@
+"""The robot as the page draws it: rigid bodies that hang on each other, each of capsules, as JSON.
+
+The page places the bodies by the joint angles of every message (`page/robot.js`). Boxes become the capsules along them;
+nothing that is drawn here is used for motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mrhubo.robot import Robot
+    from mrhubo.viewer.bodies import Body
+
+_MOST = 400
+"""Capsules of a robot; of more the largest are kept."""
+
+
+def figure_of(robot: Robot, joint_names: Sequence[str]) -> dict[str, Any]:
+    """What `robot.json` tells: `bodies`, each after the one on which it hangs, with
+
+    - `parent`: a number, or null; `origin` (4, 4): its place [m] in the parent's frame, its joint at 0, row by row;
+    - `axis` (3,), `slides`, `column`, `multiplier`, `offset`: its joint, driven by `angles[column]` of a message;
+    - `capsules`: rows of start (3,) and end (3,) [m] in its own frame, radii of both [m], and red, green, blue 0..255.
+
+    Args:
+        robot: whose URDF tells.
+        joint_names: those of the messages, in their order.
+    """
+    from mrhubo.robot import read_geometry
+    from mrhubo.view import robot_solids
+    from mrhubo.viewer.bodies import read_bodies
+
+    description = robot.description
+    geometry = read_geometry(description.parsed)
+    shaped = {shape.link for shape in geometry}
+    geometry += [shape for shape in description.solids.of_meshes if shape.link not in shaped]
+    bodies = read_bodies(robot, joint_names)
+    solids = [robot_solids([s for s in geometry if s.link in body.links], body.links) for body in bodies]
+    rows = [
+        np.column_stack([s.starts_S3, s.ends_S3, s.radii_S, s.end_radii_S, (255 * s.colors_S3).round()]) for s in solids
+    ]
+    if sum(map(len, rows)) == 0:
+        rows = _sticks(bodies)
+    sizes = np.sort(np.concatenate([_size(row_S11) for row_S11 in rows]))[::-1]
+    least = sizes[_MOST] if len(sizes) > _MOST else -1.0
+    return {
+        "bodies": [
+            {
+                "parent": body.parent, "origin": _rounded(body.origin_44), "axis": _rounded(body.axis_3),
+                "slides": body.slides, "column": body.column, "multiplier": body.multiplier, "offset": body.offset,
+                "capsules": _rounded(row_S11[_size(row_S11) > least]),
+            }
+            for body, row_S11 in zip(bodies, rows, strict=True)
+        ]
+    }  # fmt: skip
+
+
+def _size(row_S11: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(row_S11[:, 3:6] - row_S11[:, :3], axis=1) + 2 * row_S11[:, 6:8].max(axis=1, initial=0.0)
+
+
+def _sticks(bodies: Sequence[Body]) -> list[np.ndarray]:
+    """Of a robot without shapes: a capsule from each body to those that hang on it."""
+    rows: list[list[np.ndarray]] = [[] for _ in bodies]
+    for body in bodies:
+        if body.parent is not None:
+            rows[body.parent].append(np.concatenate([np.zeros(3), body.origin_44[:3, 3], [0.02, 0.02], [150] * 3]))
+    return [np.array(found).reshape(-1, 11) for found in rows]
+
+
+def _rounded(values: np.ndarray) -> Any:
+    return np.asarray(values, float).round(6).tolist()
