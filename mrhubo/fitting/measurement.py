@@ -64,9 +64,15 @@ _WAYS: Mapping[str, Way] = {
     "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
     _FRAMES: Way("retarget", lambda r, motions: [_polished(r, m, None) for m in motions]),
     _CLIPS: Way("clip", lambda r, motions: [_polished(r, m, m.frame_rate) for m in motions]),
-    _STREAM: Way("stream", lambda r, motions: [found.q for found in Stream(r, settings=ASKED).retarget_all(motions)]),
+    _STREAM: Way("stream", lambda r, motions: _streamed(r, motions)),
 }
-"""None avoids self-collision, as the reference, which they are measured against, does not."""
+"""None avoids self-collision, nor stands on a floor, as the reference, which they are measured against, does not."""
+
+
+def _streamed(retargeter: Retargeter, motions: Sequence[Motion]) -> list[Tensor]:
+    if retargeter.standing is not None:
+        motions = [motion.changed(root_rotation_T33=None, root_position_T3=None) for motion in motions]
+    return [found.q for found in Stream(retargeter, settings=ASKED).retarget_all(motions)]
 
 
 def _polished(retargeter: Retargeter, motion: Motion, frame_rate: float | None) -> Tensor:
