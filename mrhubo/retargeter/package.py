@@ -24,18 +24,17 @@ from mrhubo.body.vposer import VPoser
 from mrhubo.config import Config
 from mrhubo.errors import UserError
 from mrhubo.fast.description import FILE, Description
-from mrhubo.files.storage import write_tensors
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import Avoidance, DirectionProblem, Polish
 from mrhubo.reference.standing import Standing
 from mrhubo.retargeter.clip import join_frames
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, branches_of, shake
-from mrhubo.retargeter.describing import describe
+from mrhubo.retargeter.describing import describe, write_description
 from mrhubo.retargeter.floor import stand, standing_of
 from mrhubo.retargeter.judging import judge
 from mrhubo.retargeter.networks import JointNetwork
-from mrhubo.retargeter.parts import pose_parts
+from mrhubo.retargeter.parts import check_polish, pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
@@ -229,9 +228,7 @@ class Retargeter(nn.Module):
         check_frame_rate(joined_at)
         parts = list(self._parts(local_TJ33, polish))
         targets = [self.body_map.human_directions(part) for part in parts]
-        stands = None
-        if joined_at is not None and isinstance(local_TJ33, Motion) and len(local_TJ33):
-            stands = stand(self, local_TJ33, torch.cat(parts), torch.cat(targets), polish, avoid_collisions)
+        stands = None if joined_at is None else stand(self, local_TJ33, parts, targets, polish, avoid_collisions)
         q_TN, told = stands or (self.follow(parts, targets, polish, joined_at, avoid_collisions), {})
         shake_TD = None if frame_rate is None else shake(torch.cat(targets), frame_rate)
         sizes = [len(target) for target in targets]
@@ -248,8 +245,7 @@ class Retargeter(nn.Module):
         return judge(self, q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
 
     def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
-        if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
-            raise UserError(f"polish must be 0 or more steps, found {polish}")
+        check_polish(polish)
         return pose_parts(local_TJ33, self.body_map.skeleton, self.device)
 
     @torch.no_grad()
@@ -295,12 +291,7 @@ class Retargeter(nn.Module):
 
     def save_description(self, folder: Path) -> Path | None:
         """Writes `describe` into a folder; None for a retargeter that has no such arrays."""
-        if isinstance(self.prior, VPoser):
-            return None
-        description = self.describe()
-        tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}
-        write_tensors(folder / FILE, tensors, description.metadata())
-        return folder / FILE
+        return None if isinstance(self.prior, VPoser) else write_description(self.describe(), folder / FILE)
 
     @classmethod
     def load(cls, folder: Path | str) -> Retargeter:
