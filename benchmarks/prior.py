@@ -4,7 +4,8 @@
         [--seconds 3]
 
 The first table is on the clips held out of training (needs the training data that the config names), and on the motions
-of a folder, by default the evaluation clips; the second is by clip, the third by joint; then the speed of decoding.
+of a folder, by default the evaluation clips; the second is by clip, the third by joint, the fourth by direction, as
+networks see them; then the speed of decoding.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from mrhubo.body.skeleton import PAIRED_JOINTS, SIDES
 from mrhubo.config import PriorConfig, load_config
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
-from mrhubo.rotation import matrix_to_sixd
+from mrhubo.reference import angle_between
+from mrhubo.robot import build_body_map
+from mrhubo.rotation import matrix_to_sixd, sixd_to_matrix
 from mrhubo.runtime.locations import default_motions
 
 ROWS = {
@@ -48,6 +51,10 @@ ROWS = {
 }
 TARGETS = {"joint_mm": "<= 4", "ik_keypoint_mm": "<= 5", "roc_bent": ">= 0.97", "roc_random": ">= 0.999"}
 TARGETS |= {"samples_inside": ">= 0.99"}
+DIRECTIONS = Path(__file__).resolve().parent.parent / "conf" / "coman-whole-body.yaml"
+"""Of a robot that has all parts of a body but a head."""
+NAMES = {"elbow": "upper arm", "wrist": "forearm", "knee": "thigh", "ankle": "shin"}
+"""Of limbs, which are called after where they end."""
 
 
 def training_poses(prior: BodyPrior, config: Path) -> tuple[Tensor, Tensor] | None:
@@ -85,6 +92,28 @@ def by_joint(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
     for part in dict.fromkeys(parts):
         joints = [i for i, other in enumerate(parts) if other == part]
         rows.append([part, *(f"{float(error[joints].mean()):.2f}" for error in errors)])
+    return rows
+
+
+@torch.no_grad()
+def by_direction(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
+    """Mean angle [deg] between each direction of a whole body before and after, and what 95% stay below; left and right
+    together, for each set of poses.
+    """
+    body_map = build_body_map(load_config(DIRECTIONS).robot, Skeleton())
+    parts = [name.removeprefix(f"{SIDES[0]}_").removeprefix(f"{SIDES[1]}_") for name in body_map.measured_names]
+    found = []
+    for pose_BJ6 in columns:
+        before, after = (sixd_to_matrix(pose) for pose in (pose_BJ6, prior.denoise(pose_BJ6)))
+        angle_BD = angle_between(body_map.human_directions(before), body_map.human_directions(after))
+        found.append(torch.rad2deg(angle_BD[:, body_map.measured]))
+    rows = []
+    for part in dict.fromkeys(parts):
+        chosen = [i for i, other in enumerate(parts) if other == part]
+        cells = [angle_BD[:, chosen].flatten() for angle_BD in found]
+        most = [float(cell[:: max(1, len(cell) // 1_000_000)].quantile(0.95)) for cell in cells]
+        figures = [f"{float(cell.mean()):.1f}, {percent:.1f}" for cell, percent in zip(cells, most, strict=True)]
+        rows.append([NAMES.get(part, part.replace("_", " ")), *figures])
     return rows
 
 
@@ -137,6 +166,8 @@ def main(argv: list[str]) -> None:
     sets = [*([training[0]] if training else []), everything]
     names = [*(["held-out clips [deg]"] if training else []), f"{folder.name} [deg]"]
     print_table(["joint", *names], by_joint(prior, sets))
+    print()
+    print_table(["direction", *(name.replace("[deg]", "mean, 95% [deg]") for name in names)], by_direction(prior, sets))
     decoded, with_keypoints = poses_per_second(prior, given.seconds)
     print(f"\none thread, batch 2000: {decoded:,.0f} poses/s decoded, {with_keypoints:,.0f} decoded with 36 keypoints")
 

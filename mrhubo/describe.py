@@ -34,7 +34,7 @@ def build_parser() -> CommandParser[None]:
     parser.add_argument("--out", metavar="OUT", help=out)
     tree = "print the joints as a tree, with axes, positions and limits, and nothing else; works for any URDF"
     parser.add_argument("--tree", action="store_true", help=tree)
-    whole = "legs, feet and waist too, for `mrhubo retarget`; fits are of arms, hands and head (docs/whole-body.md)"
+    whole = "legs, feet and waist too, and not arms, hands and head alone (docs/whole-body.md)"
     parser.add_argument("--whole-body", action="store_true", help=whole)
     parser.add_argument("--force", action="store_true", help="replace files that are there already")
     return parser

@@ -87,6 +87,19 @@ def excess(matrix_BJ33: Tensor, margin: float = 0.0) -> Tensor:
     return torch.relu(angles - limits[..., 1] + margin) + torch.relu(limits[..., 0] + margin - angles)
 
 
+def random_rotations(joint: int, count: int, generator: torch.Generator) -> Tensor:
+    """Local rotations (count, 3, 3) of one joint (its position in POSED_JOINT_NAMES), twist and swings uniform in their
+    ranges.
+    """
+    lower_3, upper_3 = LIMITS_J32[joint].T
+    angle_B3 = lower_3 + (upper_3 - lower_3) * torch.rand(count, 3, generator=generator)
+    axis_33 = AXES_J33[joint] * (torch.tensor([1.0, -1.0, -1.0]) if RIGHT[joint] else 1.0)
+    twist_B33, swing_B33 = (
+        rotation.axis_angle_to_matrix(angle_B3[:, part] @ axis_33[part]) for part in (slice(0, 1), slice(1, 3))
+    )
+    return twist_B33 @ swing_B33
+
+
 def inside(pose_BJ6: Tensor) -> Tensor:
     """Whether every joint of each pose (B, 21, 6) is inside its ranges: (B,) of bool."""
     return (excess(rotation.sixd_to_matrix(pose_BJ6)) <= 0).flatten(1).all(dim=1)

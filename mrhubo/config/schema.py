@@ -110,10 +110,10 @@ class PairsConfig:
     seed: int = bounded(0, 0, 2**63 - 1)
     """Seed of the robot poses and of the amortised solver's training."""
     solver: str = choice("auto", "auto", "direct", "fine", "fast", "paper")
-    """How the human pose of a robot pose is found. `direct` = a person at rest whose arms, hands and head point where
-    the robot's do; nothing is searched for. The others are latent inverse kinematics: `fine` = amortised start, then a
-    quasi-Newton search of every pose; `fast` = amortised only; `paper` = L-BFGS over 500 poses, up to 500 iterations,
-    strong Wolfe. `auto` = `direct` where the rest of the pose counts nowhere (`align: true`, `phi: read`,
+    """How the human pose of a robot pose is found. `direct` = a person at rest whose limbs, hands, feet and head point
+    where the robot's do; nothing is searched for. The others are latent inverse kinematics: `fine` = amortised start,
+    then a quasi-Newton search of every pose; `fast` = amortised only; `paper` = L-BFGS over 500 poses, up to 500
+    iterations, strong Wolfe. `auto` = `direct` where the rest of the pose counts nowhere (`align: true`, `phi: read`,
     `model.input_frame: directions`, `robot.scale: auto`), else `fine`."""
     reverse_share: float = bounded(0.5, 0.0, 1.0)
     """Share of the pairs that are made the other way: a human pose drawn from the prior, retargeted to the robot by
@@ -136,8 +136,8 @@ class PairsConfig:
     w_prior: float = bounded(0.001, 0.0)
     """Weight of the squared norm of the latent (VPoser's inverse kinematics, and so the paper: 0.01)."""
     align: bool = True
-    """Turn the arms, hands and head that inverse kinematics found until they point exactly where the robot's do; cost
-    and distances are of the pose before that. False = leave them where they are (the paper)."""
+    """Turn the limbs, hands, feet and head that inverse kinematics found until they point exactly where the robot's do;
+    cost and distances are of the pose before that. False = leave them where they are (the paper)."""
     phi: str = choice("read", "read", "all")
     """Of what phi is the reconstruction error: `read` = the pose as the robot reads it, a person at rest but for the
     parts that the robot has, and the joints that these turn; `all` = all joints of the pose that inverse kinematics
@@ -172,8 +172,9 @@ class ModelConfig:
     """Human joints that are read, with `input_frame: local`; default: those between the chest and the robot's
     keypoints."""
     input_frame: str = choice("directions", "directions", "local")
-    """What of a human pose the networks see: `directions` = where limbs, hands and head point, seen from the chest, the
-    same however a file shares turns out among joints; `local` = the joints' local rotations (the paper)."""
+    """What of a human pose the networks see: `directions` = where limbs, hands, feet and head point, seen from the
+    chest or the pelvis, the same however a file shares turns out among joints; `local` = the joints' local rotations
+    (the paper)."""
     bound_output: str = choice("tanh", "tanh", "clamp")
     """How outputs are kept inside the joint limits: `tanh` squashes, `clamp` learns unbounded and cuts off."""
     detach_student: bool = False

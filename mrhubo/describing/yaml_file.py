@@ -61,7 +61,7 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
 
 
 def next_command(found: Discovery, file: Path) -> str:
-    """What makes a robot of this config move: a fit, or, as that is of arms and heads, the optimiser."""
+    """What makes a robot of this config move: a fit, or, for a whole body, the optimiser, which needs none."""
     if found.whole_body:
         return f"mrhubo retarget --robot {file} --motion walk.npz --out robot.npz"
     return f"mrhubo fit {file}"

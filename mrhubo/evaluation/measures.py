@@ -56,6 +56,22 @@ class Evaluation(ClipScore):
     """Share of steps in which a joint turns faster than it can (`Robot.velocity_N`)."""
     jumps: float = nan
     """Steps of more than 0.5 rad in 1/24 s that the human did not make (`mrhubo.reference.count_jumps`), in a clip."""
+    leg_deg: float = nan
+    """Mean angle between the robot's and the human's thighs and shins, seen from the pelvis."""
+    reference_leg_deg: float = nan
+    """The same for the reference."""
+    foot_deg: float = nan
+    """The same for the forward and up of feet."""
+    reference_foot_deg: float = nan
+    """The same for the reference: of where a foot points a leg of six joints gives way."""
+    chest_deg: float = nan
+    """The same for the chest's forward and up, seen from the pelvis: how the waist bends."""
+    reference_chest_deg: float = nan
+    """The same for the reference."""
+    leg_excess_deg: float = nan
+    """As `excess_deg`, of thighs and shins."""
+    leg_excess_max_deg: float = nan
+    """The same in the worst frame."""
     joints_at_limit: tuple[tuple[str, float], ...] = field(default=(), metadata={BY_JOINT: True})
     """Share of the frames in which each joint is at a limit, by its name."""
 
@@ -93,10 +109,20 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         collision=collision_share(q_TN, poses),
         reference_collision=collision_share(clip.reference_TN, reference_poses),
         geometric_limb_deg=_geometric(clip, q_TN, body_map),
+        leg_deg=mean(error_TD, "leg"),
+        reference_leg_deg=mean(reference_TD, "leg"),
+        foot_deg=mean(error_TD, "foot"),
+        reference_foot_deg=mean(reference_TD, "foot"),
+        chest_deg=mean(error_TD, "trunk"),
+        reference_chest_deg=mean(reference_TD, "trunk"),
         joints_at_limit=tuple(zip(robot.joint_names, limit_shares(robot, q_TN).tolist(), strict=True)),
         **_excess(clip, error_TD, human_TD3, body_map),
         **_speeds(clip, q_TN, human_TD3, body_map),
     )
+
+
+_EXCESS: Mapping[str, Region] = {"excess": "arm", "leg_excess": "leg"}
+"""Measures of what is the answer's fault, by what they are of."""
 
 
 def _columns(body_map: BodyMap, region: Region) -> list[int]:
@@ -113,13 +139,15 @@ def _geometric(clip: Clip, q_TN: Tensor, body_map: BodyMap) -> float:
 
 
 def _excess(clip: Clip, error_TD: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, Any]:
-    columns = _columns(body_map, "arm")
-    if clip.optimum_TN is None or not columns:
+    if clip.optimum_TN is None:
         return {}
     optimum_TD3 = body_map.robot_directions(body_map.robot.forward(clip.optimum_TN))
-    optimum_TD = torch.rad2deg(angle_between(optimum_TD3, human_TD3))
-    excess_T = (error_TD - optimum_TD)[:, columns].mean(dim=1)
-    return {"excess_deg": float(excess_T.mean()), "excess_max_deg": float(excess_T.max())}
+    excess_TD, found = error_TD - torch.rad2deg(angle_between(optimum_TD3, human_TD3)), {}
+    for name, region in _EXCESS.items():
+        if columns := _columns(body_map, region):
+            excess_T = excess_TD[:, columns].mean(dim=1)
+            found |= {f"{name}_deg": float(excess_T.mean()), f"{name}_max_deg": float(excess_T.max())}
+    return found
 
 
 def _speeds(clip: Clip, q_TN: Tensor, human_TD3: Tensor, body_map: BodyMap) -> dict[str, Any]:

@@ -160,7 +160,7 @@ def _turned_elbows(body_map: BodyMap, backwards: Mapping[str, float]) -> list[st
             range_ = None if known is None else known.ranges.get(joint)
             advice = "" if range_ is None else f": {joint}: [{range_.lower:.4g}, {range_.upper:.4g}]"
             found.append(
-                f"robot.ranges.{joint}: the arm is bent backwards in {share:.0%} of the frames; narrow this joint to "
+                f"robot.ranges.{joint}: the limb is bent backwards in {share:.0%} of the frames; narrow this joint to "
                 f"the side on which a human's bends{advice}"
             )
     return found

@@ -6,6 +6,7 @@ Legend: T frames, J = 21 human joints, N robot joints.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,12 +30,14 @@ from mrhubo.evaluation import (
 from mrhubo.fitting.first_look import unknown_collisions
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.references import make_references
+from mrhubo.fitting.whole_body import ASKED, WholeBodyTable, score_ways
 from mrhubo.motion import Motion
 from mrhubo.reference import at_limit_share
+from mrhubo.reference.standing import has_root
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.robot import Robot
 from mrhubo.runtime.progress import Reporter
-from mrhubo.streaming import Stream, StreamSettings
+from mrhubo.streaming import Stream
 
 _STILL_RAD, _MOVING_RAD = 1e-5, 0.1
 """Range of the joints' angles over all test clips that counts as none, and as one that should be there."""
@@ -56,15 +59,20 @@ class Way:
     """Joint angles (T, N) [rad] of each motion."""
 
 
-_FRAMES, _REFERENCE = "frame by frame", "reference"
-_ASKED = StreamSettings(avoid_collisions=False)
+_FRAMES, _CLIPS, _STREAM, _REFERENCE = "frame by frame", "whole clips", "stream", "reference"
 _WAYS: Mapping[str, Way] = {
     "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
     _FRAMES: Way("retarget", lambda r, motions: [_polished(r, m, None) for m in motions]),
-    "whole clips": Way("clip", lambda r, motions: [_polished(r, m, m.frame_rate) for m in motions]),
-    "stream": Way("stream", lambda r, motions: [found.q for found in Stream(r, settings=_ASKED).retarget_all(motions)]),
+    _CLIPS: Way("clip", lambda r, motions: [_polished(r, m, m.frame_rate) for m in motions]),
+    _STREAM: Way("stream", lambda r, motions: _streamed(r, motions)),
 }
-"""None avoids self-collision, as the reference, which they are measured against, does not."""
+"""None avoids self-collision, nor stands on a floor, as the reference, which they are measured against, does not."""
+
+
+def _streamed(retargeter: Retargeter, motions: Sequence[Motion]) -> list[Tensor]:
+    if retargeter.standing is not None:
+        motions = [motion.changed(root_rotation_T33=None, root_position_T3=None) for motion in motions]
+    return [found.q for found in Stream(retargeter, settings=ASKED).retarget_all(motions)]
 
 
 def _polished(retargeter: Retargeter, motion: Motion, frame_rate: float | None) -> Tensor:
@@ -84,6 +92,8 @@ class Measured:
     """Of the networks alone."""
     retarget_latency: Mapping[str, float]
     """With the steps of optimisation."""
+    whole_body: WholeBodyTable | None = None
+    """Of robots with feet, where the clips have a root."""
 
     @property
     def networks(self) -> Sequence[Evaluation]:
@@ -98,7 +108,8 @@ class Measured:
     @property
     def table(self) -> str:
         """For a person."""
-        return f"{table(self.networks)}\n\n{motion_table(self.ways)}"
+        whole_body = f"\n\n{self.whole_body.text}" if self.whole_body else ""
+        return f"{table(self.networks)}\n\n{motion_table(self.ways)}{whole_body}"
 
     @property
     def measures(self) -> dict[str, float]:
@@ -114,6 +125,9 @@ class Measured:
             prefix = _REFERENCE if way == _REFERENCE else _WAYS[way].prefix
             parts = ["test", *(["reshared"] if reshared else []), *([prefix] if prefix else [])]
             found |= mean_metrics(evaluations, self.retarget_latency if name == _FRAMES else {}, "/".join(parts))
+        for way, means in self.whole_body.means.items() if self.whole_body else ():
+            known = {name: value for name, value in means.items() if math.isfinite(value)}
+            found |= {f"test/{_WAYS[way].prefix}/whole_body/{name}": value for name, value in known.items()}
         return found
 
 
@@ -135,7 +149,20 @@ def measure(prepared: Prepared, report: Reporter, retargeter: Retargeter, clips:
     predictions = next(iter(found.values()))[: len(clips)]
     ways[_REFERENCE] = _score(prepared, [clip.reference_TN for clip in clips], clips)
     polished = functools.partial(retargeter.predict, polish=POLISH)
-    return Measured(predictions, ways, latencies(retargeter.predict, clips), latencies(polished, clips))
+    spent = latencies(retargeter.predict, clips), latencies(polished, clips)
+    return Measured(predictions, ways, *spent, _whole_body(retargeter, [clip.motion for clip in clips]))
+
+
+def _whole_body(retargeter: Retargeter, motions: Sequence[Motion]) -> WholeBodyTable | None:
+    """What becomes of the feet and of the way, of a robot with feet and of motions that have a root."""
+    rooted = [motion for motion in motions if has_root(motion)]
+    if retargeter.standing is None or not rooted:
+        return None
+    ways = {
+        _CLIPS: lambda asked: [retargeter(motion, avoid_collisions=False) for motion in asked],
+        _STREAM: Stream(retargeter, settings=ASKED).retarget_all,
+    }
+    return score_ways(retargeter.body_map, rooted, ways)
 
 
 def _score(prepared: Prepared, predictions: Sequence[Tensor], clips: Sequence[Clip]) -> list[Evaluation]:

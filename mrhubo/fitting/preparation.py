@@ -13,7 +13,6 @@ from mrhubo.evaluation import Motions, load_motions
 from mrhubo.pairing import PairSetup, pose_settings
 from mrhubo.retargeter import build_network
 from mrhubo.robot.unsure import check_unsure
-from mrhubo.robot.upper_body import check_upper_body
 from mrhubo.runtime.folders import make_folders
 from mrhubo.runtime.locations import default_tracking
 from mrhubo.runtime.names import check_name
@@ -57,7 +56,6 @@ def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
     """
     check_name("robot.name", config.robot.name)
     check_unsure(config.robot)
-    check_upper_body(config.robot)
     if config.robot.scale == "search" and not search:
         raise UserError(
             "robot.scale: 'search' is done by mrhubo.fit alone, in one process; take what it found, config.yaml in its "

@@ -1,12 +1,10 @@
-"""Whole bodies measured: the optimiser's answers to motions with a root, as whole motions and as streams.
-
-Networks are of arms, hands and heads so far, so there is no package of a whole body to be measured beside it.
-"""
+"""Whole bodies measured: answers to motions with a root, as whole motions and as streams."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 from mrhubo import rotation
@@ -18,8 +16,9 @@ from mrhubo.fitting.preparation import tracking_dir
 from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
+from mrhubo.reference.standing import has_root
 from mrhubo.retargeter import RetargetResult
-from mrhubo.robot import build_body_map
+from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.runtime.progress import Reporter
 from mrhubo.runtime.runs import ending, log_all, start_run
 from mrhubo.runtime.tables import aligned
@@ -45,6 +44,9 @@ _HEADS = {
     "jumps": ("jumps", "{:.0f}"),
 }
 Answer = OptimizationResult | RetargetResult
+Ways = Mapping[str, Callable[[Sequence[Motion]], Sequence[Answer]]]
+ASKED = StreamSettings(avoid_collisions=False)
+"""Of streams that are measured: nothing gives way to self-collision, as the reference does not either."""
 
 
 def measure_optimiser(config: Config, report: Reporter, validation: bool = False) -> str:
@@ -63,34 +65,52 @@ def measure_optimiser(config: Config, report: Reporter, validation: bool = False
     if not body_map.keypoints.standing:
         raise UserError("robot.keypoints: names no feet; --optimiser measures whole bodies, see docs/whole-body.md")
     found = load_motions(config, body_map.skeleton)
-    motions = [motion for motion in (found.validation if validation else found.test) if _has_root(motion)]
+    motions = [motion for motion in (found.validation if validation else found.test) if has_root(motion)]
     if not motions:
         raise UserError(f"evaluation.motions: no clip of {found.folder} tells a root, and whole bodies need one")
     optimiser = OptimizationRetargeter(body_map, config.evaluation.smoothness)
-    stream = Stream(optimiser, settings=StreamSettings(avoid_collisions=False))
-    ways: dict[str, Callable[[Motion], Answer]] = {"reference": optimiser, "stream": stream.retarget}
-    lines, means = [], {}
+    stream = Stream(optimiser, settings=ASKED)
+    ways: Ways = {"reference": lambda asked: [optimiser(motion) for motion in asked], "stream": stream.retarget_all}
     with report.step("evaluation", len(ways) * len(motions), "clips") as progress:
-        for number, (way, answers) in enumerate(ways.items()):
-            scores = []
-            for done, motion in enumerate(motions):
-                progress.update(number * len(motions) + done, f"{way}, {motion.name}")
-                scores.append(_score(optimiser, motion, answers(motion)))
-            means[way] = mean_whole_body(scores)
-            lines += [*_table(way, motions, scores, means[way]), ""]
+        tables = []
+        for number, way in enumerate(ways):
+            progress.update(number * len(motions), way)
+            tables.append(score_ways(body_map, motions, {way: ways[way]}))
         progress.update(len(ways) * len(motions))
-    _keep(config, means)
-    return "\n".join(lines[:-1])
+    _keep(config, {way: means for table in tables for way, means in table.means.items()})
+    return "\n\n".join(table.text for table in tables)
 
 
-def _has_root(motion: Motion) -> bool:
-    return motion.root_position_T3 is not None and motion.root_rotation_T33 is not None
+@dataclass(frozen=True)
+class WholeBodyTable:
+    """Ways of answering motions with a root, measured."""
+
+    text: str
+    """A table a way: a row a motion, and their mean."""
+    means: Mapping[str, Mapping[str, float]]
+    """The means over motions by way, as of `mean_whole_body`."""
 
 
-def _score(optimiser: OptimizationRetargeter, motion: Motion, answer: Answer) -> WholeBodyScore:
+def score_ways(body_map: BodyMap, motions: Sequence[Motion], ways: Ways) -> WholeBodyTable:
+    """Measures of a robot with feet.
+
+    Args:
+        body_map: the robot's.
+        motions: with a root.
+        ways: who answers them, by name.
+    """
+    tables, means = [], {}
+    for way, answer in ways.items():
+        scores = [_score(body_map, *pair) for pair in zip(motions, answer(motions), strict=True)]
+        means[way] = mean_whole_body(scores)
+        tables.append("\n".join(_table(way, motions, scores, means[way])))
+    return WholeBodyTable("\n\n".join(tables), means)
+
+
+def _score(body_map: BodyMap, motion: Motion, answer: Answer) -> WholeBodyScore:
     assert answer.root_position is not None and answer.root_quaternion_wxyz is not None
     base_T33 = rotation.quaternion_to_matrix(answer.root_quaternion_wxyz[:, [1, 2, 3, 0]])
-    return score_whole_body(optimiser.body_map, motion, answer.q, answer.root_position, base_T33)
+    return score_whole_body(body_map, motion, answer.q, answer.root_position, base_T33)
 
 
 def _table(

@@ -22,6 +22,7 @@ from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.cache import user_cache
 from mrhubo.files.regular import read_regular
+from mrhubo.lazy import import_optional
 
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate, GeneralName
@@ -52,6 +53,7 @@ def open_certificate(own: Path | None = None, host: str = "") -> ServerCertifica
     Raises:
         UserError: the file cannot be read or is none; the cache cannot be written; cryptography is not installed.
     """
+    import_optional("cryptography.x509", "--https needs cryptography: pip install 'mrhubo[live]'")
     path = own if own is not None else _our_file(host)
     try:
         text = read_regular(path, _MOST_BYTES)
@@ -72,10 +74,6 @@ def _refuse() -> str:
 
 def _our_file(host: str) -> Path:
     """The file of our certificate and key, which is made where there is none that still serves."""
-    try:
-        import cryptography.x509  # noqa: F401
-    except ImportError as error:
-        raise UserError("--https needs cryptography: pip install 'mrhubo[live]'") from error
     path, names = user_cache() / "live" / "certificate.pem", _our_names(host)
     if not _serves(path, names):
         content = _make(names)

@@ -16,6 +16,7 @@ from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.fast import Description, FastRetargeter, FastStream, StreamSettings
+from mrhubo.retargeting.answering import has_feet
 from mrhubo.robot_motion import RobotFacts
 
 _CHEST = POSED_JOINT_NAMES.index("spine3")
@@ -56,12 +57,16 @@ class LiveRobot:
         """By a package, without PyTorch; `form` as for `mrhubo.load_fast`.
 
         Raises:
-            UserError: there is no such package, it is damaged, or not for poses of our own skeleton.
+            UserError: there is no such package, it is damaged, not for poses of our own skeleton, or moves the robot's
+                legs.
         """
         import mrhubo
 
         folder = mrhubo.package_folder(source)
-        found = cls.of_retargeter(mrhubo.load_fast(folder, form), config)
+        fast = mrhubo.load_fast(folder, form)
+        if has_feet(fast.description):
+            raise _moves_legs(f"--retargeter {source}: its robot")
+        found = cls.of_retargeter(fast, config)
 
         def figure() -> dict[str, Any]:
             from mrhubo.live.figure import figure_of
@@ -83,10 +88,7 @@ class LiveRobot:
 
         robot = open_robot(name)
         if robot.keypoints is not None and robot.keypoints.standing:
-            raise UserError(
-                f"--robot {name}: its config moves its legs, and mrhubo live keeps no robot on its feet; name a config"
-                " of its arms, hands and head alone"
-            )
+            raise _moves_legs(f"--robot {name}: its config")
         retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
         found = cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
@@ -123,6 +125,12 @@ class LiveRobot:
 
         names = description.settings.joint_names, description.settings.branch_names
         return cls(retargeter.facts, *names, *_branches(description), home_N, answer, urdf)
+
+
+def _moves_legs(what: str) -> UserError:
+    return UserError(
+        f"{what} moves its legs, and mrhubo live keeps no robot on its feet; name one of its arms, hands and head alone"
+    )
 
 
 def hanging_pose() -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Human poses drawn joint by joint, not from a body prior: any direction of every limb, hand and head that a robot has.
+"""Human poses drawn joint by joint, not from a body prior: any direction of every limb, hand, foot and head of a robot.
 
 A prior knows how people of one collection move. Others move otherwise, and pose estimators err; a network that has seen
 every direction of a limb answers them too.
@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
+from mrhubo.body import anatomy
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.robot.parts import BendPart, BodyPart, LimbPart, OrientedPart
 
@@ -25,14 +26,17 @@ _LOOSE = math.radians(10.0)
 _SPREAD = math.radians(40.0)
 """Standard deviation of an oriented part's turn about each axis."""
 
+_RANGED = ("leg",)
+"""Regions whose limbs stay in the ranges of a human's joints: nobody's thigh points up behind."""
+
 
 def random_poses(parts: Sequence[BodyPart], count: int, generator: torch.Generator) -> Tensor:
     """Local rotations (count, 21, 3, 3) whose joints turn at random where one of the parts hangs on them; all other
     joints are at rest.
 
-    A limb on an oriented part (an upper arm on the chest) points anywhere, turned about itself in any way; a limb on a
-    limb bends about its hinge; what an oriented part turns by is normal about each axis, in equal parts at the joints
-    that share it.
+    A limb on an oriented part (an upper arm on the chest) points anywhere, turned about itself in any way, a thigh
+    anywhere in its hip's ranges; a limb on a limb bends about its hinge; what an oriented part turns by is normal about
+    each axis, in equal parts at the joints that share it.
     """
     local_BJ33 = torch.eye(3).repeat(count, len(POSED_JOINT_NAMES), 1, 1)
     hinges = {part.bent: part.rest for part in parts if isinstance(part, BendPart)}
@@ -50,6 +54,8 @@ def random_poses(parts: Sequence[BodyPart], count: int, generator: torch.Generat
             bend_B1 = _BEND * torch.rand(count, 1, generator=generator)
             bent = rotation.axis_angle_to_matrix(bend_B1 * torch.tensor(hinges[part.name]))
             local_BJ33[:, column] = bent @ normal(_LOOSE)
+        elif isinstance(part, LimbPart) and part.region in _RANGED:
+            local_BJ33[:, column] = anatomy.random_rotations(column, count, generator)
         elif isinstance(part, LimbPart):
             quaternion = torch.randn(count, 4, generator=generator)
             local_BJ33[:, column] = rotation.quaternion_to_matrix(quaternion)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, fields
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +35,7 @@ from mrhubo.fast.sections import (
     Settings,
     Trust,
 )
+from mrhubo.files.storage import write_tensors
 from mrhubo.reference import polish
 from mrhubo.retargeter import confidence
 from mrhubo.retargeter.describing_robot import (
@@ -106,6 +108,13 @@ def describe(retargeter: Retargeter) -> Description:
         ),
         describe_universal(network, bodies) if isinstance(network, UniversalJoints) else None,
     )
+
+
+def write_description(description: Description, file: Path) -> Path:
+    """Writes a description; the file's path."""
+    tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}
+    write_tensors(file, tensors, description.metadata())
+    return file
 
 
 def _human(body_map: BodyMap) -> Human:

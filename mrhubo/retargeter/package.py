@@ -9,6 +9,7 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -23,16 +24,17 @@ from mrhubo.body.vposer import VPoser
 from mrhubo.config import Config
 from mrhubo.errors import UserError
 from mrhubo.fast.description import FILE, Description
-from mrhubo.files.storage import write_tensors
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import Avoidance, DirectionProblem, Polish
+from mrhubo.reference.standing import Standing
 from mrhubo.retargeter.clip import join_frames
 from mrhubo.retargeter.confidence import STANDARD, ConfidenceModel, branches_of, shake
-from mrhubo.retargeter.describing import describe
+from mrhubo.retargeter.describing import describe, write_description
+from mrhubo.retargeter.floor import stand, standing_of
 from mrhubo.retargeter.judging import judge
 from mrhubo.retargeter.networks import JointNetwork
-from mrhubo.retargeter.parts import pose_parts
+from mrhubo.retargeter.parts import check_polish, pose_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
@@ -69,6 +71,7 @@ class Retargeter(nn.Module):
         """The optimiser's cost, for `polish`."""
         self.polisher = Polish(self.directions)
         self._avoidance: Avoidance | None = None
+        self._standing: Standing | None = None
         self.confidence, self.branches = confidence, branches_of(self.directions)
         """How much each branch of an answer is to be trusted, and what the branches are."""
         self.origin, self.checksum = "a network of mrhubo that was not saved", ""
@@ -90,6 +93,13 @@ class Retargeter(nn.Module):
         if self._avoidance is None:
             self._avoidance = Avoidance(self.body_map)
         return self._avoidance
+
+    @property
+    def standing(self) -> Standing | None:
+        """What stands the robot on the floor, made when first asked for; None: it has no feet."""
+        if self._standing is None:
+            self._standing = standing_of(self.body_map)
+        return self._standing
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -118,7 +128,8 @@ class Retargeter(nn.Module):
         together: bool | None = None,
         avoid_collisions: bool = True,
     ) -> RetargetResult:
-        """Joint angles of a human motion, with a confidence for each frame.
+        """Joint angles of a human motion, with a confidence for each frame; where the motion tells a root and the robot
+        has feet, also where its base goes, so that planted feet stay where they are (docs/whole-body.md).
 
         Args:
             motion: a `Motion`, or an array of local rotations of SMPL's joints 1..21: matrices (..., 21, 3, 3),
@@ -136,9 +147,9 @@ class Retargeter(nn.Module):
         """
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         length = poses.shape[-1] if poses.shape and poses.frame_rate else len(poses.local_TJ33)
-        clips = poses.local_TJ33.split(max(1, length))
+        clips = [motion] if isinstance(motion, Motion) else poses.local_TJ33.split(max(1, length))
         options = (polish, poses.frame_rate, together, avoid_collisions)
-        answers = [self.retarget(clip_TJ33, *options) for clip_TJ33 in clips]
+        answers = [self.retarget(clip, *options) for clip in clips]
         told = (motion.name, motion.source) if isinstance(motion, Motion) else ()
         return join_results(answers).with_leading(poses.shape, poses.frame_rate, *told)
 
@@ -171,13 +182,15 @@ class Retargeter(nn.Module):
         parts = list(self._parts(local_TJ33, polish))
         directed = bool(polish or frame_rate) or self.network.directed
         targets = [self.body_map.human_directions(part) for part in parts] if directed else [None] * len(parts)
-        return self._predict(parts, targets, polish, frame_rate, avoid_collisions)
+        return self.follow(parts, targets, polish, frame_rate, avoid_collisions)
 
-    def _predict(
+    def follow(
         self, parts: Sequence[Tensor], targets: Sequence[Tensor | None], polish: int, frame_rate: float | None,
         avoid_collisions: bool,
     ) -> Tensor:  # fmt: skip
-        """`predict` for the parts of a motion, with their directions where they are needed."""
+        """`predict` for the parts of a motion that are known to be good, with their directions, or others that shall be
+        imitated in their place, where they are needed.
+        """
         q_TN = torch.cat([self.answer(*part, polish) for part in zip(parts, targets, strict=True)])
         avoidance = self.avoidance if polish and avoid_collisions else None
         known = [target for target in targets if target is not None]
@@ -195,7 +208,7 @@ class Retargeter(nn.Module):
         avoid_collisions: bool = True,
     ) -> RetargetResult:
         """Joint angles, by default after steps of optimisation until they have converged, with a confidence for each
-        frame.
+        frame; a `Motion` that becomes one smooth motion moves the base of a robot with feet, as `forward` does.
 
         Args:
             local_TJ33: as for `predict`.
@@ -215,11 +228,13 @@ class Retargeter(nn.Module):
         check_frame_rate(joined_at)
         parts = list(self._parts(local_TJ33, polish))
         targets = [self.body_map.human_directions(part) for part in parts]
-        q_TN = self._predict(parts, targets, polish, joined_at, avoid_collisions)
+        stands = None if joined_at is None else stand(self, local_TJ33, parts, targets, polish, avoid_collisions)
+        q_TN, told = stands or (self.follow(parts, targets, polish, joined_at, avoid_collisions), {})
         shake_TD = None if frame_rate is None else shake(torch.cat(targets), frame_rate)
         sizes = [len(target) for target in targets]
         shakes = [None] * len(sizes) if shake_TD is None else shake_TD.split(sizes)
-        return join_results([judge(self, *part) for part in zip(q_TN.split(sizes), targets, shakes, strict=True)])
+        judged = [judge(self, *part) for part in zip(q_TN.split(sizes), targets, shakes, strict=True)]
+        return dataclasses.replace(join_results(judged), **told)
 
     @torch.no_grad()
     def judge(self, q_TN: Tensor, local_TJ33: Tensor, frame_rate: float | None = None) -> RetargetResult:
@@ -230,8 +245,7 @@ class Retargeter(nn.Module):
         return judge(self, q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
 
     def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
-        if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
-            raise UserError(f"polish must be 0 or more steps, found {polish}")
+        check_polish(polish)
         return pose_parts(local_TJ33, self.body_map.skeleton, self.device)
 
     @torch.no_grad()
@@ -277,12 +291,7 @@ class Retargeter(nn.Module):
 
     def save_description(self, folder: Path) -> Path | None:
         """Writes `describe` into a folder; None for a retargeter that has no such arrays."""
-        if isinstance(self.prior, VPoser):
-            return None
-        description = self.describe()
-        tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}
-        write_tensors(folder / FILE, tensors, description.metadata())
-        return folder / FILE
+        return None if isinstance(self.prior, VPoser) else write_description(self.describe(), folder / FILE)
 
     @classmethod
     def load(cls, folder: Path | str) -> Retargeter:

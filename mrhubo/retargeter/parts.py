@@ -21,6 +21,16 @@ _LARGEST = 2.0
 """No number of a rotation matrix is larger than 1; those that come near to one may be a little."""
 
 
+def check_polish(polish: int) -> None:
+    """Refuses what is no number of steps of optimisation.
+
+    Raises:
+        UserError: it is negative, or no whole number.
+    """
+    if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
+        raise UserError(f"polish must be 0 or more steps, found {polish}")
+
+
 def pose_parts(local_TJ33: MotionLike, skeleton: Skeleton, device: torch.device) -> Iterator[Tensor]:
     """The poses as the networks want them, on a device, float32.
 

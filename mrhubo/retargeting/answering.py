@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mrhubo.body.joints import SIDES
 from mrhubo.errors import InputWarning
 from mrhubo.fast.description import FILE, Description
 from mrhubo.robot_motion import RobotFacts, RobotMotion
@@ -45,7 +46,8 @@ class Answerer:
 
 
 def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) -> Answerer:
-    """A package's networks and their steps of optimisation, each motion as a whole.
+    """A package's networks and their steps of optimisation, each motion as a whole; without PyTorch, but for a robot
+    with feet.
 
     Args:
         source: as for `mrhubo.load`.
@@ -58,12 +60,18 @@ def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) ->
 
     folder = mrhubo.package_folder(source)
     arrays = Description.read(folder) if (folder / FILE).is_file() else None
-    if arrays is not None and arrays.settings.own_rest:
+    if arrays is not None and arrays.settings.own_rest and not has_feet(arrays):
         said = _describe(folder, arrays.settings.robot, arrays.settings.joint_names)
         return _of_description(said, arrays, avoid_collisions)
     retargeter = mrhubo.load(folder)
     described = _describe(folder, retargeter.body_map.robot.name, retargeter.joint_names)
     return _of_retargeter(described, retargeter, avoid_collisions)
+
+
+def has_feet(description: Description) -> bool:
+    """Whether a retargeter's robot has feet: where its base goes, only PyTorch works out."""
+    names = description.settings.direction_names
+    return any(f"{side}_foot_up" in names for side in SIDES)
 
 
 def _of_retargeter(described: str, retargeter: Retargeter, avoid_collisions: bool) -> Answerer:
@@ -100,7 +108,7 @@ def of_universal(robot: Robot, avoid_collisions: bool = True) -> Answerer:
         warnings.warn(why, InputWarning, stacklevel=2)
     said = f"no package: the universal network answers, without any training; {_sized(robot)}"
     description = retargeter.describe()
-    if not description.settings.own_rest:
+    if has_feet(description) or not description.settings.own_rest:
         return _of_retargeter(said, retargeter, avoid_collisions)
     return _of_description(said, description, avoid_collisions)
 

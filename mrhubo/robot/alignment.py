@@ -1,4 +1,4 @@
-"""Turns a human's arms and head until they point exactly where the robot's do.
+"""Turns a human's limbs, hands, feet and head until they point exactly where the robot's do.
 
 Latent inverse kinematics ends where prior and keypoints balance: a pose of Reachy's misses its head by 12 degrees and
 its hands by 14 to 24, and a network trained on that turns robots' heads and hands too far. What is left of the way is

@@ -244,7 +244,7 @@ UPPER_BODY: tuple[BodyPart, ...] = (
     CHEST.alone,
     *(part for part in PARTS if part.seen_from == CHEST.name),
 )
-"""What hangs on a chest that carries itself: what packages answer, and what a robot is described by."""
+"""What hangs on a chest that carries itself: what a robot is described by, unless it is to be its whole body."""
 
 
 def points_beyond(part: BodyPart, table: Sequence[BodyPart] = PARTS) -> tuple[str, ...]:

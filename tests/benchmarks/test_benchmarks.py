@@ -174,6 +174,9 @@ def test_prior(run: Run, tmp_path: Path, clips: Path, capture: Path) -> None:
     assert all(row[1] and row[2] for row in rows(text, "measure") if "others' limbs" not in row[0])
     assert [row[0] for row in rows(text, "clip")] == ["boxing", "wave", "mean over clips"]
     assert [row[0] for row in rows(text, "joint")][:3] == ["hip", "spine1", "knee"]
+    assert {"chest up", "upper arm", "forearm", "thigh", "shin", "foot up"} <= {
+        row[0] for row in rows(text, "direction")
+    }
     assert "poses/s decoded" in text
 
 

@@ -38,7 +38,7 @@ def test_thumbs_that_point_down_hold_joints_at_limits_and_bend_arms_backwards(ro
               for side in ("left", "right")}  # fmt: skip
     found = look(root, more_robot("g1", keypoints=thumbs))
     left = r"robot.keypoints.left_hand: the joint 'left_shoulder_yaw_joint' is at a limit in \d+% .*axes tell: left_hand: {"
-    elbow = r"robot.ranges.right_elbow_joint: the arm is bent backwards in .*: right_elbow_joint: \[-1.047, 1.5\d+\]"
+    elbow = r"robot.ranges.right_elbow_joint: the limb is bent backwards in .*: right_elbow_joint: \[-1.047, 1.5\d+\]"
     for expected in (left, elbow):
         assert any(re.match(expected, doubt) for doubt in found.doubts)
     assert found.backwards["right_elbow_joint"] > 0.05

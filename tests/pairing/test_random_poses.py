@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from mrhubo import rotation
+from mrhubo.body import anatomy
 from mrhubo.body.joints import hinge_axis
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
@@ -50,3 +51,19 @@ def test_upper_arms_point_anywhere_and_elbows_bend_forward(body_map: BodyMap) ->
         turn = rotation.matrix_to_axis_angle(poses[:, POSED_JOINT_NAMES.index(f"{side}_elbow")])
         bend = turn @ torch.tensor(hinge_axis(f"{side}_elbow"))
         assert float((bend > math.radians(-15)).float().mean()) > 0.97 and float(bend.amax()) > math.radians(140)
+
+
+def test_thighs_stay_in_the_ranges_of_hips_and_knees_bend_backwards(root: Path) -> None:
+    nao = build_body_map(load_config(root / "conf" / "nao-whole-body.yaml").robot)
+    poses = drawn(nao, 500)
+    hips = [POSED_JOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+    assert float(anatomy.excess(poses)[:, hips].max()) < 1e-3
+    angles_BX3 = anatomy.joint_angles(poses)[:, hips]
+    reach_X3 = angles_BX3.amax(dim=0) - angles_BX3.amin(dim=0)
+    limits_X3 = anatomy.LIMITS_J32[hips].diff(dim=-1)[..., 0]
+    assert bool((reach_X3 > 0.9 * limits_X3).all())
+    directions = nao.human_directions(poses)
+    thigh, shin = (directions[:, nao.direction_names.index(f"left_{name}")] for name in ("knee", "ankle"))
+    axis = directions[:, nao.direction_names.index("left_knee_axis")]
+    bent = torch.linalg.cross(thigh, shin).norm(dim=-1) > 0.5
+    assert float(((torch.linalg.cross(thigh, shin) * axis).sum(-1)[bent] >= 0).float().mean()) > 0.99

@@ -1,27 +1,13 @@
-"""A robot with legs is refused where only arms and a head can be answered; one without is as it ever was."""
+"""Which rows of the table of body parts a robot has: with a pelvis, and as it ever was, without."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from mrhubo.config import load_config
-from mrhubo.errors import UserError
-from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.robot import read_keypoints
 from mrhubo.robot.keypoints import entry_names
 from mrhubo.robot.parts import PARTS, UPPER_BODY, OrientedPart
-from mrhubo.robot.upper_body import check_upper_body
-
-
-def test_legs_are_refused_and_named(root: Path) -> None:
-    config = load_config(root / "conf" / "nao-whole-body.yaml")
-    with pytest.raises(
-        UserError, match=r"line 12: robot.keypoints.pelvis: .* not of pelvis, left_hip, .*retarget --robot"
-    ):
-        prepare_pairs(config)
-    check_upper_body(load_config(root / "conf" / "nao.yaml").robot)
 
 
 def test_a_robot_without_a_pelvis_has_the_upper_bodys_rows(root: Path) -> None:
