@@ -60,10 +60,8 @@ class FrameReader:
             return last_BJ33, torch.zeros(people, dtype=torch.bool, device=last_BJ33.device)
         found = self._of_people(to_tensor(given, self.body_map.skeleton))
         if found.ndim < 2 or len(found) != people:
-            shape, wanted = (
-                tuple(to_tensor(given).shape),
-                "a single one" if self.people is None else f"{people} of them",
-            )
+            wanted = "a single one" if self.people is None else f"{people} of them"
+            shape = tuple(to_tensor(given).shape)
             raise UserError(f"stream: expected poses of one frame, {wanted}, found an array of shape {shape}")
         seen_B = found.flatten(1).isfinite().all(dim=1)
         poses = read_poses(found[seen_B])
