@@ -146,7 +146,8 @@ class Server:
             async with serve(
                 self._meet, self.endpoint.host, self.endpoint.port, process_request=self._answer,
                 max_size=MAX_BYTES, max_queue=4, compression=None, open_timeout=5, ping_interval=2,
-                ping_timeout=_PATIENCE, close_timeout=1, server_header=None, write_limit=2**15, logger=_LOGGER, **secure,
+                ping_timeout=_PATIENCE, close_timeout=1, server_header=None, write_limit=2**15,
+                logger=_LOGGER, **secure,
             ) as server:  # fmt: skip
                 port = next(iter(server.sockets)).getsockname()[1]
                 self.endpoint = Endpoint(self.endpoint.host, port)
