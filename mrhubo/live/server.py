@@ -43,6 +43,10 @@ _MOST_PER_WINDOW, _WINDOW = 60, 0.1
 _SHOWN_RATE = 30.0
 """Outputs per second for those who watch."""
 _OPENING = 10.0
+_PATIENCE = 20.0
+"""Seconds without an answer after which a connection is given up. A browser that loads models answers nothing for long;
+its heartbeats stop the robot at once, and a connection that is given up loses a press of the button.
+"""
 _LOGGER = logging.getLogger("mrhubo.live.server")
 _LOGGER.setLevel(logging.CRITICAL)  # what strangers send is counted, and not told
 
@@ -67,8 +71,8 @@ class Server:
         self.endpoint, self.token = endpoint, find_token(endpoint.host)
         self._page, self.certificate = page, certificate
         self._waiting: deque[tuple[str, bytes | str | None]] = deque(maxlen=_MOST_MESSAGES)
-        self.figure: bytes | None = None
-        """How the robot looks (`mrhubo.live.figure`), JSON."""
+        self.figure = b"null"
+        """How the robot looks (`mrhubo.live.figure`), JSON; null: nobody knows."""
         self._lost = 0
         self._faults: deque[str] = deque(maxlen=1_000)
         self._thread: threading.Thread | None = None
@@ -141,8 +145,9 @@ class Server:
         try:
             async with serve(
                 self._meet, self.endpoint.host, self.endpoint.port, process_request=self._answer,
-                max_size=MAX_BYTES, max_queue=4, compression=None, open_timeout=5, ping_interval=2, ping_timeout=4,
-                close_timeout=1, server_header=None, write_limit=2**15, logger=_LOGGER, **secure,
+                max_size=MAX_BYTES, max_queue=4, compression=None, open_timeout=5, ping_interval=2,
+                ping_timeout=_PATIENCE, close_timeout=1, server_header=None, write_limit=2**15,
+                logger=_LOGGER, **secure,
             ) as server:  # fmt: skip
                 port = next(iter(server.sockets)).getsockname()[1]
                 self.endpoint = Endpoint(self.endpoint.host, port)
@@ -172,7 +177,7 @@ class Server:
             return _response(403, b"refused\n", "text/plain")
         if urlsplit(request.path).path == SOCKET_PATH:
             return None if len(self._clients) < _MOST_CLIENTS else _response(503, b"too many\n", "text/plain")
-        if urlsplit(request.path).path == ROBOT_PATH and self.figure is not None:
+        if urlsplit(request.path).path == ROBOT_PATH:
             return _response(200, self.figure, "application/json")
         found = find_file(self._page, request.path) or find_model(request.path)
         if found is None:
