@@ -60,7 +60,11 @@ def _of_person(path: Path, tree: JointTree, options: ReadOptions, notes: list[st
     roots = tree.roots
     if len(roots) < 2:
         return tree
-    people = {tree.names[root]: under for root in roots if find_limbs(Shape(under := tree.under(root))) is not None}
+    people: dict[str, JointTree] = {}
+    for root in roots:
+        under, name = tree.under(root), tree.names[root]
+        if find_limbs(Shape(under)) is not None:
+            people[name if name not in people else f"{name} {len(people) + 1}"] = under
     if not people:
         return tree
     chosen = choose(path, [Person(name, len(tree)) for name in people], options, notes)

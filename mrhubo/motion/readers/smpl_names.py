@@ -39,15 +39,7 @@ class _Names:
 
     pose: str
     root: tuple[str, ...] = ()
-    position: tuple[str, ...] = (
-        "trans",
-        "transl",
-        "translation",
-        "root_trans",
-        "root_trans_offset",
-        "trans_orig",
-        "global_t",
-    )
+    position: tuple[str, ...] = _PLACES
     betas: tuple[str, ...] = ("betas", "beta", "shape")
 
 
@@ -97,7 +89,7 @@ class Found:
         """The arrays, of one of the people where there are several."""
         node, names = self.node, self.names
         pose = node[names.pose]
-        array = pose.array() if person is None else self._one(pose.array(), person)
+        array = pose.array() if person is None else pose.array().take(person, 0 if self.people_first else 1)
         root, position, betas = (self._array(keys, person) for keys in (names.root, names.position, names.betas))
         frames = self._array(_FRAMES, person)
         if frames is None and self.outer is not None:
@@ -117,13 +109,11 @@ class Found:
 
     def _array(self, keys: tuple[str, ...], person: int | None) -> np.ndarray | None:
         array = self.node.find_array(*keys)
-        axis = 0 if self.people_first else 1
-        if array is None or person is None or array.ndim < 2 or array.shape[axis] != self.people:
+        if array is None or person is None or array.ndim < 2:
             return array
-        return self._one(array, person)
-
-    def _one(self, array: np.ndarray, person: int) -> np.ndarray:
-        return array[person] if self.people_first else array[:, person]
+        axes = (0,) if self.people_first else (1, 0)  # a shape has people alone
+        axis = next((axis for axis in axes if array.shape[axis] == self.people), None)
+        return array if axis is None else array.take(person, axis)
 
 
 def find_here(node: Tree) -> Found | None:

@@ -61,11 +61,13 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
 def test_people_may_be_the_second_axis(tmp_path: Path) -> None:
     people = [made_up(FRAMES, seed=seed) for seed in range(2)]
     poses = np.stack([padded(pose, 24) for pose in people], axis=1)  # (T, 2, 72)
-    np.savez(tmp_path / "a.npz", poses=poses, trans=np.stack([np.ones((FRAMES, 3)), np.zeros((FRAMES, 3))], axis=1))
+    places = np.stack([np.ones((FRAMES, 3)), np.zeros((FRAMES, 3))], axis=1)
+    np.savez(tmp_path / "a.npz", poses=poses, trans=places, betas=np.eye(2, 10))
     for person, pose in enumerate(people):
         motion = read_motion(tmp_path / "a.npz", ReadOptions(rate=30, person=str(person)))
         assert close(motion, pose, "smpl") and motion.root_position_T3 is not None
         assert float(motion.root_position_T3[0, 0]) == 1 - person
+        assert motion.betas is not None and motion.betas[person] == 1
 
 
 def test_features_of_humanml3d_tell_where_joints_are(tmp_path: Path) -> None:
