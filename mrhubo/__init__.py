@@ -86,23 +86,37 @@ def load(source: str | os.PathLike[str]) -> Retargeter:
     return Retargeter.load(package_folder(source))
 
 
-def for_robot(robot: Robot | str | os.PathLike[str]) -> Retargeter:
+def for_robot(robot: Robot | str | os.PathLike[str], whole_body: bool = False) -> Retargeter:
     """A retargeter for a robot that nothing was trained for, by the network that is the same for every robot.
+
+        retargeter = mrhubo.for_robot("my.urdf", whole_body=True)
 
     Made in seconds. It answers motions, poses and streams with a confidence as a trained one does (docs/universal.md).
 
     Args:
         robot: a `Robot` that knows its body parts; or a config's file, the name of a shipped robot, or a URDF, whose
             body parts are found out (`mrhubo describe` shows them; what is a guess is told as a warning).
+        whole_body: whether the legs, feet and waist of a URDF or a MuJoCo model move too, as with `mrhubo retarget
+            --whole-body` (docs/whole-body.md); else its arms, hands and head alone. A config or a `Robot` says itself
+            what it has.
 
     Raises:
-        UserError: the file cannot be used, or the robot's body parts make no sense.
+        UserError: the file cannot be used, the robot's body parts make no sense, or `whole_body` is said of a config or
+            a `Robot`.
     """
     from mrhubo.describing.run import open_robot
+    from mrhubo.errors import UserError
     from mrhubo.retargeter import untrained
     from mrhubo.robot import Robot
 
-    return untrained(robot if isinstance(robot, Robot) else open_robot(os.fspath(robot)))
+    if not isinstance(robot, Robot):
+        return untrained(open_robot(os.fspath(robot), whole_body))
+    if whole_body:
+        raise UserError(
+            f"whole_body=True goes with a URDF or a MuJoCo model; the robot '{robot.name}' says itself what of a body "
+            "it has"
+        )
+    return untrained(robot)
 
 
 def package_folder(source: str | os.PathLike[str]) -> Path:

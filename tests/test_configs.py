@@ -11,7 +11,7 @@ from mrhubo.robot import build_body_map, read_keypoints
 from mrhubo.robot.parts import PARTS, OrientedPart
 
 ROOT = Path(__file__).resolve().parent.parent
-ROBOTS = sorted(path for path in (ROOT / "conf").glob("*.yaml") if path.stem not in ("prior", "universal"))
+ROBOTS = sorted(path for path in (ROOT / "conf").glob("*.yaml") if not path.stem.startswith(("prior", "universal")))
 WHOLE = "-whole-body"
 
 
@@ -52,6 +52,9 @@ def test_a_whole_body_holds_the_upper_body_that_ships(path: Path) -> None:
 def test_universal() -> None:
     config = load_config(ROOT / "conf" / "universal.yaml", schema=UniversalConfig)
     assert config.tracking_dir == ROOT / "mlruns" and config.output == SHIPPED_UNIVERSAL
+
+    more = load_config(ROOT / "conf" / "universal-legs.yaml", schema=UniversalConfig)
+    assert more.start == SHIPPED_UNIVERSAL and more.legs_share > 0 and more.output != SHIPPED_UNIVERSAL
 
 
 def test_prior() -> None:

@@ -17,10 +17,16 @@ class UniversalConfig:
 
     output: Path = SHIPPED_UNIVERSAL
     """Where the weights go (.safetensors)."""
+    start: Path | None = None
+    """Weights to go on from (.safetensors), of the same width, heads and hypotheses; default: random ones."""
     problems: int = bounded(131_072, 1_024, 100_000_000)
     """Random chains with a target and the best answer that several starts find: made once, in shards of 1,024."""
     heads_share: float = bounded(0.15, 0.0, 1.0)
-    """Share of the chains that are heads; the others are arms."""
+    """Share of the chains that are heads,"""
+    legs_share: float = bounded(0.0, 0.0, 1.0)
+    """legs,"""
+    waists_share: float = bounded(0.0, 0.0, 1.0)
+    """and waists; the others are arms."""
     human_share: float = bounded(0.4, 0.0, 1.0)
     """Share of the targets that are poses of the body prior; the others are what a chain reaches, or nearly."""
     poses: int = bounded(40_000, 1, 10_000_000)

@@ -129,8 +129,8 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
     if is_config(word):
         if whole_body:
             raise UserError(
-                f"command line: --whole-body goes with a URDF or a MuJoCo model; the config '{word}' says itself what "
-                "of a body it has"
+                "--whole-body, and whole_body=True in Python, go with a URDF or a MuJoCo model; the config "
+                f"'{word}' says itself what of a body it has"
             )
         return Robot.from_config(word)
     description = read_model(word)

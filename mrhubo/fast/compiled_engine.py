@@ -53,7 +53,7 @@ class CompiledEngine:
         self._no_shake = np.zeros((0, len(description.trust.column_XD)))
         self._unroll: Callable[[np.ndarray, np.ndarray], object] | None = None
         if (universal := description.universal) is not None:
-            from mrhubo.fast.compiled.universal import look_up
+            from mrhubo.fast.compiled.universal_features import look_up
             from mrhubo.fast.compiled.universal_kernels import make_universal_kernel
             from mrhubo.fast.compiled.universal_network import lay_out
 

@@ -12,10 +12,13 @@ Legend: B poses, C branches, S = 4 signals.
 from __future__ import annotations
 
 import dataclasses
+import math
 
+import numpy as np
 import torch
+from scipy.optimize import minimize
+from scipy.special import expit
 from torch import Tensor
-from torch.nn.functional import binary_cross_entropy_with_logits, softplus
 
 from mrhubo.motion import Motion, reshare
 from mrhubo.reference import angle_between
@@ -40,6 +43,8 @@ _USUAL = 0.95
 """Share of whole poses that have the usual phi or less."""
 _RIDGE = 1e-4
 """Weight of the squared weights beside the mean loss: keeps those finite that nothing speaks against."""
+_EXACT = {"maxiter": 1_000, "ftol": 1e-13, "gtol": 1e-8}
+"""When the weights are found."""
 
 
 @torch.no_grad()
@@ -78,24 +83,22 @@ def calibrate(retargeter: Retargeter, poses: int = POSES, seed: int = 0) -> Conf
     return ConfidenceModel(usual_phi, fit_weights(moving_XS, good_X), fit_weights(still_XS, good_X))
 
 
-@torch.enable_grad()
 def fit_weights(signal_XS: Tensor, good_X: Tensor) -> Weights:
-    """Weights of a logistic regression of what is good (X,) on signals (X, S), none negative (Nelder's
-    logit link; weights are softplus of what is fitted), with a small ridge.
+    """Weights of a logistic regression of what is good (X,) on signals (X, S), none negative, with a small ridge.
+
+    A convex problem with bounds, by L-BFGS-B (R. Byrd et al., "A limited memory algorithm for bound constrained
+    optimization", 1995).
     """
-    signal_XS, good_X = signal_XS.double(), good_X.double()
-    raw = torch.zeros(1 + len(SIGNALS), dtype=torch.float64, requires_grad=True)
-    optimiser = torch.optim.LBFGS([raw], max_iter=200, line_search_fn="strong_wolfe")
+    seen_XS, wanted_X = signal_XS.double().numpy(), good_X.double().numpy()
 
-    def loss() -> Tensor:
-        optimiser.zero_grad()
-        weight_S = softplus(raw[1:])
-        cost = (
-            binary_cross_entropy_with_logits(raw[0] - signal_XS @ weight_S, good_X) + _RIDGE * weight_S.square().sum()
-        )
-        cost.backward()
-        return cost
+    def loss(weight: np.ndarray) -> tuple[float, np.ndarray]:
+        logit_X = weight[0] - seen_XS @ weight[1:]
+        miss_X = (expit(logit_X) - wanted_X) / len(wanted_X)
+        cost = np.mean(np.logaddexp(0.0, logit_X) - wanted_X * logit_X) + _RIDGE * np.square(weight[1:]).sum()
+        slope = np.concatenate(([miss_X.sum()], 2 * _RIDGE * weight[1:] - miss_X @ seen_XS))
+        return float(cost), slope
 
-    optimiser.step(loss)
-    certain, *weights = (float(x) for x in torch.cat((raw[:1], softplus(raw[1:]))).detach())
-    return Weights(certain, *weights)
+    begin = np.concatenate(([0.0], np.full(len(SIGNALS), math.log(2.0))))
+    bounds = [(None, None), *[(0.0, None)] * len(SIGNALS)]
+    found = minimize(loss, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=_EXACT)
+    return Weights(*(float(x) for x in found.x))

@@ -2,8 +2,9 @@
 
 1. The network answers K hypotheses.
 2. The cheapest of them are refined by the network and, beside, by a Gauss-Newton step; the cheaper of the two goes on.
-3. Again, with fewer.
-4., 5. Damped Gauss-Newton steps of the cheapest one, the better of two dampings each time.
+3. The cheapest three of these go by damped Gauss-Newton steps, the better of two dampings. A training has the network
+   refine them too, so that it learns from there.
+4., 5. Likewise the cheapest one.
 
 The answer is the cheapest of all angles that were come by, by the exact cost. Limits are never exceeded, as all steps
 are clipped to them.
@@ -18,11 +19,13 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from mrhubo.fast.plain.universal import DAMPINGS, FINAL, FINAL_DAMPINGS, KEPT
+from mrhubo.fast.plain.universal import DAMPINGS, FINAL_DAMPINGS, KEPT, REFINED
 from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.problem import Place, Problem, choose
 
-ITERATIONS = 1 + len(KEPT) + FINAL
+ITERATIONS = 1 + len(KEPT)
+LEARNT = 2
+"""In how many iterations after the first a training has the network answer."""
 
 
 @dataclass
@@ -49,9 +52,9 @@ class Trace:
         self.best.append(self.cost_B)
 
 
-def unroll(network: UniversalNetwork, problem: Problem, start_BN: Tensor | None = None) -> Trace:
-    """Five iterations from the middle of all ranges, or from other angles (B, N) inside the limits."""
-    place = problem.at(problem.bounds.middle_BN if start_BN is None else start_BN)
+def unroll(network: UniversalNetwork, problem: Problem, refined: int = REFINED) -> Trace:
+    """Five iterations from the middle of all ranges; in so many after the first the network answers."""
+    place = problem.at(problem.bounds.middle_BN)
     count = len(place.q_BN)
     first_BKN = _answer(network, place, place.steps(place.q_BN.new_tensor([DAMPINGS])), first=True)
     trace = Trace(place.q_BN, place.model.cost_B, first_BKN)
@@ -59,21 +62,18 @@ def unroll(network: UniversalNetwork, problem: Problem, start_BN: Tensor | None 
     cost_BK = place.cost_B.unflatten(0, (count, -1))
     trace.learnt.append(cost_BK)
     trace.see(first_BKN, cost_BK)
-    for keep in KEPT:
+    for turn, keep in enumerate(KEPT):
         place = place.rows(_best(cost_BK, keep))
-        step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))
-        network_XN = _answer(network, place, step_XKN, first=False)[:, 0]
-        tried = [place.problem.at(network_XN), place.moved(step_XKN[:, 0])]
-        trace.learnt.append(tried[0].cost_B.unflatten(0, (count, -1)))
+        if turn < refined:
+            step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))
+            network_XN = _answer(network, place, step_XKN, first=False)[:, 0]
+            tried = [place.problem.at(network_XN), place.moved(step_XKN[:, 0])]
+            trace.learnt.append(tried[0].cost_B.unflatten(0, (count, -1)))
+        else:
+            tried = [place.moved(step_XN) for step_XN in place.steps(place.q_BN.new_tensor([FINAL_DAMPINGS])).unbind(1)]
         place = choose(*tried)
         cost_BK = place.cost_B.detach().unflatten(0, (count, -1))
         trace.see(place.q_BN.unflatten(0, (count, -1)), cost_BK)
-    for _ in range(FINAL):
-        place = place.rows(_best(cost_BK, 1))
-        step_BKN = place.steps(place.q_BN.new_tensor([FINAL_DAMPINGS]))
-        place = choose(*(place.moved(step_BN) for step_BN in step_BKN.unbind(1)))
-        cost_BK = place.cost_B.detach()[:, None]
-        trace.see(place.q_BN[:, None], cost_BK)
     return trace
 
 

@@ -16,14 +16,13 @@ from torch import Tensor, nn
 
 from mrhubo.reference import DirectionProblem
 from mrhubo.robot import BodyMap, LinkPoses
-from mrhubo.robot.keypoints import Limb
-from mrhubo.robot.parts import BendPart
+from mrhubo.robot.parts import BendPart, LimbPart
 from mrhubo.universal.chains import Local
 from mrhubo.universal.iterations import unroll
 from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.objective import Bounds
 from mrhubo.universal.problem import Problem
-from mrhubo.universal.slots import AXIAL_S, MIRROR_3, SIGN_3, SLOTS, slot_of
+from mrhubo.universal.slots import AXIAL_S, MIRROR_3, SIGN_3, SLOTS, on_the_right, slot_of
 
 
 class UnfitBranch(ValueError):
@@ -67,14 +66,11 @@ class RobotBranch(nn.Module):
         if not self.places:
             raise UnfitBranch("a branch has no direction")
         shared = body_map.shared
-        rest_D3 = shared.rest_D3.index_select(0, shared.order_D)
-        outer = [d for d, part in zip(places, parts, strict=True) if not isinstance(part, BendPart)]
-        limbs = [d for d in outer if isinstance(body_map.directions[d], Limb)]
         view = shared.view_D[places[0]]
         self._view_row = robot.link_index(shared.view_links[int(view)])
         self._keep("view_axes_33", shared.view_axes_V33[view])
         like = robot.lower_N
-        mirrored = bool(rest_D3[(limbs or outer)[0], 0] < -_SIDEWAYS)
+        mirrored = self._mirrored(places)
         mirror_3 = like.new_tensor(MIRROR_3 if mirrored else [1.0, 1.0, 1.0])
         axial_S = like.new_tensor(AXIAL_S if mirrored else [1.0] * len(SLOTS))
         self._keep("mirror_3", mirror_3)
@@ -87,6 +83,16 @@ class RobotBranch(nn.Module):
         middle_1X = ((robot.lower_N + robot.upper_N) / 2)[None, self.joints_X]
         along_X = self.local(middle_1X).axis_BN3[0] @ like.new_tensor(SIGN_3)
         self.sense_X = torch.where(along_X < 0, -1.0, 1.0).to(like)
+
+    def _mirrored(self, places: list[int]) -> bool:
+        """Whether it is the mirror image of a left branch; without limbs, its parts' directions at rest say so."""
+        body_map = self.problem.body_map
+        parts = [body_map.directions[d].part for d in places]
+        limb = next((part for part in parts if isinstance(part, LimbPart)), None)
+        if limb is not None:
+            return on_the_right(body_map.skeleton, limb)
+        outer = next(d for d, part in zip(places, parts, strict=True) if not isinstance(part, BendPart))
+        return bool(body_map.shared.rest_D3[body_map.shared.order_D[outer], 0] < -_SIDEWAYS)
 
     def _keep(self, name: str, tensor: Tensor) -> None:
         self.register_buffer(name, tensor.to(self.problem.device), persistent=False)

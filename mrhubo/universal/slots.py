@@ -1,11 +1,12 @@
 """Where the directions of a branch stand in what the universal network sees.
 
-A branch (an arm, the head) turns at most one limb upon another, the axis about which the outer one bends, and one
-oriented part: five directions, told apart by their kind alone.
+A branch (an arm, a leg, the head, the waist) turns at most one limb upon another, the axis about which the outer one
+bends, and one oriented part: five directions, told apart by their kind alone.
 """
 
 from __future__ import annotations
 
+from mrhubo.body.skeleton import Skeleton, keypoint_indices
 from mrhubo.robot.parts import BendPart, BodyPart, LimbPart
 
 SLOTS = ("carrying limb", "bend axis", "bending limb", "first of an oriented part", "second of an oriented part")
@@ -13,7 +14,7 @@ SLOTS = ("carrying limb", "bend axis", "bending limb", "first of an oriented par
 AXIAL_S = (1.0, -1.0, 1.0, 1.0, 1.0)
 """-1 for what a mirror turns round besides: an axis of rotation."""
 MIRROR_3 = (-1.0, 1.0, 1.0)
-"""What makes a right arm a left one, in human axes (x left, y up, z forward)."""
+"""What makes a right limb a left one, in human axes (x left, y up, z forward)."""
 SIGN_3 = (0.8139, 0.5057, 0.2861)
 """A joint's sense of turn is canonical if its axis makes an acute angle with this direction in the middle of all
 ranges. Oblique, so that no axis that people choose is at right angles to it."""
@@ -28,3 +29,8 @@ def slot_of(part: BodyPart, word: int, carried: bool) -> int:
     if isinstance(part, LimbPart):
         return 2 if carried else 0
     return 3 + word
+
+
+def on_the_right(skeleton: Skeleton, limb: LimbPart) -> bool:
+    """Whether a limb begins on a person's right."""
+    return float(skeleton.rest_K3[keypoint_indices([limb.start])[0], 0]) < 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,12 @@ import torch
 import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
+from mrhubo.describing.run import open_robot
 from mrhubo.errors import UserError
 from mrhubo.motion import read_motion
 from mrhubo.reference import OptimizationRetargeter, angle_between
-from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.retargeter import Retargeter, build_network, without_training
+from mrhubo.retargeter.calibration import calibrate
 from mrhubo.robot import build_body_map
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -48,6 +51,27 @@ def test_a_stream_follows(reachy: Retargeter, root: Path) -> None:
     stream = mrhubo.Stream(reachy, rate=motion.frame_rate)
     first = [stream(frame_J33).q for frame_J33 in motion.local_TJ33[:4]]
     assert all(bool(torch.isfinite(torch.as_tensor(q)).all()) for q in first)
+
+
+def test_legs_of_a_urdf_move_when_they_are_asked_for(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(without_training, "calibrate", functools.partial(calibrate, poses=100))
+    file = root / "data" / "robots" / "nao" / "nao.urdf"
+    arms, whole = mrhubo.for_robot(file), mrhubo.for_robot(file, whole_body=True)
+    by_command = open_robot(str(file), whole_body=True)
+    assert whole.joint_names == by_command.joint_names and set(arms.joint_names) < set(whole.joint_names)
+    prior = BodyPrior.open()
+    local_TJ33 = prior.decode_matrices(0.7 * torch.randn(30, prior.latent, generator=torch.Generator().manual_seed(3)))
+    body_map = whole.body_map
+    q_TN, target_TD3 = torch.as_tensor(whole(local_TJ33).q), body_map.human_directions(local_TJ33)
+    off_TD = angle_between(body_map.robot_directions(body_map.robot.forward(q_TN)), target_TD3)
+    thighs = [i for i, d in enumerate(body_map.directions) if d.part.region == "leg"]
+    assert len(thighs) == 4 and float(torch.rad2deg(off_TD[:, thighs]).mean()) < 10
+
+
+def test_only_models_are_asked_for_their_whole_body(reachy: Retargeter) -> None:
+    for robot in ("nao", reachy.body_map.robot):
+        with pytest.raises(UserError, match="says itself what of a body it has"):
+            mrhubo.for_robot(robot, whole_body=True)
 
 
 def test_a_spoilt_pose_is_not_trusted(reachy: Retargeter) -> None:

@@ -15,6 +15,8 @@ from mrhubo.universal.learning.random_chains import random_chains
 from mrhubo.universal.robots import RobotBranch
 from mrhubo.universal.slots import SIGN_3
 
+EACH = {"arms": 120, "heads": 40, "legs": 100, "waists": 40}
+
 
 def double(chains: Chains) -> Chains:
     values = {f.name: getattr(chains, f.name) for f in dataclasses.fields(chains)}
@@ -23,7 +25,7 @@ def double(chains: Chains) -> Chains:
 
 def test_the_jacobian_is_the_derivative() -> None:
     generator = torch.Generator().manual_seed(0)
-    chains = double(random_chains(200, generator))
+    chains = double(random_chains(EACH, generator))
     unit_BN = torch.rand(chains.lower_BN.shape, generator=generator, dtype=torch.float64)
     q_BN = chains.lower_BN + unit_BN * (chains.upper_BN - chains.lower_BN)
     local = chains.local(q_BN)
@@ -36,7 +38,7 @@ def test_the_jacobian_is_the_derivative() -> None:
 
 def test_senses_are_canonical_and_change_no_motion() -> None:
     generator = torch.Generator().manual_seed(1)
-    chains = random_chains(300, generator)
+    chains = random_chains(EACH, generator)
     canonical, sense_BN = chains.canonical(), chains.senses()
     assert bool((sense_BN < 0).any()) and bool((canonical.senses() > 0).all())
     unit_BN = torch.rand(chains.lower_BN.shape, generator=generator)

@@ -6,9 +6,8 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mrhubo.config import UniversalConfig
 from mrhubo.universal.iterations import ITERATIONS, unroll
-from mrhubo.universal.learning.random_chains import random_chains
+from mrhubo.universal.learning.random_chains import numbers, random_chains
 from mrhubo.universal.learning.targets import HumanTargets, random_targets
 from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.newton import minimise
@@ -20,8 +19,9 @@ HUMANS = HumanTargets(500, seed=0)
 
 def draw(seed: int, count: int) -> Problem:
     generator = torch.Generator().manual_seed(seed)
-    chains = random_chains(count, generator, UniversalConfig().heads_share).canonical()
-    return Problem.of_chains(chains, random_targets(chains, HUMANS, generator))
+    number = numbers(count, {"heads": 0.15, "legs": 0.25, "waists": 0.05})
+    chains = random_chains(number, generator).canonical()
+    return Problem.of_chains(chains, random_targets(chains, number, HUMANS, generator))
 
 
 @settings(max_examples=15, deadline=None)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import robot, steps, tables, universal, universal_network
+from mrhubo.fast.compiled import robot, steps, tables, universal
 from mrhubo.fast.kept import checksum
 
 
@@ -27,7 +27,7 @@ def make_universal_kernel() -> Callable[..., Any]:
         _ = version
         joints = out_BN.shape[1]
         work, tried = robot.make_work(t), universal.make_tried(t, u)
-        room = universal_network.make_room(t, w, joints, universal_network.OUTPUTS * u.hypotheses)
+        room = universal.make_layers(t, u, w)
         q_N = np.empty(joints)
         for b in range(len(target_BD3)):
             steps.aim(t, work, target_BD3, b)

@@ -1,8 +1,10 @@
 """The layers of the universal network (`mrhubo.universal.network`) on the joints of one robot, float32.
 
-One hypothesis at a time, as its numbers then stay in the processor's nearest memory beside a layer's weights.
+All hypotheses of an iteration at a time. Arrays are as long as whole tiles are (`mrhubo.fast.compiled.tile`): what is
+beyond a robot's own joints, or a layer's own numbers, is written over or multiplied by 0.
 
-Legend: T tokens, the joints block by block; X blocks, W numbers of a token, F features, R rows, I and O of layers.
+Legend: T tokens, the joints block by block, hypothesis after hypothesis; X blocks likewise, W numbers of a token,
+F features, I and O of layers, H heads.
 """
 
 from __future__ import annotations
@@ -15,19 +17,16 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.networks import P0, P1, P2, P3, P4, P5, Q1, Q2, Q3, Q4, SILU, TANH_END, activate
 from mrhubo.fast.compiled.tables import FIRST_C, INNER, size, whole
+from mrhubo.fast.compiled.tile import COLUMNS, ROWS, multiply, whole_tiles
 from mrhubo.fast.sections import Universal
 
 FEATURES, SEEN, OUTPUTS = 44, 37, 4
-_FEATURES_4, _SEEN_4 = 44, 40
-"""The same, rounded up to a multiple of 4."""
 _EPSILON = np.float32(1e-5)
 _ONE, _HALF, _ZERO, _FAR = np.float32(1), np.float32(0.5), np.float32(0), np.float32(1e9)
-_LANES = 8
-"""Numbers that a processor works on at once."""
 
 
 class Weights(NamedTuple):
-    """Weights lie with the numbers that come in along the first axis, whose length is a multiple of 4."""
+    """Weights lie with the numbers that come in along the first axis."""
 
     joint_FW: np.ndarray
     joint_bias: np.ndarray
@@ -53,23 +52,28 @@ def lay_out(universal: Universal) -> Weights:
     """The weights as the functions here read them."""
     w = universal.weights
 
-    def turned(name: str, rows: int = 0) -> np.ndarray:
-        found_IO = w[f"{name}.weight"].T
-        return np.ascontiguousarray(np.pad(found_IO, ((0, (-len(found_IO)) % 4), (0, 0))))
+    def turned(name: str) -> np.ndarray:
+        return _wide(w[f"{name}.weight"].T)
 
     def both(name: str, kind: str) -> np.ndarray:
-        return np.stack([turned(f"layers.{i}.{name}") if kind == "weight" else w[f"layers.{i}.{name}.bias"]
+        return np.stack([turned(f"layers.{i}.{name}") if kind == "weight" else _wide(w[f"layers.{i}.{name}.bias"])
                          for i in range(2)])  # fmt: skip
 
     names = [*(f"layers.{i}.norm{k}" for i in range(2) for k in (1, 2)), "norm"]
     norms = [[w[f"{name}.weight"], w[f"{name}.bias"]] for name in names]
     return Weights(
-        turned("joint"), w["joint.bias"], turned("branch"), turned("first"), w["first.bias"], turned("later"),
-        w["later.bias"], np.array(norms),
+        turned("joint"), _wide(w["joint.bias"]), turned("branch"), turned("first"), _wide(w["first.bias"]),
+        turned("later"), _wide(w["later.bias"]), np.array(norms),
         both("mix", "weight"), both("mix", "bias"), both("mixed", "weight"), both("mixed", "bias"),
         both("up", "weight"), both("up", "bias"), both("down", "weight"), both("down", "bias"),
         int(universal.size_2[0]),
     )  # fmt: skip
+
+
+def _wide(array: np.ndarray) -> np.ndarray:
+    """With zeros behind the last axis up to whole tiles."""
+    more = whole_tiles(array.shape[-1], COLUMNS) - array.shape[-1]
+    return np.ascontiguousarray(np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, more)]))
 
 
 class Room(NamedTuple):
@@ -83,38 +87,34 @@ class Room(NamedTuple):
     one_TE: np.ndarray
     two_TE: np.ndarray
     key_EN: np.ndarray
-    score_RN: np.ndarray
-    """Rows: joints of all blocks, head by head."""
+    """Keys of a block's joints, side by side."""
+    score_TE: np.ndarray
+    """How much a joint takes from each of its block's, head by head; each head has as many columns as `key_EN`."""
+    far_CN: np.ndarray
+    """0 in the columns of a block's joints, else very low."""
+    none_1E: np.ndarray
+    """Zeros."""
     out_TO: np.ndarray
 
 
 @njit(**INNER)
-def make_room(t, w, joints, outputs):
-    """Room for one robot's joints."""
-    blocks, width, full = size(t, FIRST_C) - 1, len(w.joint_bias), 0
+def make_room(t, w, joints, outputs, several):
+    """Room for one robot's joints and so many hypotheses at a time."""
+    blocks, width, wide, full = size(t, FIRST_C) - 1, w.norm_52W.shape[2], w.mix_LWO.shape[2] + COLUMNS, 0
     for c in range(blocks):
         full = max(full, whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c))
-    full += -full % _LANES
+    full += -full % COLUMNS
+    tokens, rows = several * joints + 2 * ROWS, several * blocks + 2 * ROWS
+    far_CN = np.full((blocks, full), -_FAR, np.float32)
+    for c in range(blocks):
+        far_CN[c, : whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)] = _ZERO
     return Room(
-        np.zeros((joints, _FEATURES_4), np.float32), np.zeros((blocks, _SEEN_4), np.float32),
-        np.empty((blocks, width), np.float32), np.empty((joints, width), np.float32),
-        np.zeros((joints + _LANES, 4 * width), np.float32), np.zeros((joints, 4 * width), np.float32),
-        np.zeros((width, full), np.float32), np.zeros((joints * w.heads, full), np.float32),
-        np.empty((joints, outputs), np.float32),
+        np.zeros((tokens, FEATURES), np.float32), np.zeros((rows, SEEN), np.float32),
+        np.zeros((rows, w.branch_FW.shape[1]), np.float32), np.zeros((tokens, w.joint_FW.shape[1]), np.float32),
+        np.zeros((tokens, wide), np.float32), np.zeros((tokens, wide), np.float32),
+        np.zeros((width, full), np.float32), np.zeros((tokens, w.heads * full), np.float32),
+        far_CN, np.zeros((1, wide), np.float32), np.zeros((tokens, outputs + COLUMNS), np.float32),
     )  # fmt: skip
-
-
-@njit(**INNER)
-def _multiply(x_TI, weight_IO, out_TO, tokens, inputs):
-    """Adds x W to what stands in `out_TO`: four rows of W at a time, each number of the output loaded once for them."""
-    outputs = weight_IO.shape[1]
-    for t in range(tokens):
-        for i in range(0, inputs, 4):
-            a, b, c, d = x_TI[t, i], x_TI[t, i + 1], x_TI[t, i + 2], x_TI[t, i + 3]
-            for o in range(outputs):
-                out_TO[t, o] += (a * weight_IO[i, o] + b * weight_IO[i + 1, o]) + (
-                    c * weight_IO[i + 2, o] + d * weight_IO[i + 3, o]
-                )
 
 
 @njit(**INNER)
@@ -146,96 +146,90 @@ def exponential(x):
 
 
 @njit(**INNER)
-def _score(t, w, room, c):
-    """Scores of the joints of a block, each row less its largest, into `score_RN`."""
-    width = len(w.joint_bias)
-    each, one_TE, key_EN, score_RN = width // w.heads, room.one_TE, room.key_EN, room.score_RN
-    scale = _ONE / np.float32(math.sqrt(each))
-    first, count = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
-    for e in range(width):
-        for j in range(count):
-            key_EN[e, j] = one_TE[first + j, width + e] * scale
-    for i in range(count):
-        for h in range(w.heads):
-            r, most = (first + i) * w.heads + h, -_FAR
-            for j in range(0, count, 8):  # as many sums as the processor has room for
-                s0, s1, s2, s3, s4, s5, s6, s7 = _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
-                for e in range(h * each, (h + 1) * each):
-                    own = one_TE[first + i, e]
-                    s0, s1 = s0 + own * key_EN[e, j], s1 + own * key_EN[e, j + 1]
-                    s2, s3 = s2 + own * key_EN[e, j + 2], s3 + own * key_EN[e, j + 3]
-                    s4, s5 = s4 + own * key_EN[e, j + 4], s5 + own * key_EN[e, j + 5]
-                    s6, s7 = s6 + own * key_EN[e, j + 6], s7 + own * key_EN[e, j + 7]
-                score_RN[r, j], score_RN[r, j + 1], score_RN[r, j + 2], score_RN[r, j + 3] = s0, s1, s2, s3
-                score_RN[r, j + 4], score_RN[r, j + 5], score_RN[r, j + 6], score_RN[r, j + 7] = s4, s5, s6, s7
-            for j in range(count):
-                most = max(most, score_RN[r, j])
-            for j in range(count):
-                score_RN[r, j] -= most
-            for j in range(count, count + -count % 8):
-                score_RN[r, j] = -_FAR
+def _score(t, w, room, at, c):
+    """How well the joints of a block go together, from a token on, into `score_TE`; others' columns are far off."""
+    width, full = room.key_EN.shape
+    each, one_TE, key_EN, wide = width // w.heads, room.one_TE, room.key_EN, room.score_TE.shape[1]
+    scale, count = _ONE / np.float32(math.sqrt(each)), whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
+    for j in range(count):
+        for e in range(width):
+            key_EN[e, j] = one_TE[at + j, width + e] * scale
+    for h in range(w.heads):
+        multiply(
+            one_TE, at * one_TE.shape[1] + h * each, key_EN, h * each * full, room.far_CN, c * full, 0,
+            room.score_TE, at * wide + h * full, count, count, each,
+        )  # fmt: skip
 
 
 @njit(**INNER)
-def _share(t, w, room, c):
-    """What the joints of a block take from each other, by exponentials in `score_RN`, into `two_TE`."""
-    width = len(w.joint_bias)
-    each, one_TE, two_TE, score_RN = width // w.heads, room.one_TE, room.two_TE, room.score_RN
-    first, count = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
-    for i in range(count):
-        for h in range(w.heads):
-            r, total = (first + i) * w.heads + h, _ZERO
-            for j in range(count):
-                total += score_RN[r, j]
-            total = _ONE / total
-            for j in range(count, count + -count % 8):
-                score_RN[r, j] = _ZERO
-            for e in range(h * each, (h + 1) * each):
-                two_TE[first + i, e] = _ZERO
-            for j in range(0, count, 8):  # beyond the block, another's joints or nobody's, with a share of 0
-                a, b, c4, d = score_RN[r, j], score_RN[r, j + 1], score_RN[r, j + 2], score_RN[r, j + 3]
-                p, q, u, v = score_RN[r, j + 4], score_RN[r, j + 5], score_RN[r, j + 6], score_RN[r, j + 7]
-                at = first + j
-                for e in range(h * each, (h + 1) * each):
-                    o = 2 * width + e
-                    two_TE[first + i, e] += total * (
-                        ((a * one_TE[at, o] + b * one_TE[at + 1, o]) + (c4 * one_TE[at + 2, o] + d * one_TE[at + 3, o]))
-                        + (
-                            (p * one_TE[at + 4, o] + q * one_TE[at + 5, o])
-                            + (u * one_TE[at + 6, o] + v * one_TE[at + 7, o])
-                        )
-                    )
+def _soften(w, room, tokens):
+    """Scores become shares, which sum up to 1."""
+    full = room.key_EN.shape[1]
+    score_RN = room.score_TE.reshape(len(room.score_TE) * w.heads, full)
+    for r in range(tokens * w.heads):
+        a, b, c, d = score_RN[r, 0], score_RN[r, 1], score_RN[r, 2], score_RN[r, 3]
+        for j in range(4, full, 4):  # four at a time, as each waits for the one before
+            a, b = max(a, score_RN[r, j]), max(b, score_RN[r, j + 1])
+            c, d = max(c, score_RN[r, j + 2]), max(d, score_RN[r, j + 3])
+        most, total = max(max(a, b), max(c, d)), _ZERO
+        for j in range(full):
+            score_RN[r, j] = exponential(score_RN[r, j] - most)
+        for j in range(full):
+            total += score_RN[r, j]
+        total = _ONE / total
+        for j in range(full):
+            score_RN[r, j] *= total
 
 
 @njit(**INNER)
-def _attend(t, w, room):
-    """Joints of a block look at each other: from queries, keys and values in `one_TE` into `two_TE`."""
-    for c in range(size(t, FIRST_C) - 1):
-        _score(t, w, room, c)
-    numbers_X = room.score_RN.reshape(room.score_RN.size)
-    for x in range(len(numbers_X)):
-        numbers_X[x] = exponential(numbers_X[x])
-    for c in range(size(t, FIRST_C) - 1):
-        _share(t, w, room, c)
+def _share(t, w, room, at, c):
+    """What the joints of a block take from each other, from a token on, into `two_TE`."""
+    width, full = room.key_EN.shape
+    each, one_TE, two_TE, wide = width // w.heads, room.one_TE, room.two_TE, room.score_TE.shape[1]
+    count = whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
+    for h in range(w.heads):  # what is beyond a head's numbers is the next one's, which writes over it
+        multiply(
+            room.score_TE, at * wide + h * full, one_TE, at * one_TE.shape[1] + 2 * width + h * each, room.none_1E, 0,
+            0, two_TE, at * two_TE.shape[1] + h * each, count, each, count,
+        )  # fmt: skip
 
 
 @njit(**INNER)
-def answer(t, w, room, first):
-    """Outputs into `room.out_TO` of what stands in `room.feature_TF` and `room.seen_XF`.
+def _attend(t, w, room, several):
+    """Joints of a block look at each other: from queries, keys and values in `one_TE` into `two_TE`.
+
+    Token after token, as a tile's last rows may be the next block's.
+    """
+    blocks = size(t, FIRST_C) - 1
+    joints = whole(t, FIRST_C, blocks)
+    for k in range(several):
+        for c in range(blocks):
+            _score(t, w, room, k * joints + whole(t, FIRST_C, c), c)
+    _soften(w, room, several * joints)
+    for k in range(several):
+        for c in range(blocks):
+            _share(t, w, room, k * joints + whole(t, FIRST_C, c), c)
+
+
+@njit(**INNER)
+def answer(t, w, room, first, several):
+    """Outputs into `room.out_TO` of what stands in `room.feature_TF` and `room.seen_XF`, for so many hypotheses.
 
     Layer after layer in a loop, as each place that calls a function is compiled by itself.
     """
-    tokens, blocks, width = len(room.x_TW), size(t, FIRST_C) - 1, len(w.joint_bias)
+    blocks, width = size(t, FIRST_C) - 1, w.norm_52W.shape[2]
+    joints = whole(t, FIRST_C, blocks)
+    tokens = several * joints
+    tokens += -tokens % ROWS  # what is in rows beyond stays small, as it comes from the norm
     x_TW, one_TE, two_TE = room.x_TW, room.one_TE, room.two_TE
     for number in range(2 + 4 * 2 + 1):
         layer, kind = (number - 2) // 4, (number - 2) % 4
         last, rows, inputs = number == 10, tokens, width
         if number < 2:
-            given, weight_IO, bias, out = room.feature_TF, w.joint_FW, w.joint_bias, one_TE
-            inputs = _FEATURES_4
+            given, weight_IO, bias, out, inputs = room.feature_TF, w.joint_FW, w.joint_bias, one_TE, FEATURES
             if number == 0:
                 given, weight_IO, out = room.seen_XF, w.branch_FW, room.branch_XW
-                rows, inputs = blocks, _SEEN_4
+                rows, inputs = several * blocks, SEEN
         elif last:
             given, weight_IO, bias, out = two_TE, w.later_WO, w.later_bias, room.out_TO
             if first:
@@ -251,18 +245,24 @@ def answer(t, w, room, first):
         if last or (number >= 2 and kind % 2 == 0):
             norm_2W = w.norm_52W[4 if last else 2 * layer + kind // 2]
             _norm(x_TW, norm_2W[0], norm_2W[1], two_TE, tokens)
+        outputs = weight_IO.shape[1]
         adds = number >= 2 and not last and kind % 2 == 1
         if number == 1:  # on what is seen of each joint's branch
-            for c in range(blocks):
-                for i in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
-                    for o in range(width):
-                        one_TE[i, o] = room.branch_XW[c, o]
+            for k in range(several):
+                for c in range(blocks):
+                    for i in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
+                        for o in range(outputs):
+                            one_TE[k * joints + i, o] = room.branch_XW[k * blocks + c, o]
+        elif adds:
+            for i in range(rows):
+                for o in range(outputs):
+                    out[i, o] += bias[o]
         else:
             for i in range(rows):
-                for o in range(weight_IO.shape[1]):
-                    out[i, o] = (out[i, o] if adds else _ZERO) + bias[o]
-        _multiply(given, weight_IO, out, rows, inputs)
+                for o in range(outputs):
+                    out[i, o] = bias[o]
+        multiply(given, 0, weight_IO, 0, out, 0, out.shape[1], out, 0, rows, outputs, inputs)
         if number == 1 or (number >= 2 and not last and kind == 2):
             activate(SILU, one_TE, x_TW if number == 1 else two_TE, tokens, width if number == 1 else 2 * width)
         elif number >= 2 and not last and kind == 0:
-            _attend(t, w, room)
+            _attend(t, w, room, several)

@@ -21,11 +21,11 @@ from mrhubo.fast.sections import Universal
 DAMPINGS = (3e-3, 3e-2, 0.5)
 """Of the steps that the network sees,"""
 FINAL_DAMPINGS = (1e-4, 3e-2)
-"""and of the last iterations."""
-KEPT = (4, 2)
-"""How many hypotheses go into the second and the third iteration."""
-FINAL = 2
-"""Iterations after those."""
+"""and of the iterations without it."""
+KEPT = (4, 3, 1, 1)
+"""How many hypotheses go into each iteration after the first."""
+REFINED = 1
+"""In how many of those the network answers too."""
 REACH = 1.0
 """How far a correction goes at most [rad]."""
 STEPS = 5
@@ -245,18 +245,18 @@ def _unroll(branches: Branches, target_BD3: np.ndarray) -> np.ndarray:
         best = Best(q_BN, place.model.cost_BC, block_N)
         tried_BKN = branches.answer(place, goal, branches.steps(place, DAMPINGS), first=True)
         cost_BKC = branches.cost(tried_BKN, goal)
-        for keep in KEPT:
+        for turn, keep in enumerate(KEPT):
             kept_BKN = best.see(tried_BKN, cost_BKC, keep)
             goal_X = goal.several(kept_BKN.shape[1])
             place = branches.at(kept_BKN.reshape(-1, len(block_N)), goal_X)
-            step_XKN = branches.steps(place, DAMPINGS)
-            network_XN = branches.answer(place, goal_X, step_XKN, first=False)[:, 0]
-            ways = np.stack((network_XN, place.q_BN + step_XKN[:, 0])).reshape(2, *kept_BKN.shape)
-            tried_BKN, cost_BKC = _choose(branches, goal, ways)
-        for _ in range(FINAL):
-            place = branches.at(best.see(tried_BKN, cost_BKC, 1)[:, 0], goal)
-            step_BKN = branches.steps(place, FINAL_DAMPINGS)
-            tried_BKN, cost_BKC = _choose(branches, goal, (place.q_BN[:, None] + step_BKN).swapaxes(0, 1)[:, :, None])
+            step_XKN = branches.steps(place, DAMPINGS if turn < REFINED else FINAL_DAMPINGS)
+            first_XN = place.q_BN + step_XKN[:, 0]
+            if turn < REFINED:
+                network_XN = branches.answer(place, goal_X, step_XKN, first=False)[:, 0]
+                ways = np.stack((network_XN, first_XN))
+            else:
+                ways = np.stack((first_XN, place.q_BN + step_XKN[:, 1]))
+            tried_BKN, cost_BKC = _choose(branches, goal, ways.reshape(2, *kept_BKN.shape))
         best.see(tried_BKN, cost_BKC, 1)
         q_BN = np.where(branches.known_N, best.q_BN, q_BN)
     if not branches.known_N.all():

@@ -20,7 +20,7 @@ from mrhubo.files.arrays import DamagedFile
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.universal.chains import Chains
-from mrhubo.universal.learning.random_chains import random_chains
+from mrhubo.universal.learning.random_chains import numbers, random_chains
 from mrhubo.universal.learning.targets import HumanTargets, random_targets
 from mrhubo.universal.newton import search
 from mrhubo.universal.problem import Problem
@@ -28,7 +28,7 @@ from mrhubo.universal.problem import Problem
 SHARD = 1024
 HELD_OUT = 2
 """Shards that are measured on and not learnt from; their numbers follow those of the others."""
-_SCHEMA = "mrhubo.universal_problems/1"
+_SCHEMA = "mrhubo.universal_problems/2"
 
 
 @dataclass(frozen=True)
@@ -78,15 +78,16 @@ _NAMES = ("target_BS3", "q_BN", "cost_B")
 def make_shard(config: UniversalConfig, humans: HumanTargets, number: int) -> Lessons:
     """The shard of that number."""
     generator = torch.Generator().manual_seed(config.seed * 1_000_003 + number)
-    chains = random_chains(SHARD, generator, config.heads_share).canonical()
-    target_BS3 = random_targets(chains, humans, generator, config.human_share)
+    each = numbers(SHARD, {"heads": config.heads_share, "legs": config.legs_share, "waists": config.waists_share})
+    chains = random_chains(each, generator).canonical()
+    target_BS3 = random_targets(chains, each, humans, generator, config.human_share)
     return Lessons(chains, target_BS3, *search(Problem.of_chains(chains, target_BS3), generator))
 
 
 def load_lessons(config: UniversalConfig, folder: Path, report: Reporter = SILENT) -> tuple[Lessons, Lessons]:
     """Those to learn from, and those held out; shards that lie in the folder are used again, the others are made."""
     shards = -(-config.problems // SHARD)
-    settings = ("heads_share", "human_share", "poses", "seed")
+    settings = ("heads_share", "legs_share", "waists_share", "human_share", "poses", "seed")
     header = {"schema": _SCHEMA, "settings": fingerprint({name: getattr(config, name) for name in settings})}
     humans: HumanTargets | None = None
     found = []

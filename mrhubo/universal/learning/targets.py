@@ -5,6 +5,8 @@ Legend: B targets, H human poses, S = 5 slots.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import torch
 from torch import Tensor
 from torch.nn.functional import normalize
@@ -15,7 +17,10 @@ from mrhubo.body.turns import JointTurns
 from mrhubo.robot.bending import bend_axis
 from mrhubo.robot.parts import PARTS, BendPart, BodyPart, LimbPart, OrientedPart
 from mrhubo.universal.chains import Chains, random_units, rodrigues
-from mrhubo.universal.slots import AXIAL_S, MIRROR_3, SLOTS, slot_of
+from mrhubo.universal.slots import AXIAL_S, MIRROR_3, SLOTS, on_the_right, slot_of
+
+_REGIONS = {"arms": "hand", "heads": "head", "legs": "foot", "waists": "trunk"}
+"""The region of the oriented part at the end of each kind of branch."""
 
 
 class HumanTargets:
@@ -27,40 +32,41 @@ class HumanTargets:
         generator = torch.Generator().manual_seed(seed)
         latent_HZ = spread * torch.randn(poses, prior.latent, generator=generator)
         local_HJ33 = torch.cat([prior.decode_matrices(z) for z in latent_HZ.split(4096)])
-        hands = [part for part in PARTS if isinstance(part, OrientedPart) and part.region == "hand"]
-        self.arm_HS3 = torch.cat([_arm(skeleton, local_HJ33, hand) for hand in hands])
-        """Directions of arms; heads stand in the slots of hands."""
-        self.head_HS3 = _of(skeleton, local_HJ33, [part for part in PARTS if part.region == "head"])
+        oriented = [part for part in PARTS if isinstance(part, OrientedPart) and part.seen_from]
+        self._table_HS3 = {
+            kind: torch.cat([_branch(skeleton, local_HJ33, part) for part in oriented if part.region == region])
+            for kind, region in _REGIONS.items()
+        }
 
-    def draw(self, chains: Chains, generator: torch.Generator) -> Tensor:
-        """Targets (B, S, 3) of somebody, for chains whose heads have no limb."""
+    def draw(self, number: Mapping[str, int], generator: torch.Generator) -> Tensor:
+        """Targets (B, S, 3) of somebody, for so many chains of each kind, one kind after the other."""
         found = []
-        for table_HS3 in (self.arm_HS3, self.head_HS3):
-            rows = torch.randint(len(table_HS3), (len(chains),), generator=generator)
-            found.append(table_HS3[rows])
-        return torch.where(chains.filled_BS[:, :1, None] > 0, found[0], found[1])
+        for kind, count in number.items():
+            table_HS3 = self._table_HS3[kind]
+            found.append(table_HS3[torch.randint(len(table_HS3), (count,), generator=generator)])
+        return torch.cat(found)
 
 
-def _arm(skeleton: Skeleton, local_HJ33: Tensor, hand: OrientedPart) -> Tensor:
+def _branch(skeleton: Skeleton, local_HJ33: Tensor, outer: OrientedPart) -> Tensor:
     """Directions (H, S, 3) of an oriented part, of the limbs that carry it, and of what these bend about."""
     by_name = {part.name: part for part in PARTS}
-    carried: list[BodyPart] = []
-    part = by_name[hand.hangs_on or ""]
+    carried: list[LimbPart] = []
+    part = by_name[outer.hangs_on or ""]
     while isinstance(part, LimbPart):
         carried.insert(0, part)
         part = by_name[part.hangs_on or ""]
     names = {part.name for part in carried}
     bends = [part for part in PARTS if isinstance(part, BendPart) and part.bent in names]
-    found_HS3 = _of(skeleton, local_HJ33, [*carried, *bends, hand])
-    if hand.rest[0][0] > 0:
+    found_HS3 = _of(skeleton, local_HJ33, [*carried, *bends, outer])
+    if not carried or not on_the_right(skeleton, carried[0]):
         return found_HS3
     return found_HS3 * torch.tensor(MIRROR_3) * torch.tensor(AXIAL_S)[:, None]
 
 
 def _of(skeleton: Skeleton, local_HJ33: Tensor, parts: list[BodyPart]) -> Tensor:
-    """Directions (H, S, 3) of the parts of one branch, seen from the chest; 0 in slots that it has not."""
-    chest = next(part for part in PARTS if part.name == parts[0].seen_from)
-    turns_HX33 = JointTurns([joint_index(part.joint) for part in (chest, *parts)])(local_HJ33)
+    """Directions (H, S, 3) of the parts of one branch, as what carries them sees them; 0 in slots that it has not."""
+    view = next(part for part in PARTS if part.name == parts[0].seen_from)
+    turns_HX33 = JointTurns([joint_index(part.joint) for part in (view, *parts)])(local_HJ33)
     view_H33, found_HS3 = turns_HX33[:, 0], torch.zeros(len(local_HJ33), len(SLOTS), 3)
     names = {part.name for part in parts}
     for number, part in enumerate(parts, start=1):
@@ -96,11 +102,13 @@ def reached_targets(chains: Chains, q_BN: Tensor, generator: torch.Generator, no
     return target_BS3
 
 
-def random_targets(chains: Chains, humans: HumanTargets, generator: torch.Generator, human: float = 0.4) -> Tensor:
+def random_targets(
+    chains: Chains, number: Mapping[str, int], humans: HumanTargets, generator: torch.Generator, human: float = 0.4
+) -> Tensor:
     """Targets (B, S, 3): in a share of the chains a person's, else what the chain reaches or nearly reaches."""
     unit_BN = torch.rand(chains.lower_BN.shape, generator=generator)
     q_BN = chains.lower_BN + unit_BN * (chains.upper_BN - chains.lower_BN)
     reached_BS3 = reached_targets(chains, q_BN, generator)
     asked_B11 = torch.rand(len(chains), 1, 1, generator=generator) < human
-    target_BS3 = torch.where(asked_B11, humans.draw(chains, generator), reached_BS3)
+    target_BS3 = torch.where(asked_B11, humans.draw(number, generator), reached_BS3)
     return target_BS3 * chains.filled_BS[..., None]

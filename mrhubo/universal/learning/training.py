@@ -19,16 +19,17 @@ from mrhubo.callbacks import Checkpoints, TrainingProgress
 from mrhubo.callbacks.small_training import small_trainer, tracked
 from mrhubo.config import UniversalConfig, fingerprint, to_plain, without_paths
 from mrhubo.errors import UserError
+from mrhubo.files.atomic import checksum_file
 from mrhubo.reference import angle_between
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.run_logger import RunLogger
 from mrhubo.runtime.trainer import quiet_lightning, run_trainer, stop_at, with_schedule
 from mrhubo.runtime.workspace import Workspace
-from mrhubo.universal.iterations import unroll
+from mrhubo.universal.iterations import LEARNT, unroll
 from mrhubo.universal.learning.loss import BETAS, loss
 from mrhubo.universal.learning.problems import Lessons, load_lessons
 from mrhubo.universal.network import UniversalNetwork
-from mrhubo.universal.weights import save_network
+from mrhubo.universal.weights import open_network, save_network
 
 _EXPERIMENT = "universal"
 _EPOCH = 250
@@ -45,12 +46,12 @@ class UniversalTraining(lightning.LightningModule):
         super().__init__()
         self.config, self.learnt, self.held_out = config, learnt, held_out
         self.save_hyperparameters(to_plain(config))
-        self.network = UniversalNetwork(config.width, config.attention_heads, config.hypotheses)
+        self.network = _begin(config)
 
     def training_step(self, rows_B: Tensor, _: int) -> Tensor:
         """One batch of problems, by their numbers (B,)."""
         lessons = self.learnt.rows(rows_B)
-        value = loss(unroll(self.network, lessons.problem), lessons.q_BN, lessons.chains.present_BN)
+        value = loss(unroll(self.network, lessons.problem, LEARNT), lessons.q_BN, lessons.chains.present_BN)
         if (self.trainer.global_step + 1) % 50 == 0:
             self.log("train/loss", value.detach())
         return value
@@ -70,6 +71,23 @@ class UniversalTraining(lightning.LightningModule):
             self.network.parameters(), settings.lr, betas=BETAS, weight_decay=settings.weight_decay
         )
         return with_schedule(optimizer, settings.steps)
+
+
+def _begin(config: UniversalConfig) -> UniversalNetwork:
+    """Random weights, or those to go on from.
+
+    Raises:
+        UserError: these are missing, damaged or of another size.
+    """
+    sizes = (config.width, config.attention_heads, config.hypotheses)
+    if config.start is None:
+        return UniversalNetwork(*sizes)
+    network = open_network(config.start)
+    if (found := (network.width, network.heads, network.hypotheses)) != sizes:
+        raise UserError(
+            f"start: {config.start} has width, attention_heads and hypotheses {found}; the config says {sizes}"
+        )
+    return network.requires_grad_(True).train()
 
 
 @torch.no_grad()
@@ -109,7 +127,9 @@ def train(config: UniversalConfig, report: Reporter = SILENT) -> UniversalNetwor
     """Makes the problems, trains, measures, saves the weights with their card, and returns the network."""
     if config.width % config.attention_heads:
         raise UserError(f"width: {config.width} is no multiple of attention_heads, {config.attention_heads}")
-    key = fingerprint({k: v for k, v in to_plain(config).items() if k not in ("output", "tracking_dir")})
+    settings = {k: v for k, v in to_plain(config).items() if k not in ("output", "tracking_dir", "start")}
+    _begin(config)  # refuses what cannot be gone on from before problems are made
+    key = fingerprint(settings | ({} if config.start is None else {"start": checksum_file(config.start)}))
     with Workspace(config.tracking_dir / "fits", "universal", key) as workspace, quiet_lightning():
         lessons = load_lessons(config, config.tracking_dir / "universal_problems", report)
         lightning.seed_everything(config.seed, verbose=False)  # whether problems had to be made or not

@@ -1,0 +1,79 @@
+"""Products of small matrices of float32, four rows by sixteen columns at a time.
+
+The sums of such a tile stay in the processor's registers while the inner index runs, so that a multiplication waits for
+no memory. What numba makes of a loop over arrays loads and stores each sum at every step, which takes two to four
+times as long; so the tile is written in LLVM's own operations on vectors, which LLVM cuts to what the processor has.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir  # pyright: ignore[reportMissingImports]
+from numba import njit, types  # pyright: ignore[reportMissingImports]
+from numba.core import cgutils  # pyright: ignore[reportMissingImports]
+from numba.extending import intrinsic  # pyright: ignore[reportMissingImports]
+
+from mrhubo.fast.compiled.tables import INNER
+
+ROWS, COLUMNS = 4, 16
+"""Of a tile. Arrays have room for whole ones: what is beyond a product's own rows and columns is written over."""
+_ROUNDED_ONCE = ("contract",)
+"""A product and its sum, where the processor can."""
+
+
+def whole_tiles(count: int, each: int) -> int:
+    """Rounded up to a multiple."""
+    return count + -count % each
+
+
+@intrinsic
+def _tile(typing_context, x, x_at, x_step, w, w_at, w_step, begin, begin_at, begin_step, out, out_at, out_step, inputs):
+    """out = begin + x w in one tile. Of each array, the place where its part begins, and from one row to the next."""
+    arrays = {0: x, 3: w, 6: begin, 9: out}
+    fits = all(isinstance(a, types.Array) and a.dtype == types.float32 and a.layout == "C" for a in arrays.values())
+    return (types.void(*(arrays.get(k, types.intp) for k in range(13))), _generate) if fits else None
+
+
+def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    """The tile's operations."""
+    vector, lanes = ir.VectorType(ir.FloatType(), COLUMNS), ir.VectorType(ir.IntType(32), COLUMNS)
+    index = values[1].type
+    unset = ir.Constant(vector, ir.Undefined)
+
+    def address(array: int, row: Any, column: Any) -> Any:
+        data = context.make_array(signature.args[array])(context, builder, values[array]).data
+        place = builder.add(values[array + 1], builder.mul(row, values[array + 2]))
+        return builder.gep(data, [builder.add(place, column)])
+
+    def columns(array: int, row: Any) -> Any:
+        return builder.bitcast(address(array, row, ir.Constant(index, 0)), vector.as_pointer())
+
+    rows = [ir.Constant(index, row) for row in range(ROWS)]
+    sums = [cgutils.alloca_once(builder, vector) for _ in rows]
+    for row, found in zip(rows, sums, strict=True):
+        builder.store(builder.load(columns(6, row), align=4), found)
+    with cgutils.for_range(builder, values[12], intp=index) as loop:
+        weight = builder.load(columns(3, loop.index), align=4)
+        for row, found in zip(rows, sums, strict=True):
+            number = builder.load(address(0, row, loop.index))
+            first = builder.insert_element(unset, number, ir.Constant(ir.IntType(32), 0))
+            each = builder.shuffle_vector(first, unset, ir.Constant(lanes, [0] * COLUMNS))
+            product = builder.fmul(each, weight, flags=_ROUNDED_ONCE)
+            builder.store(builder.fadd(builder.load(found), product, flags=_ROUNDED_ONCE), found)
+    for row, found in zip(rows, sums, strict=True):
+        builder.store(builder.load(found), columns(9, row), align=4)
+    return context.get_dummy_value()
+
+
+@njit(**INNER)
+def multiply(x, x_at, w, w_at, begin, begin_at, begin_step, out, out_at, rows, columns, inputs):
+    """out = begin + x w: matrices (rows, inputs) and (inputs, columns) inside arrays of two axes, each from a place on,
+    counted through its array. `begin_step` is from one row to the next, 0 for one that is the same for all.
+    """
+    for o in range(0, columns, COLUMNS):
+        for r in range(0, rows, ROWS):
+            _tile(  # pyright: ignore[reportCallIssue] (numba adds the first argument)
+                x, x_at + r * x.shape[1], x.shape[1], w, w_at + o, w.shape[1], begin, begin_at + o + r * begin_step,
+                begin_step, out, out_at + o + r * out.shape[1], out.shape[1], inputs,
+            )  # fmt: skip
