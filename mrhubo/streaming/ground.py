@@ -1,6 +1,6 @@
 """Where a robot with feet stands and goes, frame by frame: what `mrhubo.reference.standing` is to a whole motion.
 
-A frame in three steps. What the person does: contacts (`mrhubo.motion.live_contacts`), the root's path scaled by the
+A frame in three steps. What the person does: contacts (`mrhubo.fast.plain.contacts`), the root's path scaled by the
 legs' length, feet that stand flat while planted. What legs are asked for, beside directions: planted soles stay where
 they are while the root goes on; it goes as far as the legs take it, and a little nearer to the person's path in every
 frame, so that nothing adds up. What comes of it: with the joint angles that limits allow, the root is where planted
@@ -20,8 +20,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
 from mrhubo.frames import human_to_world
-from mrhubo.motion.live_contacts import LiveContacts, next_contacts
 from mrhubo.reference.standing import UNDER_M, Legs, stand_flat
 from mrhubo.robot import LinkPoses
 

@@ -1,4 +1,4 @@
-"""When feet are planted, frame by frame: `find_contacts` for who cannot wait for the next frame.
+"""When feet are planted, frame by frame: `mrhubo.motion.contacts` for who cannot wait for the next frame.
 
 The thresholds are the same. Speeds are differences to the last frame, a little smoothed. A contact counts more and more
 after its beginning; before its end it counts the less the nearer the point is to what ends it. The floor is learned on
@@ -15,18 +15,20 @@ from typing import Any, Self
 
 import numpy as np
 
-from mrhubo.motion.contacts import (
-    BAND_M,
-    GATHERED,
-    LIFTED_M,
-    LIFTED_SPEED,
-    PLANTED_M,
-    PLANTED_SPEED,
-    RAMP_S,
-    WANDERED_M,
-    smooth_share,
-)
-
+PLANTED_M, PLANTED_SPEED = 0.04, 0.3
+"""A point that is lower [m] and slower [m/s] is planted: soles of readers' skeletons lie up to 2 cm beside the
+person's; and a heel that lands still turns at some 20 cm/s."""
+LIFTED_M, LIFTED_SPEED = 0.07, 0.5
+"""A point that is higher or faster is not. A swinging foot goes at 3 to 4 m/s, and through all these within 30 ms."""
+WANDERED_M = 0.06
+"""How far a planted point may be from where it was planted; then it is planted anew: a shuffling foot never lifts."""
+RAMP_S = 0.1
+"""How long [s] it takes until a contact counts in full, and before it ends, no more: a heel strike takes as long."""
+BAND_M = 0.04
+"""Heights of points on one floor."""
+GATHERED = 0.5
+"""A band of heights with this share of the fullest one's slow points is the floor, if none is below: who stands on a
+step stood on the floor too."""
 _SMOOTH_S = 0.02
 """Time constant [s] of speeds."""
 _HEIGHTS_M, _STEP_M = 3.0, 0.005
@@ -122,6 +124,12 @@ def next_contacts(
     return LiveContacts(
         place_BP3, velocity_BP3, floor_B, planted_BP, began_BP, age_BP, start_BP3, weight_BP, slow_BH, from_B
     )
+
+
+def smooth_share(share: np.ndarray) -> np.ndarray:
+    """How much a contact counts, 0..1, some share of the way into its ramp: it begins and ends without a corner."""
+    share = np.clip(share, 0.0, 1.0)
+    return share**2 * (3 - 2 * share)
 
 
 def _usual(height_BP: np.ndarray, from_B: np.ndarray, heights: int) -> np.ndarray:
