@@ -204,7 +204,7 @@ class Stream:
             return self._root_B33, self._place_B3, None
         if self._state is not None and not rooted and not self._unmet:
             raise UserError("stream: earlier poses came without a root; reset() begins anew")
-        turn, place = (to_tensor(x).to(self.retargeter.device, torch.float32) for x in root)
+        turn, place = (to_tensor(x).to(self._root_B33) for x in root)
         if self.people is None:
             turn, place = turn[None], place[None]
         if tuple(turn.shape) != (people, 3, 3) or tuple(place.shape) != (people, 3):

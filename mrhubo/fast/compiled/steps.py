@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import dot, put, row3
-from mrhubo.fast.compiled.robot import quadratic
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
+    BODY_H,
     CELL_CU,
     FAR,
     FIRST_C,
@@ -33,7 +34,19 @@ from mrhubo.fast.compiled.tables import (
     size,
     whole,
 )
-from mrhubo.fast.plain.steps import DAMPING, EASIER, FLOOR, FOLLOWED, HARDER, LEAST, MOST, SHORTEST, STUCK, TOLERANCE
+from mrhubo.fast.plain.steps import (
+    DAMPING,
+    EASIER,
+    FLOOR,
+    FOLLOWED,
+    HARDER,
+    LEAST,
+    MOST,
+    NEAREST_STEPS,
+    SHORTEST,
+    STUCK,
+    TOLERANCE,
+)
 
 
 @njit(**INNER)
@@ -84,7 +97,13 @@ def _held(q, gradient, lower, upper):
 
 @njit(**INNER)
 def aim(t, work, target_BD3, b):
-    """Takes a human's directions as the goal."""
+    """Takes a human's directions as the goal, and places of soles where they stand after them."""
+    directions, points = size(t, LIMB_D), size(t, BODY_H)
+    for h in range(points):
+        work.counts_H[h] = 0.0
+        if target_BD3.shape[1] > directions:
+            put(work.wanted_H3, h, row3(target_BD3, b, directions + h))
+            work.counts_H[h] = target_BD3[b, directions + points + h, 0]
     for c in range(len(work.weight_C)):
         work.weight_C[c] = 0.0
         for r in range(whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)):
@@ -196,6 +215,25 @@ def near(t, target_BD3, b, c, start, into_N):
         for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
             n = whole(t, ORDER_N, x)
             into_N[n] = single(t, POOL_UN, found * joints + n)
+
+
+@njit(**INNER)
+def nearest(t, work, target_BD3, b, q_N):
+    """The best of the pool's poses after some steps, where no network answers."""
+    blocks = len(work.cost_C)
+    aim(t, work, target_BD3, b)
+    for c in range(blocks):
+        work.best_C[c] = np.inf
+    for start in range(int(real(t, POLISH_4, STARTS))):
+        for c in range(blocks):
+            near(t, target_BD3, b, c, start, work.start_N)
+        minimise(t, work, work.start_N, NEAREST_STEPS)
+        for c in range(blocks):
+            if work.cost_C[c] < work.best_C[c]:
+                work.best_C[c] = work.cost_C[c]
+                for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
+                    n = whole(t, ORDER_N, x)
+                    q_N[n] = work.start_N[n]
 
 
 @njit(**INNER)

@@ -20,6 +20,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo import rotation
+from mrhubo.fast.plain.ground import UNDER_M
 from mrhubo.fast.together.motion import AHEAD, WINDOW
 from mrhubo.frames import human_to_world
 from mrhubo.reference.avoidance import Avoidance
@@ -37,8 +38,6 @@ PLANTED, SWINGING = 2500.0, 50.0
 degrees off, or 0.4."""
 SWEEPS, TOLERANCE = 30, 3e-4
 """How long legs give way, as for `refine`."""
-UNDER_M = 0.01
-"""How far under the floor [m] a swinging point counts as much as a planted one."""
 _FLAT = [0, 2]
 """The horizontal axes of the world."""
 _UP = 1
