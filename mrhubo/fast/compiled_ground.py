@@ -41,7 +41,7 @@ class CompiledGround:
     @property
     def planted_R(self) -> np.ndarray:
         """Whether each foot is planted."""
-        return self._f.planted_H.reshape(-1, 2).any(axis=1)
+        return np.logical_or(self._f.planted_H[::2], self._f.planted_H[1::2])
 
     def pass_by(self) -> None:
         """As `PlainGround.pass_by`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,14 +14,15 @@ import torch
 import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, SIDES
-from mrhubo.errors import UserError
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.fast import FastRetargeter, FastStream, StreamSettings
 from mrhubo.fast.description import FILE, Description
 from mrhubo.fast.engines import FORMS
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion
 from mrhubo.reference.standing import Standing
-from mrhubo.retargeter import Retargeter
+from mrhubo.retargeter import Retargeter, without_training
+from mrhubo.retargeter.confidence import STANDARD
 from mrhubo.retargeter.nearest import NearestJoints
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.robot_motion import RobotMotion
@@ -28,7 +30,7 @@ from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.streaming import Stream
 from tests.fast.exact import double, in_double
 from tests.reference.standing.steppers import jump, moved, squat, walk
-from tests.reference.walkers import walker
+from tests.reference.walkers import walker, write_urdf
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 SAME_RAD, SAME_M = 1e-5, 1e-5
@@ -211,6 +213,20 @@ def test_roots_and_contacts_that_make_no_sense_are_refused(
         stream(pose, root=(eye, zero))
     with pytest.raises(UserError, match="the floor's height must be a number"):
         FastStream(make_fast("pelvis", "numpy"), floor=float("nan"))
+
+
+def test_a_robot_of_which_there_is_a_model_alone_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(without_training, "calibrate", lambda _: STANDARD)  # it takes some seconds
+    urdf = write_urdf(tmp_path / "walker.urdf")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # what is a guess
+        retargeter = mrhubo.for_robot(urdf, whole_body=True, start="nearest")
+    fast = mrhubo.load_fast(retargeter, "numpy")
+    answer = quickly(fast, frames_of(squat(2)), StreamSettings())[-1]
+    assert answer.root_position is not None and answer.contact_names == ("left_foot", "right_foot")
+    assert "l_knee" in answer.joint_names and answer.robot.made_by == "the optimiser of mrhubo"
+    with pytest.raises(UserError, match="start 'near' does not exist; nearest: 'nearest'"):
+        mrhubo.for_robot(urdf, start="near")
 
 
 def test_one_file_stands(made: Callable[[str], Retargeter], tmp_path: Path) -> None:

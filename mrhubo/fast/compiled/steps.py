@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.cost import quadratic
-from mrhubo.fast.compiled.human import dot, put, row3
+from mrhubo.fast.compiled.human import add, dot, put, row3
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
     BODY_H,
@@ -194,20 +194,27 @@ def follow(t, work, target_BD3, b, pull, q_N):
 
 
 @njit(**INNER)
-def near(t, target_BD3, b, c, start, into_N):
-    """The pool's best pose of a cell, for the joints of a block."""
+def near(t, work, target_BD3, b, c, start, into_N):
+    """The pool's best pose of a cell, for the joints of a block. Weighted directions stand in `work.direction_D3`."""
     best, found = np.inf, -1
     joints, directions = size(t, BLOCK_N), size(t, LIMB_D)
-    poses = size(t, POOL_UN) // joints
+    poses, first, last = size(t, POOL_UN) // joints, whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)
+    for r in range(first, last):
+        d = whole(t, ORDER_D, r)
+        put(work.direction_D3, d, add((0.0, 0.0, 0.0), row3(target_BD3, b, d), real(t, WEIGHT_D, d)))
+    # What is the same for thousands of poses is looked up once: a table's number takes three loads.
+    integers, singles, wanted_D3 = t[0], t[2], work.direction_D3
+    order, cell, pool = integers[2 * ORDER_D], integers[2 * CELL_CU] + c * poses, integers[2 * POOL_UD3]
     for u in range(poses):
-        if whole(t, CELL_CU, c * poses + u) != start:
+        if integers[cell + u] != start:
             continue
-        score = 0.0
-        for r in range(whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)):
-            d = whole(t, ORDER_D, r)
-            at = 3 * (u * directions + d)
-            pooled = (single(t, POOL_UD3, at), single(t, POOL_UD3, at + 1), single(t, POOL_UD3, at + 2))
-            score += real(t, WEIGHT_D, d) * dot(row3(target_BD3, b, d), pooled)
+        score, own = 0.0, pool + 3 * u * directions
+        for r in range(first, last):
+            d = integers[order + r]
+            at = own + 3 * d
+            score += (
+                wanted_D3[d, 0] * singles[at] + wanted_D3[d, 1] * singles[at + 1] + wanted_D3[d, 2] * singles[at + 2]
+            )
         score = single(t, POOL_RIDGE_CU, c * poses + u) - 2 * score
         if score < best:
             best, found = score, u
@@ -226,7 +233,7 @@ def nearest(t, work, target_BD3, b, q_N):
         work.best_C[c] = np.inf
     for start in range(int(real(t, POLISH_4, STARTS))):
         for c in range(blocks):
-            near(t, target_BD3, b, c, start, work.start_N)
+            near(t, work, target_BD3, b, c, start, work.start_N)
         minimise(t, work, work.start_N, NEAREST_STEPS)
         for c in range(blocks):
             if work.cost_C[c] < work.best_C[c]:
@@ -274,7 +281,7 @@ def polish(t, work, target_BD3, b, q_N, steps):
         if number < starts:
             for c in range(blocks):
                 if _far(t, work, c):
-                    near(t, target_BD3, b, c, number, work.start_N)
+                    near(t, work, target_BD3, b, c, number, work.start_N)
 
 
 @njit(**INNER)
