@@ -1,7 +1,7 @@
 """Whole bodies: the optimiser's answers to clips with a root, on robots with legs, as whole motions and as streams.
 
     python benchmarks/whole_body.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--rate 60] [--collisions avoid]
-        [--ways motion,stream] [--picture FILE.png]
+        [--ways motion,stream,fast] [--picture FILE.png]
 
 A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
 planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
@@ -12,6 +12,7 @@ time alone. The picture shows moments of the first clip, the person above the ro
 
 from __future__ import annotations
 
+import dataclasses
 import statistics
 import sys
 import time
@@ -28,12 +29,16 @@ from mrhubo import rotation
 from mrhubo.body import Skeleton
 from mrhubo.errors import InputWarning
 from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
+from mrhubo.fast import FastRetargeter, FastStream
 from mrhubo.frames import human_to_world
 from mrhubo.motion import Motion, motion_files, read_motion, resample
 from mrhubo.reference import OptimizationResult, OptimizationRetargeter
 from mrhubo.reference.metrics import direction_error
-from mrhubo.retargeter import RetargetResult
+from mrhubo.reference.standing import Legs, has_root, motion_root
+from mrhubo.retargeter import RetargetResult, optimised
 from mrhubo.robot import Robot
+from mrhubo.robot_motion import RobotMotion
+from mrhubo.robot_motion.motion import PER_FRAME
 from mrhubo.streaming import Stream, StreamSettings
 from mrhubo.view import Solids, human_figure
 from mrhubo.view.camera import Camera
@@ -41,7 +46,7 @@ from mrhubo.view.painter import render
 from mrhubo.view.pictures import Artist
 from mrhubo.view.sheets import contact_sheet, save_png
 
-Answer = OptimizationResult | RetargetResult
+Answer = OptimizationResult | RetargetResult | RobotMotion
 
 _CLIPS = Path("data/external/cmu/whole_body")
 _MOMENTS = 8
@@ -153,7 +158,26 @@ def _as_stream(retargeter: OptimizationRetargeter, avoid: bool) -> Callable[[Mot
     return Stream(retargeter, settings=StreamSettings(avoid_collisions=avoid)).retarget
 
 
-_WAYS = {"motion": _as_motion, "stream": _as_stream}
+def _as_fast(retargeter: OptimizationRetargeter, avoid: bool) -> Callable[[Motion], Answer]:
+    """The same without PyTorch, with the root's way as `Stream.retarget` has it."""
+    fast = FastRetargeter(optimised(retargeter.body_map).describe())
+    legs = Legs(retargeter.body_map)
+
+    def answer(motion: Motion) -> RobotMotion:
+        stream = FastStream(fast, motion.frame_rate, StreamSettings(avoid_collisions=avoid))
+        local_TJ33 = motion.for_skeleton(retargeter.body_map.skeleton).local_TJ33
+        roots = [None] * len(motion)
+        if legs.has_feet and has_root(motion):
+            roots = list(zip(*(part.numpy() for part in motion_root(motion, local_TJ33, legs)), strict=True))
+        found = [stream(pose, root=root) for pose, root in zip(local_TJ33.numpy(), roots, strict=True)]
+        columns = {name: [getattr(frame, name) for frame in found] for name in PER_FRAME}
+        told = {name: np.stack(column) for name, column in columns.items() if column[0] is not None}
+        return dataclasses.replace(found[0], frame_rate=motion.frame_rate, **told)
+
+    return answer
+
+
+_WAYS = {"motion": _as_motion, "stream": _as_stream, "fast": _as_fast}
 
 
 def _measure(
@@ -164,9 +188,10 @@ def _measure(
     result = answers(motion)
     seconds = time.process_time() - start
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
-    base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
-    score = score_whole_body(retargeter.body_map, motion, result.q, result.root_position, base_T33)
-    touches = float("nan") if result.collision is None else float(result.collision.float().mean())
+    q_TN, place_T3, quaternion_T4 = map(torch.as_tensor, (result.q, result.root_position, result.root_quaternion_wxyz))
+    base_T33 = rotation.quaternion_to_matrix(quaternion_T4[:, [1, 2, 3, 0]])
+    score = score_whole_body(retargeter.body_map, motion, q_TN, place_T3, base_T33)
+    touches = float("nan") if result.collision is None else float(torch.as_tensor(result.collision).float().mean())
     return score, touches, 1000 * seconds / len(motion)
 
 
@@ -187,7 +212,7 @@ def _print_without_feet(
     rows: list[list[float]] = []
     for motion in motions:
         start = time.process_time()
-        q_TN = answers(motion).q
+        q_TN = torch.as_tensor(answers(motion).q)
         seconds = time.process_time() - start
         off_TD = direction_error(body_map, q_TN, motion.for_skeleton(body_map.skeleton).local_TJ33)
         change_TN = q_TN.diff(dim=0).abs() * motion.frame_rate

@@ -86,12 +86,13 @@ def load(source: str | os.PathLike[str]) -> Retargeter:
     return Retargeter.load(package_folder(source))
 
 
-def for_robot(robot: Robot | str | os.PathLike[str], whole_body: bool = False) -> Retargeter:
+def for_robot(robot: Robot | str | os.PathLike[str], whole_body: bool = False, start: str = "universal") -> Retargeter:
     """A retargeter for a robot that nothing was trained for, by the network that is the same for every robot.
 
         retargeter = mrhubo.for_robot("my.urdf", whole_body=True)
 
     Made in seconds. It answers motions, poses and streams with a confidence as a trained one does (docs/universal.md).
+    `mrhubo.load_fast` makes the form without PyTorch of it.
 
     Args:
         robot: a `Robot` that knows its body parts; or a config's file, the name of a shipped robot, or a URDF, whose
@@ -99,24 +100,30 @@ def for_robot(robot: Robot | str | os.PathLike[str], whole_body: bool = False) -
         whole_body: whether the legs, feet and waist of a URDF or a MuJoCo model move too, as with `mrhubo retarget
             --whole-body` (docs/whole-body.md); else its arms, hands and head alone. A config or a `Robot` says itself
             what it has.
+        start: what an answer's steps of optimisation begin at: "universal", that network, or "nearest", the nearest of
+            2,048 robot poses.
 
     Raises:
-        UserError: the file cannot be used, the robot's body parts make no sense, or `whole_body` is said of a config or
-            a `Robot`.
+        UserError: the file cannot be used, the robot's body parts make no sense, there is no such start, or
+            `whole_body` is said of a config or a `Robot`.
     """
     from mrhubo.describing.run import open_robot
-    from mrhubo.errors import UserError
-    from mrhubo.retargeter import untrained
-    from mrhubo.robot import Robot
+    from mrhubo.errors import UserError, unknown_name
+    from mrhubo.retargeter import optimised, untrained
+    from mrhubo.robot import BodyMap, Robot
 
-    if not isinstance(robot, Robot):
-        return untrained(open_robot(os.fspath(robot), whole_body))
-    if whole_body:
-        raise UserError(
-            f"whole_body=True goes with a URDF or a MuJoCo model; the robot '{robot.name}' says itself what of a body "
-            "it has"
-        )
-    return untrained(robot)
+    if start not in ("universal", "nearest"):
+        raise UserError(f"for_robot: {unknown_name('start', start, ('universal', 'nearest'))}")
+    if isinstance(robot, Robot):
+        if whole_body:
+            raise UserError(
+                f"whole_body=True goes with a URDF or a MuJoCo model; the robot '{robot.name}' says itself what of a "
+                "body it has"
+            )
+        found = robot
+    else:
+        found = open_robot(os.fspath(robot), whole_body)
+    return untrained(found) if start == "universal" else optimised(BodyMap.of(found))
 
 
 def package_folder(source: str | os.PathLike[str]) -> Path:
@@ -134,12 +141,13 @@ def package_folder(source: str | os.PathLike[str]) -> Path:
     return Path(source)
 
 
-def load_fast(source: str | os.PathLike[str], form: str | None = None) -> FastRetargeter:
+def load_fast(source: str | os.PathLike[str] | Retargeter, form: str | None = None) -> FastRetargeter:
     """A trained retargeter that needs no PyTorch and answers a frame in a fraction of a millisecond (docs/fast.md).
 
     Args:
         source: the folder of a package, or its file `runtime.safetensors` alone. For a package that was made before
-            there was such a file, it is worked out anew, by PyTorch.
+            there was such a file, it is worked out anew, by PyTorch; so it is for a retargeter, such as `for_robot`
+            gives for a robot without a package.
         form: "compiled" (needs numba: the extra `fast`) or "numpy"; None: compiled where numba is installed.
 
     Raises:
@@ -150,6 +158,8 @@ def load_fast(source: str | os.PathLike[str], form: str | None = None) -> FastRe
     from mrhubo.fast import FastRetargeter
     from mrhubo.fast.description import FILE
 
+    if not isinstance(source, str | os.PathLike):
+        return FastRetargeter(source.describe(), form)
     folder = Path(source)
     if folder.is_dir() and not (folder / FILE).exists():
         return FastRetargeter(load(folder).describe(), form)

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from mrhubo.fast.description import Description
+from mrhubo.fast.plain.ground import Base, Seen
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.problem import Problem
 
@@ -40,8 +41,31 @@ class Answers:
         )
 
 
+class Ground(Protocol):
+    """The floor under one robot, as `mrhubo.fast.plain.ground.PlainGround`."""
+
+    @property
+    def planted_R(self) -> np.ndarray:
+        """Whether each foot is planted."""
+        ...
+
+    def pass_by(self) -> None:
+        """Nobody is seen in this frame."""
+        ...
+
+    def look(self, seen: Seen, aim_D3: np.ndarray, turn_33: np.ndarray, passed: float) -> tuple[np.ndarray, np.ndarray]:
+        """What a frame asks for."""
+        ...
+
+    def stand(self, q_N: np.ndarray) -> Base:
+        """Where the robot's base is."""
+        ...
+
+
 class Engine(Protocol):
-    """A form of the run-time path. Poses are local rotations (B, 21, 3, 3), float32."""
+    """A form of the run-time path. Poses are local rotations (B, 21, 3, 3), float32. `avoid`, `follow` and `minimise`
+    also take targets with the places of soles after the directions (`mrhubo.fast.plain.soles`).
+    """
 
     description: Description
 
@@ -79,6 +103,14 @@ class Engine(Protocol):
         self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `mrhubo.fast.plain.steps.follow`: joint angles (B, N) [rad] and costs of blocks (B, C), float64."""
+        ...
+
+    def minimise(self, q_BN: np.ndarray, target_BX3: np.ndarray, steps: int) -> np.ndarray:
+        """Joint angles (B, N) [rad] after as many steps at most, float64."""
+        ...
+
+    def ground(self, longest_step: float, floor: float | None) -> Ground:
+        """A floor under the robot, on which nobody has been seen; arguments as of `PlainGround`."""
         ...
 
     @property

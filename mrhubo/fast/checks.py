@@ -13,7 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mrhubo.fast.description import Description
-    from mrhubo.fast.sections import Layers, Part, Universal
+    from mrhubo.fast.sections import Layers, Legs, Part, Universal
 
 _JOINTS = 21
 _ACTIVATIONS = ("silu", "leaky_relu", "tanh")
@@ -43,6 +43,8 @@ def check(d: Description) -> None:
         "I": len(d.features.input_I), "W": len(d.features.bend_W), "O": len(d.features.first_O),
         "M": len(d.features.limb_M), "F": len(d.features.center_F), "S": len(capsules.body_S),
         "Y": len(capsules.pair_Y2), "E": 0 if d.universal is None else len(d.universal.block_E),
+        **({} if d.legs is None else {"R": len(d.legs.hip_R3), "H": 2 * len(d.legs.hip_R3),
+                                      "J": len(d.legs.radius_J), "L": len(d.legs.joint_L)}),
     }  # fmt: skip
     for name, array in d.arrays().items():
         axes = name.rpartition("_")[2] if "_" in name else ""
@@ -84,8 +86,10 @@ def check(d: Description) -> None:
     _check_names(d, sizes)
     if d.universal is not None:
         _check_universal(d.universal, sizes)
-    else:
+    elif d.post:
         _check_stages(d, sizes)
+    if d.legs is not None:
+        _check_legs(d, d.legs, sizes)
     _check_prior(d, sizes)
 
 
@@ -139,6 +143,26 @@ def _check_universal(u: Universal, sizes: dict[str, int]) -> None:
     shapes |= {f"{name}.{kind}": (width,) for name in norms for kind in ("weight", "bias")}
     found = {name: array.shape for name, array in u.weights.items() if array.dtype == np.float32}
     _refuse(found != shapes or len(found) != len(u.weights), "the universal network has other layers than are needed")
+
+
+def _check_legs(d: Description, legs: Legs, sizes: dict[str, int]) -> None:
+    bodies, places = sizes["A"] + 1, sizes["L"] + 1
+    for name, array, most in (
+        ("joint_L", legs.joint_L, _JOINTS), ("parent_L", legs.parent_L, np.arange(1, places)),
+        ("start_R", legs.start_R, places), ("sole_H", legs.sole_H, places), ("carrier_1", legs.carrier_1, bodies),
+        ("body_H", legs.body_H, bodies), ("ball_body_J", legs.ball_body_J, bodies), ("near_HJ", legs.near_HJ, 2),
+        ("limb_R2", legs.limb_R2, sizes["D"]), ("foot_R2", legs.foot_R2, sizes["D"]),
+        ("block_N", legs.block_N, sizes["C"]), ("block_D", legs.block_D + 1, sizes["C"] + 1),
+    ):  # fmt: skip
+        outside = (array < 0) | (array >= most)
+        _refuse(array.dtype.kind != "i" or bool(outside.any()), f"legs.{name} names what is not there")
+    for name in ("offset_L3", "sole_H3", "axes_33", "root_3", "point_H3", "ball_J3", "radius_J", "scale_1", "hip_R3",
+                 "length_R2", "built_R23"):  # fmt: skip
+        _refuse(getattr(legs, name).dtype != np.float64, f"legs.{name} holds other numbers than are needed")
+    _refuse(not sizes["R"] or not legs.near_HJ.any(axis=1).all(), "legs.near_HJ leaves an end of a sole without a ball")
+    names = [d.settings.facts.get(name) for name in ("feet", "contact_points")]
+    counts = [len(names) if isinstance(names, list) and _are_names(names) else 0 for names in names]
+    _refuse(counts != [sizes["R"], sizes["H"]], "feet have other names than there are numbers for")
 
 
 def _check_prior(d: Description, sizes: dict[str, int]) -> None:

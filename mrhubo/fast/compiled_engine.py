@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from mrhubo.fast.answers import NO_ROTATION, Answers
+from mrhubo.fast.compiled_ground import CompiledGround
 from mrhubo.fast.description import Description
 from mrhubo.fast.kept import is_kept, note_kept
 from mrhubo.fast.plain import steps
@@ -26,6 +27,7 @@ from mrhubo.fast.together.banded import Banded, Solve
 from mrhubo.fast.together.problem import Problem, make_problem
 
 if TYPE_CHECKING:
+    from mrhubo.fast.compiled.ground_kernels import GroundKernels
     from mrhubo.fast.compiled.motion_kernels import MotionKernels
 
 FEW = 32
@@ -43,7 +45,12 @@ class CompiledEngine:
         from mrhubo.fast.compiled.networks import ACTIVATIONS
 
         self.description = description
-        self._tables = tuple(tables.pack(description))
+        self._tables = self._standing = tuple(tables.pack(description))
+        legs, cost = description.legs, description.cost
+        if legs is not None and not (
+            np.array_equal(legs.block_N, cost.block_N) and np.array_equal(legs.block_D, cost.block_D)
+        ):
+            self._standing = tuple(tables.pack(description.standing))
         self._kernels = kernels.make_kernels()
         self._check, self._direct, self._answer = kernels.CHECK, kernels.DIRECT, kernels.ANSWER
         self._activation = ACTIVATIONS[description.settings.activation]
@@ -64,7 +71,7 @@ class CompiledEngine:
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
         target_BD3, q_BN = self._room(local_BJ33)
-        if self._unroll is not None:
+        if not self.description.post:
             refuse(self._look(self._check | self._direct, local_BJ33, target_BD3, q_BN), shape)
             return target_BD3, self.network(local_BJ33, target_BD3)
         refuse(self._look(self._check | self._direct | self._answer, local_BJ33, target_BD3, q_BN), shape)
@@ -83,6 +90,8 @@ class CompiledEngine:
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""
         q_BN = self._room(local_BJ33)[1]
+        if not self.description.post and self._unroll is None:
+            return self._nearest(np.ascontiguousarray(target_BD3))
         if (unroll := self._unroll) is not None:
             target_BD3 = np.ascontiguousarray(target_BD3)
             self._shared(len(q_BN), lambda rows: unroll(target_BD3[rows], q_BN[rows]))
@@ -127,17 +136,48 @@ class CompiledEngine:
 
     def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.avoid`."""
-        q_BN = q_BN.copy()
-        self._shared(len(q_BN), lambda rows: self._kernels.avoid(self._tables, target_BD3[rows], q_BN[rows]))
+        q_BN, own = q_BN.copy(), self._asked_by(target_BD3)
+        self._shared(len(q_BN), lambda rows: self._kernels.avoid(own, target_BD3[rows], q_BN[rows]))
         return q_BN
 
     def follow(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.follow`."""
-        q_BN, cost_BC = q_BN.copy(), np.empty((len(q_BN), len(self.description.cost.cell_CU)))
-        self._kernels.follow(self._tables, target_BD3, pull_B, lower_BN, upper_BN, q_BN, cost_BC)
+        blocks = self.description.asked_by(target_BD3).cost.joints_NC.shape[1]
+        q_BN, cost_BC = q_BN.copy(), np.empty((len(q_BN), blocks))
+        self._kernels.follow(self._asked_by(target_BD3), target_BD3, pull_B, lower_BN, upper_BN, q_BN, cost_BC)
         return q_BN, cost_BC
+
+    def minimise(self, q_BN: np.ndarray, target_BX3: np.ndarray, steps: int) -> np.ndarray:
+        """As `Engine.minimise`."""
+        q_BN = q_BN.copy()
+        self._ground_kernels.start(self._asked_by(target_BX3), target_BX3, steps, q_BN)
+        return q_BN
+
+    def ground(self, longest_step: float, floor: float | None) -> CompiledGround:
+        """As `Engine.ground`."""
+        legs = self.description.legs
+        assert legs is not None, "who has no feet stands on no floor"
+        sizes = len(legs.body_H), len(legs.joint_L)
+        return CompiledGround(self._standing, self._ground_kernels, *sizes, longest_step, floor)
+
+    def _asked_by(self, target_BX3: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The arrays for targets, as `Description.asked_by`."""
+        return self._standing if target_BX3.shape[1] > len(self.description.cost.weight_D) else self._tables
+
+    def _nearest(self, target_BD3: np.ndarray) -> np.ndarray:
+        """As `mrhubo.fast.plain.steps.nearest`."""
+        cost, found_BN = self.description.cost, np.empty((len(target_BD3), len(self.description.cost.lower_N)))
+        start = self._ground_kernels.start
+        self._shared(len(found_BN), lambda rows: start(self._tables, target_BD3[rows], 0, found_BN[rows]))
+        return np.clip(found_BN.astype(np.float32), cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32))
+
+    @cached_property
+    def _ground_kernels(self) -> GroundKernels:
+        from mrhubo.fast.compiled.ground_kernels import make_ground_kernels
+
+        return make_ground_kernels()
 
     @cached_property
     def _motion_kernels(self) -> MotionKernels:

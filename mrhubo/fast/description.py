@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +25,7 @@ from mrhubo.fast.sections import (
     Human,
     Kinematics,
     Layers,
+    Legs,
     Part,
     Prior,
     Reading,
@@ -52,7 +54,7 @@ class Description:
     pre: tuple[Part, ...]
     """Networks from features to links; none of one stage."""
     post: tuple[Part, ...]
-    """Networks to joint angles."""
+    """Networks to joint angles; where there are none, the nearest of the cost's poses are what answers begin at."""
     kinematics: Kinematics
     cost: Cost
     reading: Reading
@@ -62,6 +64,19 @@ class Description:
     settings: Settings
     universal: Universal | None = None
     """In place of `pre` and `post`, which are then none."""
+    legs: Legs | None = None
+    """Of a robot that stands on feet."""
+
+    @cached_property
+    def standing(self) -> Description:
+        """The same with the blocks of joints that there are where the places of soles cost too."""
+        if self.legs is None:
+            return self
+        return replace(self, cost=replace(self.cost, block_N=self.legs.block_N, block_D=self.legs.block_D))
+
+    def asked_by(self, target_BX3: np.ndarray) -> Description:
+        """`standing` for targets with the places of soles after the directions, else this one."""
+        return self.standing if target_BX3.shape[1] > len(self.cost.weight_D) else self
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every array, by a name that `Description.of` reads."""
@@ -78,6 +93,8 @@ class Description:
         if self.universal is not None:
             found |= {f"universal.{name}": getattr(self.universal, name) for name in _UNIVERSAL}
             found |= {f"{_WEIGHTS}{name}": array for name, array in self.universal.weights.items()}
+        if self.legs is not None:
+            found |= {f"legs.{field.name}": getattr(self.legs, field.name) for field in fields(Legs)}
         return found
 
     def metadata(self) -> dict[str, str]:
@@ -98,7 +115,9 @@ class Description:
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
         universal = _universal(arrays) if "universal.block_E" in arrays else None
-        return cls(prior=prior, settings=Settings(**{**told, **names}), universal=universal, **sections, **stages)
+        legs = _section(Legs, "legs", arrays) if "legs.body_H" in arrays else None
+        settings = Settings(**{**told, **names})
+        return cls(prior=prior, settings=settings, universal=universal, legs=legs, **sections, **stages)
 
     @classmethod
     def read(cls, path: Path) -> Description:

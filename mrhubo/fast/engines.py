@@ -16,6 +16,7 @@ from mrhubo.fast.description import Description
 from mrhubo.fast.kept import numba_is_there
 from mrhubo.fast.plain import collision, human, judging, networks, robot, steps, universal
 from mrhubo.fast.plain.avoidance import Avoidance
+from mrhubo.fast.plain.ground import PlainGround
 from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import are_crooked
 from mrhubo.fast.together.avoiding import GivingWay, make_giving_way
@@ -55,6 +56,8 @@ class NumpyEngine:
         """As `Engine.network`."""
         if self._branches is not None:
             return universal.joint_angles(self._branches, target_BD3)
+        if not self.description.post:
+            return steps.nearest(self.description, target_BD3)
         return networks.joint_angles(self.description, networks.features_of(self.description, local_BJ33, target_BD3))
 
     def polish(self, q_BN: np.ndarray, target_BD3: np.ndarray, polish: int, avoid: bool) -> np.ndarray:
@@ -72,7 +75,16 @@ class NumpyEngine:
         self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.follow`."""
-        return steps.follow(self.description, q_BN, target_BD3, pull_B, lower_BN, upper_BN)
+        asked = self.description.asked_by(target_BD3)
+        return steps.follow(asked, q_BN, target_BD3, pull_B, lower_BN, upper_BN)
+
+    def minimise(self, q_BN: np.ndarray, target_BX3: np.ndarray, steps_: int) -> np.ndarray:
+        """As `Engine.minimise`."""
+        return steps.minimise(self.description.asked_by(target_BX3), q_BN, target_BX3, steps_)[0]
+
+    def ground(self, longest_step: float, floor: float | None) -> PlainGround:
+        """As `Engine.ground`."""
+        return PlainGround(self.description, longest_step, floor)
 
     @cached_property
     def problem(self) -> Problem:

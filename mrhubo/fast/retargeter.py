@@ -11,6 +11,7 @@ Legend: T frames, J = 21 posed joints, D directions, N joints, X branches.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -180,9 +181,17 @@ class FastRetargeter:
         return np.degrees(judging.of_branches(shake_TD, self.description.trust.column_XD))
 
     def told(
-        self, found: Answers, shape: tuple[int, ...], frame_rate: float | None, name: str = "", source: str = ""
+        self,
+        found: Answers,
+        shape: tuple[int, ...],
+        frame_rate: float | None,
+        name: str = "",
+        source: str = "",
+        stands: Mapping[str, Any] | None = None,
     ) -> RobotMotion:
-        """A form's answers, with the leading axes of the poses and what is known of motion and retargeter."""
+        """A form's answers, with the leading axes of the poses and what is known of motion and retargeter; `stands`:
+        fields that tell of the floor.
+        """
         trust_TX = found.trust_BX
         confidence_T = trust_TX.min(axis=1) if trust_TX.shape[1] else np.zeros_like(found.phi_B)
         return RobotMotion.trusted(
@@ -195,7 +204,7 @@ class FastRetargeter:
             frame_rate=frame_rate,
             name=name,
             source=source,
-            **self._made,
+            **{**self._made, **(stands or {})},
         )
 
 

@@ -13,26 +13,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PLANTED_M, PLANTED_SPEED = 0.04, 0.3
-"""A point that is lower [m] and slower [m/s] is planted: soles of readers' skeletons lie up to 2 cm beside the
-person's; and a heel that lands still turns at some 20 cm/s."""
-LIFTED_M, LIFTED_SPEED = 0.07, 0.5
-"""A point that is higher or faster is not. A swinging foot goes at 3 to 4 m/s, and through all these within 30 ms."""
-WANDERED_M = 0.06
-"""How far a planted point may be from where it was planted; then it is planted anew: a shuffling foot never lifts."""
-RAMP_S = 0.1
-"""How long [s] it takes until a contact counts in full, and before it ends, no more: a heel strike takes as long."""
+from mrhubo.fast.plain.contacts import (
+    BAND_M,
+    GATHERED,
+    LIFTED_M,
+    LIFTED_SPEED,
+    PLANTED_M,
+    PLANTED_SPEED,
+    RAMP_S,
+    WANDERED_M,
+    smooth_share,
+)
+
 _SCALE_ROUNDS, _SCALES = 4, (0.6, 1.6)
 """A child's legs, and a giant's, against those of readers' skeletons, and more."""
 _STILL = 0.1
 """Speed [m/s] of a root that tells nothing of its scale."""
 _TOLD = 0.05
 """To what the scale can be told: where a person's legs are known, it comes out 4% too small or large, as feet roll."""
-BAND_M = 0.04
-"""Heights of points on one floor."""
-GATHERED = 0.5
-"""A band of heights with this share of the fullest one's slow points is the floor, if none is below: who stands on a
-step stood on the floor too."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +78,6 @@ def find_contacts(
             until = np.arange(end - start, 0, -1) / frame_rate + (np.inf if end == len(planted_TP) else 0.0)
             weight_TP[start:end, point] = smooth_share(np.minimum(since, until) / RAMP_S)
     return FootContacts(planted_TP, phase_TP, weight_TP, floor)
-
-
-def smooth_share(share: np.ndarray) -> np.ndarray:
-    """How much a contact counts, 0..1, some share of the way into its ramp: it begins and ends without a corner."""
-    share = np.clip(share, 0.0, 1.0)
-    return share**2 * (3 - 2 * share)
 
 
 def root_scale(from_root_TP3: np.ndarray, root_T3: np.ndarray, frame_rate: float) -> float:

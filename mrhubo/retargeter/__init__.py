@@ -7,7 +7,7 @@ from mrhubo.retargeter.package import POLISH, Retargeter
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import read_package_robot
 from mrhubo.retargeter.universal import UniversalJoints
-from mrhubo.retargeter.without_training import untrained
+from mrhubo.retargeter.without_training import optimised, untrained
 
 __all__ = [
     "POLISH",
@@ -19,6 +19,7 @@ __all__ = [
     "UniversalJoints",
     "build_network",
     "join_results",
+    "optimised",
     "read_package_robot",
     "untrained",
 ]

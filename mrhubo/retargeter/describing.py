@@ -38,6 +38,7 @@ from mrhubo.fast.sections import (
 from mrhubo.files.storage import write_tensors
 from mrhubo.reference import polish
 from mrhubo.retargeter import confidence
+from mrhubo.retargeter.describing_legs import describe_legs
 from mrhubo.retargeter.describing_robot import (
     Bodies,
     describe_capsules,
@@ -77,6 +78,7 @@ def describe(retargeter: Retargeter) -> Description:
     }  # fmt: skip
     first, last = (_parts(stage) if isinstance(stage, Branched) else () for stage in stages)
     reading, prior, bodies = _reading(body_map), retargeter.prior, Bodies(body_map.robot)
+    legs, names_of_legs = describe_legs(body_map, bodies)
     return Description(
         _human(body_map),
         _features(network.features),
@@ -103,10 +105,12 @@ def describe(retargeter: Retargeter) -> Description:
                 "made_by": retargeter.facts.made_by,
                 "checksum": retargeter.facts.checksum,
                 "others": [asdict(other) for other in retargeter.facts.others],
+                **names_of_legs,
             },
             body_map.collision.known,
         ),
         describe_universal(network, bodies) if isinstance(network, UniversalJoints) else None,
+        legs,
     )
 
 
@@ -142,7 +146,7 @@ def _features(features: PoseFeatures) -> Features:
         names = ("columns_I", "bend_X", "upper_X", "lower_X", "first_P", "second_P", "limb_V", "axis_V", "seen_V")
         places = [whole(features.get_buffer(f"_{name}")) for name in names]
         numbers = [single(features.center_F), single(features.scale_F)]
-    else:  # nothing that is worked out; the universal network takes the directions as they are
+    else:  # nothing that is worked out; what knows no network of its own takes the directions as they are
         rows = np.zeros(0, np.int64) if isinstance(features, AllDirections) else whole(features.get_buffer("_rows"))
         places = [rows, *[np.zeros(0, np.int64)] * 8]
         numbers = [np.full(6 * len(rows), value, np.float32) for value in (0.0, 1.0)]

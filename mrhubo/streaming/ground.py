@@ -1,6 +1,6 @@
 """Where a robot with feet stands and goes, frame by frame: what `mrhubo.reference.standing` is to a whole motion.
 
-A frame in three steps. What the person does: contacts (`mrhubo.motion.live_contacts`), the root's path scaled by the
+A frame in three steps. What the person does: contacts (`mrhubo.fast.plain.contacts`), the root's path scaled by the
 legs' length, feet that stand flat while planted. What legs are asked for, beside directions: planted soles stay where
 they are while the root goes on; it goes as far as the legs take it, and a little nearer to the person's path in every
 frame, so that nothing adds up. What comes of it: with the joint angles that limits allow, the root is where planted
@@ -20,24 +20,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
+from mrhubo.fast.plain.ground import FLAT, FREE, PLANTED, RETURN_S, RETURN_SPEED, SETTLE_S, UNDER_M, UP, USUAL_S
 from mrhubo.frames import human_to_world
-from mrhubo.motion.live_contacts import LiveContacts, next_contacts
-from mrhubo.reference.standing import UNDER_M, Legs, stand_flat
+from mrhubo.reference.standing import Legs, stand_flat
 from mrhubo.robot import LinkPoses
-
-_RETURN_S, _RETURN_SPEED = 1.5, 0.1
-"""Time constant [s] with which the root returns to the person's path, and how fast it does at most [m/s]."""
-_SETTLE_S, _USUAL_S = 0.1, 2.0
-"""Time constants [s] with which the root comes to the height at which planted legs point as the person's, or, where
-nothing is planted, to its usual height; and with which it is found what is usual."""
-_PLANTED = 500.0
-"""Weight [1/m^2] of a planted point's place. Of a whole motion it is five times that: there, legs alone keep the foot
-that does not carry the root."""
-_FREE = 1.0
-"""Weight [1/m^2] of a swinging point's place, which directions tell as well."""
-_FLAT = [0, 2]
-"""The horizontal axes of the world."""
-_UP = 1
 
 
 @dataclass(frozen=True)
@@ -168,23 +155,23 @@ class Ground:
         moved_B3 = np.where((passed_B > self.longest_step)[:, None], last.path_B3 - state.path_B3, moved_B3)
         off_B3 = last.off_B3 + moved_B3
         step_B = np.minimum(passed_B, self.longest_step)
-        off_B3[:, _FLAT] -= _back(off_B3[:, _FLAT], step_B)
+        off_B3[:, FLAT] -= _back(off_B3[:, FLAT], step_B)
         share_B = np.minimum(whole_B1[:, 0], 1.0)
-        level_B = (weight_BP * -(state.path_B3[:, None] + pointing_BP3)[..., _UP]).sum(axis=1)
+        level_B = (weight_BP * -(state.path_B3[:, None] + pointing_BP3)[..., UP]).sum(axis=1)
         level_B = level_B / np.maximum(whole_B1[:, 0], 1e-9)
         begun_B = np.where(share_B > 0, level_B, -self.legs.scale * contacts.floor_B)
         usual_B = np.where(last.known_B, last.usual_B, begun_B)
-        usual_B = usual_B + share_B * (1 - np.exp(-step_B / _USUAL_S)) * (level_B - usual_B)
+        usual_B = usual_B + share_B * (1 - np.exp(-step_B / USUAL_S)) * (level_B - usual_B)
         height_B = usual_B + share_B * (level_B - usual_B)
-        off_B3[:, _UP] += (1 - np.exp(-step_B / _SETTLE_S)) * (height_B - off_B3[:, _UP])
+        off_B3[:, UP] += (1 - np.exp(-step_B / SETTLE_S)) * (height_B - off_B3[:, UP])
         first_B3 = np.stack((np.zeros_like(begun_B), begun_B, np.zeros_like(begun_B)), axis=1)
         off_B3 = np.where(last.known_B[:, None], off_B3, first_B3)
         root_B3 = state.path_B3 + off_B3
         state = replace(state, off_B3=off_B3, usual_B=usual_B, pointing_BP3=pointing_BP3,
                         known_B=np.ones_like(last.known_B))  # fmt: skip
         wanted_BP3 = root_B3[:, None] + pointing_BP3
-        under_BP = np.maximum(-wanted_BP3[..., _UP], 0.0)
-        wanted_BP3[..., _UP] += under_BP
+        under_BP = np.maximum(-wanted_BP3[..., UP], 0.0)
+        wanted_BP3[..., UP] += under_BP
         anchor_BP3 = np.stack((last.anchor_BP2[..., 0], np.zeros_like(weight_BP), last.anchor_BP2[..., 1]), axis=-1)
         held_BP1 = (last.contacts.planted_BP & contacts.planted_BP & ~contacts.began_BP)[..., None]
         on_floor_BP3 = wanted_BP3 * [1.0, 0.0, 1.0]
@@ -192,7 +179,7 @@ class Ground:
         counts_BP = np.maximum(weight_BP, np.minimum(under_BP / UNDER_M, 1.0))
         wanted_BP3 = torch.from_numpy(wanted_BP3 - root_B3[:, None]).to(target_BD3) @ turn_B33
         counts_BP3 = torch.zeros_like(wanted_BP3)
-        counts_BP3[..., 0] = _FREE + (_PLANTED - _FREE) * torch.from_numpy(counts_BP).to(target_BD3)
+        counts_BP3[..., 0] = FREE + (PLANTED - FREE) * torch.from_numpy(counts_BP).to(target_BD3)
         return state, torch.cat((target_BD3, wanted_BP3, counts_BP3), dim=1)
 
     def stand(self, last: GroundState, state: GroundState, poses: LinkPoses) -> GroundState:
@@ -200,22 +187,22 @@ class Ground:
         legs, contacts, weight_BP = self.legs, state.contacts, state.contacts.weight_BP
         seen, turn_B33 = legs.places(poses), state.turn_B33.to(poses.position_BL3)
         point_BP3, ball_BK3 = (_array(place @ turn_B33.mT) for place in (seen.point_BP3, seen.ball_BK3))
-        height_BK = ball_BK3[..., _UP] - _array(legs.radius_K)
+        height_BK = ball_BK3[..., UP] - _array(legs.radius_K)
         low_BP = np.stack([height_BK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
         whole_B1 = weight_BP.sum(axis=1)[:, None]
         rest_B1 = np.maximum(1.0 - whole_B1, 0.0)
         held_BP1 = (last.contacts.planted_BP & contacts.planted_BP & ~contacts.began_BP)[..., None]
         planned_B3 = state.path_B3 + state.off_B3
-        planned_BP2 = (planned_B3[:, None] + point_BP3)[..., _FLAT]
+        planned_BP2 = (planned_B3[:, None] + point_BP3)[..., FLAT]
         anchor_BP2 = np.where(held_BP1, last.anchor_BP2, planned_BP2)
-        flat_B2 = (weight_BP[..., None] * (anchor_BP2 - point_BP3[..., _FLAT])).sum(axis=1)
+        flat_B2 = (weight_BP[..., None] * (anchor_BP2 - point_BP3[..., FLAT])).sum(axis=1)
         root_B3 = planned_B3.copy()
-        root_B3[:, _FLAT] = (flat_B2 + rest_B1 * planned_B3[:, _FLAT]) / (whole_B1 + rest_B1)
-        rise_B = (-(weight_BP * low_BP).sum(axis=1) + rest_B1[:, 0] * planned_B3[:, _UP]) / (whole_B1 + rest_B1)[:, 0]
-        root_B3[:, _UP] = np.maximum(rise_B, -low_BP.min(axis=1))  # no sole is under the floor
+        root_B3[:, FLAT] = (flat_B2 + rest_B1 * planned_B3[:, FLAT]) / (whole_B1 + rest_B1)
+        rise_B = (-(weight_BP * low_BP).sum(axis=1) + rest_B1[:, 0] * planned_B3[:, UP]) / (whole_B1 + rest_B1)[:, 0]
+        root_B3[:, UP] = np.maximum(rise_B, -low_BP.min(axis=1))  # no sole is under the floor
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         loose_BP1 = 1.0 - weight_BP[..., None]
-        anchor_BP2 = anchor_BP2 + loose_BP1 * ((root_B3[:, None] + point_BP3)[..., _FLAT] - anchor_BP2)
+        anchor_BP2 = anchor_BP2 + loose_BP1 * ((root_B3[:, None] + point_BP3)[..., FLAT] - anchor_BP2)
         return replace(state, root_B3=root_B3, off_B3=root_B3 - state.path_B3, anchor_BP2=anchor_BP2)
 
     def base(self, state: GroundState, poses: LinkPoses) -> tuple[Tensor, Tensor]:
@@ -230,9 +217,9 @@ class Ground:
 
 def _back(off_B2: np.ndarray, passed_B: np.ndarray) -> np.ndarray:
     """How much of what the root is off the path is taken out [m]."""
-    back_B2 = off_B2 * (1 - np.exp(-passed_B / _RETURN_S))[:, None]
+    back_B2 = off_B2 * (1 - np.exp(-passed_B / RETURN_S))[:, None]
     far_B1 = np.linalg.norm(back_B2, axis=1, keepdims=True)
-    return back_B2 * np.minimum(1.0, _RETURN_SPEED * passed_B[:, None] / np.maximum(far_B1, 1e-12))
+    return back_B2 * np.minimum(1.0, RETURN_SPEED * passed_B[:, None] / np.maximum(far_B1, 1e-12))
 
 
 def _array(tensor: Tensor) -> np.ndarray:

@@ -79,7 +79,7 @@ class FrameReader:
             UserError: they have another shape, or a rotation is none.
         """
         people = len(seen_B)
-        turn_B33, place_B3 = (self._of_people(to_tensor(x).to(last_B33.device, torch.float32)) for x in given)
+        turn_B33, place_B3 = (self._of_people(to_tensor(x).to(last_B33)) for x in given)
         if tuple(turn_B33.shape) != (people, 3, 3) or tuple(place_B3.shape) != (people, 3):
             raise UserError(
                 "stream: a root is a rotation (3, 3) and a place (3,), with a leading axis if there are several people;"

@@ -202,7 +202,7 @@ def test_many_robots(run: Run, tmp_path: Path) -> None:
 
 
 def test_whole_body(run: Run, clips: Path, tmp_path: Path) -> None:
-    text = run("whole_body", "--robots", "nao", "--clips", clips, "--ways", "motion,stream",
+    text = run("whole_body", "--robots", "nao", "--clips", clips, "--ways", "motion,stream,fast",
                "--picture", tmp_path / "moments.png")  # fmt: skip
     found = rows(text, "clip")
     assert [row[0] for row in found] == ["boxing", "wave", "mean"] and "as a stream: 2 clips" in text

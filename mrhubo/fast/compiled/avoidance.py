@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.collision import apart, distance_gradient, far, place_capsules, touches
+from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import dot
-from mrhubo.fast.compiled.robot import place, quadratic
+from mrhubo.fast.compiled.robot import place
 from mrhubo.fast.compiled.steps import solve
 from mrhubo.fast.compiled.tables import BALL_Z, CLEAR_Y, FIRST_Z, INNER, real, size, whole
 from mrhubo.fast.plain.avoidance import STEPS, WEIGHT

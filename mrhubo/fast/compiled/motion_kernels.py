@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import avoidance, collision, human, steps, tables
+from mrhubo.fast.compiled import avoidance, collision, cost, human, steps, tables
 from mrhubo.fast.compiled import robot as robots
 from mrhubo.fast.kept import checksum
 
@@ -42,7 +42,7 @@ def make_motion_kernels() -> MotionKernels:
         joints = q_BN.shape[1]
         for b in range(len(q_BN)):
             steps.aim(t, work, target_BD3, b)
-            robots.quadratic(t, work, q_BN[b], work.next_cost_C, work.next_gradient_N, work.next_hessian_NN)
+            cost.quadratic(t, work, q_BN[b], work.next_cost_C, work.next_gradient_N, work.next_hessian_NN)
             for c in range(cost_BC.shape[1]):
                 cost_BC[b, c] = work.next_cost_C[c]
             for n in range(joints):

@@ -1,4 +1,4 @@
-"""As `mrhubo.fast.plain.robot`, and the cost of `mrhubo.fast.plain.steps`, for one frame."""
+"""As `mrhubo.fast.plain.robot`, for one frame."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from mrhubo.fast.compiled.tables import (
     AXIS_A3,
     BLOCK_N,
     BODY_G,
+    BODY_H,
     BODY_S,
     COLUMN_A,
     COLUMN_Q,
@@ -22,22 +23,16 @@ from mrhubo.fast.compiled.tables import (
     END_D3,
     FACTOR_Q4,
     FIRST_C,
-    FIRST_D,
     INNER,
     JOINT_Q,
     LIMB_D,
     LOWER_N,
-    MIDDLE_N,
     OFFSET_A,
-    ORDER_D,
-    ORDER_N,
     ORIGIN_A33,
     PARENT_A,
     POSITION_A3,
     RATIO_A,
-    RIDGE_N,
     ROTARY_A,
-    SEEN_D,
     START_BODY_D,
     START_D3,
     TWICE_A33,
@@ -90,6 +85,13 @@ class Work(NamedTuple):
     centre_G3: np.ndarray
     """Middles of the balls."""
     contact_N: np.ndarray
+    wanted_H3: np.ndarray
+    """Where points of soles are to be [m], seen from what carries the legs,"""
+    counts_H: np.ndarray
+    """and how much that counts [1/m^2]; 0: not at all."""
+    sole_N3: np.ndarray
+    carrier_133: np.ndarray
+    """Human axes of what carries the legs, base frame."""
 
 
 @njit(**INNER)
@@ -111,6 +113,7 @@ def make_work(t):
         np.empty(blocks), np.empty((joints, joints)), np.empty(joints), np.empty(blocks), lower_N, upper_N,
         np.empty(blocks), np.empty(blocks), np.empty(joints), np.empty(joints),
         np.empty((3 * size(t, BODY_S), 3)), np.empty((size(t, BODY_G), 3)), np.empty(joints),
+        np.empty((size(t, BODY_H), 3)), np.zeros(size(t, BODY_H)), np.zeros((joints, 3)), np.empty((1, 3, 3)),
     )  # fmt: skip
 
 
@@ -180,36 +183,3 @@ def jacobian(t, work):
         moved = add(cross(axis, lever), axis, slide)
         moved = add(moved, direction, -dot(direction, moved))
         put3(jacobian_DN3, d, n, add(row3(jacobian_DN3, d, n), moved, 1 / work.length_D[d]))
-
-
-@njit(**INNER)
-def quadratic(t, work, q_N, cost_C, gradient_N, hessian_NN):
-    """Cost and Gauss-Newton model at joint angles, for the goal in `work`."""
-    place(t, work, q_N)
-    jacobian(t, work)
-    for c in range(len(cost_C)):
-        first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
-        found = 0.0
-        for x in range(first, last):
-            n = whole(t, ORDER_N, x)
-            off = q_N[n] - real(t, MIDDLE_N, n)
-            found += real(t, RIDGE_N, n) * off * off
-            gradient_N[n] = real(t, RIDGE_N, n) * off
-            for y in range(first, x + 1):
-                hessian_NN[n, whole(t, ORDER_N, y)] = 0.0
-            hessian_NN[n, n] = real(t, RIDGE_N, n)
-        for r in range(whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)):
-            d = whole(t, ORDER_D, r)
-            goal = turn(work.view_V33, whole(t, SEEN_D, d), row(work.goal_D3, d))
-            miss = add(row(work.direction_D3, d), goal, -1.0)
-            weight = work.weight_D[d]
-            found += weight * dot(miss, miss)
-            for x in range(first, last):
-                n = whole(t, ORDER_N, x)
-                own = row3(work.jacobian_DN3, d, n)
-                own = (weight * own[0], weight * own[1], weight * own[2])
-                gradient_N[n] += dot(own, miss)
-                for y in range(first, x + 1):
-                    m = whole(t, ORDER_N, y)
-                    hessian_NN[n, m] += dot(own, row3(work.jacobian_DN3, d, m))
-        cost_C[c] = found

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.human import dot, put, row3
-from mrhubo.fast.compiled.robot import quadratic
+from mrhubo.fast.compiled.cost import quadratic
+from mrhubo.fast.compiled.human import add, dot, put, row3
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
+    BODY_H,
     CELL_CU,
     FAR,
     FIRST_C,
@@ -33,7 +34,19 @@ from mrhubo.fast.compiled.tables import (
     size,
     whole,
 )
-from mrhubo.fast.plain.steps import DAMPING, EASIER, FLOOR, FOLLOWED, HARDER, LEAST, MOST, SHORTEST, STUCK, TOLERANCE
+from mrhubo.fast.plain.steps import (
+    DAMPING,
+    EASIER,
+    FLOOR,
+    FOLLOWED,
+    HARDER,
+    LEAST,
+    MOST,
+    NEAREST_STEPS,
+    SHORTEST,
+    STUCK,
+    TOLERANCE,
+)
 
 
 @njit(**INNER)
@@ -84,7 +97,13 @@ def _held(q, gradient, lower, upper):
 
 @njit(**INNER)
 def aim(t, work, target_BD3, b):
-    """Takes a human's directions as the goal."""
+    """Takes a human's directions as the goal, and places of soles where they stand after them."""
+    directions, points = size(t, LIMB_D), size(t, BODY_H)
+    for h in range(points):
+        work.counts_H[h] = 0.0
+        if target_BD3.shape[1] > directions:
+            put(work.wanted_H3, h, row3(target_BD3, b, directions + h))
+            work.counts_H[h] = target_BD3[b, directions + points + h, 0]
     for c in range(len(work.weight_C)):
         work.weight_C[c] = 0.0
         for r in range(whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)):
@@ -175,20 +194,27 @@ def follow(t, work, target_BD3, b, pull, q_N):
 
 
 @njit(**INNER)
-def near(t, target_BD3, b, c, start, into_N):
-    """The pool's best pose of a cell, for the joints of a block."""
+def near(t, work, target_BD3, b, c, start, into_N):
+    """The pool's best pose of a cell, for the joints of a block. Weighted directions stand in `work.direction_D3`."""
     best, found = np.inf, -1
     joints, directions = size(t, BLOCK_N), size(t, LIMB_D)
-    poses = size(t, POOL_UN) // joints
+    poses, first, last = size(t, POOL_UN) // joints, whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)
+    for r in range(first, last):
+        d = whole(t, ORDER_D, r)
+        put(work.direction_D3, d, add((0.0, 0.0, 0.0), row3(target_BD3, b, d), real(t, WEIGHT_D, d)))
+    # What is the same for thousands of poses is looked up once: a table's number takes three loads.
+    integers, singles, wanted_D3 = t[0], t[2], work.direction_D3
+    order, cell, pool = integers[2 * ORDER_D], integers[2 * CELL_CU] + c * poses, integers[2 * POOL_UD3]
     for u in range(poses):
-        if whole(t, CELL_CU, c * poses + u) != start:
+        if integers[cell + u] != start:
             continue
-        score = 0.0
-        for r in range(whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)):
-            d = whole(t, ORDER_D, r)
-            at = 3 * (u * directions + d)
-            pooled = (single(t, POOL_UD3, at), single(t, POOL_UD3, at + 1), single(t, POOL_UD3, at + 2))
-            score += real(t, WEIGHT_D, d) * dot(row3(target_BD3, b, d), pooled)
+        score, own = 0.0, pool + 3 * u * directions
+        for r in range(first, last):
+            d = integers[order + r]
+            at = own + 3 * d
+            score += (
+                wanted_D3[d, 0] * singles[at] + wanted_D3[d, 1] * singles[at + 1] + wanted_D3[d, 2] * singles[at + 2]
+            )
         score = single(t, POOL_RIDGE_CU, c * poses + u) - 2 * score
         if score < best:
             best, found = score, u
@@ -196,6 +222,25 @@ def near(t, target_BD3, b, c, start, into_N):
         for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
             n = whole(t, ORDER_N, x)
             into_N[n] = single(t, POOL_UN, found * joints + n)
+
+
+@njit(**INNER)
+def nearest(t, work, target_BD3, b, q_N):
+    """The best of the pool's poses after some steps, where no network answers."""
+    blocks = len(work.cost_C)
+    aim(t, work, target_BD3, b)
+    for c in range(blocks):
+        work.best_C[c] = np.inf
+    for start in range(int(real(t, POLISH_4, STARTS))):
+        for c in range(blocks):
+            near(t, work, target_BD3, b, c, start, work.start_N)
+        minimise(t, work, work.start_N, NEAREST_STEPS)
+        for c in range(blocks):
+            if work.cost_C[c] < work.best_C[c]:
+                work.best_C[c] = work.cost_C[c]
+                for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
+                    n = whole(t, ORDER_N, x)
+                    q_N[n] = work.start_N[n]
 
 
 @njit(**INNER)
@@ -236,7 +281,7 @@ def polish(t, work, target_BD3, b, q_N, steps):
         if number < starts:
             for c in range(blocks):
                 if _far(t, work, c):
-                    near(t, target_BD3, b, c, number, work.start_N)
+                    near(t, work, target_BD3, b, c, number, work.start_N)
 
 
 @njit(**INNER)

@@ -16,7 +16,8 @@ from mrhubo.fast.plain.avoidance import CLEARANCE
 from mrhubo.fast.plain.broad_phase import make_groups, reaches
 from mrhubo.fast.plain.collision import clearances
 from mrhubo.fast.plain.human import skew
-from mrhubo.fast.sections import SECTIONS, Layers, Part
+from mrhubo.fast.plain.soles import moved_points
+from mrhubo.fast.sections import SECTIONS, Layers, Legs, Part
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -32,6 +33,9 @@ _KEYS = (
     "net_H6", "layer_G5", "column", "count_6", "number",
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
+    "joint_L", "parent_L", "offset_L3", "start_R", "sole_H", "sole_H3", "carrier_1", "axes_33", "root_3", "body_H",
+    "point_H3", "ball_body_J", "ball_J3", "radius_J", "near_HJ", "scale_1", "hip_R3", "limb_R2", "length_R2", "foot_R2",
+    "built_R23", "block_H",
 )  # fmt: skip
 """The tables, as in `mrhubo.fast.sections` but for these:
 
@@ -45,7 +49,8 @@ nearer than that. net_H6: first and number of layers, place and number of input 
 network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in `number`, and 1 where
 the weights are among `shorts`, whose scales stand after the biases then; column: all columns; count_6: networks of the
 first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
-distance.
+distance. block_H: the block whose joints move a point of a sole, -1: none does. What is of legs is empty for robots
+without feet.
 """
 (
     JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
@@ -60,6 +65,8 @@ distance.
     FIRST_Z, CAPSULE_Z, BALL_Z, REACH_Z, BODY_G, CENTRE_G3,
     NET_H6, LAYER_G5, COLUMN, COUNT_6, NUMBER,
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
+    JOINT_L, PARENT_L, OFFSET_L3, START_R, SOLE_H, SOLE_H3, CARRIER_1, AXES_33, ROOT_3, BODY_H, POINT_H3, BALL_BODY_J,
+    BALL_J3, RADIUS_J, NEAR_HJ, SCALE_1, HIP_R3, LIMB_R2, LENGTH_R2, FOOT_R2, BUILT_R23, BLOCK_H,
 ) = np.arange(len(_KEYS))  # fmt: skip
 # Numbers of NumPy, as numba compiles a function anew for each of Python's that it is called with.
 PLANE_LOW, PLANE_HIGH, NEEDED_LOW, NEEDED_HIGH = FAR, GAIN, STARTS, FIRST_STEPS = np.arange(4)
@@ -96,6 +103,7 @@ def pack(description: Description) -> Packed:
         section = getattr(description, name)
         found |= {field.name: getattr(section, field.name) for field in fields(section)}
     shorts, clear_Y = [np.zeros(0, np.int16)], clearances(description, CLEARANCE)
+    found |= _of_legs(description)
     found |= {**_derived(description, clear_Y), **_nets(description, shorts, bool((clear_Y > _ROUNDED).all()))}
     integers: list[np.ndarray] = [np.zeros(2 * len(_KEYS), np.int64)]
     floats, singles = [np.zeros(0)], [np.zeros(0, np.float32)]
@@ -109,6 +117,21 @@ def pack(description: Description) -> Packed:
         np.concatenate(singles),
         np.concatenate(shorts),
     )
+
+
+_OF_LEGS = [field.name for field in fields(Legs) if not field.name.startswith("block_")]
+_WHOLE_OF_LEGS = (
+    "joint_L", "parent_L", "start_R", "sole_H", "carrier_1", "body_H", "ball_body_J", "near_HJ", "limb_R2", "foot_R2",
+)  # fmt: skip
+
+
+def _of_legs(d: Description) -> dict[str, np.ndarray]:
+    if d.legs is None:
+        nothing = {name: np.zeros(0, np.int64 if name in _WHOLE_OF_LEGS else np.float64) for name in _OF_LEGS}
+        return {**nothing, "block_H": np.zeros(0, np.int64)}
+    moved_HN = np.abs(moved_points(d, d.legs)).sum(axis=1) > 0
+    block_H = np.where(moved_HN.any(axis=1), d.cost.block_N[moved_HN.argmax(axis=1)], -1)
+    return {**{name: getattr(d.legs, name) for name in _OF_LEGS}, "block_H": block_H}
 
 
 def _derived(d: Description, clear_Y: np.ndarray) -> dict[str, np.ndarray]:
@@ -155,7 +178,7 @@ def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np
         add(_alone(coder), coarse=True)
     kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
-        "net_H6": np.array(nets), "layer_G5": np.array(layers), "column": np.concatenate(columns),
+        "net_H6": np.array(nets, np.int64), "layer_G5": np.array(layers, np.int64), "column": np.concatenate(columns),
         "count_6": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
         "number": np.concatenate(numbers),
     }  # fmt: skip

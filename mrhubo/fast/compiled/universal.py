@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import add, dot, row, turn_back
-from mrhubo.fast.compiled.robot import place, quadratic
+from mrhubo.fast.compiled.robot import place
 from mrhubo.fast.compiled.steps import minimise
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,

@@ -13,6 +13,7 @@ import numpy as np
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.plain.robot import jacobian, place, unseen
+from mrhubo.fast.plain.soles import add_soles
 from mrhubo.fast.sections import Cost
 
 TOLERANCE = 1e-4
@@ -55,7 +56,9 @@ class Model:
 
 
 def quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> Model:
-    """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3)."""
+    """Cost and Gauss-Newton model at joint angles (B, N) [rad] for human directions (B, D, 3), or with places of soles
+    after them (`mrhubo.fast.plain.soles`).
+    """
     if len(q_BN) <= _CHUNK:
         return _quadratic(description, q_BN, target_BD3)
     parts = [_quadratic(description, q_BN[rows], target_BD3[rows]) for rows in chunks(len(q_BN), _CHUNK)]
@@ -69,12 +72,16 @@ def _quadratic(description: Description, q_BN: np.ndarray, target_BD3: np.ndarra
     jacobian_D3NB = jacobian(kinematics, placed, len(cost.lower_N))
     unit_D3B, weight_DB = goals(cost, target_BD3)
     miss_D3B = placed.direction_D3B - unseen(human.seen_D, placed.view_V33B, unit_D3B)
-    return model_of(cost, q_BN, jacobian_D3NB, miss_D3B, weight_DB)
+    model = model_of(cost, q_BN, jacobian_D3NB, miss_D3B, weight_DB)
+    if description.legs is not None and target_BD3.shape[1] > len(cost.weight_D):
+        found = model.cost_BC, model.gradient_BN, model.hessian_BNN
+        add_soles(description, description.legs, placed, target_BD3, *found)
+    return model
 
 
 def goals(cost: Cost, target_BD3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Human directions of length 1 (D, 3, B), and how much each counts (D, B)."""
-    target_D3B = np.ascontiguousarray(np.moveaxis(target_BD3, 0, -1))
+    target_D3B = np.ascontiguousarray(np.moveaxis(target_BD3[:, : len(cost.weight_D)], 0, -1))
     length_DB = np.sqrt(np.einsum("dib,dib->db", target_D3B, target_D3B))
     length_DB = np.where(cost.partial_D[:, None] > 0, length_DB, 1.0)
     return target_D3B / np.maximum(length_DB, SHORTEST)[:, None], cost.weight_D[:, None] * length_DB
@@ -211,7 +218,7 @@ def polish(description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, s
 
 def weights(cost: Cost, target_BD3: np.ndarray) -> np.ndarray:
     """How much the directions of each block count together (B, C)."""
-    return (norm(target_BD3) * cost.weight_D) @ cost.directions_DC
+    return (norm(target_BD3[:, : len(cost.weight_D)]) * cost.weight_D) @ cost.directions_DC
 
 
 def _again(
@@ -223,10 +230,27 @@ def _again(
     start_XSN = np.where(far_XC[:, None, cost.block_N], near(cost, target_XD3, starts), q_XN[:, None])
     target_YD3 = np.repeat(target_XD3, starts, axis=0)
     found_YN, cost_YC = minimise(description, start_XSN.reshape(-1, q_XN.shape[1]), target_YD3, min(steps, first))
-    best_XC = cost_YC.reshape(len(q_XN), starts, -1).argmin(axis=1)
-    best_XN = best_XC[:, cost.block_N]
-    begin_XN = np.take_along_axis(found_YN.reshape(len(q_XN), starts, -1), best_XN[:, None], axis=1)[:, 0]
-    return minimise(description, begin_XN, target_XD3, steps)
+    return minimise(description, _best(cost, found_YN, cost_YC, starts), target_XD3, steps)
+
+
+NEAREST_STEPS = 3
+"""Steps from the nearest poses, where no network answers (`mrhubo.retargeter.nearest`)."""
+
+
+def nearest(description: Description, target_BD3: np.ndarray) -> np.ndarray:
+    """Joint angles (B, N) [rad] of robots without a network, float32: the best of the pool's poses after some steps."""
+    cost, starts = description.cost, int(description.settings.constants["starts"])
+    start_BSN, target_YD3 = near(cost, target_BD3, starts), np.repeat(target_BD3, starts, axis=0)
+    found_YN, cost_YC = minimise(description, start_BSN.reshape(-1, start_BSN.shape[2]), target_YD3, NEAREST_STEPS)
+    lower_N, upper_N = cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32)
+    return np.clip(_best(cost, found_YN, cost_YC, starts).astype(np.float32), lower_N, upper_N)
+
+
+def _best(cost: Cost, found_YN: np.ndarray, cost_YC: np.ndarray, starts: int) -> np.ndarray:
+    """The cheapest of as many answers to each frame, block by block (B, N)."""
+    best_BC = cost_YC.reshape(-1, starts, cost_YC.shape[1]).argmin(axis=1)
+    found_BSN = found_YN.reshape(-1, starts, found_YN.shape[1])
+    return np.take_along_axis(found_BSN, best_BC[:, None, cost.block_N], axis=1)[:, 0]
 
 
 def near(cost: Cost, target_XD3: np.ndarray, starts: int) -> np.ndarray:

@@ -14,15 +14,11 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from mrhubo.fast.roots import CROOKED, FAR_M
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
-
-CROOKED = 1e-2
-"""How far a rotation's numbers may be from those of one: files round them."""
-FAR_M = 1e5
-"""No motion goes so far [m]; in float32, places out there are centimetres apart."""
 
 
 @dataclass(frozen=True)

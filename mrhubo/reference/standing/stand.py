@@ -21,6 +21,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from torch import Tensor, nn
 
 from mrhubo import rotation
+from mrhubo.fast.plain.ground import UNDER_M
 from mrhubo.fast.together.motion import AHEAD, WINDOW
 from mrhubo.frames import human_to_world
 from mrhubo.reference.avoidance import Avoidance
@@ -38,8 +39,6 @@ PLANTED, SWINGING = 2500.0, 50.0
 degrees off, or 0.4."""
 SWEEPS, TOLERANCE = 10, 3e-4
 """How long legs give way, as for `refine`."""
-UNDER_M = 0.01
-"""How far under the floor [m] a swinging point counts as much as a planted one."""
 ROUNDS = 2
 """How often the legs give way: once more where feet that stand were lifted, as others would be under the floor."""
 LIFTED_M, LIFT_S, FREE_S = 0.005, 0.1, 0.3

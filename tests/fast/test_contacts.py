@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
 from mrhubo.motion import mirror, read_motion, resample, trim
 from mrhubo.motion.contacts import find_contacts
-from mrhubo.motion.live_contacts import LiveContacts, next_contacts
 from mrhubo.motion.writers.amass import write_motion
 from mrhubo.reference.standing import Legs, read_steps
 from mrhubo.rotation import matrix_to_axis_angle

@@ -1,4 +1,4 @@
-"""When feet are planted, frame by frame: `find_contacts` for who cannot wait for the next frame.
+"""When feet are planted, frame by frame: `mrhubo.motion.contacts` for who cannot wait for the next frame.
 
 The thresholds are the same. Speeds are differences to the last frame, a little smoothed. A contact counts more and more
 after its beginning; before its end it counts the less the nearer the point is to what ends it. The floor is learned on
@@ -15,25 +15,27 @@ from typing import Any, Self
 
 import numpy as np
 
-from mrhubo.motion.contacts import (
-    BAND_M,
-    GATHERED,
-    LIFTED_M,
-    LIFTED_SPEED,
-    PLANTED_M,
-    PLANTED_SPEED,
-    RAMP_S,
-    WANDERED_M,
-    smooth_share,
-)
-
-_SMOOTH_S = 0.02
+PLANTED_M, PLANTED_SPEED = 0.04, 0.3
+"""A point that is lower [m] and slower [m/s] is planted: soles of readers' skeletons lie up to 2 cm beside the
+person's; and a heel that lands still turns at some 20 cm/s."""
+LIFTED_M, LIFTED_SPEED = 0.07, 0.5
+"""A point that is higher or faster is not. A swinging foot goes at 3 to 4 m/s, and through all these within 30 ms."""
+WANDERED_M = 0.06
+"""How far a planted point may be from where it was planted; then it is planted anew: a shuffling foot never lifts."""
+RAMP_S = 0.1
+"""How long [s] it takes until a contact counts in full, and before it ends, no more: a heel strike takes as long."""
+BAND_M = 0.04
+"""Heights of points on one floor."""
+GATHERED = 0.5
+"""A band of heights with this share of the fullest one's slow points is the floor, if none is below: who stands on a
+step stood on the floor too."""
+SMOOTH_S = 0.02
 """Time constant [s] of speeds."""
-_HEIGHTS_M, _STEP_M = 3.0, 0.005
+HEIGHTS_M, STEP_M = 3.0, 0.005
 """Heights at which the floor is looked for, up and down from where it was first, and how finely."""
-_USUAL_S, _USUAL_M = 3.0, 0.15
+USUAL_S, USUAL_M = 3.0, 0.15
 """A floor at 0 counts like a point that rests there for so long [s], where the lowest point begins that near to it."""
-_MEMORY_S = 10.0
+MEMORY_S = 10.0
 """Time constant [s] with which it is forgotten where slow points were."""
 
 
@@ -68,7 +70,7 @@ class LiveContacts:
         flags, numbers = np.zeros((people, points), dtype=bool), np.zeros((people, points))
         places = np.zeros((people, points, 3))
         return cls(places, places, np.full(people, np.nan), flags, flags, numbers, places, numbers,
-                   np.zeros((people, round(2 * _HEIGHTS_M / _STEP_M))), np.zeros(people))  # fmt: skip
+                   np.zeros((people, round(2 * HEIGHTS_M / STEP_M))), np.zeros(people))  # fmt: skip
 
     def where(self, chosen_B: np.ndarray, other: Self) -> Self:
         """`other` for some people, this one for the rest."""
@@ -93,12 +95,12 @@ def next_contacts(
         given_BP: which points are planted, where that is known; else it is found.
     """
     new_B, passed_B1 = np.isnan(last.floor_B), passed_B[:, None]
-    share_B11 = (passed_B / (passed_B + _SMOOTH_S))[:, None, None]
+    share_B11 = (passed_B / (passed_B + SMOOTH_S))[:, None, None]
     velocity_BP3 = (place_BP3 - last.place_BP3) / passed_B1[..., None]
     velocity_BP3 = last.velocity_BP3 + share_B11 * (velocity_BP3 - last.velocity_BP3)
     velocity_BP3 = _chosen(new_B, np.zeros_like(velocity_BP3), velocity_BP3)
     speed_BP, height_BP = np.linalg.norm(velocity_BP3, axis=-1), place_BP3[..., 1]
-    from_B = np.where(new_B, height_BP.min(axis=1) - _HEIGHTS_M, last.from_B)
+    from_B = np.where(new_B, height_BP.min(axis=1) - HEIGHTS_M, last.from_B)
     slow_BH = _chosen(new_B, _usual(height_BP, from_B, last.slow_BH.shape[1]), last.slow_BH)
     slow_BP = (speed_BP < PLANTED_SPEED) & ~new_B[:, None]  # how fast those are that are new is not known
     slow_BH = _gather(slow_BH, height_BP - from_B[:, None], slow_BP, passed_B)
@@ -124,25 +126,31 @@ def next_contacts(
     )
 
 
+def smooth_share(share: np.ndarray) -> np.ndarray:
+    """How much a contact counts, 0..1, some share of the way into its ramp: it begins and ends without a corner."""
+    share = np.clip(share, 0.0, 1.0)
+    return share**2 * (3 - 2 * share)
+
+
 def _usual(height_BP: np.ndarray, from_B: np.ndarray, heights: int) -> np.ndarray:
     """What is known of slow points' heights before the first frame (B, H) [s]."""
     found_BH = np.zeros((len(height_BP), heights))
-    near_X = np.flatnonzero(np.abs(height_BP.min(axis=1)) < _USUAL_M)
-    found_BH[near_X, (-from_B[near_X] / _STEP_M).astype(int)] = _USUAL_S
+    near_X = np.flatnonzero(np.abs(height_BP.min(axis=1)) < USUAL_M)
+    found_BH[near_X, (-from_B[near_X] / STEP_M).astype(int)] = USUAL_S
     return found_BH
 
 
 def _gather(slow_BH: np.ndarray, up_BP: np.ndarray, slow_BP: np.ndarray, passed_B: np.ndarray) -> np.ndarray:
     """For how long slow points were at each height, this frame's among them."""
-    found_BH = slow_BH * np.exp(-passed_B / _MEMORY_S)[:, None]
-    row_X, point_X = np.nonzero(slow_BP & (up_BP >= 0) & (up_BP < 2 * _HEIGHTS_M))
-    np.add.at(found_BH, (row_X, (up_BP[row_X, point_X] / _STEP_M).astype(int)), passed_B[row_X])
+    found_BH = slow_BH * np.exp(-passed_B / MEMORY_S)[:, None]
+    row_X, point_X = np.nonzero(slow_BP & (up_BP >= 0) & (up_BP < 2 * HEIGHTS_M))
+    np.add.at(found_BH, (row_X, (up_BP[row_X, point_X] / STEP_M).astype(int)), passed_B[row_X])
     return found_BH
 
 
 def _lowest_band(slow_BH: np.ndarray) -> np.ndarray:
     """As `find_floor`: how high the floor is over the lowest of the heights [m]; NaN where nothing has been slow."""
-    width = round(BAND_M / _STEP_M)
+    width = round(BAND_M / STEP_M)
     sums_BH = np.concatenate((np.zeros((len(slow_BH), 1)), slow_BH.cumsum(axis=1)), axis=1)
     band_BH = sums_BH[:, width:] - sums_BH[:, :-width]
     most_B1 = band_BH.max(axis=1, keepdims=True)
@@ -155,7 +163,7 @@ def _lowest_band(slow_BH: np.ndarray) -> np.ndarray:
     weight_BX = slow_BH[rows_B[:, None], inside_BX]
     half_B1 = weight_BX.sum(axis=1, keepdims=True) / 2
     median_B = (weight_BX.cumsum(axis=1) >= half_B1).argmax(axis=1)
-    return np.where(most_B1[:, 0] > 0, (inside_BX[rows_B, median_B] + 0.5) * _STEP_M, np.nan)
+    return np.where(most_B1[:, 0] > 0, (inside_BX[rows_B, median_B] + 0.5) * STEP_M, np.nan)
 
 
 def _chosen(chosen: np.ndarray, one: np.ndarray, other: np.ndarray) -> Any:
