@@ -14,8 +14,19 @@ import torch
 from torch import Tensor
 
 from mrhubo.fast.together.banded import Banded
-from mrhubo.fast.together.bounded import Bounds, bounded_minimum
-from mrhubo.fast.together.refine import DAMPING, EASIER, FLOOR, HARDER, LEAST, MOST, PATIENCE
+from mrhubo.fast.together.bounded import bounded_minimum
+from mrhubo.fast.together.bounds import Bounds
+from mrhubo.fast.together.refine import (
+    DAMPING,
+    EASIER,
+    FLOOR,
+    HARDER,
+    LEAST,
+    LEVEL,
+    MOST,
+    PATIENCE,
+    ROUNDING,
+)
 from mrhubo.reference.banded import factor
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
@@ -43,17 +54,18 @@ def refine(
 ) -> tuple[Tensor, Tensor]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
 
-    Gauss-Newton on all frames at once: the system is banded. Joints at a limit that the descent would push beyond it
-    are frozen for the step. A block's step counts only if the block's cost falls; damping is raised in the frames whose
-    own share of the cost rose, and lowered in the others if the step counted. A block ends when a step turns none of
-    its joints by `tolerance` [rad], or six steps in a row were of no use. Frames in `fixed_T` (T,) stay as they are.
+    Gauss-Newton on all frames at once: the system is banded, and limits hold a step while it is found. A block's step
+    counts only if the block's cost falls (or, where rounding hides that, its slope); damping, in units of what the
+    frame's own cost curves by, is raised in the frames whose own share of the cost rose, and lowered in the others if
+    the step counted. A block ends when a step turns none of its joints by `tolerance` [rad], or six steps in a row were
+    of no use. Frames in `fixed_T` (T,) stay as they are.
 
     With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad.
     """
     model = _motion_model(problem, q_TN, target_TD3, smoothness)
     cost_C = model.frames.cost_BC.double().sum(0)
     damping_TC = torch.full_like(model.frames.cost_BC, DAMPING)
-    failures_C = torch.zeros_like(cost_C)
+    failures_C, joints_NC = torch.zeros_like(cost_C), problem.blocks.joints_NC.double()
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
         trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
@@ -61,8 +73,12 @@ def refine(
         trial_TN = torch.where(running_C[problem.blocks.block_N], trial_TN, q_TN)
         trial = _motion_model(problem, trial_TN, target_TD3, smoothness)
         trial_cost_C = trial.frames.cost_BC.double().sum(0)
-        better_C = trial_cost_C < cost_C
-        moved_C = ((trial_TN - q_TN).abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
+        moved_TN = trial_TN - q_TN
+        slope_C, end_C = (
+            (around.frames.gradient_BN * moved_TN).double().sum(0) @ joints_NC for around in (model, trial)
+        )
+        better_C = (trial_cost_C < cost_C) | ((trial_cost_C < cost_C * (1 + ROUNDING)) & (end_C < -LEVEL * slope_C))
+        moved_C = (moved_TN.abs()[..., None] * problem.blocks.joints_NC).amax(dim=(0, 1))
         settled_C = better_C & (moved_C < tolerance)
         failures_C = torch.where(better_C, torch.where(settled_C, PATIENCE, 0), failures_C + 1)
         factor_TC = torch.where(trial.frames.cost_BC > model.frames.cost_BC, HARDER, torch.where(better_C, EASIER, 1.0))
@@ -151,29 +167,24 @@ def _motion_step(
     bound: StepBound | None,
 ) -> Tensor:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
-    gradient_TN = model.frames.gradient_BN
-    free_TN = torch.ones_like(q_TN, dtype=torch.bool) if bound else ~problem.frozen(q_TN, gradient_TN)
-    if fixed_T is not None:
-        free_TN &= ~fixed_T[:, None]
+    free_T = torch.ones_like(q_TN[:, 0], dtype=torch.bool) if fixed_T is None else ~fixed_T
+    right_TN = -model.frames.gradient_BN * free_T[:, None]
+    own_TN = model.frames.hessian_BNN.diagonal(dim1=-2, dim2=-1)
     bands, step_TN = smoothness.hessian(q_TN), torch.zeros_like(q_TN)
     for block, running in enumerate(running_C.tolist()):
         if running:
             joints_M = torch.nonzero(problem.blocks.block_N == block)[:, 0]
             entries = _coupled(problem, model, smoothness, block, joints_M, bands)
-            free_TM, right_TM = free_TN[:, joints_M], -gradient_TN[:, joints_M] * free_TN[:, joints_M]
-            diagonal_TM = entries[0].diagonal(dim1=-2, dim2=-1)
-            diagonal_TM = diagonal_TM + damping_TC[:, block, None] * (diagonal_TM + FLOOR)
-            diagonal_TM = torch.where(free_TM, diagonal_TM, torch.ones_like(diagonal_TM))
+            extra_TM = damping_TC[:, block, None] * (own_TN[:, joints_M] + FLOOR)
+            diagonal_TM = entries[0].diagonal(dim1=-2, dim2=-1) + extra_TM
+            diagonal_TM = torch.where(free_T[:, None], diagonal_TM, torch.ones_like(diagonal_TM))
             within_TMM, *couplings_TMM = (
-                _array(entry * (free_TM[lag:, :, None] & free_TM[: len(free_TM) - lag, None]))
+                _array(entry * (free_T[lag:] & free_T[: len(free_T) - lag])[:, None, None])
                 for lag, entry in enumerate(entries)
             )
             system = Banded(within_TMM, _array(diagonal_TM), couplings_TMM)
-            if bound is None:
-                step_TM = factor(system)(_array(right_TM))
-            else:
-                bounds = _bounds(problem, q_TN, free_TN[:, 0], bound, joints_M)
-                step_TM = bounded_minimum(system, _array(right_TM), bounds, factor)
+            bounds = _bounds(problem, q_TN, free_T, bound, joints_M)
+            step_TM = bounded_minimum(system, _array(right_TN[:, joints_M]), bounds, factor)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
 
@@ -199,12 +210,15 @@ def _coupled(
     return entries
 
 
-def _bounds(problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, bound: StepBound, joints_M: Tensor) -> Bounds:
+def _bounds(
+    problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, bound: StepBound | None, joints_M: Tensor
+) -> Bounds:
+    moves_2TM = _array(torch.stack((problem.lower_N - q_TN, problem.upper_N - q_TN))[..., joints_M])
+    if bound is None:
+        return Bounds.of(moves_2TM, _array(free_T))
     moved_XM, most_M = q_TN.diff(dim=0)[:, joints_M], bound.step_N[joints_M]
-    moves = torch.stack((problem.lower_N - q_TN, problem.upper_N - q_TN))[..., joints_M]
-    steps = torch.stack((-most_M - moved_XM, most_M - moved_XM))
-    counts_X = bound.counts_X & (free_T[1:] | free_T[:-1])
-    return Bounds(_array(moves), _array(steps), _array(free_T), _array(counts_X))
+    steps_2XM = _array(torch.stack((-most_M - moved_XM, most_M - moved_XM)))
+    return Bounds.of(moves_2TM, _array(free_T), steps_2XM, _array(bound.counts_X & (free_T[1:] | free_T[:-1])))
 
 
 def _array(tensor: Tensor) -> np.ndarray:

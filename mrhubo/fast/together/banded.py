@@ -27,12 +27,14 @@ class Banded:
     """Entries between the joints one, two ... frames later, the rows, and those of a frame, the columns:
     (T - 1, M, M), (T - 2, M, M) ..."""
 
-    def plus(self, diagonal_TM: np.ndarray, next_XM: np.ndarray) -> Banded:
+    def plus(self, diagonal_TM: np.ndarray, next_XM: np.ndarray | None = None) -> Banded:
         """The same with something added to the diagonal, and to what couples joints with themselves a frame later."""
-        first_XMM, *others = self.couplings_TMM
-        first_XMM, diagonal_TM = first_XMM.copy(), self.diagonal_TM + diagonal_TM
-        diagonal(first_XMM)[:] += next_XM
-        return replace(self, diagonal_TM=diagonal_TM, couplings_TMM=[first_XMM, *others])
+        couplings_TMM = self.couplings_TMM
+        if next_XM is not None:
+            first_XMM = couplings_TMM[0].copy()
+            diagonal(first_XMM)[:] += next_XM
+            couplings_TMM = [first_XMM, *couplings_TMM[1:]]
+        return replace(self, diagonal_TM=self.diagonal_TM + diagonal_TM, couplings_TMM=couplings_TMM)
 
     def times(self, x_TM: np.ndarray) -> np.ndarray:
         """The product (T, M) with moves (T, M)."""

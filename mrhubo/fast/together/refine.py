@@ -11,7 +11,8 @@ import numpy as np
 
 from mrhubo.fast.plain.steps import Model, diagonal
 from mrhubo.fast.together.banded import Banded
-from mrhubo.fast.together.bounded import Bounds, bounded_minimum
+from mrhubo.fast.together.bounded import bounded_minimum
+from mrhubo.fast.together.bounds import Bounds
 from mrhubo.fast.together.problem import Problem
 from mrhubo.fast.together.smoothness import Smoothness
 
@@ -19,7 +20,15 @@ PATIENCE = 6
 """Steps in a row that are of no use, after which a block ends."""
 DAMPING, EASIER, HARDER, LEAST, MOST, FLOOR = 1e-3, 0.1, 10.0, 1e-3, 1e6, 0.01
 """Damping at first; its factors after a step that helped and one that did not; its bounds; and what is added to the
-diagonal that it multiplies."""
+diagonal that it multiplies: that of the frames' own cost, for smoothness weighs far more on each frame alone than on
+frames that move together."""
+
+
+ROUNDING, LEVEL = 1e-6, 0.5
+"""Where a step changes a cost by no more than this share of it, which is what rounding may add in float32, its slope
+tells whether the step helped: at its end at most this share of what it was at its beginning, the other way (the
+"approximate Wolfe conditions" of W. W. Hager, H. Zhang, "A new conjugate gradient method with guaranteed descent and an
+efficient line search", SIAM Journal on Optimization, 2005)."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +66,12 @@ def refine(
         trial_TN = np.where(running_C[cost.block_N], trial_TN, q_TN)
         trial = _motion_model(problem, trial_TN, target_TD3, smoothness)
         trial_cost_C = trial.frames.cost_BC.sum(axis=0)
-        better_C = trial_cost_C < cost_C
-        moved_N = np.abs(trial_TN - q_TN).max(axis=0)
-        settled_C = better_C & ((moved_N[:, None] * cost.joints_NC).max(axis=0) < tolerance)
+        moved_TN = trial_TN - q_TN
+        slope_C, end_C = (
+            (around.frames.gradient_BN * moved_TN).sum(axis=0) @ cost.joints_NC for around in (model, trial)
+        )
+        better_C = (trial_cost_C < cost_C) | ((trial_cost_C < cost_C * (1 + ROUNDING)) & (end_C < -LEVEL * slope_C))
+        settled_C = better_C & ((np.abs(moved_TN).max(axis=0)[:, None] * cost.joints_NC).max(axis=0) < tolerance)
         failures_C = np.where(better_C, np.where(settled_C, PATIENCE, 0), failures_C + 1)
         factor_TC = np.where(trial.frames.cost_BC > model.frames.cost_BC, HARDER, np.where(better_C, EASIER, 1.0))
         damping_TC = np.clip(damping_TC * factor_TC, LEAST, MOST)
@@ -148,27 +160,20 @@ def _motion_step(
     bound: StepBound | None,
 ) -> np.ndarray:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
-    cost, gradient_TN = problem.cost, model.frames.gradient_BN
-    free_TN = np.broadcast_to(~fixed_T[:, None], q_TN.shape)
-    if bound is None:
-        low_TN, high_TN = q_TN <= cost.lower_N, q_TN >= cost.upper_N
-        free_TN = free_TN & ~((low_TN & (gradient_TN > 0)) | (high_TN & (gradient_TN < 0)))
-    bands, step_TN = smoothness.hessian(q_TN), np.zeros_like(q_TN)
+    cost, free_T = problem.cost, ~fixed_T
+    right_TN = -model.frames.gradient_BN * free_T[:, None]
+    own_TN, bands, step_TN = diagonal(model.frames.hessian_BNN), smoothness.hessian(q_TN), np.zeros_like(q_TN)
     for block in np.flatnonzero(running_C):
         joints_M = np.flatnonzero(cost.block_N == block)
         entries = _coupled(model, smoothness, np.flatnonzero(cost.block_D == block), joints_M, bands)
-        free_TM, right_TM = free_TN[:, joints_M], -gradient_TN[:, joints_M] * free_TN[:, joints_M]
         within_TMM, *couplings_TMM = (
-            entry * (free_TM[lag:, :, None] & free_TM[: len(free_TM) - lag, None]) for lag, entry in enumerate(entries)
+            entry * (free_T[lag:] & free_T[: len(free_T) - lag])[:, None, None] for lag, entry in enumerate(entries)
         )
-        diagonal_TM = diagonal(entries[0])
-        diagonal_TM = np.where(free_TM, diagonal_TM + damping_TC[:, block, None] * (diagonal_TM + FLOOR), 1.0)
+        extra_TM = damping_TC[:, block, None] * (own_TN[:, joints_M] + FLOOR)
+        diagonal_TM = np.where(free_T[:, None], diagonal(entries[0]) + extra_TM, 1.0)
         system = Banded(within_TMM, diagonal_TM, couplings_TMM)
-        if bound is None:
-            step_TN[:, joints_M] = problem.factor(system)(right_TM)
-        else:
-            bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, ~fixed_T, bound, q_TN, joints_M)
-            step_TN[:, joints_M] = bounded_minimum(system, right_TM, bounds, problem.factor)
+        bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, free_T, bound, q_TN, joints_M)
+        step_TN[:, joints_M] = bounded_minimum(system, right_TN[:, joints_M], bounds, problem.factor)
     return step_TN
 
 
@@ -189,9 +194,16 @@ def _coupled(
 
 
 def _bounds(
-    down_TN: np.ndarray, up_TN: np.ndarray, free_T: np.ndarray, bound: StepBound, q_TN: np.ndarray, joints_M: np.ndarray
+    down_TN: np.ndarray,
+    up_TN: np.ndarray,
+    free_T: np.ndarray,
+    bound: StepBound | None,
+    q_TN: np.ndarray,
+    joints_M: np.ndarray,
 ) -> Bounds:
+    moves_2TM = np.stack((down_TN[:, joints_M], up_TN[:, joints_M]))
+    if bound is None:
+        return Bounds.of(moves_2TM, free_T)
     moved_XM, most_M = np.diff(q_TN[:, joints_M], axis=0), bound.step_N[joints_M]
-    moves = np.stack((down_TN[:, joints_M], up_TN[:, joints_M]))
-    steps = np.stack((-most_M - moved_XM, most_M - moved_XM))
-    return Bounds(moves, steps, free_T, bound.counts_X & (free_T[1:] | free_T[:-1]))
+    steps_2XM = np.stack((-most_M - moved_XM, most_M - moved_XM))
+    return Bounds.of(moves_2TM, free_T, steps_2XM, bound.counts_X & (free_T[1:] | free_T[:-1]))
