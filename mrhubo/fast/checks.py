@@ -88,6 +88,8 @@ def check(d: Description) -> None:
         _check_universal(d.universal, sizes)
     elif d.post:
         _check_stages(d, sizes)
+    else:
+        _check_starts(d)
     if d.legs is not None:
         _check_legs(d, d.legs, sizes)
     _check_prior(d, sizes)
@@ -143,6 +145,15 @@ def _check_universal(u: Universal, sizes: dict[str, int]) -> None:
     shapes |= {f"{name}.{kind}": (width,) for name in norms for kind in ("weight", "bias")}
     found = {name: array.shape for name, array in u.weights.items() if array.dtype == np.float32}
     _refuse(found != shapes or len(found) != len(u.weights), "the universal network has other layers than are needed")
+
+
+def _check_starts(d: Description) -> None:
+    """Where no network answers, each cell needs poses to start from."""
+    _refuse(bool(d.pre), "its networks give no joint angles")
+    starts = int(d.settings.constants["starts"])
+    _refuse(not 1 <= starts <= len(d.cost.pool_UN), "there are no poses to start from")
+    found = [bool((d.cost.cell_CU == start).any(axis=1).all()) for start in range(starts)]
+    _refuse(not all(found), "cost.cell leaves a start without a pose")
 
 
 def _check_legs(d: Description, legs: Legs, sizes: dict[str, int]) -> None:

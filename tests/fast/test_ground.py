@@ -239,6 +239,10 @@ def test_one_file_stands(made: Callable[[str], Retargeter], tmp_path: Path) -> N
         mrhubo.load_fast(file, "numpy"), FastRetargeter(retargeter.describe(), "numpy")))  # fmt: skip
     np.testing.assert_array_equal(read[-1].root_position, own[-1].root_position)
     tensors, metadata = read_tensors(file)
+    cells = {**tensors, "cost.cell_CU": torch.zeros_like(tensors["cost.cell_CU"])}
+    write_tensors(tmp_path / "changed.safetensors", cells, metadata)
+    with pytest.raises(UserError, match="a start without a pose"):
+        Description.read(tmp_path / "changed.safetensors")
     names = [name for name in tensors if name.startswith("legs.")]
     assert len(names) > 20
     for name in names:

@@ -92,6 +92,8 @@ class Work(NamedTuple):
     sole_N3: np.ndarray
     carrier_133: np.ndarray
     """Human axes of what carries the legs, base frame."""
+    wanted_X: np.ndarray
+    """A block's directions, weighted, one number after the other."""
 
 
 @njit(**INNER)
@@ -114,6 +116,7 @@ def make_work(t):
         np.empty(blocks), np.empty(blocks), np.empty(joints), np.empty(joints),
         np.empty((3 * size(t, BODY_S), 3)), np.empty((size(t, BODY_G), 3)), np.empty(joints),
         np.empty((size(t, BODY_H), 3)), np.zeros(size(t, BODY_H)), np.zeros((joints, 3)), np.empty((1, 3, 3)),
+        np.empty(3 * directions),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.cost import quadratic
-from mrhubo.fast.compiled.human import add, dot, put, row3
+from mrhubo.fast.compiled.human import dot, put, row3
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
     BODY_H,
@@ -24,8 +24,8 @@ from mrhubo.fast.compiled.tables import (
     ORDER_N,
     PARTIAL_D,
     POLISH_4,
+    POOL_CUX,
     POOL_RIDGE_CU,
-    POOL_UD3,
     POOL_UN,
     STARTS,
     WEIGHT_D,
@@ -195,26 +195,22 @@ def follow(t, work, target_BD3, b, pull, q_N):
 
 @njit(**INNER)
 def near(t, work, target_BD3, b, c, start, into_N):
-    """The pool's best pose of a cell, for the joints of a block. Weighted directions stand in `work.direction_D3`."""
-    best, found = np.inf, -1
-    joints, directions = size(t, BLOCK_N), size(t, LIMB_D)
+    """The pool's best pose of a cell, for the joints of a block."""
+    best, found, joints, wanted_X = np.inf, -1, size(t, BLOCK_N), work.wanted_X
     poses, first, last = size(t, POOL_UN) // joints, whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)
     for r in range(first, last):
         d = whole(t, ORDER_D, r)
-        put(work.direction_D3, d, add((0.0, 0.0, 0.0), row3(target_BD3, b, d), real(t, WEIGHT_D, d)))
+        for i in range(3):
+            wanted_X[3 * (r - first) + i] = real(t, WEIGHT_D, d) * target_BD3[b, d, i]
     # What is the same for thousands of poses is looked up once: a table's number takes three loads.
-    integers, singles, wanted_D3 = t[0], t[2], work.direction_D3
-    order, cell, pool = integers[2 * ORDER_D], integers[2 * CELL_CU] + c * poses, integers[2 * POOL_UD3]
+    integers, singles, numbers = t[0], t[2], 3 * (last - first)
+    cell, pool = integers[2 * CELL_CU] + c * poses, integers[2 * POOL_CUX] + 3 * first * poses
     for u in range(poses):
         if integers[cell + u] != start:
             continue
-        score, own = 0.0, pool + 3 * u * directions
-        for r in range(first, last):
-            d = integers[order + r]
-            at = own + 3 * d
-            score += (
-                wanted_D3[d, 0] * singles[at] + wanted_D3[d, 1] * singles[at + 1] + wanted_D3[d, 2] * singles[at + 2]
-            )
+        score, own = 0.0, pool + numbers * u
+        for x in range(numbers):
+            score += wanted_X[x] * singles[own + x]
         score = single(t, POOL_RIDGE_CU, c * poses + u) - 2 * score
         if score < best:
             best, found = score, u
