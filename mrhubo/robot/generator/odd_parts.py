@@ -261,6 +261,14 @@ def free_knees(chance: Chance, plan: Plan, places: Places) -> Angles:
     return {}
 
 
+def telescopes(chance: Chance, plan: Plan, places: Places) -> Angles:
+    """Legs that grow shorter in place of a knee that bends."""
+    for name in SIDES:
+        if _joint(plan, f"{name}_knee") is not None:
+            plan.change(f"{name}_knee", kind="prismatic", axis_3=Z, lower=0.0, upper=0.2 * places.scale)
+    return {f"{name}_{role}": 0.0 for name in SIDES for role in ("hip_pitch", "knee", "ankle_pitch")}
+
+
 def floating_base(chance: Chance, plan: Plan, places: Places) -> Angles:
     """Three joints that slide and three that turn, by which the pelvis floats in the world."""
     body, at_3 = places.pelvis, _at(plan, places.pelvis)

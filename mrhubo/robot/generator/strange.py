@@ -95,6 +95,7 @@ STRANGE: dict[str, Strange] = {
     "one arm": Strange(build=odd_parts.one_arm, mappable=False),
     "hips askew": Strange(build=odd_parts.askew_hips),
     "knees both ways": Strange(build=odd_parts.free_knees),
+    "legs that telescope": Strange(build=odd_parts.telescopes),
     "floating base of six joints": Strange(build=odd_parts.floating_base, root_at=("floating",)),
     "planar base of three joints": Strange(build=odd_parts.planar_base, root_at=("floating",)),
     "root at the head": Strange(root_at=("neck",)),
