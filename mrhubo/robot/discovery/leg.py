@@ -58,14 +58,19 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     rotary = tuple(step for step in chain if step.hinge.rotary)
     lines = lines_of(rotary)
     places = _three(lines)
+    # By what slides, how many joints turn before it.
+    above = [sum(step.hinge.rotary for step in chain[:i]) for i, step in enumerate(chain) if not step.hinge.rotary]
     if places is None:
         knee_at = find_elbow(bodies, rotary)
-        if knee_at is None:
+        # What slides between a hip and an ankle stands for a knee.
+        if knee_at is None or any(0 < count < len(rotary) for count in above):
             return None
         hip_at = next((i for i in reversed(range(knee_at)) if _parallel(lines[i], lines[knee_at])), None)
         ankle_at = knee_at + 1 if knee_at + 1 < len(rotary) else None
     else:
         hip_at, knee_at, ankle_at = places
+        if any(hip_at < count <= knee_at for count in above):
+            return None  # an ankle and toes
     ball_3 = _ball(lines[:knee_at], lines[knee_at])
     aside_3 = _across(lines, knee_at, hip_at, ankle_at, _SQUARE)
     if aside_3 is None:

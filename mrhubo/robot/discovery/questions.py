@@ -20,7 +20,9 @@ _BACK = 3
 """Joints of a waist at most, where no legs tell that it is one."""
 
 _LEG = 0.6
-"""Length of a further leg at least, as a share of that of the legs."""
+"""Length of a further leg at least, as a share of that of the legs; of one without a knee, of that of the arms."""
+_PARTS = 3
+"""Joints of a leg without a knee at least."""
 
 Named = tuple[str, Spot, tuple[Candidate, ...]]
 """A point by its name, and where else it may lie."""
@@ -52,8 +54,7 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
             yield Question(f"{side}_foot", "no shape tells where its sole is; give how far it reaches backwards, "
                            "forwards and down from the link's origin [m], as in sole: [0.05, 0.12, 0.035]",
                            (foot.link,))  # fmt: skip
-    if roles.legs is not None and not limbs.legs:
-        first = tuple(chain[0].hinge.name for chain in roles.legs.chains)
+    if not limbs.legs and (first := _unread_legs(roles)):
         yield Question("pelvis", "of the limbs below it no knee could be told, so they are left out: if they are legs, "
                        "write hips, knees, ankles and feet by hand, with their joints", first)  # fmt: skip
     if roles.legs is not None and (more := _more_legs(roles)):
@@ -63,6 +64,14 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.legs is None and len(turning) > _BACK:
         yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
                        "which may be a tail or an arm", turning)  # fmt: skip
+
+
+def _unread_legs(roles: Roles) -> tuple[str, ...]:
+    """First joints of limbs that may be legs, and have no knee."""
+    if roles.legs is not None:
+        return tuple(chain[0].hinge.name for chain in roles.legs.chains)
+    pairs = [pair for pair in roles.others if pair.size > _LEG * roles.arms.size and len(pair.chains[0]) >= _PARTS]
+    return tuple(chain[0].hinge.name for pair in pairs for chain in pair.chains)
 
 
 def _more_legs(roles: Roles) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.robot.generator.limbs import SIDES, Chance
-from mrhubo.robot.generator.plan import Plan, X, Y, Z, about, mirrored
+from mrhubo.robot.generator.plan import Plan, X, Y, Z, mirrored
 
 Angles = dict[str, float]
 
@@ -197,7 +197,7 @@ def face(chance: Chance, plan: Plan, places: Places) -> Angles:
 
 def tail(chance: Chance, plan: Plan, places: Places) -> Angles:
     """A tail of four joints behind the pelvis."""
-    start_3 = _at(plan, places.pelvis) + 0.1 * places.scale * np.array([-1.0, 0.0, 0.5])
+    start_3 = place_of(plan, places.pelvis) + 0.1 * places.scale * np.array([-1.0, 0.0, 0.5])
     body = places.pelvis
     for number in range(4):
         at_3 = start_3 - number * 0.12 * places.scale * X
@@ -239,48 +239,6 @@ def one_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
     return {}
 
 
-def askew_hips(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Hips whose axes cross in one point, and are turned so that none of them need be parallel to the knee's."""
-    axis_3 = np.array([chance.between(-1.0, 1.0), chance.between(-1.0, 1.0), chance.between(-1.0, 1.0)])
-    turn_33 = about(np.zeros(3), axis_3, chance.between(0.3, 1.2))[:3, :3]
-    angles: Angles = {}
-    for name, side in SIDES.items():
-        flip_33 = np.diag([1.0, side, 1.0])
-        for joint in [joint for joint in plan.joints if joint.role.startswith(f"{name}_hip_")]:
-            at_3 = plan.points[f"{name}_hip"][1]
-            plan.change(joint.role, point_3=at_3, axis_3=flip_33 @ turn_33 @ flip_33 @ joint.axis_3)
-        angles |= {f"{name}_{role}": 0.0 for role in ("hip_pitch", "knee", "ankle_pitch")}
-    return angles
-
-
-def free_knees(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Knees that bend as far forwards as backwards."""
-    for name in SIDES:
-        if _joint(plan, f"{name}_knee") is not None:
-            plan.change(f"{name}_knee", lower=-2.2, upper=2.2)
-    return {}
-
-
-def floating_base(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Three joints that slide and three that turn, by which the pelvis floats in the world."""
-    body, at_3 = places.pelvis, _at(plan, places.pelvis)
-    for word, axis_3 in zip("zyx", (Z, Y, X), strict=True):
-        body = plan.join(f"floating_turn_{word}", body, at_3, axis_3, (-3.2, 3.2))
-    for word, axis_3 in zip("zyx", (Z, Y, X), strict=True):
-        body = plan.join(f"floating_{word}", body, at_3, axis_3, (-5.0, 5.0), "prismatic")
-    return {}
-
-
-def planar_base(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Two joints that slide and one that turns, by which the pelvis moves over the ground."""
-    body, at_3 = places.pelvis, _at(plan, places.pelvis) * np.array([1.0, 1.0, 0.0])
-    kinds = [("turn", Z, "revolute"), ("y", Y, "prismatic"), ("x", X, "prismatic")]
-    for word, axis_3, kind in kinds if chance.maybe(0.7) else kinds[1:] + kinds[:1]:
-        limits = None if kind == "revolute" else (-5.0, 5.0)
-        body = plan.join(f"floating_{word}", body, at_3, axis_3, limits, kind)
-    return {}
-
-
 def without_limits(plan: Plan) -> Plan:
     """No joint that turns has limits."""
     turning = ("revolute", "continuous")
@@ -312,7 +270,8 @@ def _joint(plan: Plan, role: str):  # noqa: ANN202
     return next((joint for joint in plan.joints if joint.role == role), None)
 
 
-def _at(plan: Plan, body: int) -> np.ndarray:
+def place_of(plan: Plan, body: int) -> np.ndarray:
+    """About where a body is (3,)."""
     solid = plan.solids.get(body)
     below = [joint.point_3 for joint in plan.joints if joint.parent == body]
     return solid.centre_3 if solid is not None else np.mean(below, axis=0)

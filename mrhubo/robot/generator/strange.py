@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mrhubo.robot.generator import odd_parts
+from mrhubo.robot.generator import odd_legs, odd_parts
 from mrhubo.robot.generator.hands import HandShape
 from mrhubo.robot.generator.limbs import ArmShape, Chance
 from mrhubo.robot.generator.odd_parts import Angles, Places
@@ -93,10 +93,11 @@ STRANGE: dict[str, Strange] = {
     "a third arm": Strange(build=odd_parts.third_arm),
     "wings": Strange(build=odd_parts.wings),
     "one arm": Strange(build=odd_parts.one_arm, mappable=False),
-    "hips askew": Strange(build=odd_parts.askew_hips),
-    "knees both ways": Strange(build=odd_parts.free_knees),
-    "floating base of six joints": Strange(build=odd_parts.floating_base, root_at=("floating",)),
-    "planar base of three joints": Strange(build=odd_parts.planar_base, root_at=("floating",)),
+    "hips askew": Strange(build=odd_legs.askew_hips),
+    "knees both ways": Strange(build=odd_legs.free_knees),
+    "legs that telescope": Strange(build=odd_legs.telescopes),
+    "floating base of six joints": Strange(build=odd_legs.floating_base, root_at=("floating",)),
+    "planar base of three joints": Strange(build=odd_legs.planar_base, root_at=("floating",)),
     "root at the head": Strange(root_at=("neck",)),
     "root at a foot": Strange(root_at=("left_ankle",)),
     "root at a hand": Strange(root_at=("left_elbow", "left_forearm", "left_wrist")),

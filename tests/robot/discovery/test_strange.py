@@ -35,7 +35,7 @@ def test_what_is_wrong_is_asked_or_refused(kind: str, tmp_path: Path) -> None:
     for seed in SEEDS:
         truth, path = made(seed, kind, tmp_path)
         try:
-            found = discover(path)
+            found = discover(path, whole_body=True)
         except UserError:
             continue
         wrong = mistakes(found, truth, path) if truth.mappable else ["two arms: not refused"]
@@ -96,6 +96,25 @@ def test_a_base_that_drives_or_floats_is_no_waist(tmp_path: Path) -> None:
         left_out = [why for why in found.left_out.values() if "a base" in why]
         assert set(found.chains["waist"]) >= set(truth.chains["waist"]) and len(left_out) >= joints
         assert not [joint for joint in found.joints if joint in found.left_out]
+
+
+def test_what_a_motor_beside_it_turns_is_moved_by_that_motor(tmp_path: Path) -> None:
+    truth, path = made(1, "twists behind gears", tmp_path)
+    found, joints = discover(path), describe(path).joints
+    following = [joint for chain in ("left_arm", "neck") for joint in truth.chains[chain] if joints[joint].mimic]
+    assert following and set(following) <= set(found.held)
+    for joint in following:
+        mimic = joints[joint].mimic
+        assert mimic is not None and mimic.joint in found.joints and mimic.joint in found.held[joint]
+    assert set(truth.chains["left_arm"]) == set(found.chains["left_arm"])
+
+
+def test_legs_that_telescope_are_left_out_and_asked_about(tmp_path: Path) -> None:
+    for seed in (1, 3):
+        truth, path = made(seed, "legs that telescope", tmp_path)
+        found = discover(path, whole_body=True)
+        assert truth.chains["left_leg"] and not found.chains.get("left_leg")
+        assert [question for question in found.questions if question.about == "pelvis" and "no knee" in question.text]
 
 
 def test_limits_in_degrees_are_told_and_made_radians(tmp_path: Path) -> None:

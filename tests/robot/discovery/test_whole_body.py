@@ -102,3 +102,30 @@ def test_a_robot_of_arms_alone_says_so(root: Path) -> None:
     found = discover(root / "data/robots/reachy/reachy.urdf", whole_body=True)
     assert found.joints == discover(root / "data/robots/reachy/reachy.urdf").joints
     assert any("neither legs nor a waist" in note for note in found.notes)
+
+
+def test_a_knee_that_bends_forwards_and_a_second_pair_of_legs_are_asked_about(tmp_path: Path) -> None:
+    joint = (
+        '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{0}_l"/><origin xyz="{2} {3} {4}"/>'
+        '<axis xyz="{5}"/><limit lower="{6}" upper="{7}" effort="1" velocity="1"/></joint><link name="{0}_l"/>'
+    )
+    text = '<robot name="centaur"><link name="body"/>'
+
+    def limb(name: str, x: float, y: float, down: float, kinds: str, bent: tuple[float, float]) -> str:
+        made, parent = "", "body"
+        for number, kind in enumerate(kinds):
+            at = (x, y, 0.3 if down < 0.4 else 0.0) if number == 0 else (0, 0, -down if number in (2, 3) else 0)
+            axis = {"p": "0 1 0", "r": "1 0 0", "y": "0 0 1"}[kind]
+            low, high = bent if number == 2 else (-1.5, 1.2)
+            made, parent = made + joint.format(f"{name}{number}", parent, *at, axis, low, high), f"{name}{number}_l"
+        return made
+
+    for side, y in (("l", 0.1), ("r", -0.1)):
+        text += limb(f"{side}_arm", 0.2, 2 * y, 0.3, "prpy", (-2.0, 0.0))
+        text += limb(f"{side}_leg", 0.2, y, 0.4, "rppr", (-2.0, 0.1) if y > 0 else (-0.1, 2.0))
+        text += limb(f"{side}_hind", -0.4, y, 0.4, "rppr", (0.0, 2.0))
+    path = tmp_path / "centaur.urdf"
+    path.write_text(text + "</robot>")
+    asked = {question.about: question.text for question in discover(path, whole_body=True).questions}
+    assert "more than two limbs" in asked["pelvis"]
+    assert "further forwards" in asked["left_knee"] and "further forwards" not in asked.get("right_knee", "")
