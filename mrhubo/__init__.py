@@ -97,8 +97,8 @@ def for_robot(robot: Robot | str | os.PathLike[str], whole_body: bool = False, s
     Args:
         robot: a `Robot` that knows its body parts; or a config's file, the name of a shipped robot, or a URDF, whose
             body parts are found out (`mrhubo describe` shows them; what is a guess is told as a warning).
-        whole_body: whether the legs, feet and waist of a URDF or a MuJoCo model move too, as with `mrhubo retarget
-            --whole-body` (docs/whole-body.md); else its arms, hands and head alone. A config or a `Robot` says itself
+        whole_body: whether the legs, feet and waist of a URDF or a MuJoCo model move too, as --whole-body of the
+            commands has it (docs/whole-body.md); else its arms, hands and head alone. A config or a `Robot` says itself
             what it has.
         start: what an answer's steps of optimisation begin at: "universal", that network, or "nearest", the nearest of
             2,048 robot poses.
