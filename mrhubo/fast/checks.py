@@ -74,8 +74,7 @@ def check(d: Description) -> None:
         ("features", d.features.input_I, sizes["D"] if d.settings.features == "directions" else _JOINTS),
         *(("features", getattr(d.features, name), sizes["I"]) for name in _INPUTS),
     ):  # fmt: skip
-        outside = (array < 0) | (array >= most)
-        _refuse(bool(outside.any()), f"{name} names what is not there")
+        _refuse(not _are_places(array, most), f"{name} names what is not there")
     needs_two = reading.kind_K > 0
     _refuse(bool((reading.direction_K3[needs_two, 1] < 0).any()), "reading.direction names what is not there")
     _refuse(
@@ -98,6 +97,11 @@ def check(d: Description) -> None:
 def _refuse(wrong: bool, what: str) -> None:
     if wrong:
         raise ValueError(what)
+
+
+def _are_places(array: np.ndarray, most: int | np.ndarray) -> bool:
+    """Whether all are whole numbers from 0 to under some most: compiled functions look nowhere else."""
+    return array.dtype.kind == "i" and not bool(((array < 0) | (array >= most)).any())
 
 
 def _check_names(d: Description, sizes: dict[str, int]) -> None:
@@ -131,8 +135,7 @@ def _check_universal(u: Universal, sizes: dict[str, int]) -> None:
         ("view_E", u.view_E, sizes["V"]), ("joint_N", u.joint_N, sizes["A"]), ("axial_E3", u.axial_E3 + 1, 3),
         ("flip_E53", u.flip_E53 + 1, 3), ("sense_N", u.sense_N + 1, 3), ("size_2", u.size_2 - 1, _LARGEST),
     ):  # fmt: skip
-        outside = (array < 0) | (array >= most)
-        _refuse(bool(outside.any()), f"universal.{name} names what is not there")
+        _refuse(not _are_places(array, most), f"universal.{name} names what is not there")
     _refuse(len(set(u.block_E.tolist())) != len(u.block_E), "universal.block_E names a block twice")
     (heads, hypotheses), width = u.size_2.tolist(), len(u.weights["joint.bias"])
     _refuse(not 1 <= width <= _LARGEST or bool(width % heads), "the universal network's sizes are no network's")
@@ -165,8 +168,7 @@ def _check_legs(d: Description, legs: Legs, sizes: dict[str, int]) -> None:
         ("limb_R2", legs.limb_R2, sizes["D"]), ("foot_R2", legs.foot_R2, sizes["D"]),
         ("block_N", legs.block_N, sizes["C"]), ("block_D", legs.block_D + 1, sizes["C"] + 1),
     ):  # fmt: skip
-        outside = (array < 0) | (array >= most)
-        _refuse(array.dtype.kind != "i" or bool(outside.any()), f"legs.{name} names what is not there")
+        _refuse(not _are_places(array, most), f"legs.{name} names what is not there")
     for name in ("offset_L3", "sole_H3", "axes_33", "root_3", "point_H3", "ball_J3", "radius_J", "scale_1", "hip_R3",
                  "length_R2", "built_R23"):  # fmt: skip
         _refuse(getattr(legs, name).dtype != np.float64, f"legs.{name} holds other numbers than are needed")
@@ -184,10 +186,11 @@ def _check_prior(d: Description, sizes: dict[str, int]) -> None:
 
 
 def _check_stage(name: str, stage: tuple[Part, ...], inputs: int, outputs: int) -> None:
-    given = np.concatenate([part.output for part in stage]) if stage else np.zeros(0)
-    _refuse(not np.array_equal(np.sort(given), np.arange(outputs)), f"{name} gives other numbers than are needed")
+    given = np.concatenate([part.output for part in stage]) if stage else np.zeros(0, int)
+    whole = _are_places(given, outputs) and np.array_equal(np.sort(given), np.arange(outputs))
+    _refuse(not whole, f"{name} gives other numbers than are needed")
     for part in stage:
-        _refuse(bool(((part.input < 0) | (part.input >= inputs)).any()), f"{name} sees what is not there")
+        _refuse(not _are_places(part.input, inputs), f"{name} sees what is not there")
         _check_layers(name, part.layers, len(part.input), len(part.output))
 
 

@@ -140,6 +140,9 @@ def test_places_outside_an_array_are_refused(package: Path, tmp_path: Path) -> N
             write_tensors(tmp_path / "changed.safetensors", changed, metadata)
             with pytest.raises(UserError, match="no description"):
                 Description.read(tmp_path / "changed.safetensors")
+        write_tensors(tmp_path / "changed.safetensors", {**tensors, name: tensors[name].double()}, metadata)
+        with pytest.raises(UserError, match="no description"):
+            Description.read(tmp_path / "changed.safetensors")
     for name, tensor in tensors.items():
         if name not in ("trust.measured", "capsules.pair_Y2") and len(tensor) > 1:  # these may be any
             write_tensors(tmp_path / "changed.safetensors", {**tensors, name: tensor[:-1].contiguous()}, metadata)
