@@ -44,10 +44,10 @@ class DirectionJerk:
     def hessian(self, jacobian_TE3M: Tensor, columns_E: Tensor) -> list[Tensor]:
         """Half of the Gauss-Newton Hessian of some joints, by how they turn the directions of some columns: entries
         within a frame (T, M, M), then between the joints of the next frame, the rows, and those of a frame (T - 1, M,
-        M), of the one after that (T - 2, M, M), and so on.
+        M), of the one after that (T - 2, M, M), and so on; float64.
         """
-        rows_TRM, found = jacobian_TE3M.flatten(1, 2), []
-        for lag, band_XE in enumerate(bands(self.weight_YD[:, columns_E], THIRD)):
+        rows_TRM, found = jacobian_TE3M.double().flatten(1, 2), []
+        for lag, band_XE in enumerate(bands(self.weight_YD[:, columns_E].double(), THIRD)):
             weighted_XRM = rows_TRM[: len(band_XE)] * band_XE.repeat_interleave(3, dim=1)[..., None]
             found.append(rows_TRM[lag:].mT @ weighted_XRM)
         return found

@@ -64,10 +64,10 @@ class Smoothness:
 
     def hessian(self, q_TN: Tensor) -> list[Tensor]:
         """Half of their Hessian: its diagonal (T, N), then its entries between each frame and the next (T - 1, N), the
-        one after that (T - 2, N), and so on.
+        one after that (T - 2, N), and so on; float64, as what frames that move together cost is a millionth of them.
         """
-        found = bands(torch.full_like(q_TN[1:], self.pull), FIRST)
+        found = bands(torch.full_like(q_TN[1:], self.pull, dtype=torch.float64), FIRST)
         if self.jerk_YN is not None and len(self.jerk_YN):
-            more = bands(self.jerk_YN, THIRD)
+            more = bands(self.jerk_YN.double(), THIRD)
             found = [found[0] + more[0], found[1] + more[1], *more[2:]]
         return found
