@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -189,10 +190,23 @@ def test_code_that_retargets_runs(page: str, package: str) -> None:
 
 
 def test_code_without_pytorch_runs(package: str) -> None:
-    (code,) = [code for code in blocks("docs/fast.md") if "load_fast" in code]
+    (code,) = [code for code in blocks("docs/fast.md") if 'load_fast("mlruns' in code]
     names: dict[str, Any] = {"poses": np.tile(np.eye(3), (2, 21, 1, 1))}
     exec(re.sub(r"mlruns/packages/nao-\w+", package, code), names)
     assert names["answer"].q.shape == (433, 8) and names["angles"].shape == (2, 8)
+
+
+def test_whole_bodies_without_pytorch_run() -> None:
+    """The code for a robot on feet, with a person who stands before the camera and a robot that takes note."""
+    (code,) = [code for code in blocks("docs/fast.md") if "nao-whole-body" in code]
+    sent: list[tuple[Any, ...]] = []
+    robot = SimpleNamespace(move=lambda *told: sent.append(told))
+    person = np.tile(np.eye(3), (21, 1, 1)), np.eye(3), np.array([0.0, 0.9, 0.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        exec("import mrhubo\n" + code, {"camera": [person] * 3, "robot": robot})
+    assert len(sent) == 3 and all(np.isfinite(part).all() for told in sent for part in told)
+    assert sent[-1][1].shape == (3,) and sent[-1][3].all()
 
 
 def test_the_readme_shows_six_lines() -> None:

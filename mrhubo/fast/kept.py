@@ -24,6 +24,8 @@ from mrhubo.files.atomic import atomic_path
 from mrhubo.files.cache import user_cache
 
 _SOURCES = ("compiled", "plain")
+_MARK = "mrhubo-compiled.txt"
+"""Beside numba's files: which version of the sources they are of."""
 
 
 def checksum() -> str:
@@ -55,6 +57,22 @@ def note_kept(folders: Iterable[str], universal: bool = False) -> None:
     with contextlib.suppress(UserError, importlib.metadata.PackageNotFoundError):
         with atomic_path(_note(universal)) as half:
             half.write_text(json.dumps(files))
+
+
+def drop_others(folder: str | None) -> None:
+    """Deletes what numba has kept in a folder of other versions of the sources: numba tells them from this one's, but
+    cannot read a list of them in which a type is named that has since moved, and would keep them for ever.
+    """
+    if folder is None:
+        return
+    mark, told = Path(folder) / _MARK, checksum()
+    with contextlib.suppress(OSError, UserError):
+        if not mark.is_file() or mark.read_text() != told:
+            for file in [*Path(folder).glob("*kernels.*.nbi"), *Path(folder).glob("*kernels.*.nbc")]:
+                file.unlink(missing_ok=True)
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            with atomic_path(mark) as half:
+                half.write_text(told)
 
 
 def _note(universal: bool) -> Path:

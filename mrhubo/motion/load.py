@@ -10,7 +10,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.formats import FORMATS, find_format, read_any
-from mrhubo.motion.readers.frame_folders import frame_files
+from mrhubo.motion.readers.frame_files import frame_files
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 

@@ -14,7 +14,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import contacts, ground, steps, tables
 from mrhubo.fast.compiled import robot as robots
-from mrhubo.fast.kept import checksum
+from mrhubo.fast.kept import checksum, drop_others
 
 
 class GroundKernels(NamedTuple):
@@ -61,4 +61,5 @@ def make_ground_kernels() -> GroundKernels:
         robots.place(t, work, q_N)
         ground.stand(t, work, f)
 
+    drop_others(start.stats.cache_path)
     return GroundKernels(start, look, stand)

@@ -20,7 +20,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 from mrhubo.fast.compiled import avoidance, collision, judging, networks, steps, tables
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import robot as robots
-from mrhubo.fast.kept import checksum
+from mrhubo.fast.kept import checksum, drop_others
 
 
 class Kernels(NamedTuple):
@@ -157,4 +157,5 @@ def make_kernels() -> Kernels:
                     trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
                     phi_B[b] = max(phi_B[b], phi)
 
+    drop_others(look.stats.cache_path)
     return Kernels(look, follow, avoid, retarget)

@@ -15,7 +15,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import avoidance, collision, cost, human, steps, tables
 from mrhubo.fast.compiled import robot as robots
-from mrhubo.fast.kept import checksum
+from mrhubo.fast.kept import checksum, drop_others
 
 
 class MotionKernels(NamedTuple):
@@ -141,4 +141,5 @@ def make_motion_kernels() -> MotionKernels:
             for k in range(len(before_X)):
                 before_X[k] -= row_W[width - len(before_X) + k] * found
 
+    drop_others(quadratic.stats.cache_path)
     return MotionKernels(quadratic, whole, turning, close, factor, solve)

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import robot, steps, tables, universal
-from mrhubo.fast.kept import checksum
+from mrhubo.fast.kept import checksum, drop_others
 
 
 @cache
@@ -36,4 +36,5 @@ def make_universal_kernel() -> Callable[..., Any]:
                 low, high = np.float32(tables.real(t, tables.LOWER_N, n)), np.float32(tables.real(t, tables.UPPER_N, n))
                 out_BN[b, n] = min(max(np.float32(q_N[n]), low), high)
 
+    drop_others(unroll.stats.cache_path)
     return unroll

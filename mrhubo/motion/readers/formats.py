@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -10,7 +11,7 @@ from types import ModuleType
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.advice import advice
 from mrhubo.motion.readers.content import Content, NoMotion
-from mrhubo.motion.readers.frame_folders import frame_files, read_frames
+from mrhubo.motion.readers.frame_files import frame_files
 from mrhubo.motion.readers.options import ReadOptions
 
 
@@ -74,8 +75,9 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
         NoMotion: nobody does; says what the file is.
         UserError: whoever does finds it bad.
     """
-    frames = frame_files(path) if path.is_dir() else []
-    if frames:
+    if frames := frame_files(path) if os.path.isdir(path) else []:
+        from mrhubo.motion.readers.frame_folders import read_frames
+
         return read_frames(path, frames, options)
     content = Content.open(path)
     row = find_format(content)

@@ -13,7 +13,6 @@ Legend: T frames, K keypoints.
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -23,42 +22,17 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.frame_files import MAX_BYTES
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.tracks import Person, choose
 
-_MAX_BYTES = 10_000_000
-_MAX_FRAMES = 100_000
 _MOST_PEOPLE, _MOST_NUMBERS = 100, 4_000
 """In a frame, and of a person."""
 _LISTS = ("people", "bodies")
 _POINTS = ("keypoints3d", "joints19", "joints26", "pose_keypoints_3d")
 _FLAT = "pose_keypoints_2d"
-_BEGINNING = re.compile(
-    rb'\s*+(?:\{.{0,300}?"(?:people|bodies)"\s*:\s*\[|\[\s*(?:\]\s*$|\{(?=.{0,300}?"keypoints3d"))).*', re.DOTALL
-)
-_NUMBER = re.compile(r"\d+")
-
-
-def frame_files(folder: Path) -> list[Path]:
-    """The files of a folder with one a frame, in order; none where it is no such folder."""
-    try:
-        files = [file for file in folder.iterdir() if file.suffix.lower() == ".json" and not file.name.startswith(".")]
-    except OSError:
-        return []
-    if len(files) < 2 or len(files) > _MAX_FRAMES or not all(_NUMBER.search(file.stem) for file in files):
-        return []
-    files = sorted(files, key=lambda file: (int(_NUMBER.findall(file.stem)[-1][:15]), file.name))
-    return files if is_frame(files[0]) and is_frame(files[-1]) else []
-
-
-def is_frame(file: Path) -> bool:
-    """Whether a file is a frame of such a folder; does not raise."""
-    try:
-        return bool(_BEGINNING.match(read_regular(file, _MAX_BYTES)[:4096]))
-    except UserError:
-        return False
 
 
 def read_frames(folder: Path, files: list[Path], options: ReadOptions) -> Motion:
@@ -107,7 +81,7 @@ def read_frames(folder: Path, files: list[Path], options: ReadOptions) -> Motion
 def _people(file: Path) -> list[dict[str, Any]]:
     """The people of a frame."""
     try:
-        value = json.loads(read_regular(file, _MAX_BYTES))
+        value = json.loads(read_regular(file, MAX_BYTES))
     except (ValueError, RecursionError) as error:
         raise UserError(f"{file}: is no JSON: {shortened(error, 80)}") from error
     if isinstance(value, dict):
