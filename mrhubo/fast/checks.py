@@ -13,7 +13,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mrhubo.fast.description import Description
-    from mrhubo.fast.sections import Layers, Legs, Part, Universal
+    from mrhubo.fast.leg_section import Legs
+    from mrhubo.fast.sections import Layers, Part, Universal
 
 _JOINTS = 21
 _ACTIVATIONS = ("silu", "leaky_relu", "tanh")

@@ -17,6 +17,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.fast.checks import check
+from mrhubo.fast.leg_section import Legs
 from mrhubo.fast.sections import (
     SECTIONS,
     Capsules,
@@ -25,7 +26,6 @@ from mrhubo.fast.sections import (
     Human,
     Kinematics,
     Layers,
-    Legs,
     Part,
     Prior,
     Reading,

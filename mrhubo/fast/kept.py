@@ -32,7 +32,8 @@ def checksum() -> str:
     """Of all that is compiled, and of what it takes constants from."""
     digest, here = xxhash.xxh3_64(), Path(__file__).parent
     sources = [path for folder in _SOURCES for path in sorted((here / folder).glob("*.py"))]
-    for path in (*sources, here / "sections.py"):  # whose kinds of steps are constants of what is compiled
+    # The kinds of steps of one and the order of the other's arrays are constants of what is compiled.
+    for path in (*sources, here / "sections.py", here / "leg_section.py"):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -28,7 +28,8 @@ from mrhubo.fast.together.motion import join_frames
 from mrhubo.robot_motion import FollowingJoint, RobotFacts, RobotMotion
 
 POLISH = 10
-"""Steps of optimisation at most, unless told otherwise: as many as `Retargeter` makes."""
+"""Steps of optimisation that `retarget` makes after the networks, at most, unless told otherwise. On CMU's clips and
+NAO, 0.36% of the arms have not converged after ten; five leave 0.84%, forty 0.32%, which need another start."""
 
 
 class FastRetargeter:

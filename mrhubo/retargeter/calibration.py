@@ -20,11 +20,12 @@ from scipy.optimize import minimize
 from scipy.special import expit
 from torch import Tensor
 
+from mrhubo.fast.retargeter import POLISH
 from mrhubo.motion import Motion, reshare
 from mrhubo.reference import angle_between
 from mrhubo.retargeter.confidence import GOOD_DEG, SIGNALS, ConfidenceModel, Weights, scaled, shake
 from mrhubo.retargeter.judging import signals_of
-from mrhubo.retargeter.package import POLISH, Retargeter
+from mrhubo.retargeter.package import Retargeter
 from mrhubo.retargeter.spoiling import bent_backwards, dislocated, shaken
 
 POSES = 2_000

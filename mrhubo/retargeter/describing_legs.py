@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, ancestors
-from mrhubo.fast.sections import Legs
+from mrhubo.fast.leg_section import Legs
 from mrhubo.reference import standing
 from mrhubo.retargeter.describing_robot import Bodies, real, whole
 from mrhubo.robot import BodyMap

@@ -10,7 +10,7 @@ Legend: T frames, J = 21 human joints, N robot joints, D directions.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ from mrhubo.body.vposer import VPoser
 from mrhubo.config import Config
 from mrhubo.errors import UserError
 from mrhubo.fast.description import FILE, Description
+from mrhubo.fast.retargeter import POLISH
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import Avoidance, DirectionProblem, Polish
@@ -34,15 +35,11 @@ from mrhubo.retargeter.describing import describe, write_description
 from mrhubo.retargeter.floor import stand, standing_of
 from mrhubo.retargeter.judging import judge
 from mrhubo.retargeter.networks import JointNetwork
-from mrhubo.retargeter.parts import check_polish, pose_parts
+from mrhubo.retargeter.parts import checked_parts
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
 from mrhubo.robot_motion import RobotFacts
-
-POLISH = 10
-"""Steps of optimisation that `retarget` makes after the networks, at most, unless told otherwise. On CMU's clips and
-NAO, 0.36% of the arms have not converged after ten; five leave 0.84%, forty 0.32%, which need another start."""
 
 
 class Retargeter(nn.Module):
@@ -179,7 +176,7 @@ class Retargeter(nn.Module):
                 `polish` is negative, or the frame rate not positive.
         """
         check_frame_rate(frame_rate)
-        parts = list(self._parts(local_TJ33, polish))
+        parts = checked_parts(local_TJ33, self.body_map.skeleton, self.device, polish)
         directed = bool(polish or frame_rate) or self.network.directed
         targets = [self.body_map.human_directions(part) for part in parts] if directed else [None] * len(parts)
         return self.follow(parts, targets, polish, frame_rate, avoid_collisions)
@@ -226,7 +223,7 @@ class Retargeter(nn.Module):
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
         joined_at = None if together is False else frame_rate
         check_frame_rate(joined_at)
-        parts = list(self._parts(local_TJ33, polish))
+        parts = checked_parts(local_TJ33, self.body_map.skeleton, self.device, polish)
         targets = [self.body_map.human_directions(part) for part in parts]
         stands = None if joined_at is None else stand(self, local_TJ33, parts, targets, polish, avoid_collisions)
         q_TN, told = stands or (self.follow(parts, targets, polish, joined_at, avoid_collisions), {})
@@ -243,10 +240,6 @@ class Retargeter(nn.Module):
         """
         target_TD3 = self.body_map.human_directions(local_TJ33)
         return judge(self, q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
-
-    def _parts(self, local_TJ33: MotionLike, polish: int) -> Iterator[Tensor]:
-        check_polish(polish)
-        return pose_parts(local_TJ33, self.body_map.skeleton, self.device)
 
     @torch.no_grad()
     def answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int = 0) -> Tensor:

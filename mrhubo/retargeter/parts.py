@@ -31,6 +31,16 @@ def check_polish(polish: int) -> None:
         raise UserError(f"polish must be 0 or more steps, found {polish}")
 
 
+def checked_parts(local_TJ33: MotionLike, skeleton: Skeleton, device: torch.device, polish: int) -> list[Tensor]:
+    """`pose_parts` of what is to be answered with so many steps of optimisation.
+
+    Raises:
+        UserError: as `check_polish` and `pose_parts`.
+    """
+    check_polish(polish)
+    return list(pose_parts(local_TJ33, skeleton, device))
+
+
 def pose_parts(local_TJ33: MotionLike, skeleton: Skeleton, device: torch.device) -> Iterator[Tensor]:
     """The poses as the networks want them, on a device, float32.
 

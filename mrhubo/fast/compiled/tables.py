@@ -12,12 +12,13 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.description import Description
+from mrhubo.fast.leg_section import Legs
 from mrhubo.fast.plain.avoidance import CLEARANCE
 from mrhubo.fast.plain.broad_phase import make_groups, reaches
 from mrhubo.fast.plain.collision import clearances
 from mrhubo.fast.plain.human import skew
 from mrhubo.fast.plain.soles import moved_points
-from mrhubo.fast.sections import SECTIONS, Layers, Legs, Part
+from mrhubo.fast.sections import SECTIONS, Layers, Part
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",

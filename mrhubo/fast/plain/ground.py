@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mrhubo.fast.description import Description
+from mrhubo.fast.leg_section import Legs
 from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
 from mrhubo.fast.plain.human import cross, norm, normalize
 from mrhubo.fast.plain.robot import Placed, place
 from mrhubo.fast.plain.soles import carrier, turned_points
-from mrhubo.fast.sections import Legs
 
 RETURN_S, RETURN_SPEED = 1.5, 0.1
 """Time constant [s] with which the root returns to the person's path, and how fast it does at most [m/s]."""

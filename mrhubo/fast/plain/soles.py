@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from mrhubo.fast.description import Description
+from mrhubo.fast.leg_section import Legs
 from mrhubo.fast.plain.collision import carries
 from mrhubo.fast.plain.human import cross
 from mrhubo.fast.plain.robot import Placed
-from mrhubo.fast.sections import Legs
 
 
 def turned_points(placed: Placed, body_X: np.ndarray, point_X3: np.ndarray) -> np.ndarray:
