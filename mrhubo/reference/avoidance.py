@@ -85,4 +85,4 @@ class Avoidance(nn.Module):
         free_T = widen(close_T, around) & ~fixed_T
         found_TN = torch.where(close_T[:, None], self(q_TN, target_TD3), q_TN)
         found_TN = refine_around(self.problem, found_TN, target_TD3, smoothness, free_T, SWEEPS, TOLERANCE)
-        return keep_speed(self.problem, found_TN, target_TD3, smoothness, step_N, around, fixed_T)
+        return keep_speed(self.problem, found_TN, target_TD3, smoothness, step_N, around, fixed_T, SWEEPS)

@@ -67,11 +67,14 @@ def keep_speed(
     step_N: Tensor,
     around: int,
     fixed_T: Tensor | None = None,
+    sweeps: int = SWEEPS,
 ) -> Tensor:
     """The best motion (T, N) [rad] near another that keeps to the bound; one that keeps to it stays, to the bit.
 
     Blocks of joints without a step that is too long stay too, and so do frames that are more than `around` away from
     those that the nearest slow motion changes, and those in `fixed_T` (T,), whose steps are short enough.
+
+    A few `sweeps` do where the nearest slow motion is nearly the best; where it touches the robot itself it is not.
     """
     nearest_TN = nearest_slow(q_TN, step_N, fixed_T)
     changed_TN = nearest_TN != q_TN
@@ -82,7 +85,7 @@ def keep_speed(
         free_T = free_T & ~fixed_T
     found_TN = nearest_TN
     for terms in (smoothness,) if smoothness.directions is None else (smoothness.of_joints, smoothness):
-        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, SWEEPS, TOLERANCE, step_N)
+        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, sweeps, TOLERANCE, step_N)
     found_TN = nearest_slow(found_TN, step_N, fixed_T)
     concerned_C = changed_TN.any(dim=0).to(q_TN) @ problem.blocks.joints_NC > 0
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)

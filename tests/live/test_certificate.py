@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("websockets")
 pytest.importorskip("cryptography")
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import InvalidMessage, InvalidStatus
 from websockets.sync.client import connect
 
 from mrhubo.errors import UserError
@@ -82,6 +82,21 @@ def test_who_was_not_told_refuses_it(server: Server) -> None:
         plain.getresponse()
 
 
+def refused(url: str, trust: ssl.SSLContext, origin: str) -> int:
+    """The status with which a server sends somebody away. It closes the connection at once, and what it said may be lost
+    on the way if the other side was still sending; then once more.
+    """
+    for _ in range(5):
+        try:
+            with connect(url, ssl=trust, origin=origin):  # pyright: ignore[reportArgumentType]
+                return 101
+        except InvalidStatus as error:
+            return error.response.status_code
+        except InvalidMessage:
+            continue
+    raise AssertionError("no answer")
+
+
 def test_pages_and_tokens_as_without_it(ours: ServerCertificate, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(TOKEN_VARIABLE, "a-secret-of-some-length")
     server = Server(Endpoint("0.0.0.0", 0), certificate=ours)
@@ -90,8 +105,7 @@ def test_pages_and_tokens_as_without_it(ours: ServerCertificate, monkeypatch: py
         here, trust = f"127.0.0.1:{server.endpoint.port}", who_trusts(ours.path)
         known = "?token=a-secret-of-some-length"
         for query, origin in (("", f"https://{here}"), (known, f"http://{here}"), (known, "https://evil.example")):
-            with pytest.raises(InvalidStatus, match="403"):
-                connect(f"wss://{here}/live{query}", ssl=trust, origin=origin)  # pyright: ignore[reportArgumentType]
+            assert refused(f"wss://{here}/live{query}", trust, origin) == 403
         with connect(f"wss://{here}/live{known}", ssl=trust, origin=f"https://{here}"):  # pyright: ignore
             pass
         assert server.url.startswith("https://") and server.url.endswith("/#token=a-secret-of-some-length")

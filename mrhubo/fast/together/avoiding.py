@@ -50,7 +50,7 @@ class GivingWay:
         found_TN = q_TN.copy()
         found_TN[close_T] = self.alone(q_TN[close_T], target_TD3[close_T])
         found_TN = refine_around(self.problem, found_TN, target_TD3, smoothness, free_T, SWEEPS, TOLERANCE)
-        return keep_speed(self.problem, found_TN, target_TD3, smoothness, step_N, around, fixed_T)
+        return keep_speed(self.problem, found_TN, target_TD3, smoothness, step_N, around, fixed_T, SWEEPS)
 
 
 def make_giving_way(

@@ -61,6 +61,7 @@ def keep_speed(
     step_N: np.ndarray,
     around: int,
     fixed_T: np.ndarray,
+    sweeps: int = SWEEPS,
 ) -> np.ndarray:
     """The best motion (T, N) [rad] near another that keeps to the bound; one that keeps to it stays, to the bit."""
     nearest_TN = nearest_slow(q_TN, step_N, fixed_T)
@@ -71,6 +72,6 @@ def keep_speed(
     concerned_C = changed_TN.any(axis=0) @ problem.cost.joints_NC > 0
     found_TN = nearest_TN
     for terms in (smoothness.of_joints, smoothness):
-        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, SWEEPS, TOLERANCE, step_N, concerned_C)
+        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, sweeps, TOLERANCE, step_N, concerned_C)
     found_TN = nearest_slow(found_TN, step_N, fixed_T)
     return np.where(concerned_C[problem.cost.block_N], found_TN, q_TN)
