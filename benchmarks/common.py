@@ -6,12 +6,16 @@ import platform
 import shlex
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import torch
 
+from mrhubo.motion import motion_files
 from mrhubo.runtime.locations import project_root
 from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.tables import markdown
+
+_WHOLE_BODY = Path("data/external/cmu/whole_body")
 
 
 def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list[str]]:
@@ -27,6 +31,15 @@ def read_options(argv: list[str], **defaults: str) -> tuple[dict[str, str], list
             sys.exit(f"{word}: is unknown or lacks its value; there are --{', --'.join(defaults)}")
         defaults[name], *argv = argv
     return defaults, others
+
+
+def whole_body_clips(clips: str) -> list[Path]:
+    """Files of motions with a root: all of `_WHOLE_BODY`, those of a folder, or some by their names with commas between
+    them.
+    """
+    if clips == "all" or Path(clips).is_dir():
+        return motion_files(_WHOLE_BODY if clips == "all" else Path(clips))
+    return [_WHOLE_BODY / f"{name}.npz" for name in clips.split(",")]
 
 
 def print_header() -> None:

@@ -29,19 +29,19 @@ from typing import Any
 
 import numpy as np
 import torch
-from common import print_header, print_table, read_options
+from common import print_header, print_table, read_options, whole_body_clips
 from scipy.spatial import ConvexHull, QhullError
 
 from mrhubo import rotation
 from mrhubo.body import Skeleton
 from mrhubo.errors import InputWarning, first_line
 from mrhubo.lazy import import_optional
-from mrhubo.motion import Motion, motion_files, read_motion, resample
+from mrhubo.motion import Motion, read_motion, resample
 from mrhubo.reference import OptimizationResult, OptimizationRetargeter
 from mrhubo.reference.standing import Legs
 from mrhubo.robot import Robot
 
-_CLIPS, _OWN = Path("data/external/cmu/whole_body"), Path("data/motions")
+_OWN = Path("data/motions")
 _UPPER_BODY = "wave,pointing,conversation,directing_traffic,bow_and_greet"
 _GRAVITY = 9.81
 _NEAR_M = 0.02
@@ -67,7 +67,7 @@ def main(argv: list[str]) -> None:
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
             retargeter = OptimizationRetargeter(Robot.from_config(config))
         simulated = Simulated(mujoco, retargeter)
-        motions = [resample(read_motion(path), float(options["rate"])) for path in _paths(options["clips"])]
+        motions = [resample(read_motion(path), float(options["rate"])) for path in whole_body_clips(options["clips"])]
         rows = [[motion.name, *simulated.played(motion)] for motion in motions]
         print(f"## {Path(name).stem}, {simulated.mass:.1f} kg: clips played as they are\n")
         print_table(["clip", "depth [cm]", "force, median", "force, p99", "in flight", "supported", "effort, p99"],
@@ -261,12 +261,6 @@ def _standing(motion: Motion, rate: float) -> Motion:
     place_T3 = torch.zeros(len(motion), 3)
     place_T3[:, 1] = -lowest_T
     return motion.changed(root_rotation_T33=torch.eye(3).repeat(len(motion), 1, 1), root_position_T3=place_T3)
-
-
-def _paths(clips: str) -> list[Path]:
-    if clips == "all" or Path(clips).is_dir():
-        return motion_files(_CLIPS if clips == "all" else Path(clips))
-    return [_CLIPS / f"{name}.npz" for name in clips.split(",")]
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from common import print_header, print_table, read_options
+from common import print_header, print_table, read_options, whole_body_clips
 from PIL.Image import Image
 
 from mrhubo import rotation
@@ -31,7 +31,7 @@ from mrhubo.errors import InputWarning
 from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
 from mrhubo.fast import FastRetargeter, FastStream
 from mrhubo.frames import human_to_world
-from mrhubo.motion import Motion, motion_files, read_motion, resample
+from mrhubo.motion import Motion, read_motion, resample
 from mrhubo.reference import OptimizationResult, OptimizationRetargeter
 from mrhubo.reference.metrics import direction_error
 from mrhubo.reference.standing import Legs, has_root, motion_root
@@ -48,7 +48,6 @@ from mrhubo.view.sheets import contact_sheet, save_png
 
 Answer = OptimizationResult | RetargetResult | RobotMotion
 
-_CLIPS = Path("data/external/cmu/whole_body")
 _MOMENTS = 8
 """Of the picture."""
 _PARTS = {"knee": "thigh", "ankle": "shin", "trunk": "chest", "foot": "feet", "elbow": "upper arm", "wrist": "forearm"}
@@ -67,7 +66,7 @@ def main(argv: list[str]) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
             retargeter = OptimizationRetargeter(Robot.from_config(f"conf/{name}-whole-body.yaml"))
-        motions = [_motion(path, options["rate"]) for path in _paths(options["clips"])]
+        motions = [_motion(path, options["rate"]) for path in whole_body_clips(options["clips"])]
         if not retargeter.body_map.keypoints.standing:
             for way in ways:
                 _print_without_feet(name, way, retargeter, motions, bool(options["collisions"]))
@@ -130,12 +129,6 @@ def _pictures(figures: list[Solids], middle: float) -> list[Image]:
         camera = Camera(60.0, 8.0, (float(x), float(y), middle), 1.75 * middle)
         found.append(render(figure, (170, 235), camera, ground=0.0))
     return found
-
-
-def _paths(clips: str) -> list[Path]:
-    if clips == "all" or Path(clips).is_dir():
-        return motion_files(_CLIPS if clips == "all" else Path(clips))
-    return [_CLIPS / f"{name}.npz" for name in clips.split(",")]
 
 
 def _motion(path: Path, rate: str) -> Motion:

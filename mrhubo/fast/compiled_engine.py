@@ -90,12 +90,12 @@ class CompiledEngine:
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""
         q_BN = self._room(local_BJ33)[1]
-        if not self.description.post and self._unroll is None:
-            return self._nearest(np.ascontiguousarray(target_BD3))
         if (unroll := self._unroll) is not None:
             target_BD3 = np.ascontiguousarray(target_BD3)
             self._shared(len(q_BN), lambda rows: unroll(target_BD3[rows], q_BN[rows]))
             return q_BN
+        if not self.description.post:
+            return self._nearest(np.ascontiguousarray(target_BD3))
         self._look(self._answer, local_BJ33, target_BD3, q_BN)
         return q_BN
 
@@ -164,7 +164,7 @@ class CompiledEngine:
 
     def _asked_by(self, target_BX3: np.ndarray) -> tuple[np.ndarray, ...]:
         """The arrays for targets, as `Description.asked_by`."""
-        return self._standing if target_BX3.shape[1] > len(self.description.cost.weight_D) else self._tables
+        return self._tables if self.description.asked_by(target_BX3) is self.description else self._standing
 
     def _nearest(self, target_BD3: np.ndarray) -> np.ndarray:
         """As `mrhubo.fast.plain.steps.nearest`."""

@@ -15,6 +15,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import xxhash
@@ -28,6 +29,7 @@ _MARK = "mrhubo-compiled.txt"
 """Beside numba's files: which version of the sources they are of."""
 
 
+@cache
 def checksum() -> str:
     """Of all that is compiled, and of what it takes constants from."""
     digest, here = xxhash.xxh3_64(), Path(__file__).parent

@@ -69,7 +69,10 @@ def of_package(source: str | os.PathLike[str], avoid_collisions: bool = True) ->
 
 
 def has_feet(description: Description) -> bool:
-    """Whether a retargeter's robot has feet: where its base goes, only PyTorch works out."""
+    """Whether a retargeter's robot has feet: where its base goes, only PyTorch works out.
+
+    By the names of its directions, for descriptions written before they held `legs` tell feet by nothing else.
+    """
     names = description.settings.direction_names
     return any(f"{side}_foot_up" in names for side in SIDES)
 

@@ -195,9 +195,8 @@ def read_lerobot(folder: Path) -> list[RobotMotion]:
         features = info["features"]
         names, rate, version = features[_ACTION]["names"], float(info["fps"]), info["codebase_version"]
         feet = features[_CONTACT].get("names") if _CONTACT in features else []
-        feet = (
-            feet if isinstance(feet, list) and all(isinstance(foot, str) for foot in feet) else []
-        )  # a stranger's own
+        if not isinstance(feet, list) or not all(isinstance(foot, str) for foot in feet):
+            feet = []  # a stranger's own
         robot = str(info.get("robot_type") or "")
     except UserError:
         raise

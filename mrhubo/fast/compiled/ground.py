@@ -63,7 +63,6 @@ class Floor(NamedTuple):
     off_3: np.ndarray
     pointing_H3: np.ndarray
     anchor_H3: np.ndarray
-    root_3: np.ndarray
     sole_H3: np.ndarray
     """Points of the person's soles, or of the robot's from its root, in the world [m]."""
     turn_L33: np.ndarray
@@ -205,7 +204,7 @@ def stand(t, work, f):
             anchor[0] + loose * (here[0] - anchor[0]), 0.0, anchor[2] + loose * (here[2] - anchor[2]),
         ))  # fmt: skip
     for i in range(3):
-        f.root_3[i], f.off_3[i] = found[i], found[i] - f.path_3[i]
+        f.off_3[i] = found[i] - f.path_3[i]
     _base(work, f, found, root)
 
 

@@ -80,8 +80,6 @@ class GroundState:
     """Where soles would be from the root, if legs pointed as the person's do, along the world's axes."""
     anchor_H2: np.ndarray
     """Where each point has been planted, on the floor."""
-    root_3: np.ndarray
-    """Where the robot's root is."""
     known: bool
     """Whether somebody has been seen."""
 
@@ -90,7 +88,7 @@ class GroundState:
         """Nobody has been seen."""
         contacts, zeros_3 = LiveContacts.none(1, points), np.zeros(3)
         return cls(contacts, contacts.planted_BP[0], zeros_3, np.eye(3), zeros_3, 0.0, np.zeros((points, 3)),
-                   np.zeros((points, 2)), zeros_3, False)  # fmt: skip
+                   np.zeros((points, 2)), False)  # fmt: skip
 
 
 class PlainGround:
@@ -187,7 +185,7 @@ class PlainGround:
         root_3[UP] = max(rise, -low_H.min())  # no sole is under the floor
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         anchor_H2 = anchor_H2 + (1.0 - weight_H[:, None]) * ((root_3 + point_H3)[:, FLAT] - anchor_H2)
-        self._state = replace(state, root_3=root_3, off_3=root_3 - state.path_3, anchor_H2=anchor_H2)
+        self._state = replace(state, off_3=root_3 - state.path_3, anchor_H2=anchor_H2)
         base_33 = state.turn_33[WORLD] @ axes_33.T
         return Base(root_3[WORLD] - base_33 @ from_3, base_33)
 

@@ -22,8 +22,6 @@ DAMPING, EASIER, HARDER, LEAST, MOST, FLOOR = 1e-3, 0.1, 10.0, 1e-3, 1e6, 0.01
 """Damping at first; its factors after a step that helped and one that did not; its bounds; and what is added to the
 diagonal that it multiplies: that of the frames' own cost, for smoothness weighs far more on each frame alone than on
 frames that move together."""
-
-
 ROUNDING, LEVEL = 1e-6, 0.5
 """Where a step changes a cost by no more than this share of it, which is what rounding may add in float32, its slope
 tells whether the step helped: at its end at most this share of what it was at its beginning, the other way (the

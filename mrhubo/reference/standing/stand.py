@@ -25,7 +25,7 @@ from mrhubo.fast.plain.ground import UNDER_M
 from mrhubo.fast.together.motion import AHEAD, WINDOW
 from mrhubo.frames import human_to_world
 from mrhubo.reference.avoidance import Avoidance
-from mrhubo.reference.refine import refine_around
+from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import nearest_slow, speed_bound
 from mrhubo.reference.standing.human import HumanSteps
@@ -116,7 +116,8 @@ class Standing(nn.Module):
         free_T = torch.ones(len(q_TN), dtype=torch.bool, device=q_TN.device)
         for again in range(ROUNDS):
             if again:
-                free_T = torch.from_numpy(_around(_lift(carried) > LIFTED_M, steps.frame_rate)).to(q_TN.device)
+                lifted_T = torch.from_numpy(_lift(carried) > LIFTED_M).to(q_TN.device)
+                free_T = widen(lifted_T, round(FREE_S * steps.frame_rate))
                 if not bool(free_T.any()):
                     break
                 carried = _lifted(carried, steps.frame_rate)
@@ -242,11 +243,6 @@ class Standing(nn.Module):
 def _lift(carried: _Carried) -> np.ndarray:
     """How far (T) the root is to be lifted [m] so that no sole is under the floor."""
     return np.maximum(-carried.low_TP.min(axis=1), 0.0)
-
-
-def _around(mask_T: np.ndarray, frame_rate: float) -> np.ndarray:
-    """Frames (T) of a mask, and those within `FREE_S` of them."""
-    return maximum_filter1d(mask_T, 2 * round(FREE_S * frame_rate) + 1, mode="constant", cval=False)
 
 
 def _lifted(carried: _Carried, frame_rate: float) -> _Carried:
