@@ -90,8 +90,8 @@ def test_one_of_two_processes_dies(
     states = [trial.state.name for trial in study.trials]
     assert states.count("COMPLETE") + states.count("PRUNED") == 4 and states.count("FAIL") == 1
     dead = next(trial for trial in study.trials if trial.state.name == "FAIL")
-    if dead.params:
-        assert any(trial.params == dead.params for trial in study.trials if trial.number > dead.number)
+    later = [trial.params.items() for trial in study.trials if trial.number > dead.number]
+    assert any(dead.params.items() <= params for params in later)  # it may have died before it had drawn all
 
     best = load_config(Path(output.split("--config ")[1].split()[0]))
     assert (

@@ -1,8 +1,8 @@
 """Optuna studies that any number of processes work on, and that survive the death of any of them.
 
 A trial whose process is gone (same machine: looked up; other machines: no heartbeat for a while) is drawn again with
-the same values. Every trial's draw is seeded by (seed, number of the trial), so a study that was stopped goes on as it
-would have.
+the values that it had drawn; the others are drawn anew. Every trial's draw is seeded by (seed, number of the trial),
+so a study that was stopped goes on as it would have.
 """
 
 from __future__ import annotations

@@ -45,10 +45,12 @@ def test_an_interrupted_trial_is_drawn_again(tmp_path: Path) -> None:
     assert [trial.state.name for trial in study.trials] == ["COMPLETE", "COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
 
 
-def test_a_dead_process_trial_is_drawn_again_at_once(tmp_path: Path) -> None:
+@pytest.mark.parametrize("drawn", [["x", "n"], ["x"], []], ids=len)
+def test_a_dead_process_trial_is_drawn_again_at_once(tmp_path: Path, drawn: list[str]) -> None:
+    draws = {"x": "trial.suggest_float('x', -1, 1)", "n": "trial.suggest_int('n', 0, 3)"}
     code = (
         "import os, sys; from pathlib import Path; from mrhubo.search import open_study, work_on\n"
-        "def die(trial): trial.suggest_float('x', -1, 1); trial.suggest_int('n', 0, 3); os.kill(os.getpid(), 9)\n"
+        f"def die(trial): {'; '.join([*(draws[name] for name in drawn), 'os.kill(os.getpid(), 9)'])}\n"
         "work_on(open_study(Path(sys.argv[1]), None, 's', 'random', 0), die, 2)"
     )
     ended = subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=120)
@@ -56,8 +58,9 @@ def test_a_dead_process_trial_is_drawn_again_at_once(tmp_path: Path) -> None:
     study = open_study(tmp_path, None, "s", "random", 0)
     assert len(open_trials(study)) == 1
     work_on(study, objective, 2)
-    assert [trial.state.name for trial in study.trials] == ["FAIL", "COMPLETE", "COMPLETE"]
-    assert study.trials[1].params == study.trials[0].params and not open_trials(study)
+    assert [trial.state.name for trial in study.trials] == ["FAIL", "COMPLETE", "COMPLETE"] and not open_trials(study)
+    assert list(study.trials[0].params) == drawn
+    assert study.trials[0].params.items() <= study.trials[1].params.items()
 
 
 def test_a_failing_trial_counts_and_three_in_a_row_end_it(tmp_path: Path) -> None:
