@@ -121,3 +121,11 @@ def test_files_that_pages_name_exist(root: Path, page: Path) -> None:
 def test_every_page_of_the_docs_is_in_the_sites_navigation(root: Path) -> None:
     navigation = (root / "mkdocs.yml").read_text().split("\nnav:", 1)[1]
     assert sorted(re.findall(r"[\w/-]+\.md", navigation)) == [str(page.relative_to(root / "docs")) for page in DOCS]
+
+
+def test_the_start_page_leads_to_every_page_and_every_picture_is_shown(root: Path) -> None:
+    start = (root / "docs" / "index.md").read_text()
+    pages = {str(page.relative_to(root / "docs")) for page in DOCS if page.parent.name == "docs"} - {"index.md"}
+    assert pages <= set(re.findall(r"\]\(([\w/-]+\.md)", start))
+    text = "".join(page.read_text() for page in [*TOP, *DOCS])
+    assert not [path.name for path in (root / "docs" / "images").iterdir() if f"images/{path.name}" not in text]
