@@ -2,8 +2,9 @@
 
 MediaPipe's world landmarks: metres, x to the right of the picture, y down, z away from the camera
 (https://ai.google.dev/edge/mediapipe/solutions/vision/pose_landmarker). PICO's 24 joints are SMPL's and two hands
-(https://github.com/XR-Robotics); WebXR's are those of `XRBody` (https://immersive-web.github.io/body-tracking). Both
-have x to the right, y up, z backwards, as OpenXR has, which is right-handed as we are.
+(https://github.com/XR-Robotics); WebXR's are those of `XRBody` (https://immersive-web.github.io/body-tracking), and
+nose and ears, by which our page tells how a headset is turned. Both have x to the right, y up, z backwards, as OpenXR
+has, which is right-handed as we are.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ _WEBXR = {
     "{side}-hand-thumb-metacarpal": "{side}_thumb", "{side}-hand-index-phalanx-proximal": "{side}_index",
     "{side}-hand-middle-phalanx-proximal": "{side}_middle", "{side}-hand-little-phalanx-proximal": "{side}_pinky",
     "{side}-upper-leg": "{side}_hip", "{side}-lower-leg": "{side}_knee", "{side}-foot-ankle": "{side}_ankle",
+    "{side}-foot-ball": "{side}_foot", "nose": "nose", "{side}_ear": "{side}_ear",
 }  # fmt: skip
 
 

@@ -34,7 +34,7 @@ export class Live {
 
   // One message; false where it was left out.
   send(kind, content, time = performance.now() / 1000) {
-    if (this.socket.readyState !== WebSocket.OPEN) return false;
+    if (!this.connected) return false;
     if (kind !== "heartbeat" && this.socket.bufferedAmount > MOST_WAITING) return false;
     this.number += 1;
     this.socket.send(JSON.stringify({ mrhubo: VERSION, session: this.session, number: this.number, time, kind, ...content }));
@@ -45,15 +45,22 @@ export class Live {
 
   // Whether the button is held from now on: without a connection it is not.
   hold(held) {
-    held = held && this.socket.readyState === WebSocket.OPEN;
+    held = held && this.connected;
     if (held === this.held) return;
     this.held = held;
     this.beat();
   }
 
+  get connected() { return this.socket.readyState === WebSocket.OPEN; }
+
+  nobody(time) { return this.send("nobody", {}, time); }
+
+  // points: [x, y, z] of these names, of a set that names its points; time as below.
+  named(set, names, points, time) { return this.send("landmarks", { set, names, points }, time); }
+
   // points: 33 of MediaPipe's world landmarks {x, y, z, visibility}; time in seconds of performance.now()'s clock.
   landmarks(points, time) {
-    if (!points) return this.send("nobody", {}, time);
+    if (!points) return this.nobody(time);
     return this.send("landmarks", {
       set: "mediapipe",
       points: points.map(({ x, y, z }) => [x, y, z]),

@@ -1,6 +1,7 @@
 // What the page shows of a session. Text from messages is set as text, never as markup.
 
 import { Camera } from "./camera.js";
+import { Headset } from "./headset.js";
 import { Live, deadman } from "./live.js";
 import { RobotView } from "./robot.js";
 
@@ -54,4 +55,5 @@ const live = new Live({
   closed: (reason) => { release(); tell("closed", `Not connected: ${reason}.`); },
 });
 release = deadman(live, at("hold"));
-new Camera(at("stage"), live, () => release(), (mirrored) => at("figure").classList.toggle("mirrored", mirrored));
+const camera = new Camera(at("stage"), live, () => release(), (mirrored) => at("figure").classList.toggle("mirrored", mirrored));
+new Headset(at("headset"), live, () => camera.stop());
