@@ -18,7 +18,7 @@ from mrhubo.body import KEYPOINT_NAMES
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, SIDE_OF
 from mrhubo.describing.markers import SIDE_COLORS, arrow, axis_rods, bone
 from mrhubo.frames import human_to_world
-from mrhubo.robot import Axis, BodyMap, Limb, link_poses, read_geometry
+from mrhubo.robot import Axis, BodyMap, Limb, bare_sticks, link_poses, read_geometry
 from mrhubo.robot.meshes import read_meshes
 from mrhubo.view import Solids, human_figure, robot_solids
 from mrhubo.view.solids import Color
@@ -57,8 +57,7 @@ class FigureMaker:
         meshes = read_meshes(parsed, self.robot.description.path, shaped)
         surfaces = sample_surfaces(((mesh.vertices_V3, mesh.faces_F3) for mesh in meshes), _PALE)
         self._skins = [(mesh.link, skin) for mesh, skin in zip(meshes, surfaces, strict=True) if len(skin)]
-        self._is_shaped = 3 * len({link for link, _ in self._skins} | shaped) >= len(parsed.robot.links)
-        self._parents = {joint.child: joint.parent for joint in parsed.robot.joints}
+        self._sticks = bare_sticks(self.robot.description, {link for link, _ in self._skins} | shaped)
         self._limbs = [d for d in body_map.directions if isinstance(d, Limb)]
         self._axes = [d for d in body_map.directions if isinstance(d, Axis)]
         self._inner = [limb.part.hangs_on == limb.part.seen_from for limb in self._limbs]
@@ -152,7 +151,7 @@ class FigureMaker:
 
     def _body(self, poses: Mapping[str, np.ndarray], place_44: np.ndarray) -> tuple[Solids, Surface | None]:
         """Primitive shapes, and the surface of meshes; sticks, where neither makes a body."""
-        solids = robot_solids(self._geometry, poses, None if self._is_shaped else self._parents).recolored(_PALE)
+        solids = robot_solids(self._geometry, poses, self._sticks).recolored(_PALE)
         body = solids.scaled(self.scale).transformed(place_44)
         if not self._skins:
             return body, None

@@ -13,7 +13,6 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mrhubo.robot import Robot
-    from mrhubo.viewer.bodies import Body
 
 _MOST = 400
 """Capsules of a robot; of more the largest are kept."""
@@ -30,21 +29,23 @@ def figure_of(robot: Robot, joint_names: Sequence[str]) -> dict[str, Any]:
         robot: whose URDF tells.
         joint_names: those of the messages, in their order.
     """
-    from mrhubo.robot import read_geometry
-    from mrhubo.view import robot_solids
-    from mrhubo.viewer.bodies import read_bodies
+    from mrhubo.robot import bare_sticks, read_geometry
+    from mrhubo.view import Solids, robot_solids
+    from mrhubo.viewer.bodies import body_sticks, read_bodies
 
     description = robot.description
     geometry = read_geometry(description.parsed)
     shaped = {shape.link for shape in geometry}
     geometry += [shape for shape in description.solids.of_meshes if shape.link not in shaped]
     bodies = read_bodies(robot, joint_names)
-    solids = [robot_solids([s for s in geometry if s.link in body.links], body.links) for body in bodies]
+    sticks = body_sticks(bodies, bare_sticks(description, {shape.link for shape in geometry}))
+    solids = [
+        Solids.concatenate([robot_solids([s for s in geometry if s.link in body.links], body.links), own])
+        for body, own in zip(bodies, sticks, strict=True)
+    ]
     rows = [
         np.column_stack([s.starts_S3, s.ends_S3, s.radii_S, s.end_radii_S, (255 * s.colors_S3).round()]) for s in solids
     ]
-    if sum(map(len, rows)) == 0:
-        rows = _sticks(bodies)
     sizes = np.sort(np.concatenate([_size(row_S11) for row_S11 in rows]))[::-1]
     least = sizes[_MOST] if len(sizes) > _MOST else -1.0
     return {
@@ -61,15 +62,6 @@ def figure_of(robot: Robot, joint_names: Sequence[str]) -> dict[str, Any]:
 
 def _size(row_S11: np.ndarray) -> np.ndarray:
     return np.linalg.norm(row_S11[:, 3:6] - row_S11[:, :3], axis=1) + 2 * row_S11[:, 6:8].max(axis=1, initial=0.0)
-
-
-def _sticks(bodies: Sequence[Body]) -> list[np.ndarray]:
-    """Of a robot without shapes: a capsule from each body to those that hang on it."""
-    rows: list[list[np.ndarray]] = [[] for _ in bodies]
-    for body in bodies:
-        if body.parent is not None:
-            rows[body.parent].append(np.concatenate([np.zeros(3), body.origin_44[:3, 3], [0.02, 0.02], [150] * 3]))
-    return [np.array(found).reshape(-1, 11) for found in rows]
 
 
 def _rounded(values: np.ndarray) -> Any:

@@ -5,7 +5,7 @@ from mrhubo.view.distributions import distributions
 from mrhubo.view.figures import animated_frames, figure_animation, figure_sheet, human_figure
 from mrhubo.view.human import HUMAN_COLOR, SKIN_COLOR, human_solids
 from mrhubo.view.painter import render
-from mrhubo.view.robot import robot_solids, stick_solids
+from mrhubo.view.robot import robot_solids, stick_radius, stick_solids
 from mrhubo.view.sheets import contact_sheet, phi_histogram, save_gif, save_png
 from mrhubo.view.solids import Solids
 
@@ -27,5 +27,6 @@ __all__ = [
     "robot_solids",
     "save_gif",
     "save_png",
+    "stick_radius",
     "stick_solids",
 ]

@@ -14,12 +14,12 @@ from mrhubo.view.solids import Color, Solids
 def robot_solids(
     geometry: Sequence[LinkGeometry],
     link_poses: Mapping[str, np.ndarray],
-    parents: Mapping[str, str | None] | None = None,
+    sticks: Mapping[str, str | None] | None = None,
 ) -> Solids:
     """The robot with its links at ``link_poses``: name -> pose (4, 4), m, in the world frame, or any frame with z up.
 
-    ``parents`` (link -> parent link, None at the root): where given, a robot of which fewer than a third of the links
-    have shapes (the rest are meshes) gets sticks too (:func:`stick_solids`), so that the picture shows it whole.
+    ``sticks`` (link -> the link from which a stick leads to it): for links without shapes, so that the picture shows
+    the robot whole (:func:`mrhubo.robot.bare_sticks`).
     """
     poses_S44 = np.array([_pose(link_poses, shape.link) @ shape.origin_44 for shape in geometry]).reshape(-1, 4, 4)
     centres_S3 = poses_S44[:, :3, 3]
@@ -43,10 +43,7 @@ def robot_solids(
         flat_S=np.array([shape.kind == "cylinder" for shape in geometry]),
         sides_S3=sides_S3,
     )
-    shaped = {shape.link for shape in geometry}
-    if parents is None or 3 * len(shaped) >= len(link_poses):
-        return shapes
-    return Solids.concatenate([shapes, stick_solids(link_poses, parents)])
+    return Solids.concatenate([shapes, stick_solids(link_poses, sticks)]) if sticks else shapes
 
 
 def stick_solids(
@@ -55,14 +52,13 @@ def stick_solids(
     color: Color = ROBOT_COLOR,
     radius_m: float | None = None,
 ) -> Solids:
-    """A robot without primitive shapes: a capsule from the origin of every link to that of its parent.
+    """Links without primitive shapes: a capsule from the origin of every link to that of its parent.
 
     ``link_poses``: link -> pose (4, 4), m. ``parents``: link -> parent link; the root is missing or has None.
-    ``radius_m``: default 1.5% of the robot's largest extent.
+    ``radius_m``: default that of :func:`stick_radius`.
     """
     if radius_m is None:
-        origins_L3 = np.array([np.asarray(pose_44)[:3, 3] for pose_44 in link_poses.values()]).reshape(-1, 3)
-        radius_m = max(0.015 * float(np.ptp(origins_L3, axis=0).max()) if len(origins_L3) else 0.0, 1e-3)
+        radius_m = stick_radius(link_poses)
     rows = []
     for link, parent in parents.items():
         if parent is None:
@@ -71,6 +67,12 @@ def stick_solids(
         rows.append((start, end, radius_m, radius_m))
         rows.append((end, end, 1.35 * radius_m, 1.35 * radius_m))
     return Solids.capsules(rows, color)
+
+
+def stick_radius(link_poses: Mapping[str, np.ndarray]) -> float:
+    """How thick [m] a robot's sticks are: 1.5% of its largest extent."""
+    origins_L3 = np.array([np.asarray(pose_44)[:3, 3] for pose_44 in link_poses.values()]).reshape(-1, 3)
+    return max(0.015 * float(np.ptp(origins_L3, axis=0).max()) if len(origins_L3) else 0.0, 1e-3)
 
 
 def _pose(link_poses: Mapping[str, np.ndarray], link: str) -> np.ndarray:

@@ -5,22 +5,19 @@ Legend: T frames, N moved joints, B bodies.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.rotations import axis_angle_to_matrix
-from mrhubo.robot import Robot, read_geometry
+from mrhubo.robot import Robot, bare_sticks, read_geometry
 from mrhubo.robot.joint import Mimic, drive
 from mrhubo.robot.meshes import read_meshes
 from mrhubo.robot.urdf import Description, moved
-from mrhubo.view import stick_solids
+from mrhubo.view import Solids, stick_radius, stick_solids
 from mrhubo.viewer.meshing import Mesh, capsule_meshes, joined, shape_mesh
-
-_FEWEST = 1 / 3
-"""Share of links with shapes below which a robot gets sticks, so that it is seen whole (as in pictures)."""
 
 
 @dataclass
@@ -114,8 +111,8 @@ def _driver(description: Description, joint: str) -> Mimic:
 
 def dress(bodies: Sequence[Body], robot: Robot) -> None:
     """Gives bodies their looks: the meshes and shapes of the URDF's visual elements; for a link without any that can be
-    read, its collision shapes, or the capsules that stand for collision meshes; and sticks from link to link where few
-    links have any of these.
+    read, its collision shapes, or the capsules that stand for collision meshes; and sticks where links have none of
+    these (:func:`mrhubo.robot.bare_sticks`).
     """
     parsed, path = robot.description.parsed, robot.description.path
     found: dict[str, list[Mesh]] = {}
@@ -129,11 +126,10 @@ def dress(bodies: Sequence[Body], robot: Robot) -> None:
     meshed = [shape for shape in robot.description.solids.of_meshes if shape.link not in found]
     for shape in meshed:
         found.setdefault(shape.link, []).append(shape_mesh(shape))
-    for body in bodies:
+    sticks = body_sticks(bodies, bare_sticks(robot.description, found))
+    for body, solids in zip(bodies, sticks, strict=True):
         parts = [mesh.placed(pose_44) for link, pose_44 in body.links.items() for mesh in found.get(link, [])]
-        body.meshes = joined(parts)
-    if len(found) < _FEWEST * len(robot.description.links):
-        _add_sticks(bodies)
+        body.meshes = joined(parts) + capsule_meshes(solids)
 
 
 def _links_with_visible_shapes(robot: Robot) -> set[str]:
@@ -146,20 +142,27 @@ def _links_with_visible_shapes(robot: Robot) -> set[str]:
     }
 
 
-def _add_sticks(bodies: Sequence[Body]) -> None:
-    """A stick from every body to those that hang on it, as thick as in pictures."""
-    still_T44 = [body.origin_44 for body in bodies]
-    poses: dict[str, np.ndarray] = {}
-    for body, pose_44 in zip(bodies, still_T44, strict=True):
-        poses[body.name] = pose_44 if body.parent is None else poses[bodies[body.parent].name] @ pose_44
-    parents = {body.name: None if body.parent is None else bodies[body.parent].name for body in bodies}
-    sticks = stick_solids(poses, parents)
-    rows = iter(capsule_meshes(sticks))
-    for body in bodies[1:]:
-        assert body.parent is not None, "only the root hangs on nothing"
-        parent = bodies[body.parent]
-        for mesh in (next(rows), next(rows)):  # the stick, and the ball at its end
-            parent.meshes += [mesh.placed(np.linalg.inv(poses[parent.name]))]
+def body_sticks(bodies: Sequence[Body], sticks: Mapping[str, str]) -> list[Solids]:
+    """Of each body, in its own frame, the sticks that start at its links, as thick as in pictures.
+
+    Args:
+        bodies: of one robot.
+        sticks: `{end: start}`, links by name (:func:`mrhubo.robot.bare_sticks`).
+    """
+    poses: list[np.ndarray] = []
+    for body in bodies:
+        poses.append(body.origin_44 if body.parent is None else poses[body.parent] @ body.origin_44)
+    places = {
+        link: pose_44 @ own_44
+        for body, pose_44 in zip(bodies, poses, strict=True)
+        for link, own_44 in body.links.items()
+    }
+    radius_m = stick_radius(places)
+    return [
+        stick_solids(places, {end: start for end, start in sticks.items() if start in body.links}, radius_m=radius_m)
+        .transformed(np.linalg.inv(pose_44))
+        for body, pose_44 in zip(bodies, poses, strict=True)
+    ]  # fmt: skip
 
 
 def link_places(bodies: Sequence[Body], q_TN: np.ndarray) -> tuple[list[str], np.ndarray]:

@@ -14,7 +14,7 @@ from PIL.Image import Image
 from mrhubo.body import KEYPOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.frames import base_to_human
-from mrhubo.robot import read_geometry
+from mrhubo.robot import bare_sticks, read_geometry
 from mrhubo.view import Solids, animated_frames, figure_sheet, human_solids, robot_solids, save_gif, save_png
 from mrhubo.viewer.film import save_mp4
 from mrhubo.viewer.performance import Performance
@@ -79,13 +79,13 @@ def _robot_solids(robot: Performance, standing: Standing, frames: Sequence[int])
     geometry = read_geometry(description.parsed)
     shaped = {shape.link for shape in geometry}
     geometry += [shape for shape in description.solids.of_meshes if shape.link not in shaped]
-    parents = {joint.child: joint.parent for joint in description.parsed.robot.joints}
+    sticks = bare_sticks(description, {shape.link for shape in geometry})
     names, poses_TL44 = robot.links()
     poses_TL44 = poses_TL44[list(frames)]
     base_T44 = _in_place(standing, frames)
     poses_TL44[..., :3, 3] /= robot.scale  # shapes are drawn at their own size, and then made larger
     return [
-        robot_solids(geometry, dict(zip(names, poses_L44, strict=True)), parents)
+        robot_solids(geometry, dict(zip(names, poses_L44, strict=True)), sticks)
         .scaled(robot.scale)
         .transformed(base_44)
         for poses_L44, base_44 in zip(poses_TL44, base_T44, strict=True)

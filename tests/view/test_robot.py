@@ -88,11 +88,9 @@ def test_sticks_join_links_to_their_parents(toy):
     sticks = stick_solids(poses, {**parents, "base": None}, radius_m=0.01)
     low, high = sticks.bounds()
     assert low[1] == pytest.approx(-0.0135) and high[1] == pytest.approx(0.5135)
-    assert len(robot_solids(read_geometry(urdf), poses, parents)) == len(read_geometry(urdf)), (
-        "three of four have shapes"
-    )
-    sparse = [shape for shape in read_geometry(urdf) if shape.link == "arm"]
-    assert len(robot_solids(sparse, poses, parents)) == len(sparse) + len(sticks)
+    shapes = read_geometry(urdf)
+    assert len(robot_solids(shapes, poses, parents)) == len(shapes) + len(sticks)
+    assert len(robot_solids(shapes, poses, {})) == len(shapes)
     assert len(stick_solids(poses, {})) == 0
 
 
