@@ -21,6 +21,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MotionLike, read_poses, to_tensor
+from mrhubo.motion.steady import steady_root
 from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
@@ -108,6 +109,8 @@ class OptimizationRetargeter(nn.Module):
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
                 frame), or the frame rate is not positive.
         """
+        if isinstance(motion, Motion) and self._legs.has_feet:
+            motion = steady_root(motion)
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
         steps = read_steps(motion, local_TJ33, self._legs) if isinstance(motion, Motion) else None

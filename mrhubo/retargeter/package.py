@@ -27,6 +27,7 @@ from mrhubo.fast.description import FILE, Description
 from mrhubo.fast.retargeter import POLISH
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.checks import check_frame_rate
+from mrhubo.motion.steady import steady_root
 from mrhubo.reference import Avoidance, DirectionProblem, Polish
 from mrhubo.reference.standing import Standing
 from mrhubo.retargeter.clip import join_frames
@@ -223,6 +224,8 @@ class Retargeter(nn.Module):
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
         joined_at = None if together is False else frame_rate
         check_frame_rate(joined_at)
+        if joined_at is not None and isinstance(local_TJ33, Motion) and self.standing is not None:
+            local_TJ33 = steady_root(local_TJ33)
         parts = checked_parts(local_TJ33, self.body_map.skeleton, self.device, polish)
         targets = [self.body_map.human_directions(part) for part in parts]
         stands = None if joined_at is None else stand(self, local_TJ33, parts, targets, polish, avoid_collisions)

@@ -71,6 +71,21 @@ def test_the_world_may_be_turned_and_its_floor_be_anywhere(retargeter: Optimizat
     torch.testing.assert_close(other_T33, turn_33 @ turn_T33, atol=1e-4, rtol=0)
 
 
+def test_a_pelvis_that_was_lost_for_a_frame_turns_no_base(retargeter: OptimizationRetargeter) -> None:
+    """Limbs stay where they are in the world, as where a marker of the pelvis alone is lost."""
+    motion = squat()
+    assert motion.root_rotation_T33 is not None
+    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.3, 0.1, 0.4]))
+    root_T33, local_TJ33 = motion.root_rotation_T33.clone(), motion.local_TJ33.clone()
+    root_T33[20] = root_T33[20] @ turn_33
+    local_TJ33[20, :3] = turn_33.T @ local_TJ33[20, :3]
+    plain, lost = retargeter(motion), retargeter(motion.changed(root_rotation_T33=root_T33, local_TJ33=local_TJ33))
+    (place_T3, turn_T33), (other_T3, other_T33) = base(plain), base(lost)
+    assert torch.rad2deg(rotation.geodesic_distance(other_T33, turn_T33)).max() < 1
+    torch.testing.assert_close(other_T3, place_T3, atol=0.01, rtol=0)
+    torch.testing.assert_close(lost.q, plain.q, atol=0.05, rtol=0)
+
+
 def test_a_jump_is_as_high_as_the_persons_and_lands_on_the_floor(retargeter: OptimizationRetargeter) -> None:
     result = retargeter(jump())
     _, low_TP = soles(retargeter, result)
