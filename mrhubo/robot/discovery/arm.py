@@ -82,8 +82,15 @@ class Arm:
         return upper + float(np.linalg.norm(self.wrist.point_3 - self.elbow.point_3))
 
 
-def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
-    """Roles and points of an arm's joints; None if it has no elbow."""
+def read_arm(bodies: Bodies, chain: Chain, by_origin: bool = True) -> Arm | None:
+    """Roles and points of an arm's joints; None if it has no elbow.
+
+    Args:
+        bodies: the robot.
+        chain: the arm's joints, and those of its hand.
+        by_origin: whether the origin of a forearm's twist may tell where the forearm ends; along its axis it lies
+            wherever a file puts it.
+    """
     branches = long_branches(bodies, chain, _FINGER)
     chain, left_out = without_hand(bodies, chain)
     found = elbow_and_rival(bodies, chain)
@@ -110,7 +117,7 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < ON * bodies.size
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
     elbow = Spot(point_3, step.start, links, cue, sure)
-    wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
+    wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder, by_origin)
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < LEAST * bodies.size:
         return None
     if other is not None:
@@ -192,8 +199,9 @@ def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | No
 
 
 def _wrist(
-    bodies: Bodies, chain: Chain, lines: list[Line], elbow_at: int, elbow: Spot, shoulder: Spot
-) -> tuple[Spot, int | None]:
+    bodies: Bodies, chain: Chain, lines: list[Line], elbow_at: int, elbow: Spot, shoulder: Spot,
+    by_origin: bool,
+) -> tuple[Spot, int | None]:  # fmt: skip
     """The wrist, and the position of the forearm's twist."""
     upper = float(np.linalg.norm(elbow.point_3 - shoulder.point_3))
     beyond = list(range(elbow_at + 1, len(chain)))
@@ -225,7 +233,7 @@ def _wrist(
         farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
         # A hand that is fixed beyond a twist near the elbow tells more of the forearm's length.
         fixed_hand = sure > GUESS and math.dist(end_3, elbow.point_3) > _SHORT * upper > outward
-        if outward > _OUT * upper and farther and not fixed_hand:
+        if by_origin and outward > _OUT * upper and farther and not fixed_hand:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
         step = chain[twist_at]
@@ -270,8 +278,10 @@ def limb_end(
                 f"the end of the limb's collision shape, as no joint tells the {called}",
                 0.45,
             )
-    far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
-    if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
+    # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
+    fixed = {link: math.dist(bodies.position(link), start_3) for link in inside if link != last.outer_link}
+    far = max(fixed, key=lambda link: fixed[link], default=None)
+    if far is not None and fixed[far] > _OUT * usual:
         return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the {called}", 0.45
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:

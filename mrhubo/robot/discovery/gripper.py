@@ -6,11 +6,13 @@ import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import WRIST_JOINTS, elbow_reach, find_elbow
-from mrhubo.robot.discovery.lines import feet, measure, sine, unit
+from mrhubo.robot.discovery.lines import ON, PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 _BESIDE = 0.025
 """How far a jaw's axis passes the hand's line, as a share of the arm."""
+_FINGER = 0.4
+"""How long a finger is at most, as a share of the way from the elbow to its base; a hand is 0.7 of a forearm."""
 _MEET = 0.005
 """How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
 _LONGER = 1.5
@@ -33,13 +35,16 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
             end = i
         elif i - first >= WRIST_JOINTS:
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
-        elif i > first and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
+        elif (i > first or (elbow_at and i == len(chain) - 1)) and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
             end, why = i, "its name says that it belongs to the hand"
         else:
             continue
         break
-    if end == len(chain) and end > first + 1 and elbow_at and not bodies.onward(chain[-1]) and _is_jaw(chain, elbow_at):
-        end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
+    if end == len(chain) and elbow_at and not bodies.onward(chain[-1]):
+        if end > first + 1 and _is_jaw(chain, elbow_at):
+            end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
+        elif end == first + 1 and _is_lone_jaw(bodies, chain, elbow_at):
+            end, why = end - 1, "its axis lies beside the forearm's middle and it carries no more than a finger: a jaw"
     return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
 
 
@@ -62,6 +67,26 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
         line for line in lines[elbow_at + 1 : -1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
     ]
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def _is_lone_jaw(bodies: Bodies, chain: Chain, elbow_at: int) -> bool:
+    """Whether the only joint beyond an elbow is a jaw: a wrist's axis crosses the forearm's middle and carries a hand,
+    which is about as long as the forearm; a jaw's passes beside it, and carries a finger.
+    """
+    hinge, last = chain[elbow_at].hinge.line, chain[-1].hinge.line
+    centre_3, before_3 = bodies.centre(chain[-1].start), feet(hinge, last)[0]
+    if elbow_at > 0 and sine(chain[elbow_at - 1].hinge.line.axis_3, hinge.axis_3) > PARALLEL:
+        before_3 = feet(hinge, chain[elbow_at - 1].hinge.line)[0]
+    if centre_3 is None or not (way_3 := unit(centre_3 - before_3)).any() or sine(way_3, last.axis_3) < 0.7:
+        return False
+    middle = Line(before_3, way_3)
+    beside = float(np.linalg.norm(np.subtract(*feet(middle, last))))
+    corners = np.concatenate([bodies.corners(chain[-1].end), *([] if (tip := bodies.centre(chain[-1].end)) is None
+                              else [[last.nearest(tip) + 2 * (tip - last.nearest(tip))]])])  # fmt: skip
+    finger = max(last.distance(corner_3) for corner_3 in corners)
+    forearm = last.distance(before_3)
+    arm = float(measure(lines_of(chain)).out_N[-1])
+    return beside > _BESIDE * arm and ON * bodies.size < finger < _FINGER * forearm
 
 
 def without_gripper(bodies: Bodies, chain: Chain) -> Chain:
