@@ -166,6 +166,13 @@ class Bodies:
         centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
         return np.average(centres, axis=0, weights=[mass[0] for _, mass in found])
 
+    def bare(self, body: int) -> bool:
+        """Whether a body has neither mass nor shape, nor a mesh: a frame, or what a sensor turns."""
+        links = self.description.parsed.link_map
+        return self.centre(body) is None and not any(
+            links[link].visuals or links[link].collisions for link in self.links_of[body] if link in links
+        )
+
     def weight(self, body: int) -> float:
         """Mass of a body [kg]; 0 if the file gives none."""
         return sum(self.description.masses[link][0] for link in self.links_of[body] if link in self.description.masses)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands, read_arms
 from mrhubo.robot.discovery.bodies import Bodies, Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
@@ -15,6 +14,7 @@ from mrhubo.robot.discovery.foot import read_foot, with_fixed_ankle
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
 from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.questions import Named, coupled, notes, questions
 from mrhubo.robot.discovery.ranges import find_ranges
 from mrhubo.robot.discovery.reading import read_bodies
@@ -148,10 +148,8 @@ class _Finder:
         if roles.neck:
             link = roles.neck[-1].outer_link
             cue = "the end of the longest chain in the middle above the chest; it faces ahead at the zero pose"
-            named = any(
-                names.speaks_of(name, "head") for step in roles.neck for name in (step.hinge.name, step.outer_link)
-            )
-            yield "head", self._end(link, {"forward": forward_3, "up": up_3}, min(sure, 0.9 if named else 0.7), cue)
+            named = 0.9 if is_named(roles.neck) else 0.7
+            yield "head", self._end(link, {"forward": forward_3, "up": up_3}, min(sure, named), cue)
         for side, hand in self.hands.items():
             axes = {"fingers": hand.fingers_3, "thumb": hand.thumb_3}
             yield f"{side}_hand", self._end(hand.link, axes, hand.confidence, hand.cue)

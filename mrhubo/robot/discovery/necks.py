@@ -64,6 +64,11 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
     return tuple(chain for _, chain in ranked)
 
 
+def is_named(neck: Chain) -> bool:
+    """Whether names say that a chain is a neck."""
+    return any(names.speaks_of(name, "head") for step in neck for name in (step.hinge.name, step.outer_link))
+
+
 def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray, least: float) -> bool:
     """Whether another joint is the mirror image, better than a joint is its own: an eye, an ear. None is of one that
     lies nearer to the middle than `least` [m].
@@ -86,12 +91,12 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
 
 def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
     """Whether a joint above a neck's is one of the face, as a jaw's or an eye's, or of a linkage: by its name, or as a
-    single one beside pairs, or as one that carries little of the head's weight.
+    single one beside pairs, or as one that carries nothing, or little of the head's weight.
     """
     if _is_face(step):
         return True
     inside, hinges = bodies.beyond(step)
-    if paired and len(hinges) == 1:
+    if len(hinges) == 1 and (paired or (bodies.bare(step.end) and not bodies.bare(step.start))):
         return True
     weights = [sum(map(bodies.weight, part)) for part in (inside, {step.start})]
     return 0 < weights[0] < _LIGHT * weights[1]

@@ -8,6 +8,7 @@ from mrhubo.robot.discovery.arm import Spot
 from mrhubo.robot.discovery.bodies import Chain
 from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.ranges import driver
 from mrhubo.robot.discovery.result import Candidate, Question
 from mrhubo.robot.discovery.roles import Roles
@@ -39,6 +40,9 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.sure < _SURE:
         first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
         yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
+    if roles.neck and not is_named(roles.neck) and _below_shoulders(limbs):
+        yield Question("neck", "the chain that was taken for a neck ends below the shoulders, so it may be a tail, or "
+                       "an arm", tuple(step.hinge.name for step in roles.neck))  # fmt: skip
     for name, spot, _ in spots:
         if spot.confidence < _SURE:
             yield Question(name, f"the {name.replace('_', ' ')} was taken as {spot.cue}; give its point", spot.links)
@@ -64,6 +68,11 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.legs is None and len(turning) > _BACK:
         yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
                        "which may be a tail or an arm", turning)  # fmt: skip
+
+
+def _below_shoulders(limbs: Limbs) -> bool:
+    up_3, head_3 = limbs.heading.up_3, limbs.bodies.middle(limbs.roles.neck[-1].end)
+    return all(float((head_3 - arm.shoulder.point_3) @ up_3) < 0 for arm in limbs.arms.values())
 
 
 def _unread_legs(roles: Roles) -> tuple[str, ...]:
