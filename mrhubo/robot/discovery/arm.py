@@ -256,7 +256,7 @@ def limb_end(
         called: what the end is called.
     """
     inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
-    if onward:
+    if len(onward) > 1:  # where a single finger begins is no middle
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
             return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45

@@ -40,6 +40,9 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.sure < _SURE:
         first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
         yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
+    if more := _more_arms(roles):
+        yield Question("chest", "it carries more than two limbs that may be arms; those were taken that are longest, or "
+                       "most like arms, and the others stay as they are", more)  # fmt: skip
     if roles.neck and not is_named(roles.neck) and _below_shoulders(limbs):
         yield Question("neck", "the chain that was taken for a neck ends below the shoulders, so it may be a tail, or "
                        "an arm", tuple(step.hinge.name for step in roles.neck))  # fmt: skip
@@ -81,6 +84,16 @@ def _unread_legs(roles: Roles) -> tuple[str, ...]:
         return tuple(chain[0].hinge.name for chain in roles.legs.chains)
     pairs = [pair for pair in roles.others if pair.size > _LEG * roles.arms.size and len(pair.chains[0]) >= _PARTS]
     return tuple(chain[0].hinge.name for pair in pairs for chain in pair.chains)
+
+
+def _more_arms(roles: Roles) -> tuple[str, ...]:
+    """First joints of further pairs of limbs, about as long as the arms and with as many joints, on the same body."""
+    arms = roles.arms
+    pairs = [
+        pair for pair in roles.others
+        if pair.body == arms.body and pair.size > _LEG * arms.size and len(pair.chains[0]) >= len(arms.chains[0])
+    ]  # fmt: skip
+    return tuple(chain[0].hinge.name for pair in (arms, *pairs) for chain in pair.chains) if pairs else ()
 
 
 def _more_legs(roles: Roles) -> tuple[str, ...]:
