@@ -93,7 +93,9 @@ def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> floa
     """How far a limb reaches beyond its last joint [m], by shapes, masses and links; as far as is usual where these
     tell nothing, as where all shapes are meshes.
     """
-    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(last)[0]])
+    # Fingers are no part of a forearm: a limb ends where they begin.
+    bases = [bodies.position(on.outer_link)[None] for on in bodies.onward(last)]
+    corners = np.concatenate([bodies.corners(last.end), *bases])
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None:
         corners = np.vstack([corners, end_3 + 2 * (centre_3 - end_3)])

@@ -22,6 +22,8 @@ _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+_PLANE = 0.7
+"""Cosine of how far apart the normals of the mirror planes of arms and legs may be, with a waist turned at zero."""
 _ARM = 4
 """Joints of an arm with a whole shoulder."""
 _LEG = 3
@@ -82,6 +84,10 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
             f"{_following(bodies)}"
         )
+    # Arms and legs are mirrored by one plane: a waist and a neck that are alike, one below the chest and one above, are
+    # no legs.
+    beside = [pair for pair in armed if any(_beside(pair, other) for other in armed if other is not pair)]
+    armed = beside or armed[:1]
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
@@ -93,7 +99,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     else:
         options = [
             (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high) + 2.0 * _whole_arm(high), i, j)
-            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
+            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j and _beside(low, high)
         ]  # fmt: skip
         options.sort(key=lambda option: -option[0])
         score, i, j = options[0]
@@ -135,6 +141,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if legs is None:
         waist = without_base(waist, bodies.size)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
+
+
+def _beside(one: Pair, other: Pair) -> bool:
+    """Whether two pairs may have the same mirror plane."""
+    return abs(float(one.normal_3 @ other.normal_3)) > _PLANE
 
 
 def _following(bodies: Bodies) -> str:
