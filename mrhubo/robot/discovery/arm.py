@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.elbow import elbow_and_rival
+from mrhubo.robot.discovery.elbow import ball_of, elbow_and_rival
 from mrhubo.robot.discovery.gripper import without_hand
 from mrhubo.robot.discovery.limbs import ways_on
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine, unit
@@ -31,6 +31,8 @@ _ACROSS = 0.7
 """Sine of the angle between a twist axis and the elbow's hinge at the least: 45 degrees."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+_TELESCOPE = 0.15
+"""How far an arm reaches at least beyond a joint that makes it longer, as a share of it; a gripper's reaches less."""
 _FINGER = 0.4
 """How far fingers reach at most, as a share of the arm along its axes."""
 GUESS = 0.45
@@ -92,7 +94,9 @@ def read_arm(bodies: Bodies, chain: Chain, by_origin: bool = True) -> Arm | None
             wherever a file puts it.
     """
     branches = long_branches(bodies, chain, _FINGER)
+    chain, slides = _without_slides(bodies, chain)
     chain, left_out = without_hand(bodies, chain)
+    left_out = (*slides, *left_out)
     found = elbow_and_rival(bodies, chain)
     if found is None:
         return None
@@ -128,6 +132,21 @@ def read_arm(bodies: Bodies, chain: Chain, by_origin: bool = True) -> Arm | None
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
+def _without_slides(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
+    """The joints of an arm without those that slide within it, as of a forearm that telescopes: their axes have a
+    direction and no place. One before the first that turns is a lift, one at the end a gripper's.
+    """
+    first = next((i for i, step in enumerate(chain) if step.hinge.rotary), 0)
+    last = max((i for i, step in enumerate(chain) if step.hinge.rotary and step.hinge.alone), default=0)
+    inside = {
+        i for i in range(first + 1, last)
+        if not chain[i].hinge.rotary and bodies.extent(chain[i]) > _TELESCOPE * bodies.extent(chain[0])
+    }  # fmt: skip
+    why = "it makes the arm longer, as no human's becomes"
+    kept = tuple(step for i, step in enumerate(chain) if i not in inside)
+    return kept, tuple((chain[i].hinge.name, why) for i in sorted(inside))
+
+
 def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
     """What is to be said of a limb that ends in branches longer than a share of it, one of which may be its rest, while
     another is a linkage; nothing if none is as long.
@@ -159,10 +178,15 @@ def _forearm_twist(lines: list[Line], elbow_at: int, upper: float) -> int | None
     """Position of the forearm's twist, of an arm whose upper arm is so long [m]; None if it has none."""
     if elbow_at + 1 >= len(lines):
         return None
+    twist_at = elbow_at + 1
+    if ball := ball_of(lines, elbow_at):
+        nodes_N3 = measure(lines).nodes_N3
+        along_3 = unit(nodes_N3[elbow_at + 1 + ball] - nodes_N3[elbow_at])
+        twist_at = min(range(twist_at, twist_at + ball), key=lambda i: sine(lines[i].axis_3, along_3))
     # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
-    hinge, axis = lines[elbow_at], lines[elbow_at + 1]
+    hinge, axis = lines[elbow_at], lines[twist_at]
     close = float(np.linalg.norm(np.subtract(*feet(hinge, axis)))) < _TWIST_MISS * upper
-    return elbow_at + 1 if close and sine(hinge.axis_3, axis.axis_3) > 0.5 else None
+    return twist_at if close and sine(hinge.axis_3, axis.axis_3) > 0.5 else None
 
 
 def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | None) -> tuple[Spot, int]:
@@ -204,7 +228,7 @@ def _wrist(
 ) -> tuple[Spot, int | None]:  # fmt: skip
     """The wrist, and the position of the forearm's twist."""
     upper = float(np.linalg.norm(elbow.point_3 - shoulder.point_3))
-    beyond = list(range(elbow_at + 1, len(chain)))
+    beyond = list(range(elbow_at + 1 + ball_of(lines, elbow_at), len(chain)))
     twist_at = _forearm_twist(lines, elbow_at, upper)
     swings = [i for i in beyond if i != twist_at]
     if swings:

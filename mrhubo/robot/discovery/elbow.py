@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import LEAST, ON, feet, measure, sine
+from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine
 
 WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
 _HAND, _FOREARM = 0.5, 0.75
 """How much what lies beyond the last joint counts as a forearm, as it may be a long gripper; and beyond one whose axis
 crosses the one before, as a twist does at an elbow."""
+_SAME = 0.02
+"""Stretches shorter than this share of the longest one are none: the axes meet in a point."""
 _CROSSING = 0.1
 """How near two axes pass each other that cross, as a share of the longest stretch."""
 _CLOSE = 0.8
@@ -72,14 +76,25 @@ def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
     gap_N[-1] = (_FOREARM if _meets(chain, longest) else _HAND) * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
     scores = np.zeros(len(chain))
     for i in range(1, len(chain)):
-        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
-        after = max(gap_N[i : i + 2])
+        # A twist at the elbow comes before the forearm, and so do the other axes of an elbow that is a ball: the stretch
+        # is one axis further, or behind all that meet there.
+        k = next((k for k in range(i, len(chain)) if gap_N[k] > _SAME * longest), len(chain) - 1)
+        after = max(gap_N[i : max(i + 2, k + 1)])
         scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
         # More joints than a wrist has beyond it: the elbow is farther out, and the first ones are a clavicle's.
         scores[i] *= _FEW ** max(0, len(chain) - i - 2 - WRIST_JOINTS)
     if not scores.any():
         scores[1:] = gap_N[:-1]
     return scores
+
+
+def ball_of(lines: Sequence[Line], elbow_at: int) -> int:
+    """How many axes beyond an elbow's hinge meet it there, one of which twists the forearm, where the elbow is a ball; 0
+    where it is none.
+    """
+    out_N = measure(lines).out_N
+    met = sum(out - out_N[elbow_at] < _SAME * out_N[-1] for out in out_N[elbow_at + 1 :])
+    return met if met > 1 and elbow_at + 1 + met < len(lines) else 0
 
 
 def _meets(chain: Chain, longest: float) -> bool:

@@ -58,6 +58,7 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
             sure = 0.4
             why = "the leg is spread at zero" if aside > _SPREAD else "the leg does not stand at zero"
             why = "no joint turns it against the shin" if leg.ankle_at is None else why
+            why = "it ends in a wheel, which is no foot" if leg.wheeled else why
             doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
     forward_3 = heading.forward_3
     if leg.straight and leg.ankle_at is not None:
@@ -75,7 +76,7 @@ def with_fixed_ankle(bodies: Bodies, leg: Leg, heading: Heading) -> Leg:
     tells a foot from a shin that ends in a peg.
     """
     foot = leg.chain[-1].end
-    if leg.ankle_at is not None or not bodies.shapes_of[foot]:
+    if leg.ankle_at is not None or leg.wheeled or not bodies.shapes_of[foot]:
         return leg
     knee_3 = leg.knee.point_3
     up_3 = _up(bodies, foot, _upright(bodies, leg, heading))[0]

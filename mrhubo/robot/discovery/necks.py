@@ -15,6 +15,8 @@ _PLANE = 0.03
 """How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
 _LATERAL = 0.97
 """Cosine of an axis's angle to what runs across the mirror plane, from which on it is its own mirror image."""
+_MOST, _NAMED_MOST = 4, 6
+"""Joints of a neck at most; and of one that names call so, as two balls, of neck and head."""
 _LIGHT = 0.25
 """Share of its head's weight that a jaw has at most."""
 
@@ -48,7 +50,7 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
             paired = bool(twins)
             fitting = [s for s in fitting if not (chain and _in_face(bodies, s, paired))]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
-            if not fitting or len(chain) >= 4:
+            if not fitting or len(chain) >= (_NAMED_MOST if is_named((*chain, *fitting[:1])) else _MOST):
                 break
             chain.append(fitting[0])
             todo = beside = bodies.onward(fitting[0])
