@@ -23,8 +23,8 @@ _OTHER = "; the other side tells another length"
 
 
 def read_arms(bodies: Bodies, chains: Sequence[Chain]) -> list[Arm]:
-    """Both arms, without those that have no elbow. Where their forearms differ, the origins of the forearms' twists told
-    one of them at least, and shapes and masses tell both, if these agree.
+    """Both arms, without those that have no elbow. Where their forearms differ, the origins of the forearms' twists
+    told one of them at least, and shapes and masses tell both, if these agree.
     """
     arms, others = (
         [arm for chain in chains if (arm := read_arm(bodies, chain, by_origin)) is not None]

@@ -73,11 +73,13 @@ def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
     longest = float(gap_N.max())
     if longest < LEAST * bodies.size:
         return None
-    gap_N[-1] = (_FOREARM if _meets(chain, longest) else _HAND) * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
+    beyond = _beyond(bodies, chain[-1], found.nodes_N3[-1])
+    # Where nothing tells, as where all shapes are meshes, as far as is usual.
+    gap_N[-1] = _HAND * longest if beyond is None else (_FOREARM if _meets(chain, longest) else _HAND) * beyond
     scores = np.zeros(len(chain))
     for i in range(1, len(chain)):
-        # A twist at the elbow comes before the forearm, and so do the other axes of an elbow that is a ball: the stretch
-        # is one axis further, or behind all that meet there.
+        # A twist at the elbow comes before the forearm, and so do the other axes of an elbow that is a ball: the
+        # stretch is one axis further, or behind all that meet there.
         k = next((k for k in range(i, len(chain)) if gap_N[k] > _SAME * longest), len(chain) - 1)
         after = max(gap_N[i : max(i + 2, k + 1)])
         scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
@@ -89,8 +91,8 @@ def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
 
 
 def ball_of(lines: Sequence[Line], elbow_at: int) -> int:
-    """How many axes beyond an elbow's hinge meet it there, one of which twists the forearm, where the elbow is a ball; 0
-    where it is none.
+    """How many axes beyond an elbow's hinge meet it there, one of which twists the forearm, where the elbow is a ball;
+    0 where it is none.
     """
     out_N = measure(lines).out_N
     met = sum(out - out_N[elbow_at] < _SAME * out_N[-1] for out in out_N[elbow_at + 1 :])
@@ -104,10 +106,8 @@ def _meets(chain: Chain, longest: float) -> bool:
     return near and sine(one.axis_3, other.axis_3) > 1 - _CROSSING
 
 
-def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> float:
-    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; as far as is usual where these
-    tell nothing, as where all shapes are meshes.
-    """
+def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray) -> float | None:
+    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; None where these tell nothing."""
     # Fingers are no part of a forearm: a limb ends where they begin.
     bases = [bodies.position(on.outer_link)[None] for on in bodies.onward(last)]
     corners = np.concatenate([bodies.corners(last.end), *bases])
@@ -117,4 +117,4 @@ def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> floa
     # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
     own_3 = bodies.position(last.outer_link)
     corners = corners[np.linalg.norm(corners - own_3, axis=-1) > ON * bodies.size]
-    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
+    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else None

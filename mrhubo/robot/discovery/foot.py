@@ -107,7 +107,9 @@ def _upright(bodies: Bodies, leg: Leg, heading: Heading) -> np.ndarray:
 
 
 def _up(bodies: Bodies, foot: int, up_3: np.ndarray) -> tuple[np.ndarray, str | None, float]:
-    """Where a foot's sole faces away from, by its largest box: a given up_3 itself, and no cue, where there is none near it."""
+    """Where a foot's sole faces away from, by its largest box: a given up_3 itself, and no cue, where there is none
+    near it.
+    """
     boxes = [shape for shape in bodies.shapes_of[foot] if shape.kind == "box"]
     if boxes:
         box = max(boxes, key=lambda shape: float(np.prod(shape.size)))

@@ -43,7 +43,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
             end, why = i, "a wrist has no more than three joints, so it belongs to a gripper"
         elif elbow_at and _is_finger(chain, elbow_at, i):
             end, why = i, "parallel axes near each other, up to the end: a finger"
-        elif (i > first or (elbow_at and i == len(chain) - 1)) and speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn"):
+        elif (i > first or (elbow_at and i == len(chain) - 1)) and _is_named_hand(step):
             end, why = i, "its name says that it belongs to the hand"
         else:
             continue
@@ -56,13 +56,18 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
     return chain[:end], tuple((step.hinge.name, why) for step in whole[end:])
 
 
+def _is_named_hand(step: Step) -> bool:
+    return speaks_of(step.hinge.name, "hand") and not speaks_of(step.hinge.name, "turn")
+
+
 def _is_finger(chain: Chain, elbow_at: int, at: int) -> bool:
-    """Whether a joint is the first of a finger: two or more follow, all parallel to it, and each nearer to the one before
-    than a hand is long. A wrist's axes cross; one that is parallel to a single jaw's may be either.
+    """Whether a joint is the first of a finger: two or more follow, all parallel to it, and each nearer to the one
+    before than a hand is long. A wrist's axes cross; one that is parallel to a single jaw's may be either.
     """
     lines = lines_of(chain)
-    least, most = ON * lines[elbow_at].distance(lines[at].point_3), _PHALANX * lines[at].distance(
-        feet(lines[elbow_at], lines[at])[0]
+    least, most = (
+        ON * lines[elbow_at].distance(lines[at].point_3),
+        _PHALANX * lines[at].distance(feet(lines[elbow_at], lines[at])[0]),
     )
     return at + 2 < len(chain) and all(
         sine(one.axis_3, other.axis_3) < PARALLEL and least < one.distance(other.point_3) < most
@@ -86,9 +91,7 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
         return True
     if any(float(np.linalg.norm(np.subtract(*feet(line, last)))) < _MEET * arm for line in before):
         return False  # two axes that cross are a wrist, wherever the forearm's twist passes them
-    twists = [
-        line for line in lines[first:-1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95
-    ]
+    twists = [line for line in lines[first:-1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
 
 

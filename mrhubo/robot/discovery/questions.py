@@ -41,8 +41,8 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
         first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
         yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
     if more := _more_arms(roles):
-        yield Question("chest", "it carries more than two limbs that may be arms; those were taken that are longest, or "
-                       "most like arms, and the others stay as they are", more)  # fmt: skip
+        yield Question("chest", "it carries more than two limbs that may be arms; those were taken that are longest, "
+                       "or most like arms, and the others stay as they are", more)  # fmt: skip
     if roles.neck and not is_named(roles.neck) and _below_shoulders(limbs):
         yield Question("neck", "the chain that was taken for a neck ends below the shoulders, so it may be a tail, or "
                        "an arm", tuple(step.hinge.name for step in roles.neck))  # fmt: skip
