@@ -79,9 +79,9 @@ def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
     scores = np.zeros(len(chain))
     for i in range(1, len(chain)):
         # A twist at the elbow comes before the forearm, and so do the other axes of an elbow that is a ball: the
-        # stretch is one axis further, or behind all that meet there.
-        k = next((k for k in range(i, len(chain)) if gap_N[k] > _SAME * longest), len(chain) - 1)
-        after = max(gap_N[i : max(i + 2, k + 1)])
+        # stretch is one axis further, or behind all that meet there. Without a shoulder before it, that ball is one.
+        met = (k for k in range(i, len(chain)) if gap_N[k] > _SAME * longest)
+        after = max(gap_N[i : max(i + 2, next(met, i) + 1 if i >= _BEFORE else 0)])
         scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
         # More joints than a wrist has beyond it: the elbow is farther out, and the first ones are a clavicle's.
         scores[i] *= _FEW ** max(0, len(chain) - i - 2 - WRIST_JOINTS)

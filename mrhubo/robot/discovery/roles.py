@@ -22,8 +22,9 @@ _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
-_PLANE = 0.7
-"""Cosine of how far apart the normals of the mirror planes of arms and legs may be, with a waist turned at zero."""
+_ACROSS, _MIDDLE = 0.3, 0.03
+"""Cosine under which two mirror planes are at right angles, and how far from one a chain begins that lies in it, as a
+share of the robot's size."""
 _ARM = 4
 """Joints of an arm with a whole shoulder."""
 _LEG = 3
@@ -84,10 +85,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
             f"{_following(bodies)}"
         )
-    # Arms and legs are mirrored by one plane: a waist and a neck that are alike, one below the chest and one above, are
-    # no legs.
-    beside = [pair for pair in armed if any(_beside(pair, other) for other in armed if other is not pair)]
-    armed = beside or armed[:1]
+    # A waist and a neck that are alike, one below the chest and one above, are no limbs.
+    armed = [pair for pair in armed if not any(_between(bodies, pair, other) for other in armed)]
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
@@ -99,7 +98,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     else:
         options = [
             (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high) + 2.0 * _whole_arm(high), i, j)
-            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j and _beside(low, high)
+            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
         ]  # fmt: skip
         options.sort(key=lambda option: -option[0])
         score, i, j = options[0]
@@ -143,9 +142,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 
-def _beside(one: Pair, other: Pair) -> bool:
-    """Whether two pairs may have the same mirror plane."""
-    return abs(float(one.normal_3 @ other.normal_3)) > _PLANE
+def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
+    """Whether a pair begins in the mirror plane of a larger one, and is mirrored across it: what is in the middle."""
+    apart = (pair.mounts_23 - other.mounts_23.mean(0)) @ other.normal_3
+    across = abs(float(pair.normal_3 @ other.normal_3)) < _ACROSS
+    return across and other.size > pair.size and float(np.abs(apart).max()) < _MIDDLE * bodies.size
 
 
 def _following(bodies: Bodies) -> str:
