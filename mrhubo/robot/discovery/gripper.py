@@ -33,7 +33,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
     elbow_at = find_elbow(bodies, chain)
     first, most = 2, WRIST_JOINTS
     if elbow_at is not None:
-        first, most = elbow_at + 1, WRIST_JOINTS + max(0, ball_of(lines_of(chain), elbow_at) - 1)
+        first, most = elbow_at + 1, WRIST_JOINTS + ball_of(lines_of(chain), elbow_at)
     for i in range(first, len(chain)):
         step = chain[i]
         # Behind a gripper nothing is driven by itself; a bar beside the elbow follows it too.
