@@ -57,13 +57,16 @@ def choose_neck(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) 
     """The roles with the likeliest neck that begins above the shoulders or ends there, or with none."""
     if not roles.necks:
         return roles
+    necks = [neck for neck in roles.necks if is_named(neck) or not is_named(neck, "waist")]
+    if not necks:
+        return roles.with_neck(())
     heading = find_heading(bodies, roles.with_neck(()), arms, legs)
     if heading.up_sure < _UNSURE:
-        return roles.with_neck(roles.necks[0])
+        return roles.with_neck(necks[0])
     shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms]))
-    tops = {neck: float(bodies.middle(neck[-1].end) @ heading.up_3) - shoulders for neck in roles.necks}
+    tops = {neck: float(bodies.middle(neck[-1].end) @ heading.up_3) - shoulders for neck in necks}
     # A tail, or an arm before the chest, may end at the height of the shoulders; a head is above them if it can be.
-    likely = sorted(roles.necks, key=lambda neck: not is_named(neck) and tops[neck] < 0)
+    likely = sorted(necks, key=lambda neck: not is_named(neck) and tops[neck] < 0)
     least = -_BELOW * arms[0].length
     return roles.with_neck(next((neck for neck in likely if is_named(neck) or tops[neck] > least), ()))
 

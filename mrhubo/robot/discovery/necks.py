@@ -66,9 +66,9 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
     return tuple(chain for _, chain in ranked)
 
 
-def is_named(neck: Chain) -> bool:
-    """Whether names say that a chain is a neck."""
-    return any(names.speaks_of(name, "head") for step in neck for name in (step.hinge.name, step.outer_link))
+def is_named(neck: Chain, kind: str = "head") -> bool:
+    """Whether names say that a chain is a neck, or a `waist`."""
+    return any(names.speaks_of(name, kind) for step in neck for name in (step.hinge.name, step.outer_link))
 
 
 def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray, least: float) -> bool:
