@@ -91,7 +91,7 @@ def with_fixed_ankle(bodies: Bodies, leg: Leg, heading: Heading) -> Leg:
         return leg
     # Seen from before, a shin goes straight down from its knee.
     ankle_3 = knee_3 - (1 - _HEIGHT) * tall * up_3 + (float(along.min()) + _HEEL * length) * ahead_3
-    cue = "as high above the sole and as far before the heel as usual, as no joint tells the ankle"
+    cue = "the point as high above the sole and as far before the heel as usual, as no joint tells the ankle"
     return replace(leg, ankle=Spot(ankle_3, foot, leg.ankle.links, cue, GUESS))
 
 
