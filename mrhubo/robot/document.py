@@ -160,13 +160,14 @@ def _remove_namespaces(path: Path, robot: etree._Element) -> None:
 
 
 def _separate(robot: etree._Element) -> None:
-    """Puts blanks for commas between the numbers of a list, as simulators read them too. A decimal comma gives more
-    numbers than there may be, and is told as any other wrong list.
+    """Puts blanks for commas between the three numbers of a list, as simulators read them too. Decimal commas would
+    give another count: such a list stays as it is, and is told as any other wrong one.
     """
     for element in robot.iter("origin", "axis", "box", "mesh"):
         for word in _LISTS:
-            if "," in element.get(word, ""):
-                element.set(word, element.get(word).replace(",", " "))
+            text = element.get(word, "")
+            if "," in text and len(text.replace(",", " ").split()) == 3:
+                element.set(word, text.replace(",", " "))
 
 
 def _split(element: etree._Element) -> tuple[str, str, str]:
