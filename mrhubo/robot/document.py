@@ -34,6 +34,8 @@ _NO_XML = {
     b"<!doctype html": "is a web page; save the file itself (on GitHub: Raw)",
     b"<html": "is a web page; save the file itself (on GitHub: Raw)",
 }
+_LISTS = ("xyz", "rpy", "size", "scale")
+"""Attributes of several numbers."""
 _UNDEFINED_PREFIX = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
 
 
@@ -68,6 +70,7 @@ def read_document(path: Path) -> Document:
         lines_before, text = text.count(b"\n", 0, start), text[start:]
     robot = _parse(path, text)
     _remove_namespaces(path, robot)
+    _separate(robot)
     if robot.tag != "robot":
         raise UserError(f"robot.urdf: {path} is no URDF: {_root(robot.tag)}")
     if robot.find("link") is None:
@@ -154,6 +157,17 @@ def _remove_namespaces(path: Path, robot: etree._Element) -> None:
     for element in foreign:
         if element.getparent() is not None:
             element.getparent().remove(element)
+
+
+def _separate(robot: etree._Element) -> None:
+    """Puts blanks for commas between the three numbers of a list, as simulators read them too. Decimal commas would
+    give another count: such a list stays as it is, and is told as any other wrong one.
+    """
+    for element in robot.iter("origin", "axis", "box", "mesh"):
+        for word in _LISTS:
+            text = element.get(word, "")
+            if "," in text and len(text.replace(",", " ").split()) == 3:
+                element.set(word, text.replace(",", " "))
 
 
 def _split(element: etree._Element) -> tuple[str, str, str]:

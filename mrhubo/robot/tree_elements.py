@@ -113,7 +113,7 @@ def _shape_problem(element: etree._Element) -> str | None:
     for word, count in _SHAPES[shape.tag].items():
         if shape.get(word) is None:
             return f"is a <{shape.tag}> without {word}"
-        numbers = read_numbers(shape.get(word).replace(",", " "), count, MOST_METRES)
+        numbers = read_numbers(shape.get(word), count, MOST_METRES)
         if isinstance(numbers, str):
             return f"has {shown(shape, word, numbers)}"
     return None
@@ -125,7 +125,7 @@ def _shape(document: Document, element: etree._Element, found: Findings) -> etre
     for material in clean.findall("material"):
         clean.replace(material, clean_material(document, material, found))
     for mesh in clean.iterfind("geometry/mesh"):
-        if any(isinstance(read_numbers(word, 1), str) for word in mesh.get("scale", "").replace(",", " ").split()):
+        if any(isinstance(read_numbers(word, 1), str) for word in mesh.get("scale", "").split()):
             del mesh.attrib["scale"]
     return clean
 

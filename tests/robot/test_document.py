@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -141,3 +142,15 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, edits: list[tuple[int
 def test_no_entity_is_expanded_from_a_file(arm: Callable[..., Path]) -> None:
     bomb = '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="arm">&a;'
     assert Robot(arm(('<robot name="arm">', bomb)), ["shoulder"]).joint_names == ("shoulder",)
+
+
+def test_commas_between_numbers_are_blanks(tmp_path: Path) -> None:
+    usual = describe(written(tmp_path, PAIR))
+    text = re.sub(r'(xyz|size)="([^"]*)"', lambda found: f'{found[1]}="{", ".join(found[2].split())}"', PAIR)
+    assert text != PAIR and not describe(written(tmp_path, text)).faults
+    for name, joint in describe(written(tmp_path, text)).joints.items():
+        assert (joint.origin_44 == usual.joints[name].origin_44).all() and (
+            joint.axis_3 == usual.joints[name].axis_3
+        ).all()
+    # A decimal comma makes more numbers than there may be, and is told as before.
+    assert describe(written(tmp_path, PAIR.replace('xyz="0 1 0"', 'xyz="0,0 1,0 0,0"', 1))).faults

@@ -32,7 +32,7 @@ NEEDED = [
     (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz="0 0 -1e200"'), r"<origin xyz=\"0 0 -1e200\"> is beyond 1,000; lengths are in metres"),
     (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz="0 0 nan"'), r"<origin xyz=\"0 0 nan\"> holds NaN"),
     (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz="0 0 -inf"'), r"<origin xyz=\"0 0 -inf\"> holds an infinite number"),
-    (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz="0,0,-0.25"'), r"<origin xyz=\"0,0,-0.25\"> must be three numbers"),
+    (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz="0,0 0,0 -0,25"'), r"<origin xyz=\"0,0 0,0 -0,25\"> must be three numbers"),
     (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz=""'), r"<origin xyz=\"\"> must be three numbers, not 0"),
     (within("l_yaw", 'xyz="0 0 -0.25"', 'xyz="0 0 -0.25" rpy="0 ${pi} 0"'), r"<origin rpy=\"0 \${pi} 0\"> is an expression, .*`xacro FILE"),
     (within("l_yaw", 'lower="-1.5"', 'lower="${-pi/2}"'), r"'l_yaw' has impossible limits: <limit lower=\"\${-pi/2}\"> is an expression, .*`xacro FILE"),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import GUESS, Arm, doubted
+from mrhubo.robot.discovery.arm import GUESS, Arm, doubted, read_arm
+from mrhubo.robot.discovery.bodies import Bodies, Chain
 from mrhubo.robot.discovery.hand import Hand
 
 _LENGTH = 0.05
@@ -21,16 +22,33 @@ _FINGERS = math.cos(math.radians(5))
 _OTHER = "; the other side tells another length"
 
 
+def read_arms(bodies: Bodies, chains: Sequence[Chain]) -> list[Arm]:
+    """Both arms, without those that have no elbow. Where their forearms differ, the origins of the forearms' twists
+    told one of them at least, and shapes and masses tell both, if these agree.
+    """
+    arms, others = (
+        [arm for chain in chains if (arm := read_arm(bodies, chain, by_origin)) is not None]
+        for by_origin in (True, False)
+    )
+    if len(arms) == len(others) == 2 and _differ(_forearms(arms)) and not _differ(_forearms(others)):
+        return others
+    return arms
+
+
 def agreeing_arms(arms: Mapping[str, Arm]) -> dict[str, Arm]:
     """The arms, with points less sure that make one side's upper arm or forearm longer than the other's."""
     upper = [math.dist(arm.shoulder.point_3, arm.elbow.point_3) for arm in arms.values()]
-    lower = [math.dist(arm.elbow.point_3, arm.wrist.point_3) for arm in arms.values()]
+    lower = _forearms(arms.values())
     found = dict(arms)
     if _differ(upper):
         found = {side: replace(arm, elbow=doubted(arm.elbow, _OTHER)) for side, arm in found.items()}
     if _differ(lower):
         found = {side: replace(arm, wrist=doubted(arm.wrist, _OTHER)) for side, arm in found.items()}
     return found
+
+
+def _forearms(arms: Iterable[Arm]) -> list[float]:
+    return [math.dist(arm.elbow.point_3, arm.wrist.point_3) for arm in arms]
 
 
 def _differ(lengths: list[float]) -> bool:

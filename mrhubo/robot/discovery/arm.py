@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.elbow import elbow_and_rival
+from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
+from mrhubo.robot.discovery.elbow import ball_of, elbow_and_rival
+from mrhubo.robot.discovery.ends import OUT, limb_end, long_branches
 from mrhubo.robot.discovery.gripper import without_hand
-from mrhubo.robot.discovery.limbs import ways_on
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
-_OUT = 1 / 3
-"""How long a forearm is at least, as a share of the upper arm."""
 _SHORT, _NAMED = 0.6, 0.5
 """How long a forearm is usually at least, as a share of the upper arm, and one whose twist is called a wrist's: shorter
 ones are asked about where no joint that swings tells the wrist."""
@@ -31,6 +29,8 @@ _ACROSS = 0.7
 """Sine of the angle between a twist axis and the elbow's hinge at the least: 45 degrees."""
 _CLAVICLE = 0.2
 """How far a first axis passes the shoulder if it is a clavicle's, as a share of the arm (0.1 m on a human's)."""
+_TELESCOPE = 0.15
+"""How far an arm reaches at least beyond a joint that makes it longer, as a share of it; a gripper's reaches less."""
 _FINGER = 0.4
 """How far fingers reach at most, as a share of the arm along its axes."""
 GUESS = 0.45
@@ -82,10 +82,19 @@ class Arm:
         return upper + float(np.linalg.norm(self.wrist.point_3 - self.elbow.point_3))
 
 
-def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
-    """Roles and points of an arm's joints; None if it has no elbow."""
+def read_arm(bodies: Bodies, chain: Chain, by_origin: bool = True) -> Arm | None:
+    """Roles and points of an arm's joints; None if it has no elbow.
+
+    Args:
+        bodies: the robot.
+        chain: the arm's joints, and those of its hand.
+        by_origin: whether the origin of a forearm's twist may tell where the forearm ends; along its axis it lies
+            wherever a file puts it.
+    """
     branches = long_branches(bodies, chain, _FINGER)
+    chain, slides = _without_slides(bodies, chain)
     chain, left_out = without_hand(bodies, chain)
+    left_out = (*slides, *left_out)
     found = elbow_and_rival(bodies, chain)
     if found is None:
         return None
@@ -110,7 +119,7 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     on_hinge = float(np.linalg.norm(point_3 - hinge_3)) < ON * bodies.size
     links = (step.inner_link, step.outer_link) if on_hinge else (step.inner_link,)
     elbow = Spot(point_3, step.start, links, cue, sure)
-    wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder)
+    wrist, forearm_twist_at = _wrist(bodies, chain, lines, elbow_at, elbow, shoulder, by_origin)
     if min(math.dist(shoulder.point_3, elbow.point_3), math.dist(elbow.point_3, wrist.point_3)) < LEAST * bodies.size:
         return None
     if other is not None:
@@ -121,16 +130,19 @@ def read_arm(bodies: Bodies, chain: Chain) -> Arm | None:
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
 
 
-def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
-    """What is to be said of a limb that ends in branches longer than a share of it, one of which may be its rest, while
-    another is a linkage; nothing if none is as long.
+def _without_slides(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:
+    """The joints of an arm without those that slide within it, as of a forearm that telescopes: their axes have a
+    direction and no place. One before the first that turns is a lift, one at the end a gripper's.
     """
-    way = float(measure(lines_of(chain)).out_N[-1])
-    onward = ways_on(bodies, chain[-1])
-    if not any(bodies.extent(on) > share * way for on in onward):
-        return ""
-    among = " and ".join(f"'{on.hinge.name}'" for on in onward)
-    return f"; the limb was taken to end where {among} begin, one of which may go on with it"
+    first = next((i for i, step in enumerate(chain) if step.hinge.rotary), 0)
+    last = max((i for i, step in enumerate(chain) if step.hinge.rotary and step.hinge.alone), default=0)
+    inside = {
+        i for i in range(first + 1, last)
+        if not chain[i].hinge.rotary and bodies.extent(chain[i]) > _TELESCOPE * bodies.extent(chain[0])
+    }  # fmt: skip
+    why = "it makes the arm longer, as no human's becomes"
+    kept = tuple(step for i, step in enumerate(chain) if i not in inside)
+    return kept, tuple((chain[i].hinge.name, why) for i in sorted(inside))
 
 
 def _twist(lines: list[Line], elbow_at: int) -> int | None:
@@ -152,10 +164,15 @@ def _forearm_twist(lines: list[Line], elbow_at: int, upper: float) -> int | None
     """Position of the forearm's twist, of an arm whose upper arm is so long [m]; None if it has none."""
     if elbow_at + 1 >= len(lines):
         return None
+    twist_at = elbow_at + 1
+    if ball := ball_of(lines, elbow_at):
+        nodes_N3 = measure(lines).nodes_N3
+        along_3 = unit(nodes_N3[elbow_at + 1 + ball] - nodes_N3[elbow_at])
+        twist_at = min(range(twist_at, twist_at + ball), key=lambda i: sine(lines[i].axis_3, along_3))
     # A swing of a wrist passes the elbow a forearm away; a twist passes it close by.
-    hinge, axis = lines[elbow_at], lines[elbow_at + 1]
+    hinge, axis = lines[elbow_at], lines[twist_at]
     close = float(np.linalg.norm(np.subtract(*feet(hinge, axis)))) < _TWIST_MISS * upper
-    return elbow_at + 1 if close and sine(hinge.axis_3, axis.axis_3) > 0.5 else None
+    return twist_at if close and sine(hinge.axis_3, axis.axis_3) > 0.5 else None
 
 
 def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | None) -> tuple[Spot, int]:
@@ -192,11 +209,12 @@ def _shoulder(chain: Chain, lines: list[Line], elbow_at: int, twist_at: int | No
 
 
 def _wrist(
-    bodies: Bodies, chain: Chain, lines: list[Line], elbow_at: int, elbow: Spot, shoulder: Spot
-) -> tuple[Spot, int | None]:
+    bodies: Bodies, chain: Chain, lines: list[Line], elbow_at: int, elbow: Spot, shoulder: Spot,
+    by_origin: bool,
+) -> tuple[Spot, int | None]:  # fmt: skip
     """The wrist, and the position of the forearm's twist."""
     upper = float(np.linalg.norm(elbow.point_3 - shoulder.point_3))
-    beyond = list(range(elbow_at + 1, len(chain)))
+    beyond = list(range(elbow_at + 1 + ball_of(lines, elbow_at), len(chain)))
     twist_at = _forearm_twist(lines, elbow_at, upper)
     swings = [i for i in beyond if i != twist_at]
     if swings:
@@ -225,7 +243,7 @@ def _wrist(
         farther = outward > math.dist(end_3, elbow.point_3) or lines[twist_at].distance(elbow.point_3) < 0.05 * upper
         # A hand that is fixed beyond a twist near the elbow tells more of the forearm's length.
         fixed_hand = sure > GUESS and math.dist(end_3, elbow.point_3) > _SHORT * upper > outward
-        if outward > _OUT * upper and farther and not fixed_hand:
+        if by_origin and outward > OUT * upper and farther and not fixed_hand:
             end_3, how, sure = origin_3, "the origin of the forearm's twist, the only joint beyond the elbow", 0.7
         end_3 = lines[twist_at].nearest(end_3)
         step = chain[twist_at]
@@ -233,55 +251,3 @@ def _wrist(
         if math.dist(end_3, elbow.point_3) < (_NAMED if named else _SHORT) * upper:
             sure, how = min(sure, GUESS), f"{how}, which makes a short forearm"
     return Spot(end_3, last.end, (last.outer_link,), how, sure), twist_at
-
-
-def limb_end(
-    bodies: Bodies, last: Step, start_3: np.ndarray, usual_3: np.ndarray, called: str = "wrist"
-) -> tuple[np.ndarray, str, float]:
-    """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
-
-    Args:
-        bodies: the robot.
-        last: the last joint.
-        start_3: where the limb starts.
-        usual_3: where it should end about, as seen from its start (3,) [m]: as the limb before it goes on.
-        called: what the end is called.
-    """
-    inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
-    if onward:
-        bases = [bodies.position(on.outer_link) for on in onward]
-        if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > _OUT * usual:
-            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
-    named = [
-        link
-        for link in inside
-        if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > _OUT * usual
-    ]
-    if named:
-        nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
-        return bodies.position(nearest), f"the fixed link '{nearest}', after its name", 0.6
-    if bodies.shapes_of[last.end]:
-        corners = bodies.corners(last.end)
-        out_3 = unit(corners.mean(0) - start_3)
-        reach = float(((corners - start_3) @ out_3).max())
-        if reach > _OUT * usual:
-            return (
-                start_3 + reach * out_3,
-                f"the end of the limb's collision shape, as no joint tells the {called}",
-                0.45,
-            )
-    far = max(inside, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
-    if float(np.linalg.norm(bodies.position(far) - start_3)) > _OUT * usual:
-        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the {called}", 0.45
-    centre_3 = bodies.centre(last.end)
-    if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
-        return (
-            start_3 + 2 * (centre_3 - start_3),
-            f"twice as far as the centre of mass, as no joint tells the {called}",
-            0.4,
-        )
-    return (
-        start_3 + usual_3,
-        f"a guess: as long as the limb before it, and straight, as nothing tells the {called}",
-        0.1,
-    )

@@ -166,6 +166,13 @@ class Bodies:
         centres = [self.pose_44[link][:3, :3] @ np.array(mass[1:]) + self.position(link) for link, mass in found]
         return np.average(centres, axis=0, weights=[mass[0] for _, mass in found])
 
+    def bare(self, body: int) -> bool:
+        """Whether a body has neither mass nor shape, nor a mesh: a frame, or what a sensor turns."""
+        links = self.description.parsed.link_map
+        return self.centre(body) is None and not any(
+            links[link].visuals or links[link].collisions for link in self.links_of[body] if link in links
+        )
+
     def weight(self, body: int) -> float:
         """Mass of a body [kg]; 0 if the file gives none."""
         return sum(self.description.masses[link][0] for link in self.links_of[body] if link in self.description.masses)
@@ -179,17 +186,21 @@ class Bodies:
         """Points (P, 3) at the outside of a body's shapes, and the origins of its links; of meshes nothing is known."""
         found = [self.position(link)[None] for link in self.links_of[body]]
         for shape in self.shapes_of[body]:
-            pose_44 = self.pose_44[shape.link] @ shape.origin_44
-            size = shape.size
-            half_3 = {
-                "box": lambda s=size: np.array(s) / 2,
-                "sphere": lambda s=size: np.full(3, s[0]),
-                "cylinder": lambda s=size: np.array([s[0], s[0], s[1] / 2]),
-                "capsule": lambda s=size: np.array([s[0], s[0], s[1] / 2 + s[0]]),
-            }[shape.kind]()
-            signs_83 = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)
-            found.append(pose_44[:3, 3] + (signs_83 * half_3) @ pose_44[:3, :3].T)
+            found.append(self.shape_corners(shape))
         return np.concatenate(found)
+
+    def shape_corners(self, shape: LinkGeometry) -> np.ndarray:
+        """Corners (8, 3) of the box around a primitive shape."""
+        pose_44 = self.pose_44[shape.link] @ shape.origin_44
+        size = shape.size
+        half_3 = {
+            "box": lambda: np.array(size) / 2,
+            "sphere": lambda: np.full(3, size[0]),
+            "cylinder": lambda: np.array([size[0], size[0], size[1] / 2]),
+            "capsule": lambda: np.array([size[0], size[0], size[1] / 2 + size[0]]),
+        }[shape.kind]()
+        signs_83 = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)
+        return pose_44[:3, 3] + (signs_83 * half_3) @ pose_44[:3, :3].T
 
     def beyond(self, step: Step) -> tuple[set[int], list[Hinge]]:
         """The bodies and joints of a branch, its first joint among them."""

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.robot.discovery import names
-from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands
-from mrhubo.robot.discovery.arm import read_arm
+from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands, read_arms
 from mrhubo.robot.discovery.bodies import Bodies, Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
-from mrhubo.robot.discovery.foot import read_foot
+from mrhubo.robot.discovery.foot import read_foot, with_fixed_ankle
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
 from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.questions import Named, coupled, notes, questions
 from mrhubo.robot.discovery.ranges import find_ranges
 from mrhubo.robot.discovery.reading import read_bodies
@@ -56,7 +55,7 @@ class _Finder:
     """Puts together what the parts of this package find."""
 
     def __init__(self, bodies: Bodies, roles: Roles, whole_body: bool) -> None:
-        arms = [arm for chain in roles.arms.chains if (arm := read_arm(bodies, chain)) is not None]
+        arms = read_arms(bodies, roles.arms.chains)
         legs = [
             leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None
         ]
@@ -68,6 +67,7 @@ class _Finder:
         across_3 = roles.legs.normal_3 if roles.legs else self.heading.left_3
         if float(across_3 @ self.heading.left_3) < 0:
             legs = legs[::-1]
+        legs = [with_fixed_ankle(bodies, leg, self.heading) for leg in legs]
         self.legs: dict[str, Leg] = dict(zip(SIDES, legs, strict=False))
         hands: dict[str, Hand] = {}
         for sign, (side, arm) in zip((1.0, -1.0), self.arms.items(), strict=True):
@@ -148,10 +148,8 @@ class _Finder:
         if roles.neck:
             link = roles.neck[-1].outer_link
             cue = "the end of the longest chain in the middle above the chest; it faces ahead at the zero pose"
-            named = any(
-                names.speaks_of(name, "head") for step in roles.neck for name in (step.hinge.name, step.outer_link)
-            )
-            yield "head", self._end(link, {"forward": forward_3, "up": up_3}, min(sure, 0.9 if named else 0.7), cue)
+            named = 0.9 if is_named(roles.neck) else 0.7
+            yield "head", self._end(link, {"forward": forward_3, "up": up_3}, min(sure, named), cue)
         for side, hand in self.hands.items():
             axes = {"fingers": hand.fingers_3, "thumb": hand.thumb_3}
             yield f"{side}_hand", self._end(hand.link, axes, hand.confidence, hand.cue)

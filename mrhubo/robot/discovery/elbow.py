@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import LEAST, ON, measure
+from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, measure, sine
 
 WRIST_JOINTS = 3
 """Joints beyond an elbow that an arm can have: a twist and two swings."""
-_HAND = 0.5
-"""How much what lies beyond the last joint counts as a forearm: it may be a long gripper."""
+_HAND, _FOREARM = 0.5, 0.75
+"""How much what lies beyond the last joint counts as a forearm, as it may be a long gripper; and beyond one whose axis
+crosses the one before, as a twist does at an elbow."""
+_SAME = 0.02
+"""Stretches shorter than this share of the longest one are none: the axes meet in a point."""
+_CROSSING = 0.1
+"""How near two axes pass each other that cross, as a share of the longest stretch."""
 _CLOSE = 0.8
 """Second axis's share of the elbow's stretches from which on it may be the elbow as well."""
 _BEFORE, _FEW = 3, 0.8
@@ -28,13 +35,14 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
 
 def elbow_and_rival(bodies: Bodies, chain: Chain) -> tuple[int, str | None] | None:
     """`find_elbow`, and the joint that may be the elbow as well, if one has stretches about as long on either side.
-    Beyond an elbow that has a whole shoulder before it, a wrist with a long hand is none.
+    Beyond an elbow that has a whole shoulder before it, and no more joints beyond it than a wrist has, a wrist with a
+    long hand is none.
     """
     scores = _elbow_scores(bodies, chain)
     if scores is None:
         return None
     elbow_at = _best(scores)
-    if elbow_at >= _BEFORE:
+    if elbow_at >= _BEFORE and len(chain) - elbow_at - 1 <= WRIST_JOINTS:
         scores[elbow_at + 1 :] = 0.0
     best = float(scores[elbow_at])
     scores[elbow_at] = 0.0
@@ -65,26 +73,48 @@ def _elbow_scores(bodies: Bodies, chain: Chain) -> np.ndarray | None:
     longest = float(gap_N.max())
     if longest < LEAST * bodies.size:
         return None
-    gap_N[-1] = _HAND * _beyond(bodies, chain[-1], found.nodes_N3[-1], longest)
+    beyond = _beyond(bodies, chain[-1], found.nodes_N3[-1])
+    # Where nothing tells, as where all shapes are meshes, as far as is usual.
+    gap_N[-1] = _HAND * longest if beyond is None else (_FOREARM if _meets(chain, longest) else _HAND) * beyond
     scores = np.zeros(len(chain))
     for i in range(1, len(chain)):
-        # A twist at the elbow comes before the forearm: the stretch is one or two axes further.
-        after = max(gap_N[i : i + 2])
+        # A twist at the elbow comes before the forearm, and so do the other axes of an elbow that is a ball: the
+        # stretch is one axis further, or behind all that meet there. Without a shoulder before it, that ball is one.
+        met = (k for k in range(i, len(chain)) if gap_N[k] > _SAME * longest)
+        after = max(gap_N[i : max(i + 2, next(met, i) + 1 if i >= _BEFORE else 0)])
         scores[i] = min(gap_N[i - 1], after) * (_FEW ** max(0, _BEFORE - i) if len(chain) > _BEFORE + 2 else 1.0)
+        # More joints than a wrist has beyond it: the elbow is farther out, and the first ones are a clavicle's.
+        scores[i] *= _FEW ** max(0, len(chain) - i - 2 - WRIST_JOINTS)
     if not scores.any():
         scores[1:] = gap_N[:-1]
     return scores
 
 
-def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray, usual: float) -> float:
-    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; as far as is usual where these
-    tell nothing, as where all shapes are meshes.
+def ball_of(lines: Sequence[Line], elbow_at: int) -> int:
+    """How many axes beyond an elbow's hinge meet it there, one of which twists the forearm, where the elbow is a ball;
+    0 where it is none.
     """
-    corners = np.concatenate([bodies.corners(body) for body in bodies.beyond(last)[0]])
+    out_N = measure(lines).out_N
+    met = sum(out - out_N[elbow_at] < _SAME * out_N[-1] for out in out_N[elbow_at + 1 :])
+    return met if met > 1 and elbow_at + 1 + met < len(lines) else 0
+
+
+def _meets(chain: Chain, longest: float) -> bool:
+    """Whether the last axis crosses the one before, about at a right angle."""
+    one, other = lines_of(chain)[-2:]
+    near = float(np.linalg.norm(np.subtract(*feet(one, other)))) < _CROSSING * longest
+    return near and sine(one.axis_3, other.axis_3) > 1 - _CROSSING
+
+
+def _beyond(bodies: Bodies, last: Step, end_3: np.ndarray) -> float | None:
+    """How far a limb reaches beyond its last joint [m], by shapes, masses and links; None where these tell nothing."""
+    # Fingers are no part of a forearm: a limb ends where they begin.
+    bases = [bodies.position(on.outer_link)[None] for on in bodies.onward(last)]
+    corners = np.concatenate([bodies.corners(last.end), *bases])
     centre_3 = bodies.centre(last.end)
     if centre_3 is not None:
         corners = np.vstack([corners, end_3 + 2 * (centre_3 - end_3)])
     # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
     own_3 = bodies.position(last.outer_link)
     corners = corners[np.linalg.norm(corners - own_3, axis=-1) > ON * bodies.size]
-    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else usual
+    return float(np.linalg.norm(corners - end_3, axis=-1).max()) if len(corners) else None

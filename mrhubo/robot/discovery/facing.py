@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain
+from mrhubo.robot.discovery.bodies import Bodies
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import reach_middle
+from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.roles import Roles
 from mrhubo.robot.discovery.votes import NAMES, Vote, forward_votes
 
@@ -57,18 +57,18 @@ def choose_neck(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) 
     """The roles with the likeliest neck that begins above the shoulders or ends there, or with none."""
     if not roles.necks:
         return roles
+    necks = [neck for neck in roles.necks if is_named(neck) or not is_named(neck, "waist")]
+    if not necks:
+        return roles.with_neck(())
     heading = find_heading(bodies, roles.with_neck(()), arms, legs)
-    shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms])) - _BELOW * arms[0].length
-    for neck in roles.necks:
-        top_3 = bodies.middle(neck[-1].end)
-        if _is_named(neck) or heading.up_sure < _UNSURE or float(top_3 @ heading.up_3) > shoulders:
-            return roles.with_neck(neck)
-    return roles.with_neck(())
-
-
-def _is_named(neck: Chain) -> bool:
-    """Whether names say that a chain is a neck."""
-    return any(names.speaks_of(name, "head") for step in neck for name in (step.hinge.name, step.outer_link))
+    if heading.up_sure < _UNSURE:
+        return roles.with_neck(necks[0])
+    shoulders = float(np.mean([arm.shoulder.point_3 @ heading.up_3 for arm in arms]))
+    tops = {neck: float(bodies.middle(neck[-1].end) @ heading.up_3) - shoulders for neck in necks}
+    # A tail, or an arm before the chest, may end at the height of the shoulders; a head is above them if it can be.
+    likely = sorted(necks, key=lambda neck: not is_named(neck) and tops[neck] < 0)
+    least = -_BELOW * arms[0].length
+    return roles.with_neck(next((neck for neck in likely if is_named(neck) or tops[neck] > least), ()))
 
 
 def find_heading(bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg]) -> Heading:
@@ -152,7 +152,7 @@ def _up(
         cues.append(("how the arms move", hangs_3, 0.7 * min(1.0, 3 * float(np.linalg.norm(hangs_3)))))
     if roles.neck:
         top_3 = bodies.middle(roles.neck[-1].end)
-        cues.append(("the head", top_3 - shoulders_3, 2.0 if _is_named(roles.neck) else 0.7))
+        cues.append(("the head", top_3 - shoulders_3, 2.0 if is_named(roles.neck) else 0.7))
     flat = [(what, vector_3 - normal_3 * (normal_3 @ vector_3), weight) for what, vector_3, weight in cues]
     flat = [(what, unit(vector_3), weight) for what, vector_3, weight in flat if np.linalg.norm(vector_3) > 1e-6]
     candidates = _directions(bodies, roles, normal_3)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mrhubo.robot.discovery.arm import GUESS, Spot
 from mrhubo.robot.discovery.bodies import Bodies
 from mrhubo.robot.discovery.facing import Heading
 from mrhubo.robot.discovery.leg import Leg
@@ -20,6 +21,13 @@ _STANDING = 0.8
 """Cosine of how far from downwards a leg may run at the zero pose for its foot to stand on a floor there."""
 _SPREAD = 0.2
 """Sine of how far outwards or inwards it may run there for its foot to be flat (12 degrees)."""
+_HEIGHT, _HEEL = 0.165, 0.32
+"""Where an ankle is that has no joint: how high above the sole, as a share of the knee's height, and how far before the
+heel, as a share of the foot's length. Both are medians of fifteen public humanoids whose ankles have joints, of which
+the height is 0.11 to 0.31 and the distance 0.22 to 0.5."""
+_FOOT, _FLOOR = 0.25, 0.1
+"""How long a foot is at least, and how far above the lowest of its shapes the others may end, as shares of the knee's
+height."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +47,8 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
     """The foot at the end of a leg."""
     last = leg.chain[-1]
     link = last.outer_link
-    up_3, how, sure = _up(bodies, last.end, heading.up_3)
+    up_3, how, sure = _up(bodies, last.end, _upright(bodies, leg, heading))
+    up_3 = heading.up_3 if how is None else up_3
     doubt = None
     along_3 = unit(leg.ankle.point_3 - leg.hip.point_3)
     down, aside = -float(along_3 @ heading.up_3), abs(float(along_3 @ heading.left_3))
@@ -49,6 +58,7 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
             sure = 0.4
             why = "the leg is spread at zero" if aside > _SPREAD else "the leg does not stand at zero"
             why = "no joint turns it against the shin" if leg.ankle_at is None else why
+            why = "it ends in a wheel, which is no foot" if leg.wheeled else why
             doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
     forward_3 = heading.forward_3
     if leg.straight and leg.ankle_at is not None:
@@ -61,8 +71,45 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
     return Foot(link, forward_3, up_3, sure, how, doubt)
 
 
+def with_fixed_ankle(bodies: Bodies, leg: Leg, heading: Heading) -> Leg:
+    """The leg with its ankle above the sole of a foot that no joint turns; as it is if a joint turns it, or no shape
+    tells a foot from a shin that ends in a peg.
+    """
+    foot = leg.chain[-1].end
+    if leg.ankle_at is not None or leg.wheeled or not bodies.shapes_of[foot]:
+        return leg
+    knee_3 = leg.knee.point_3
+    up_3 = _up(bodies, foot, _upright(bodies, leg, heading))[0]
+    ahead_3 = unit(heading.forward_3 - up_3 * (up_3 @ heading.forward_3))
+    corners = [bodies.shape_corners(shape) - knee_3 for shape in bodies.shapes_of[foot]]
+    tall = -min(float((corners_83 @ up_3).min()) for corners_83 in corners)
+    along = np.concatenate([
+        corners_83 @ ahead_3 for corners_83 in corners if float((corners_83 @ up_3).min()) < (_FLOOR - 1) * tall
+    ]) if tall > 0 else np.zeros(1)  # fmt: skip
+    length = float(along.max() - along.min())
+    if length < _FOOT * tall or tall <= 0:
+        return leg
+    # Seen from before, a shin goes straight down from its knee.
+    ankle_3 = knee_3 - (1 - _HEIGHT) * tall * up_3 + (float(along.min()) + _HEEL * length) * ahead_3
+    cue = "the point as high above the sole and as far before the heel as usual, as no joint tells the ankle"
+    return replace(leg, ankle=Spot(ankle_3, foot, leg.ankle.links, cue, GUESS))
+
+
+def _upright(bodies: Bodies, leg: Leg, heading: Heading) -> np.ndarray:
+    """Where a foot's sole may face away from (3,): the robot's up, or, where no joint turns the foot against the shin,
+    the way up the shin, which stands upright on a flat foot.
+    """
+    shapes = bodies.shapes_of[leg.chain[-1].end]
+    if leg.ankle_at is not None or not shapes:
+        return heading.up_3
+    lowest = min((bodies.shape_corners(shape) for shape in shapes), key=lambda c_83: float((c_83 @ heading.up_3).min()))
+    return unit(leg.knee.point_3 - lowest.mean(0))
+
+
 def _up(bodies: Bodies, foot: int, up_3: np.ndarray) -> tuple[np.ndarray, str | None, float]:
-    """Where a foot's sole faces away from, by its largest box: up_3 itself, and no cue, where there is none near it."""
+    """Where a foot's sole faces away from, by its largest box: a given up_3 itself, and no cue, where there is none
+    near it.
+    """
     boxes = [shape for shape in bodies.shapes_of[foot] if shape.kind == "box"]
     if boxes:
         box = max(boxes, key=lambda shape: float(np.prod(shape.size)))

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.robot.discovery.arm import GUESS, Spot, doubted, limb_end, long_branches
+from mrhubo.robot.discovery.arm import GUESS, Spot, doubted
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
+from mrhubo.robot.discovery.ends import limb_end, long_branches
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine
 from mrhubo.robot.discovery.names import speaks_of
 
@@ -51,11 +52,14 @@ class Leg:
     ankle: Spot
     straight: bool
     """Whether three parallel axes told the knee."""
+    wheeled: bool = False
+    """Whether it ends in a wheel, which is no foot: the ankle is the axle, and no joint of the chain turns it."""
 
 
 def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     """Roles and points of a leg's joints; None if it has no knee."""
     rotary = tuple(step for step in chain if step.hinge.rotary)
+    wheel = rotary[-1] if _is_wheel(rotary) else None
     lines = lines_of(rotary)
     places = _three(lines)
     # By what slides, how many joints turn before it.
@@ -104,9 +108,20 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     if places is not None and (more := _more_hinges(lines, places)):
         names = " and ".join(f"'{rotary[i].hinge.name}'" for i in more)
         hip, knee = (doubted(spot, f", though {names} bends the leg as well, some way off") for spot in (hip, knee))
+    if wheel is not None and ankle_at is not None and ankle_at == len(rotary) - 1:
+        axle_3 = lines[ankle_at].nearest(knee_3)
+        links = (wheel.inner_link, wheel.outer_link)
+        ankle = Spot(axle_3, wheel.start, links, f"the axle of '{wheel.hinge.name}', as the leg ends in a wheel", 0.8)
+        return Leg(rotary[:-1], hip_at, knee_at, None, hip, knee, ankle, places is not None, wheeled=True)
     return Leg(
         _without_toes(rotary, lines, knee_at, ankle_at), hip_at, knee_at, ankle_at, hip, knee, ankle, places is not None
     )
+
+
+def _is_wheel(chain: Chain) -> bool:
+    """Whether a leg's last joint turns a wheel: nothing limits it, while the others have limits."""
+    last = chain[-1].hinge if chain else None
+    return last is not None and last.lower is None and last.upper is None and all(s.hinge.limited for s in chain[:-1])
 
 
 def _ball(lines: list[Line], knee: Line) -> np.ndarray | None:

@@ -15,6 +15,8 @@ _PLANE = 0.03
 """How far from the mirror plane an axis may pass that belongs to neck or waist, as a share of the robot's size."""
 _LATERAL = 0.97
 """Cosine of an axis's angle to what runs across the mirror plane, from which on it is its own mirror image."""
+_MOST, _NAMED_MOST = 4, 6
+"""Joints of a neck at most; and of one that names call so, as two balls, of neck and head."""
 _LIGHT = 0.25
 """Share of its head's weight that a jaw has at most."""
 
@@ -48,7 +50,7 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
             paired = bool(twins)
             fitting = [s for s in fitting if not (chain and _in_face(bodies, s, paired))]
             fitting.sort(key=lambda s: (-len(bodies.beyond(s)[0]), -bodies.extent(s), s.hinge.name))
-            if not fitting or len(chain) >= 4:
+            if not fitting or len(chain) >= (_NAMED_MOST if is_named((*chain, *fitting[:1])) else _MOST):
                 break
             chain.append(fitting[0])
             todo = beside = bodies.onward(fitting[0])
@@ -62,6 +64,11 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
         ranked.append((named + 0.5 * min(len(chain), 2) - away / reach, tuple(chain)))
     ranked.sort(key=lambda found: -found[0])
     return tuple(chain for _, chain in ranked)
+
+
+def is_named(neck: Chain, kind: str = "head") -> bool:
+    """Whether names say that a chain is a neck, or a `waist`."""
+    return any(names.speaks_of(name, kind) for step in neck for name in (step.hinge.name, step.outer_link))
 
 
 def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3: np.ndarray, least: float) -> bool:
@@ -86,12 +93,12 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
 
 def _in_face(bodies: Bodies, step: Step, paired: bool) -> bool:
     """Whether a joint above a neck's is one of the face, as a jaw's or an eye's, or of a linkage: by its name, or as a
-    single one beside pairs, or as one that carries little of the head's weight.
+    single one beside pairs, or as one that carries nothing, or little of the head's weight.
     """
     if _is_face(step):
         return True
     inside, hinges = bodies.beyond(step)
-    if paired and len(hinges) == 1:
+    if len(hinges) == 1 and (paired or (bodies.bare(step.end) and not bodies.bare(step.start))):
         return True
     weights = [sum(map(bodies.weight, part)) for part in (inside, {step.start})]
     return 0 < weights[0] < _LIGHT * weights[1]

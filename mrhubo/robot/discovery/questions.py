@@ -8,6 +8,7 @@ from mrhubo.robot.discovery.arm import Spot
 from mrhubo.robot.discovery.bodies import Chain
 from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.ranges import driver
 from mrhubo.robot.discovery.result import Candidate, Question
 from mrhubo.robot.discovery.roles import Roles
@@ -39,6 +40,12 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.sure < _SURE:
         first = [chain[0].hinge.name for pair in (roles.arms, roles.legs) if pair for chain in pair.chains]
         yield Question("chest", "it is not clear which pair of limbs is arms and which legs", tuple(first))
+    if more := _more_arms(roles):
+        yield Question("chest", "it carries more than two limbs that may be arms; those were taken that are longest, "
+                       "or most like arms, and the others stay as they are", more)  # fmt: skip
+    if roles.neck and not is_named(roles.neck) and _below_shoulders(limbs):
+        yield Question("neck", "the chain that was taken for a neck ends below the shoulders, so it may be a tail, or "
+                       "an arm", tuple(step.hinge.name for step in roles.neck))  # fmt: skip
     for name, spot, _ in spots:
         if spot.confidence < _SURE:
             yield Question(name, f"the {name.replace('_', ' ')} was taken as {spot.cue}; give its point", spot.links)
@@ -66,12 +73,27 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
                        "which may be a tail or an arm", turning)  # fmt: skip
 
 
+def _below_shoulders(limbs: Limbs) -> bool:
+    up_3, head_3 = limbs.heading.up_3, limbs.bodies.middle(limbs.roles.neck[-1].end)
+    return all(float((head_3 - arm.shoulder.point_3) @ up_3) < 0 for arm in limbs.arms.values())
+
+
 def _unread_legs(roles: Roles) -> tuple[str, ...]:
     """First joints of limbs that may be legs, and have no knee."""
     if roles.legs is not None:
         return tuple(chain[0].hinge.name for chain in roles.legs.chains)
     pairs = [pair for pair in roles.others if pair.size > _LEG * roles.arms.size and len(pair.chains[0]) >= _PARTS]
     return tuple(chain[0].hinge.name for pair in pairs for chain in pair.chains)
+
+
+def _more_arms(roles: Roles) -> tuple[str, ...]:
+    """First joints of further pairs of limbs, about as long as the arms and with as many joints, on the same body."""
+    arms = roles.arms
+    pairs = [
+        pair for pair in roles.others
+        if pair.body == arms.body and pair.size > _LEG * arms.size and len(pair.chains[0]) >= len(arms.chains[0])
+    ]  # fmt: skip
+    return tuple(chain[0].hinge.name for pair in (arms, *pairs) for chain in pair.chains) if pairs else ()
 
 
 def _more_legs(roles: Roles) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
 from mrhubo.robot.discovery.result import FoundRange, Question
-from mrhubo.robot.joint import drive
+from mrhubo.robot.joint import Mimic, drive
 
 _ELBOW, _KNEE = 0.1, 0.35
 """How far an elbow, and a knee, must bend the other way [rad] for their range to be narrowed. A knee stands behind the
@@ -64,7 +64,8 @@ def find_ranges(
     """
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
-    for step in (step for chain in chains for step in chain):
+    steps = [step for chain in chains for step in chain]
+    for step in steps:
         hinge = driver(bodies, step)
         if hinge is None or not hinge.rotary:
             continue
@@ -76,9 +77,12 @@ def find_ranges(
         if not _limits_meant(hinge.lower, hinge.upper):
             found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
     for bend in _bends(arms, legs, forward_3):
-        narrowed, question = _human_range(bodies, bend, found)
+        gear = _gear(bodies, bend.step, {step.hinge.name for step in steps})
+        if gear is None:
+            continue
+        narrowed, question = _human_range(bodies, bend, gear, found)
         if narrowed is not None:
-            found[bend.step.hinge.name] = narrowed
+            found[gear.joint] = narrowed
         if question is not None:
             asked.append(question)
     return found, asked
@@ -95,16 +99,37 @@ def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarr
         yield _Bend(f"{side}_knee", leg.chain[leg.knee_at], ends[1] - ends[0], ends[2] - ends[1], -forward_3, _KNEE)
 
 
+def _gear(bodies: Bodies, step: Step, moving: Collection[str]) -> Mimic | None:
+    """What drives an elbow or a knee: itself, or a motor of its own, as behind a gear; None if another joint of the
+    limbs does, or one motor drives several joints.
+    """
+    joints, name = bodies.description.joints, step.hinge.name
+    motor = driver(bodies, step)
+    if motor is None or (motor.name != name and motor.name in moving):
+        return None
+    gear = drive(joints, name)
+    shared = sum(joint.mimic is not None and joint.mimic.joint == gear.joint for joint in joints.values())
+    alone = shared <= 1 or name == gear.joint or name in bodies.gains
+    return gear if alone and gear.multiplier else None
+
+
+def _limits_of(bodies: Bodies, hinge: Hinge, gear: Mimic, known: Mapping[str, FoundRange]) -> tuple[float, float]:
+    """Limits of a joint [rad]: those of what drives it, within its own."""
+    motor = next(other for other in bodies.hinges if other.name == gear.joint)
+    ends = (motor.lower, motor.upper) if gear.joint not in known else (known[gear.joint].lower, known[gear.joint].upper)
+    lower, upper = sorted(gear.multiplier * float(end or 0.0) + gear.offset for end in ends)
+    if motor is not hinge and hinge.limited:
+        lower, upper = max(lower, float(hinge.lower or 0.0)), min(upper, float(hinge.upper or 0.0))
+    return lower, upper
+
+
 def _human_range(
-    bodies: Bodies, bend: _Bend, known: Mapping[str, FoundRange]
+    bodies: Bodies, bend: _Bend, gear: Mimic, known: Mapping[str, FoundRange]
 ) -> tuple[FoundRange | None, Question | None]:
-    """The human side of an elbow or a knee that bends both ways."""
+    """The human side of an elbow or a knee that bends both ways, as a range of what drives it."""
     hinge, upper_3 = bend.step.hinge, bend.upper_3
     name = hinge.name
-    if name in known:
-        lower, upper = known[name].lower, known[name].upper
-    else:
-        lower, upper = float(hinge.lower or 0.0), float(hinge.upper or 0.0)
+    lower, upper = _limits_of(bodies, hinge, gear, known)
     axis_3 = bend.step.sign * hinge.line.axis_3
     straight = straight_angle(axis_3, bend.lower_3, upper_3) / bodies.gains.get(name, 1.0)
     straight = min((straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper))
@@ -131,7 +156,10 @@ def _human_range(
             )
     ends = (straight, upper) if above else (lower, straight)
     why = f"it bends both ways ({lower:.2f} .. {upper:.2f}), a human {bend.what} one way; straight is at {straight:.2f}"
-    return FoundRange(float(ends[0]), float(ends[1]), why), question
+    if gear.joint != name:
+        why = f"it drives '{name}': {why}"
+    low, high = sorted((float(end) - gear.offset) / gear.multiplier for end in ends)
+    return FoundRange(low, high, why), question
 
 
 def driver(bodies: Bodies, step: Step) -> Hinge | None:

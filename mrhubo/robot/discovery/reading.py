@@ -106,7 +106,9 @@ def _read(
 
 def _limits(description: Description, joint: Joint) -> tuple[float | None, float | None]:
     """Limits of a joint; of a continuous one those that some files give it all the same."""
-    given = description.parsed.joint_map[joint.name].limit if joint.kind == "continuous" else None
+    # A joint below one whose numbers cannot be read has no place, and is none of the parsed ones.
+    parsed = description.parsed.joint_map.get(joint.name)
+    given = parsed.limit if joint.kind == "continuous" and parsed is not None else None
     if given is None or given.lower is None or given.upper is None:
         return joint.lower, joint.upper
     return (given.lower, given.upper) if 0.0 < given.upper - given.lower < FULL_TURN else (None, None)

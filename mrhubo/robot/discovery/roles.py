@@ -22,6 +22,9 @@ _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
 _SMALL = 0.25
 """Limbs shorter than this share of the longest pair are no limbs: wheels, eyes, antennas."""
+_ACROSS, _MIDDLE = 0.3, 0.03
+"""Cosine under which two mirror planes are at right angles, and how far from one a chain begins that lies in it, as a
+share of the robot's size."""
 _ARM = 4
 """Joints of an arm with a whole shoulder."""
 _LEG = 3
@@ -82,6 +85,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
             f"{_following(bodies)}"
         )
+    # A waist and a neck that are alike, one below the chest and one above, are no limbs.
+    armed = [pair for pair in armed if not any(_between(bodies, pair, other) for other in armed)]
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
@@ -135,6 +140,13 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if legs is None:
         waist = without_base(waist, bodies.size)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
+
+
+def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
+    """Whether a pair begins in the mirror plane of a larger one, and is mirrored across it: what is in the middle."""
+    apart = (pair.mounts_23 - other.mounts_23.mean(0)) @ other.normal_3
+    across = abs(float(pair.normal_3 @ other.normal_3)) < _ACROSS
+    return across and other.size > pair.size and float(np.abs(apart).max()) < _MIDDLE * bodies.size
 
 
 def _following(bodies: Bodies) -> str:

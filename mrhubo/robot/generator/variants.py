@@ -89,7 +89,7 @@ def _scale(robot: etree._Element, scale: float) -> None:
     for element in robot.iter("origin", "box", "sphere", "cylinder"):
         for word in _LENGTHS:
             if element.get(word) is not None:
-                numbers = element.get(word).replace(",", " ").split()
+                numbers = element.get(word).split()
                 element.set(word, " ".join(repr(scale * float(number)) for number in numbers))
     for joint in robot.findall("joint"):
         limit = joint.find("limit")

@@ -1,0 +1,81 @@
+"""Where limbs end beyond their last joints: by fingers, fixed links, shapes or masses, as no axis tells it there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
+from mrhubo.robot.discovery.limbs import ways_on
+from mrhubo.robot.discovery.lines import measure, unit
+from mrhubo.robot.discovery.names import speaks_of
+
+OUT = 1 / 3
+"""How long a forearm is at least, as a share of the upper arm."""
+
+
+def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
+    """What is to be said of a limb that ends in branches longer than a share of it, one of which may be its rest, while
+    another is a linkage; nothing if none is as long.
+    """
+    way = float(measure(lines_of(chain)).out_N[-1])
+    onward = ways_on(bodies, chain[-1])
+    if not any(bodies.extent(on) > share * way for on in onward):
+        return ""
+    among = " and ".join(f"'{on.hinge.name}'" for on in onward)
+    return f"; the limb was taken to end where {among} begin, one of which may go on with it"
+
+
+def limb_end(
+    bodies: Bodies, last: Step, start_3: np.ndarray, usual_3: np.ndarray, called: str = "wrist"
+) -> tuple[np.ndarray, str, float]:
+    """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
+
+    Args:
+        bodies: the robot.
+        last: the last joint.
+        start_3: where the limb starts.
+        usual_3: where it should end about, as seen from its start (3,) [m]: as the limb before it goes on.
+        called: what the end is called.
+    """
+    inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
+    if len(onward) > 1:  # where a single finger begins is no middle
+        bases = [bodies.position(on.outer_link) for on in onward]
+        if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > OUT * usual:
+            return np.mean(bases, axis=0), "the middle of where the fingers begin", 0.45
+    named = [
+        link
+        for link in inside
+        if speaks_of(link, "tool") and np.linalg.norm(bodies.position(link) - start_3) > OUT * usual
+    ]
+    if named:
+        nearest = min(named, key=lambda link: float(np.linalg.norm(bodies.position(link) - start_3)))
+        return bodies.position(nearest), f"the fixed link '{nearest}', after its name", 0.6
+    if bodies.shapes_of[last.end]:
+        corners = bodies.corners(last.end)
+        out_3 = unit(corners.mean(0) - start_3)
+        reach = float(((corners - start_3) @ out_3).max())
+        if reach > OUT * usual:
+            return (
+                start_3 + reach * out_3,
+                f"the end of the limb's collision shape, as no joint tells the {called}",
+                0.45,
+            )
+    # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
+    fixed = {link: math.dist(bodies.position(link), start_3) for link in inside if link != last.outer_link}
+    far = max(fixed, key=lambda link: fixed[link], default=None)
+    if far is not None and fixed[far] > OUT * usual:
+        return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the {called}", 0.45
+    centre_3 = bodies.centre(last.end)
+    if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
+        return (
+            start_3 + 2 * (centre_3 - start_3),
+            f"twice as far as the centre of mass, as no joint tells the {called}",
+            0.4,
+        )
+    return (
+        start_3 + usual_3,
+        f"a guess: as long as the limb before it, and straight, as nothing tells the {called}",
+        0.1,
+    )

@@ -1,0 +1,206 @@
+"""Robots of other conventions: what is odd about them is passed over, read as it is meant, or asked about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrhubo.errors import UserError
+from mrhubo.robot.discovery import Discovery, discover
+from mrhubo.robot.generator import humanoid
+from mrhubo.robot.generator.score import mistakes
+
+X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+SIDES = {"left": 1, "right": -1}
+
+
+@dataclass
+class Made:
+    """A URDF that is being written: a chest, and what is joined to it."""
+
+    parts: list[str] = field(default_factory=lambda: ["<link name='chest'/>"])
+
+    def join(
+        self, name: str, parent: str, xyz, axis, limits=(-1.5, 1.5), kind="revolute", more: str = "", shape: str = ""
+    ) -> str:  # fmt: skip
+        """A link that weighs something, on a joint with limits, or without."""
+        given = "" if limits is None else f"<limit lower='{limits[0]}' upper='{limits[1]}' effort='1' velocity='1'/>"
+        self.parts.append(
+            f"<link name='{name}'><inertial><origin xyz='0 0 -0.05'/><mass value='1'/></inertial>{shape}</link>"
+            f"<joint name='{name}_joint' type='{kind}'><parent link='{parent}'/><child link='{name}'/>"
+            f"<origin xyz='{xyz[0]} {xyz[1]} {xyz[2]}'/><axis xyz='{axis[0]} {axis[1]} {axis[2]}'/>{given}{more}</joint>"
+        )
+        return name
+
+    def arm(self, side: str, height: float = 0.4, called: str = "") -> str:
+        """Shoulder and upper arm, hanging; its last link."""
+        link = "chest"
+        for word, axis in (("pitch", Y), ("roll", X), ("yaw", Z)):
+            at = (0, 0.2 * SIDES[side], height) if word == "pitch" else (0, 0, 0)
+            limits = (-2.8, 1.2) if word == "pitch" else (-1.5, 1.5)
+            link = self.join(f"{side}_{called}shoulder_{word}", link, at, axis, limits)
+        return link
+
+    def forearm(self, side: str, parent: str, height: float = -0.3, called: str = "") -> str:
+        """Elbow and forearm's twist."""
+        link = self.join(f"{side}_{called}elbow", parent, (0, 0, height), Y, (-2.3, 0.0))
+        return self.join(f"{side}_{called}forearm", link, (0, 0, -0.1), Z)
+
+    def wrist(self, side: str, parent: str, called: str = "") -> str:
+        """The wrist's two swings."""
+        link = self.join(f"{side}_{called}wrist_pitch", parent, (0, 0, -0.15), Y)
+        return self.join(f"{side}_{called}wrist_roll", link, (0, 0, 0), X)
+
+    def leg(self, side: str) -> str:
+        """As far as the shank, which is 0.4 m long."""
+        link = self.join(f"{side}_hip_roll", "chest", (0, 0.1 * SIDES[side], -0.1), X)
+        link = self.join(f"{side}_hip_pitch", link, (0, 0, 0), Y, (-2.0, 0.5))
+        return self.join(f"{side}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2))
+
+    def found(self, folder: Path) -> Discovery:
+        """What is discovered of it."""
+        file = folder / "made.urdf"
+        file.write_text(f"<robot name='made'>{''.join(self.parts)}</robot>")
+        return discover(file, whole_body=True)
+
+
+def at(found: Discovery, point: str) -> list[float]:
+    return list(found.points[point].root_3)
+
+
+def about(found: Discovery) -> set[str]:
+    return {question.about for question in found.questions}
+
+
+def test_an_elbow_behind_a_gear_is_narrowed_by_its_motors_range(tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        upper = made.arm(side)
+        made.join(f"{side}_motor", upper, (0, 0, -0.1), Y, (-5.0, 5.0))
+        mimic = f"<mimic joint='{side}_motor_joint' multiplier='-0.5' offset='0.1'/>"
+        link = made.join(f"{side}_elbow", upper, (0, 0, -0.3), Y, (-2.0, 2.2), more=mimic)
+        made.wrist(side, made.join(f"{side}_forearm", link, (0, 0, -0.1), Z))
+    found = made.found(tmp_path)
+    for side in SIDES:
+        # Straight is at an elbow's 0, a motor's 0.2; the elbow's own limit of -2.0 is its 4.2.
+        limits = found.ranges[f"{side}_motor_joint"]
+        assert (limits.lower, limits.upper) == pytest.approx((0.2, 4.2), abs=1e-6)
+        assert f"{side}_motor_joint" in found.joints and f"{side}_elbow_joint" not in found.ranges
+
+
+def test_a_forearm_that_telescopes_has_elbow_and_wrist(tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        link = made.join(f"{side}_elbow", made.arm(side), (0, 0, -0.3), Y, (-2.3, 0.0))
+        link = made.join(f"{side}_tube", link, (0, 0, -0.1), (0, 0, -1), (0.0, 0.2), "prismatic")
+        made.wrist(side, made.join(f"{side}_forearm", link, (0, 0, 0), Z))
+    found = made.found(tmp_path)
+    assert at(found, "left_shoulder") == pytest.approx([0, 0.2, 0.4])
+    assert at(found, "left_elbow") == pytest.approx([0, 0.2, 0.1])
+    assert at(found, "left_wrist") == pytest.approx([0, 0.2, -0.15])
+    assert "longer" in found.left_out["left_tube_joint"]
+
+
+def test_a_finger_of_three_links_is_no_wrist(tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        link = made.forearm(side, made.arm(side))
+        for number, down in enumerate((-0.2, -0.04, -0.04)):
+            link = made.join(f"{side}_{number}", link, (0.01, 0, down), Y, (0.0, 1.2))
+    found = made.found(tmp_path)
+    assert found.chains["left_arm"][-1] == "left_forearm_joint" and len(found.chains["left_arm"]) == 5
+
+
+def test_a_leg_on_a_wheel_has_no_ankle_that_turns(tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        made.join(f"{side}_rim", made.leg(side), (0, 0, -0.4), Y, None, "continuous")
+    found = made.found(tmp_path)
+    assert "left_rim_joint" not in found.joints and at(found, "left_ankle") == pytest.approx([0, 0.1, -0.9])
+    assert {"left_foot", "right_foot"} <= about(found) and "left_ankle" not in about(found)
+
+
+@pytest.mark.parametrize("pitch", [0.0, 0.3])
+def test_an_ankle_that_no_joint_tells_lies_over_the_foot(tmp_path: Path, pitch: float) -> None:
+    """However the shank with its foot is turned against the robot at the zero pose."""
+    foot = (
+        "<collision><origin xyz='0.05 0 -0.46'/><geometry><box size='0.24 0.1 0.04'/></geometry></collision>"
+        "<collision><origin xyz='0 0 -0.2'/><geometry><cylinder radius='0.03' length='0.4'/></geometry></collision>"
+    )
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        link = made.join(f"{side}_hip_roll", "chest", (0, 0.1 * SIDES[side], -0.1), X)
+        link = made.join(f"{side}_hip_pitch", link, (0, 0, 0), Y, (-2.0, 0.5))
+        made.join(f"{side}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2), shape=foot)
+        made.parts[-1] = made.parts[-1].replace(
+            "<origin xyz='0 0 -0.4'/><axis", f"<origin xyz='0 0 -0.4' rpy='0 {pitch} 0'/><axis"
+        )
+    found = made.found(tmp_path)
+    knee_3, ankle_3 = np.array(at(found, "left_knee")), np.array(at(found, "left_ankle"))
+    turn_33 = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
+    ahead, aside, up = turn_33.T @ (ankle_3 - knee_3)
+    assert aside == pytest.approx(0) and -0.03 < ahead < 0.03 and -0.43 < up < -0.36
+    assert {"left_ankle", "right_ankle"} <= about(found)
+
+
+def test_a_body_of_balls_is_read_as_its_bones(tmp_path: Path) -> None:
+    """As of a human skeleton that became a URDF: three joints in each point, arms in a T."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = "chest"
+        for part, out in (("shoulder", 0.2), ("elbow", 0.3), ("wrist", 0.25)):
+            for number, axis in enumerate((X, Z, Y)):
+                place = (0, 0, 0) if number else (0, sign * out, 0.4 * (part == "shoulder"))
+                link = made.join(f"{side}_{part}_{number}", link, place, axis)
+    found = made.found(tmp_path)
+    for point, out in (("shoulder", 0.2), ("elbow", 0.5), ("wrist", 0.75)):
+        assert at(found, f"left_{point}") == pytest.approx([0, out, 0.4]), point
+    assert len(found.chains["left_arm"]) == 9
+
+
+def test_a_second_pair_of_arms_is_asked_about(tmp_path: Path) -> None:
+    made = Made()
+    for called, height in (("", 0.4), ("lower_", 0.1)):
+        for side in SIDES:
+            upper = made.arm(side, height, called)
+            made.wrist(side, made.forearm(side, upper, called=called), called)
+    for side in SIDES:
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
+    assert "chest" in about(made.found(tmp_path))
+
+
+@pytest.mark.parametrize("broken", ["0 0 x", "0 0"])
+def test_what_hangs_on_a_joint_that_cannot_be_read_is_no_crash(tmp_path: Path, broken: str) -> None:
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    made.join("left_extra", "left_wrist_roll", (0, 0, -0.1), X)
+    made.parts[-1] = made.parts[-1].replace("<axis xyz='1 0 0'/>", f"<axis xyz='{broken}'/>")
+    made.join("left_spin", "left_extra", (0, 0, -0.1), X, None, "continuous")
+    assert len(made.found(tmp_path).chains["left_arm"]) == 7
+    with pytest.raises(UserError, match="no two arms"):
+        Made().found(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("seed", "kind"),
+    [
+        (1138, None),  # one jaw, right behind the elbow
+        (1184, None),  # the origin of one forearm's twist lies behind the elbow
+        (1589, None),  # a neck and a waist that are mirror images
+        (1347, None),  # an arm of three swings, a twist and a short forearm with long fingers
+        (1051, None),  # a clavicle, and a forearm that only twists
+        (1003, "clavicles of two joints"),
+        (1009, "a tail"),  # which ends at the height of the shoulders
+        (1010, "no limits"),  # a lidar on the head
+    ],
+)
+def test_random_robots_that_were_wrong_are_right(seed: int, kind: str | None, tmp_path: Path) -> None:
+    truth, path = humanoid(seed, kind), tmp_path / "made.urdf"
+    path.write_text(truth.urdf)
+    assert not mistakes(discover(path, whole_body=True), truth, path)
