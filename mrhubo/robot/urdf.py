@@ -61,6 +61,10 @@ class Description:
     _found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
     """What `once` has found."""
 
+    def __deepcopy__(self, memo: object) -> Description:
+        """Itself: nothing in it changes."""
+        return self
+
     @property
     def solids(self) -> SolidShapes:
         """The shapes that can bump into each other; meshes are read when first asked for."""
