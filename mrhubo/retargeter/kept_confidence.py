@@ -30,7 +30,11 @@ _LONGEST = 10_000
 
 def calibrated(retargeter: Retargeter) -> ConfidenceModel:
     """As `calibrate`; of a robot that it was asked for before, what it found then."""
-    path = user_cache() / f"confidence-{_checksum(retargeter)}.json"
+    try:
+        folder = user_cache()
+    except RuntimeError:  # a user without a home
+        return calibrate(retargeter)
+    path = folder / f"confidence-{_checksum(retargeter)}.json"
     with contextlib.suppress(OSError, UserError, UnicodeDecodeError), open_regular(path) as file:
         return ConfidenceModel.from_json(file.read(_LONGEST).decode())
     found = calibrate(retargeter)

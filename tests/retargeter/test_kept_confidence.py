@@ -69,3 +69,15 @@ def test_a_cache_that_takes_no_file_is_none(found: list[int], make: Callable[...
     (tmp_path / "mrhubo").write_text("a file where the folder should be")
     assert make().confidence == make().confidence
     assert len(found) == 2
+
+
+def test_a_user_without_a_home_is_no_fault(
+    found: list[int], make: Callable[..., Retargeter], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", homeless)
+    assert make().confidence == make().confidence
+    assert len(found) == 2
