@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import json
 import os
 import resource
 import signal
@@ -30,7 +31,7 @@ from tests.light import lighten
 
 ROOT = Path(__file__).resolve().parent.parent
 __all__ = [
-    "ROOT", "Motion", "answer", "as_command", "as_torchrun", "cut_motion", "fit", "killed_at", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
+    "ROOT", "Motion", "answer", "as_command", "as_notebook", "as_torchrun", "cut_motion", "fit", "killed_at", "load", "new_package", "optimise", "pair", "quietly", "read_motion",
     "read_tensors", "write_tensors",
 ]  # fmt: skip
 
@@ -55,6 +56,23 @@ def as_command(
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored below a shell's background job
     sys.argv = [f"mrhubo.{name}", *arguments]
     run_command(importlib.import_module(f"mrhubo.{name}").main)
+
+
+def as_notebook(path: Path, output: Path) -> None:
+    """In a process of its own: what Jupyter does with a notebook's cells, up to the first that fails."""
+    from IPython.core.interactiveshell import InteractiveShell
+
+    class Shell(InteractiveShell):
+        def enable_gui(self, gui: str | None = None) -> None:
+            """There is no window to wait for."""
+
+    _go_apart(output, {})
+    os.chdir(path.parent)
+    sys.path.insert(0, str(path.parent))
+    shell = Shell.instance()
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code" and not shell.run_cell("".join(cell["source"]), store_history=True).success:
+            sys.exit(1)
 
 
 def as_torchrun(arguments: Sequence[str], output: Path, environment: Mapping[str, str]) -> None:

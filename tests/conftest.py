@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import gc
-import multiprocessing
 import os
 import sqlite3
 from collections.abc import Callable, Iterator
-from functools import partial
 from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import filelock
 import pytest
+
+from tests.processes import new_server
 
 if TYPE_CHECKING:
     from sqlalchemy import Engine
@@ -31,7 +31,12 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 _TOGETHER = (
-    ("tests/test_fit.py", "tests/test_pair.py", "tests/test_sweep.py"),  # `server` imports everything once
+    (
+        "tests/test_fit.py",
+        "tests/test_pair.py",
+        "tests/test_sweep.py",
+        "notebooks/",
+    ),  # `server` imports everything once
     ("tests/fast/",),  # what numba compiles is compiled once
 )
 _LONGEST = (
@@ -39,7 +44,7 @@ _LONGEST = (
     "tests/pairing/test_generate.py", "tests/callbacks/test_scale_search.py", "tests/universal/learning/test_training.py",
     "tests/invariance/test_invariance.py", "tests/fitting/test_steps.py", "tests/streaming/test_stream.py",
     "tests/test_examples.py", "tests/baselines/s3le/test_s3le.py", "tests/fitting/test_fit.py",
-    "tests/body/test_quasi_newton.py", "notebooks/03_train_and_evaluate.ipynb", "tests/retargeter/test_package.py",
+    "tests/body/test_quasi_newton.py", "tests/retargeter/test_package.py",
     "tests/paper/test_tables.py",
 )  # fmt: skip
 """Begun first: of several processes that share the files, none is left alone with a long one at the end."""
@@ -54,21 +59,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files that take longest come first."""
     order = {name: place for place, name in enumerate(_LONGEST)}
     items.sort(key=lambda item: order.get(_unit(item.nodeid.split("::")[0]), len(order)))
-    for item in items:
-        if item.path.suffix == ".ipynb":
-            item.runtest = partial(_start_again, item.runtest)
-
-
-def _start_again(run: Callable[[], None]) -> None:
-    """Jupyter chooses the ports of a notebook's process before it starts, and another process may be faster to take one:
-    then it is started once more. What cells do is not repeated.
-    """
-    try:
-        run()
-    except RuntimeError as error:
-        if "Kernel died before replying" not in str(error):
-            raise
-        run()
 
 
 def pytest_collection_finish() -> None:
@@ -157,13 +147,8 @@ def light_records(copied_database: Callable[[Engine], None]) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def server() -> ForkServerContext:
-    """Starts processes that have imported everything already, which takes a fresh interpreter seconds."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(
-        ["mrhubo.fit", "mrhubo.pair", "mrhubo.sweep", "mrhubo.fitting.sweeping", "mrhubo.fitting.fit", "tests.chain", "tests.light",
-         "mlflow.store.tracking.sqlalchemy_store"]
-    )  # fmt: skip
-    return context
+    """Starts processes that have imported everything already."""
+    return new_server()
 
 
 @pytest.fixture(scope="module")

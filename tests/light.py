@@ -16,7 +16,7 @@ def _leave_to_the_disk(connection: Any, _: object) -> None:
 
 def lighten(patch: pytest.MonkeyPatch) -> None:
     """Confidence is calibrated on few poses, a frame's time is taken once and of few frames at a time, figures in
-    pictures are blank, pages show a moment, MLflow does not compare the installed versions with those that it has just
+    pictures and pictures of studies are blank, pages show a moment, MLflow does not compare the installed versions with those that it has just
     been told, and databases, from now on, do not wait until the disk has what they have written, which a killed process
     leaves whole.
     """
@@ -28,6 +28,7 @@ def lighten(patch: pytest.MonkeyPatch) -> None:
     from mrhubo.evaluation import latency
     from mrhubo.fitting import fit, measurement
     from mrhubo.fitting.record import moving
+    from mrhubo.search import plots
     from mrhubo.view import figures, pictures
 
     patch.setattr(fit, "calibrate", functools.partial(fit.calibrate, poses=200))
@@ -37,5 +38,6 @@ def lighten(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(pictures, "GIF_RATE", 1.0)
     patch.setattr(moving, "PAGE_SECONDS", 0.1)
     patch.setattr(figures, "render", lambda solids, size, *_, **__: Image.new("RGB", size))
+    patch.setattr(plots, "_image", lambda axes, width=8.0: (plots.close(axes), Image.new("RGB", (80, 45)))[1])
     if not event.contains(Engine, "connect", _leave_to_the_disk):
         event.listen(Engine, "connect", _leave_to_the_disk)

@@ -24,12 +24,12 @@ from tests.robot.two_arms import PAIR
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a robot; pictures are blank, and no motion is tried."""
     from mrhubo import describe
-    from mrhubo.describing import run
+    from mrhubo.describing import picture
 
     monkeypatch.setattr(describe, "_try", lambda file: None)
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(run, "draw", lambda body_map: Image.new("RGB", (3, 3)))
+    monkeypatch.setattr(picture, "draw", lambda body_map: Image.new("RGB", (3, 3)))
     Path("my.urdf").write_text(PAIR)
     return tmp_path
 

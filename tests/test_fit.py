@@ -227,7 +227,7 @@ def test_stopped_in_training_it_resumes_to_the_same_metrics(
     assert process.is_alive(), f"it ended before it could be stopped: {(tmp_path / 'output').read_text()}"
     assert process.pid is not None
     os.killpg(process.pid, stop)
-    process.join(60)
+    process.join(200)
     assert process.exitcode == (status if status is not None else -stop)
     (unfinished,) = runs_of(tmp_path)
     assert unfinished.info.status == ("KILLED" if stop == signal.SIGINT else "RUNNING")

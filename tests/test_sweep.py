@@ -82,7 +82,7 @@ def test_one_of_two_processes_dies(
         time.sleep(0.05)
     two[0].kill()
     for process in two:
-        process.join(180)
+        process.join(400)
     assert two[1].exitcode == 0, outputs[1].read_text()
     main(arguments)  # started again: nothing is left to do, or the last trial
     output = capfd.readouterr().out

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from mrhubo.config import is_config, load_config
 from mrhubo.describing.model_file import find_model, model_named
-from mrhubo.describing.picture import draw, save_picture
 from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, unsure
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.files.atomic import atomic_path
@@ -154,6 +153,8 @@ def draw_config(file: Path, picture: Path) -> str | None:
     Raises:
         UserError: a link or a joint does not exist, or the picture cannot be written.
     """
+    from mrhubo.describing.picture import draw, save_picture  # a second that a robot which is opened has no use for
+
     config = load_config(file)
     with warnings.catch_warnings(action="ignore"):  # told by the check below
         body_map = BodyMap(Robot.from_config(file))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mrhubo.body import BodyPrior
-from mrhubo.retargeter.calibration import calibrate
+from mrhubo.retargeter.kept_confidence import calibrated
 from mrhubo.retargeter.nearest import NearestJoints
 from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.retargeter.package import Retargeter
@@ -42,5 +42,5 @@ def optimised(body_map: BodyMap) -> Retargeter:
 def _calibrated(network: JointNetwork, body_map: BodyMap, origin: str) -> Retargeter:
     retargeter = Retargeter(network, body_map, BodyPrior.open(), None, math.nan)
     retargeter.origin = origin
-    retargeter.confidence = calibrate(retargeter)
+    retargeter.confidence = calibrated(retargeter)
     return retargeter

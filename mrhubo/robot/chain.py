@@ -7,17 +7,21 @@ MB and most of a second which a robot's computer has no use for, so matplotlib n
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import sys
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
+import torch
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 from scipy.spatial.transform import Rotation
+from torch import Tensor
 
 from mrhubo.errors import UserError
 from mrhubo.robot.joint import Joint
@@ -28,6 +32,8 @@ if TYPE_CHECKING:
 
 _DEEPEST = 100
 """Most joints in a row: pytorch-kinematics goes down a tree by recursion."""
+_KEPT = 8
+"""Chains that are kept for the next robot with the same joints."""
 
 
 def chain_joints(
@@ -105,12 +111,20 @@ def _numbers(values: np.ndarray) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
+@lru_cache(maxsize=_KEPT)
 def build_chain(xml: bytes) -> Chain:
-    """The chain of a URDF's joints and links."""
+    """The chain of a URDF's joints and links, in float32; who wants another one changes a copy (`chain_like`)."""
     with _without_matplotlib():
         import pytorch_kinematics
 
-    return pytorch_kinematics.build_chain_from_urdf(xml)
+    return pytorch_kinematics.build_chain_from_urdf(xml).to(dtype=torch.float32)
+
+
+def chain_like(chain: Chain, like: Tensor) -> Chain:
+    """The same chain with a tensor's type and device; pytorch-kinematics would change the chain itself."""
+    if chain.dtype == like.dtype and torch.device(chain.device) == like.device:
+        return chain
+    return copy.deepcopy(chain).to(dtype=like.dtype, device=like.device)
 
 
 @contextmanager

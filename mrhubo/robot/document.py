@@ -57,13 +57,13 @@ class Document:
         return f"line {(element.sourceline or 1) + self.lines_before}"
 
 
-def read_document(path: Path) -> Document:
-    """The XML of a URDF file, plain or packed by gzip.
+def read_document(path: Path, text: bytes | None = None) -> Document:
+    """The XML of a URDF file, plain or packed by gzip; of its text (`read_text`), where that has been read already.
 
     Raises:
         UserError: the file is missing, too large, or no URDF; says what it is where that can be told.
     """
-    text = _read(path)
+    text = read_text(path) if text is None else text
     start = text.find(b"<")
     lines_before = 0
     if text[:start].isspace() and text[start : start + 5] == b"<?xml":
@@ -82,7 +82,12 @@ def read_document(path: Path) -> Document:
     return Document(path, robot, lines_before)
 
 
-def _read(path: Path) -> bytes:
+def read_text(path: Path) -> bytes:
+    """The text of a URDF file, plain or packed by gzip.
+
+    Raises:
+        UserError: the file is missing, cannot be read, or is too large.
+    """
     try:
         if not path.exists():
             raise UserError(f"robot.urdf: {path} does not exist; name a URDF file, relative to the YAML")

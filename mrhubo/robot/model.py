@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from mrhubo import rotation
 from mrhubo.config import find_config, load_config, places_named
 from mrhubo.errors import InputWarning, UserError
-from mrhubo.robot.chain import build_chain, chain_joints, chain_xml
+from mrhubo.robot.chain import build_chain, chain_joints, chain_like, chain_xml
 from mrhubo.robot.entries import check_names
 from mrhubo.robot.joint import Joint, Mimic, drive
 from mrhubo.robot.keypoints import Keypoints, read_keypoints
@@ -133,7 +133,7 @@ class Robot(nn.Module):
             name: drive.multiplier * self.held.get(drive.joint, 0.0) + drive.offset for name, drive in drives.items()
         }
         joints = chain_joints(self.description, self.links, turned, rest)
-        self._chain = build_chain(chain_xml(self.description.root, joints)).to(dtype=torch.float32)
+        self._chain = build_chain(chain_xml(self.description.root, joints))
         angles = self._chain.get_joint_parameter_names()
         select_AN, constant_A = torch.zeros(len(angles), len(self.joint_names)), torch.zeros(len(angles))
         for row, joint in enumerate(angles):
@@ -163,7 +163,7 @@ class Robot(nn.Module):
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Robot:
         """Moves the chain, which is no module, along with the buffers."""
         super()._apply(fn, recurse)
-        self._chain = self._chain.to(dtype=self.select_AN.dtype, device=self.select_AN.device)
+        self._chain = chain_like(self._chain, self.select_AN)
         return self
 
     @classmethod

@@ -21,7 +21,12 @@ class StandingRobot:
     def __init__(self, description: Description, configuration: Mapping[str, float]) -> None:
         """Places every link; `configuration` as for `mrhubo.robot.urdf.link_poses`."""
         self.description = description
-        self.poses = link_poses(description.parsed, configuration)
+        parsed = description.parsed
+        self.poses = (
+            link_poses(parsed, configuration)
+            if configuration
+            else description.once("poses at 0", lambda: link_poses(parsed, {}))
+        )
         """Pose (4, 4) of every link."""
 
     def line(self, joint: Joint) -> Line:

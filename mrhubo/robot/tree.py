@@ -46,13 +46,13 @@ class Tree:
     """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
 
 
-def read_tree(path: Path) -> Tree:
-    """The links and joints of a URDF file.
+def read_tree(path: Path, text: bytes | None = None) -> Tree:
+    """The links and joints of a URDF file; `text` as for `read_document`.
 
     Raises:
         UserError: the file is no URDF, or its links and joints are no tree; names the joint or link and the line.
     """
-    document = read_document(path)
+    document = read_document(path, text)
     links = _named(document, "link")
     joints = _named(document, "joint")
     for name, joint in joints.items():

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import yourdfpy
@@ -18,6 +20,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.config import fingerprint
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.robot.document import read_text
 from mrhubo.robot.joint import ROTARY, Joint, Mimic
 from mrhubo.robot.limits import with_soft_limits
 from mrhubo.robot.solid_shapes import SolidShapes, read_solids
@@ -25,6 +28,10 @@ from mrhubo.robot.tree import Tree, read_tree
 
 # It warns at every pose about mimic joints whose source is fixed (NAO's fingers), which is no news to our users.
 logging.getLogger("yourdfpy.urdf").setLevel(logging.ERROR)
+
+_KEPT = 8
+"""Files whose description is kept, so that it is not made, and the robot not looked through, once more."""
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,12 @@ class Description:
     """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
     _read: dict[str, SolidShapes] = field(default_factory=dict, repr=False, compare=False)
     """What has been read when it was first asked for; the same robot in another form knows it too."""
+    _found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    """What `once` has found."""
+
+    def __deepcopy__(self, memo: object) -> Description:
+        """Itself: nothing in it changes."""
+        return self
 
     @property
     def solids(self) -> SolidShapes:
@@ -69,10 +82,18 @@ class Description:
             joints.append([j.name, j.kind, j.parent, j.child, place, repr(j.lower), repr(j.upper), mimic])
         return fingerprint([self.root, joints])
 
+    def once(self, name: str, find: Callable[[], Found]) -> Found:
+        """What `find` makes of this description, and of nothing else, no file either. It is asked once, also where the
+        same text is read again; nobody may change what it gives.
+        """
+        if name not in self._found:
+            self._found[name] = find()
+        return self._found[name]
+
     def with_joints(self, changed: Mapping[str, Joint]) -> Description:
         """The same robot with some joints in another form."""
         joints = {**self.joints, **changed}
-        return replace(self, joints=joints, parent_joint={joint.child: joint for joint in joints.values()})
+        return replace(self, joints=joints, parent_joint={joint.child: joint for joint in joints.values()}, _found={})
 
     def joint(self, name: str) -> Joint:
         """UserError with the nearest name if there is no such joint."""
@@ -144,15 +165,22 @@ def _placed(joint: yourdfpy.urdf.Joint, angle: float) -> np.ndarray:
 
 def moved(axis_3: np.ndarray, angle: float, slides: bool) -> np.ndarray:
     """The motion (4, 4) of a joint about its axis (which need not be unit), or along it [m]; O. Rodrigues, 1840."""
-    motion_44 = np.eye(4)
     if slides:
+        motion_44 = np.eye(4)
         motion_44[:3, 3] = angle * axis_3
         return motion_44
-    x, y, z = unit_3 = axis_3 / np.sqrt(np.dot(axis_3, axis_3))
-    sine, cosine = np.sin(angle), np.cos(angle)
-    motion_44[:3, :3] = np.diag([cosine] * 3) + np.outer(unit_3, unit_3) * (1.0 - cosine)
-    motion_44[:3, :3] += np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) * sine
-    return motion_44
+    # Plain numbers: arrays of three of them take NumPy ten times as long.
+    x, y, z = (axis_3 / np.sqrt(np.dot(axis_3, axis_3))).tolist()
+    sine, cosine = math.sin(angle), math.cos(angle)
+    rest = 1.0 - cosine
+    return np.array(
+        [
+            [cosine + x * x * rest, x * y * rest - z * sine, x * z * rest + y * sine, 0.0],
+            [x * y * rest + z * sine, cosine + y * y * rest, y * z * rest - x * sine, 0.0],
+            [x * z * rest - y * sine, y * z * rest + x * sine, cosine + z * z * rest, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def describe(path: Path) -> Description:
@@ -163,7 +191,13 @@ def describe(path: Path) -> Description:
             floating or planar joint anywhere but directly under the root (where it only places the robot in the world,
             and is taken as fixed).
     """
-    tree = read_tree(path)
+    # Meshes may have changed since the same text was read before.
+    return replace(_described(path, read_text(path)), _read={})
+
+
+@lru_cache(maxsize=_KEPT)
+def _described(path: Path, text: bytes) -> Description:
+    tree = read_tree(path, text)
     parsed = _parsed(tree)
     read = {joint.name: joint for joint in parsed.robot.joints}
     joints = {name: _joint(element, read.get(name)) for name, element in tree.joints.items()}

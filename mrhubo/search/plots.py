@@ -37,12 +37,17 @@ def study_plots(study: Study, measure: str) -> Mapping[str, Image.Image]:
 
 def _image(axes: Axes, width: float = 8.0) -> Image.Image:
     """The figure of these axes as a picture, and no longer in matplotlib's memory."""
-    import matplotlib.pyplot as plt
-
     figure = axes.figure
     figure.set_size_inches(width, 4.5)  # pyright: ignore[reportAttributeAccessIssue]
     stream = io.BytesIO()
     figure.savefig(stream, dpi=100, bbox_inches="tight", facecolor="white")  # pyright: ignore[reportAttributeAccessIssue]
-    plt.close(figure)  # pyright: ignore[reportArgumentType]
+    close(axes)
     stream.seek(0)
     return Image.open(stream).convert("RGB")
+
+
+def close(axes: Axes) -> None:
+    """Lets go of the figure of these axes, which matplotlib would keep."""
+    import matplotlib.pyplot as plt
+
+    plt.close(axes.figure)  # pyright: ignore[reportArgumentType]

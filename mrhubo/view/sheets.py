@@ -137,9 +137,9 @@ def phi_histogram(
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    widths = np.diff(edges)
-    axes.bar(edges[:-1], counts[0], widths, align="edge", color=_KEPT, label="kept")
-    axes.bar(edges[:-1], counts[1], widths, bottom=counts[0], align="edge", color=_DROPPED, label="extreme: dropped")
+    kept, whole = counts[0], counts[0] + counts[1]
+    axes.stairs(kept, edges, fill=True, color=_KEPT, label="kept")  # bars, each for itself, take ten times as long
+    axes.stairs(whole, edges, baseline=kept, fill=True, color=_DROPPED, label="extreme: dropped")
     axes.axvline(threshold, color="#262b33", linewidth=1.2, linestyle="--")
     right = float(np.searchsorted(edges, threshold)) > 0.75 * len(edges)
     axes.annotate(
@@ -154,7 +154,7 @@ def phi_histogram(
     if logarithmic:
         axes.set_xscale("log")
     axes.set_xlim(float(edges[0]), float(edges[-1]))
-    axes.set_ylim(0.0, 1.18 * float((counts[0] + counts[1]).max()))
+    axes.set_ylim(0.0, 1.18 * float(whole.max()))
     axes.set_xlabel("phi: mean squared error of the 6D pose")
     axes.set_ylabel("pairs")
     axes.set_title(f"{title}: {100.0 * kept_B.mean():.1f}% kept of {len(phi_B):,}", fontsize=11)

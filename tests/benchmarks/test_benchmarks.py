@@ -21,8 +21,10 @@ import torch
 from mrhubo import pair, rotation
 from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
+from mrhubo.fast import engines
 from mrhubo.pairing import lbfgs
-from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.retargeter import Retargeter, build_network, without_training
+from mrhubo.retargeter.confidence import STANDARD
 from mrhubo.robot import build_body_map
 from tests.reference.walkers import entries, write_urdf
 from tests.video.films import needs_models
@@ -68,6 +70,12 @@ def run(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtu
         return text
 
     return run
+
+
+@pytest.fixture(autouse=True)
+def _uncalibrated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The confidence of a robot that nothing was trained for takes seconds, and no table here has it."""
+    monkeypatch.setattr(without_training, "calibrated", lambda _: STANDARD)
 
 
 @pytest.fixture(scope="module")
@@ -194,15 +202,16 @@ def test_reference(run: Run, clips: Path) -> None:
     assert [row[0] for row in rows(text, "output")] == ["q", "q_cf, from q"]
 
 
-def test_many_robots(run: Run, tmp_path: Path) -> None:
-    picture, motion = tmp_path / "many.png", "data/motions/wave.npz"
+def test_many_robots(run: Run, clips: Path, tmp_path: Path) -> None:
+    picture, motion = tmp_path / "many.png", clips / "wave.npz"
     text = run("many_robots", "--robots", "nao", "--made", 1, "--motion", motion, "--out", picture)
     (name, *numbers), (made, *_) = rows(text, "robot")
     assert (name, made) == ("nao", "made 1") and picture.stat().st_size > 1000
     assert abs(float(numbers[1]) - float(numbers[2])) < 1
 
 
-def test_whole_body(run: Run, clips: Path, tmp_path: Path) -> None:
+def test_whole_body(run: Run, clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engines, "numba_is_there", lambda: False)  # it would compile for half a minute
     text = run("whole_body", "--robots", "nao", "--clips", clips, "--ways", "motion,stream,fast",
                "--picture", tmp_path / "moments.png")  # fmt: skip
     found = rows(text, "clip")

@@ -13,7 +13,7 @@ import pytest
 
 def run(body: str, **options) -> subprocess.CompletedProcess[str]:
     """A process whose main() has this body."""
-    return subprocess.run([sys.executable, "-c", script(body)], capture_output=True, text=True, timeout=60, **options)
+    return subprocess.run([sys.executable, "-c", script(body)], capture_output=True, text=True, timeout=300, **options)
 
 
 def script(body: str) -> str:
@@ -76,7 +76,7 @@ def test_a_reader_that_went_away_is_quiet(body):
     read, write = os.pipe()
     os.close(read)
     with os.fdopen(write, "wb") as pipe:
-        done = subprocess.run([sys.executable, "-c", script(body)], stdout=pipe, stderr=subprocess.PIPE, timeout=60)
+        done = subprocess.run([sys.executable, "-c", script(body)], stdout=pipe, stderr=subprocess.PIPE, timeout=300)
     assert (done.returncode, done.stderr) == (141, b"")
 
 
@@ -87,7 +87,7 @@ def test_closed_output_is_no_error():
         env={**os.environ, "BODY": script("print('x')")},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
     )
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -102,7 +102,7 @@ def test_ctrl_c(tmp_path: Path):
     )
     assert process.stdout is not None and process.stdout.readline() == "go\n"
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=300)
     assert (process.returncode, err) == (130, "interrupted; the same command resumes\n")
 
 
@@ -116,7 +116,7 @@ def test_sigterm_ends_as_an_interrupt_does():
     )
     assert process.stdout is not None and process.stdout.readline() == "go\n"
     process.terminate()
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     assert (process.returncode, out, err) == (143, "closed\n", "terminated; the same command resumes\n")
 
 

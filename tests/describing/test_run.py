@@ -104,9 +104,9 @@ def test_a_robot_without_a_config_is_the_one_that_a_config_would_give(urdf: Path
 def test_a_wrong_config_is_drawn_and_its_fault_told(urdf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from PIL import Image
 
-    from mrhubo.describing import run
+    from mrhubo.describing import picture
 
-    monkeypatch.setattr(run, "draw", lambda body_map: Image.new("RGB", (3, 3)))
+    monkeypatch.setattr(picture, "draw", lambda body_map: Image.new("RGB", (3, 3)))
     file = describe_model("my.urdf").file
     assert draw_config(file, Path("a.png")) is None
     text = file.read_text()

@@ -216,7 +216,7 @@ def test_roots_and_contacts_that_make_no_sense_are_refused(
 
 
 def test_a_robot_of_which_there_is_a_model_alone_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(without_training, "calibrate", lambda _: STANDARD)  # it takes some seconds
+    monkeypatch.setattr(without_training, "calibrated", lambda _: STANDARD)  # it takes some seconds
     urdf = write_urdf(tmp_path / "walker.urdf")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # what is a guess

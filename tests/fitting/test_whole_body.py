@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("light_records")
 def test_the_command(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, one_thread: None
 ) -> None:
-    monkeypatch.setattr(without_training, "calibrate", lambda retargeter: STANDARD)
+    monkeypatch.setattr(without_training, "calibrated", lambda retargeter: STANDARD)
     for name in ("drinking", "wave"):
         cut_motion(name, tmp_path / "clips", (1, 2), every=12)
     settings = [f"evaluation.motions=[{tmp_path / 'clips'}]", f"tracking.dir={tmp_path / 'runs'}"]

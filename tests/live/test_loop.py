@@ -184,7 +184,7 @@ def test_what_cannot_be_opened_leaves_nothing_open(replay: ReplaySource, tmp_pat
 def test_udp_from_end_to_end() -> None:
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     receiver.bind(("127.0.0.1", 0))
-    receiver.settimeout(2)
+    receiver.settimeout(30)
     source, sink = UdpSource(Endpoint("127.0.0.1", 0)), UdpSink(Endpoint(*receiver.getsockname()))
     session = Session.of(make_robot(lambda pose, time: UPPER), [source], [sink], LiveConfig(ramp_time=0.0))
     session.open()

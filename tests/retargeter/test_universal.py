@@ -54,7 +54,7 @@ def test_a_stream_follows(reachy: Retargeter, root: Path) -> None:
 
 
 def test_legs_of_a_urdf_move_when_they_are_asked_for(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(without_training, "calibrate", functools.partial(calibrate, poses=100))
+    monkeypatch.setattr(without_training, "calibrated", functools.partial(calibrate, poses=100))
     file = root / "data" / "robots" / "nao" / "nao.urdf"
     arms, whole = mrhubo.for_robot(file), mrhubo.for_robot(file, whole_body=True)
     by_command = open_robot(str(file), whole_body=True)

@@ -91,9 +91,11 @@ def test_differences_are_named(root: Path) -> None:
 def test_the_urdf_is_parsed_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
     load = urdf.read_tree
-    monkeypatch.setattr(urdf, "read_tree", lambda path: (read.append(path), load(path))[1])
+    monkeypatch.setattr(urdf, "read_tree", lambda path, text: (read.append(path), load(path, text))[1])
+    urdf._described.cache_clear()
     body_map = build_body_map(load_config(root / "conf" / "coman.yaml").robot)
     assert body_map.collision.pairs
     Artist(body_map.robot).robot_figure(body_map.robot.home())
     OptimizationRetargeter(body_map)
+    build_body_map(load_config(root / "conf" / "coman.yaml").robot)
     assert read == [body_map.robot.urdf]

@@ -20,7 +20,7 @@ from mrhubo.runtime.failures import may_pass, reason_of, silence
 
 def test_a_server_that_is_not_there_is_silent() -> None:
     start = time.monotonic()
-    assert silence("http://127.0.0.1:9", 5.0) == "Connection refused" and time.monotonic() - start < 3
+    assert silence("http://127.0.0.1:9", 60.0) == "Connection refused" and time.monotonic() - start < 30
     assert silence("http://", 1.0) is not None
 
 

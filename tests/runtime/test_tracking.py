@@ -61,7 +61,7 @@ def test_addresses_that_do_not_work_are_named_within_seconds(
     start = time.monotonic()
     with pytest.raises(UserError, match=sentence) as error:
         open_client(tmp_path, "mrhubo", uri)
-    assert "s3cret" not in str(error.value) and time.monotonic() - start < 8
+    assert "s3cret" not in str(error.value) and time.monotonic() - start < 30  # not minutes
 
 
 def test_mlflow_gets_the_password_apart_from_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands, read_arms
-from mrhubo.robot.discovery.bodies import Bodies, Step
+from mrhubo.robot.discovery.bodies import Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.foot import read_foot, with_fixed_ankle
 from mrhubo.robot.discovery.hand import Hand, read_hand
@@ -26,7 +26,7 @@ from mrhubo.robot.discovery.result import (
     FoundPoint,
     Vector,
 )
-from mrhubo.robot.discovery.roles import Roles, find_roles
+from mrhubo.robot.discovery.roles import find_roles
 from mrhubo.robot.discovery.symmetry import find_pairs
 from mrhubo.robot.urdf import Description, describe
 
@@ -46,15 +46,15 @@ def discover(robot: Description | Path | str, whole_body: bool = False) -> Disco
         UserError: the file is no robot (as `describe`), or it has no two arms that could be told; says what it has.
     """
     description = robot if isinstance(robot, Description) else describe(Path(robot))
-    bodies = read_bodies(description)
-    roles = find_roles(bodies, find_pairs(bodies))
-    return _Finder(bodies, roles, whole_body).found()
+    return description.once("discovery", lambda: _Finder(description)).found(whole_body)
 
 
 class _Finder:
     """Puts together what the parts of this package find."""
 
-    def __init__(self, bodies: Bodies, roles: Roles, whole_body: bool) -> None:
+    def __init__(self, description: Description) -> None:
+        bodies = read_bodies(description)
+        roles = find_roles(bodies, find_pairs(bodies))
         arms = read_arms(bodies, roles.arms.chains)
         legs = [
             leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None
@@ -76,11 +76,11 @@ class _Finder:
                 hands[side] = hand
         self.hands = agreeing_hands(hands, self.heading.left_3)
         self.feet = {side: read_foot(bodies, leg, self.heading) for side, leg in self.legs.items()}
-        self.limbs = Limbs(bodies, roles, self.heading, self.arms, self.legs, self.hands, whole_body)
 
-    def found(self) -> Discovery:
-        """The result."""
-        limbs, spots = self.limbs, list(self._spots())
+    def found(self, whole_body: bool) -> Discovery:
+        """The result; whether legs and waist are to move too."""
+        limbs = Limbs(self.bodies, self.roles, self.heading, self.arms, self.legs, self.hands, whole_body)
+        spots = list(self._spots())
         legs = self.legs if limbs.whole_body else {}
         ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading.forward_3)
         joints = limbs.moved()
