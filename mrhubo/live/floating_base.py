@@ -36,10 +36,11 @@ FLAT, UP = [0, 1], 2
 """The horizontal axes of the world, and the upright one."""
 STANDS_M, LIFTED_M = 0.02, 0.06
 """A sole's point lower than this [m] stands on the floor, one higher does not: in between it counts in part."""
-RISE_S, FALL_S = 0.1, 0.025
-"""Times [s] in which a contact that begins comes to count in full, and one that ends not at all, at the soonest."""
-TURN_S = 0.1
-"""The same [s] for a whole sole, whose turn then counts or not: the base turns with it, and should not jerk."""
+BEARS_M = 0.005
+"""A sole's point lower than this [m] bears a robot that stands otherwise than the person, one higher than `STANDS_M`
+does not."""
+RISE_S = 0.1
+"""Time [s] in which a contact that begins comes to count in full, at the soonest."""
 LEVEL_SPEED = 1.0
 """How fast the base and planted feet are turned [rad/s] to what the stream has, where they are not so turned."""
 SINK_SPEED, GRAVITY = 0.5, 9.81
@@ -69,10 +70,6 @@ class _Place(NamedTuple):
     """Points of soles from the base's place, along the world's axes [m]."""
     low_H: np.ndarray
     """How high the lowest ball at each point is over the base [m]."""
-    anchor_H2: np.ndarray
-    """Where points of soles are planted [m],"""
-    orient_R33: np.ndarray
-    """and how feet are to be turned."""
 
 
 class FloatingBase:
@@ -111,8 +108,8 @@ class FloatingBase:
         """How the stream has the feet turned."""
         self._begun = True
         """Whether what is followed began anew with the newest stance."""
-        self._at = _Place(turn_33, place_3, point_H3, low_H, self._anchor_H2, self._orient_R33)
-        self._weight_H = self._near()
+        self._at = _Place(turn_33, place_3, point_H3, low_H)
+        self._weight_H = self._near(STANDS_M, LIFTED_M)
         self._flat_R = self._weight_H.reshape(-1, 2).min(axis=1)
         """How far each foot stands with its whole sole (R,), 0..1, so that its turn counts."""
 
@@ -142,19 +139,17 @@ class FloatingBase:
         """
         others = [] if stance is None or stance is self._stance else [stance.q_N]
         soles, self._stop_soles, *theirs = self._soles(q_N, stop_N, *others)
-        before, was_H, was_R = self._at, self._weight_H, self._flat_R
+        before = self._at
         followed = stance if share > 0 else None
         free_33, planned_3 = self._coast() if followed is None else self._follow(followed, share)
         self._weigh(followed)
         if followed is not None:
-            self._turn_feet(followed, theirs[0].turn_R33 if theirs else None, was_R, share)
+            self._turn_feet(followed, theirs[0].turn_R33 if theirs else None, share)
         self._stance = followed
-        self._at = at = self._solve(soles, free_33, planned_3, was_H, was_R)
-        loose_H1 = 1.0 - self._weight_H[:, None]  # what is hardly planted yet, or no more, goes along
-        self._anchor_H2 = at.anchor_H2 + loose_H1 * ((at.place_3 + at.point_H3)[:, FLAT] - at.anchor_H2)
-        loose_R1 = 1.0 - self._flat_R[:, None]
-        away_R3 = _turns(at.turn_33 @ soles.turn_R33 @ at.orient_R33.mT)
-        self._orient_R33 = _rotations(loose_R1 * away_R3) @ at.orient_R33
+        self._at = at = self._solve(soles, free_33, planned_3)
+        # Where two planted feet go apart, both slide, and the middle stays; it is not remembered, so that no foot is
+        # pulled back to where it was when the other one is lifted.
+        self._anchor_H2, self._orient_R33 = (at.place_3 + at.point_H3)[:, FLAT], at.turn_33 @ soles.turn_R33
         if followed is not None:
             turned_3 = _turn(at.turn_33 @ before.turn_33.T)
             self._velocity_6 = np.concatenate((at.place_3 - before.place_3, turned_3)) / self._period
@@ -164,7 +159,7 @@ class FloatingBase:
         left = max(self._brake_time - self._coasted, 0.0)
         way_6 = self._velocity_6 * (left * left / (2 * self._brake_time))
         free_33 = _rotation(way_6[3:]) @ self._at.turn_33
-        at = self._solve(self._stop_soles, free_33, self._at.place_3 + way_6[:3], self._weight_H, self._flat_R)
+        at = self._solve(self._stop_soles, free_33, self._at.place_3 + way_6[:3])
         return Base(at.place_3, at.turn_33)
 
     def settle(self) -> None:
@@ -185,9 +180,9 @@ class FloatingBase:
         height_J = soles.ball_J3 @ turn_33[UP] - self._legs.radius_J
         return np.where(self._legs.near_HJ > 0, height_J, np.inf).min(axis=1)
 
-    def _near(self) -> np.ndarray:
-        """How far each point stands on the floor (H,), 0..1."""
-        return np.clip((LIFTED_M - self._at.place_3[UP] - self._at.low_H) / (LIFTED_M - STANDS_M), 0.0, 1.0)
+    def _near(self, low: float, high: float) -> np.ndarray:
+        """How far each point is at the floor (H,), 1 under a height [m], 0 above another one."""
+        return np.clip((high - self._at.place_3[UP] - self._at.low_H) / (high - low), 0.0, 1.0)
 
     def _in_world(self, stance: Stance) -> np.ndarray:
         """The rotation of the stream's base in the robot's world."""
@@ -237,7 +232,7 @@ class FloatingBase:
     def _sunk(self, height: float, sinks: bool) -> float:
         """A height [m], or a lower one, if the robot is in the air and should not be."""
         above = height + float(self._at.low_H.min())
-        if not sinks or above <= 0 or self._weight_H.sum() >= 1:
+        if not sinks or above <= 1e-9 or self._weight_H.sum() >= 1:
             self._sinking = 0.0
             return height
         self._sinking = min(self._sinking + GRAVITY * self._period, SINK_SPEED, above / self._period)
@@ -247,19 +242,18 @@ class FloatingBase:
         """How much each point's contact counts: as the person's, if it stands on the floor; where the robot stands
         otherwise than the person, that is on what is lowest. Who is stopped stands as he stood.
         """
-        near_H, total = self._near(), 1.0
+        wanted_H, total = self._weight_H, 1.0
         if stance is not None:
-            wanted_H, total = stance.weight_H * near_H, min(float(stance.weight_H.sum()), 1.0)
-        else:
-            wanted_H = self._weight_H
+            wanted_H = stance.weight_H * self._near(STANDS_M, LIFTED_M)
+            total = min(float(stance.weight_H.sum()), 1.0)
         missing = max(0.0, total - float(wanted_H.sum()))
-        wanted_H = wanted_H + near_H * (missing / max(float(near_H.sum()), 1e-9))
-        change_H = np.minimum(wanted_H, 1.0) - self._weight_H
-        self._weight_H = self._weight_H + np.clip(change_H, -self._period / FALL_S, self._period / RISE_S)
-        change_R = self._weight_H.reshape(-1, 2).min(axis=1) - self._flat_R
-        self._flat_R = self._flat_R + np.clip(change_R, -self._period / TURN_S, self._period / TURN_S)
+        if missing > 0:
+            wanted_H = np.maximum(wanted_H, missing * self._near(BEARS_M, STANDS_M))
+        self._weight_H = np.minimum(wanted_H, self._weight_H + self._period / RISE_S)
+        flat_R = self._weight_H.reshape(-1, 2).min(axis=1)
+        self._flat_R = np.minimum(flat_R, self._flat_R + self._period / RISE_S)
 
-    def _turn_feet(self, stance: Stance, turn_R33: np.ndarray | None, was_R: np.ndarray, share: float) -> None:
+    def _turn_feet(self, stance: Stance, turn_R33: np.ndarray | None, share: float) -> None:
         """Turns planted feet as the stream does, while it has them planted too, and towards how it has them.
         `turn_R33`: how they are turned in the stream's base; None: as before.
         """
@@ -267,7 +261,7 @@ class FloatingBase:
         if turn_R33 is not None:
             self._theirs_R33 = self._in_world(stance) @ turn_R33
         goes_on = turn_R33 is not None and self._stance is not None and not self._begun
-        for foot in np.flatnonzero(np.minimum(theirs_R, was_R) > 0):
+        for foot in np.flatnonzero(np.minimum(theirs_R, self._flat_R) > 0):
             if goes_on:
                 turned_3 = _turn(self._theirs_R33[foot] @ last_33[foot].T)
                 self._orient_R33[foot] = _rotation(share * turned_3) @ self._orient_R33[foot]
@@ -279,25 +273,19 @@ class FloatingBase:
         most = LEVEL_SPEED * share * self._period
         return _rotation(off_3 * min(1.0, most / max(_norm(off_3), 1e-12))) @ turn_33
 
-    def _solve(
-        self, soles: _Soles, free_33: np.ndarray, planned_3: np.ndarray, was_H: np.ndarray, was_R: np.ndarray
-    ) -> _Place:
-        """The base that planted soles carry, and as far as none is planted, one that moves freely. `was_H`, `was_R`:
-        how far points and soles were planted before; what was not is planted where it would be.
-        """
-        flat_R, weight_H = self._flat_R, self._weight_H
-        orient_R33 = np.where(was_R[:, None, None] > 0, self._orient_R33, free_33 @ soles.turn_R33)
-        away_R3 = _turns(orient_R33 @ soles.turn_R33.mT @ free_33.T)
+    def _solve(self, soles: _Soles, free_33: np.ndarray, planned_3: np.ndarray) -> _Place:
+        """The base that planted soles carry, and as far as none is planted, one that moves freely."""
+        flat_R, weight_H, anchor_H2 = self._flat_R, self._weight_H, self._anchor_H2
+        away_R3 = _turns(self._orient_R33 @ soles.turn_R33.mT @ free_33.T)
         turn_33 = _rotation(flat_R @ away_R3 / max(float(flat_R.sum()), 1.0)) @ free_33
         point_H3, low_H = soles.point_H3 @ turn_33.T, self._lowest(soles, turn_33)
-        anchor_H2 = np.where(was_H[:, None] > 0, self._anchor_H2, (planned_3 + point_H3)[:, FLAT])
         whole = float(weight_H.sum())
         rest = max(1.0 - whole, 0.0)
         place_3 = planned_3.copy()
         place_3[FLAT] = (weight_H @ (anchor_H2 - point_H3[:, FLAT]) + rest * planned_3[FLAT]) / (whole + rest)
         rise = (-float(weight_H @ low_H) + rest * planned_3[UP]) / (whole + rest)
         place_3[UP] = max(rise, -float(low_H.min()))
-        return _Place(turn_33, place_3, point_H3, low_H, anchor_H2, orient_R33)
+        return _Place(turn_33, place_3, point_H3, low_H)
 
 
 def _turn(matrix_33: np.ndarray) -> np.ndarray:
