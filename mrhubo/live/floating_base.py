@@ -242,13 +242,13 @@ class FloatingBase:
         """How much each point's contact counts: as the person's, if it stands on the floor; where the robot stands
         otherwise than the person, that is on what is lowest. Who is stopped stands as he stood.
         """
-        wanted_H, total = self._weight_H, 1.0
-        if stance is not None:
+        bears_H = self._near(BEARS_M, STANDS_M)
+        if stance is None:
+            wanted_H = np.maximum(self._weight_H, bears_H)
+        else:
             wanted_H = stance.weight_H * self._near(STANDS_M, LIFTED_M)
-            total = min(float(stance.weight_H.sum()), 1.0)
-        missing = max(0.0, total - float(wanted_H.sum()))
-        if missing > 0:
-            wanted_H = np.maximum(wanted_H, missing * self._near(BEARS_M, STANDS_M))
+            missing = min(float(stance.weight_H.sum()), 1.0) - float(wanted_H.sum())
+            wanted_H = np.maximum(wanted_H, missing * bears_H)
         self._weight_H = np.minimum(wanted_H, self._weight_H + self._period / RISE_S)
         flat_R = self._weight_H.reshape(-1, 2).min(axis=1)
         self._flat_R = np.minimum(flat_R, self._flat_R + self._period / RISE_S)

@@ -41,8 +41,10 @@ def legged(tmp_path_factory: pytest.TempPathFactory) -> FastRetargeter:
     return make_legged(tmp_path_factory.mktemp("legged"))
 
 
-def assert_inside(pilot: Pilot, sent: Sent) -> None:
-    """Positions, speeds and accelerations of joints, from standing on; soles, and the base from one output to the next."""
+def assert_inside(pilot: Pilot, sent: Sent, fastest: float = 2.0) -> None:
+    """Positions, speeds and accelerations of joints, from standing on; soles, and the base from one output to the next,
+    which goes no faster than that [m/s].
+    """
     governor, config = pilot.governor, pilot.config
     q_TN = np.concatenate([np.tile(pilot.robot.home_N, (2, 1)), sent.q_TN])
     velocity_TN = np.diff(q_TN, axis=0) * config.rate
@@ -52,7 +54,7 @@ def assert_inside(pilot: Pilot, sent: Sent) -> None:
     assert sent.lowest_T.min() > -1e-6
     assert np.isfinite(sent.place_T3).all()
     goes_T, turns_T = sent.speed(config.rate)
-    assert goes_T.max() < 3.0 and turns_T.max() < 12.0, "the base jumps"
+    assert goes_T.max() < fastest and turns_T.max() < 12.0, "the base jumps"
 
 
 def assert_rests(sent: Sent, frame: int) -> None:
@@ -67,14 +69,16 @@ def test_people_are_followed_with_stops(external_dir: Path, legged: FastRetarget
     frames = poses_of(read_motion(external_dir / "cmu" / "whole_body" / f"{clip}.npz"))[:240]
     config = LiveConfig(ramp_time=0.3)
     pilot, sent = drive(legged, frames, config, held=lambda frame: frame % 80 < 60, after=30)
-    assert_inside(pilot, sent)
+    assert_inside(pilot, sent, 4.0 if clip == "127_05" else 2.5)  # a run
     assert {output.state for output in sent.outputs} == {"following", "stopped"}
     for stop in range(60, len(frames), 80):  # the button is let go of; who is in the air comes down
         rest = stop + round((config.stop_time - config.heartbeat_timeout) * config.rate)
         assert np.ptp(sent.place_T3[rest : stop + 19, :2], axis=0).max() < 1e-6
         assert np.ptp(sent.turn_T33[rest : stop + 19], axis=0).max() < 1e-6
         goes_T, turns_T = sent.speed()
-        assert goes_T[stop + 19 : stop + 23].max() < 0.15 and turns_T[stop + 19 : stop + 23].max() < 0.3, "a jump"
+        again_T = np.arange(6) / 60 / config.ramp_time  # how far the ramp has risen
+        assert (goes_T[stop + 19 : stop + 25] < 7.0 * again_T + 0.01).all(), "a jump"
+        assert (turns_T[stop + 19 : stop + 25] < 12.0 * again_T + 0.01).all(), "a jump"
     assert_rests(sent, len(frames) + 20)
     assert pilot.inbox.counts["jumped"] == pilot.inbox.counts["malformed"] == 0
 
@@ -124,8 +128,7 @@ def test_what_a_person_goes_while_the_robot_is_stopped_is_not_made_up_for(legged
     x_T = sent.place_T3[:, 0]
     assert x_T[48:110].max() - x_T[48:110].min() < 1e-6
     assert x_T[40] - x_T[0] > 0.1 and x_T[-1] - x_T[110] > 0.1
-    goes_T, _ = sent.speed()
-    assert goes_T.max() < 1.3, "it hurries after the person"
+    assert x_T[-1] - x_T[110] < 0.6 * 40 / 60 + 0.1, "it hurries after the person"
 
 
 def test_where_it_would_stand_is_where_it_stands(legged: FastRetargeter) -> None:
@@ -227,11 +230,12 @@ def test_points_in_the_world_lead_where_the_person_goes(legged: FastRetargeter) 
 
 def test_points_from_the_hips_bend_the_knees_and_go_nowhere(legged: FastRetargeter) -> None:
     frames = poses_of(squat(90, 60.0, 0.0))
-    pilot, sent = drive(legged, points(frames, False), QUICK)
+    pilot, sent = drive(legged, points(frames, False), LiveConfig(ramp_time=0.2))
     assert_inside(pilot, sent)
     knee = sent.q_TN[:, pilot.robot.joint_names.index("l_knee")]
     assert np.ptp(knee) > 0.5 and np.ptp(sent.place_T3[:, 2]) > 0.03
-    assert np.ptp(sent.place_T3[:, :2], axis=0).max() < 0.1 and sent.lowest_T[30:].max() < 0.02
+    assert np.ptp(sent.place_T3[:, :2], axis=0).max() < 0.25 and sent.lowest_T.max() < 1e-6
+    assert np.ptp(sent.point_TH3[..., :2].mean(axis=1), axis=0).max() < 1e-6, "planted soles stay"
 
 
 def test_a_webcam_that_sees_no_knees_moves_arms_alone(legged: FastRetargeter) -> None:
