@@ -96,8 +96,8 @@ class LiveRobot:
         return replace(found, figure=figure)
 
     @classmethod
-    def of_robot(cls, name: str, config: LiveConfig, form: str | None = None) -> LiveRobot:
-        """By the universal network, without training; as `mrhubo.for_robot`.
+    def of_robot(cls, name: str, config: LiveConfig, form: str | None = None, whole_body: bool = False) -> LiveRobot:
+        """By the universal network, without training; as `mrhubo.for_robot`, whose `whole_body` it is.
 
         Raises:
             UserError: the robot cannot be used.
@@ -105,7 +105,7 @@ class LiveRobot:
         from mrhubo.describing.run import open_robot
         from mrhubo.retargeter import untrained
 
-        robot = open_robot(name)
+        robot = open_robot(name, whole_body)
         retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
         found = cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
