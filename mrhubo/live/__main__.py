@@ -56,9 +56,9 @@ def build_parser() -> CommandParser[LiveConfig]:
 def main(argv: list[str]) -> int:
     """The command; 128 and the signal's number where a signal other than Ctrl-C ended it."""
     if SETUP in argv:
-        from mrhubo.models import main as fetch_models
+        from mrhubo.video.fetching import fetch
 
-        fetch_models([word for word in argv if word != SETUP])
+        fetch([word for word in argv if word != SETUP], f"mrhubo live {SETUP}")
         return 0
     config, options = parse_arguments(build_parser(), argv)
     from mrhubo.config.command import Terminated

@@ -20,6 +20,7 @@ import numpy as np
 
 from mrhubo.body.joints import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, hinge_axis
 from mrhubo.fast.plain.human import BEND_DEG
+from mrhubo.live.seen_points import REST, SeenPoints, frame_of, turn_between
 from mrhubo.live.vectors import (
     IDENTITY,
     Rotation,
@@ -37,21 +38,17 @@ from mrhubo.live.vectors import (
     relative,
     shortest,
     transposed,
-    undo,
     unit,
 )
 from mrhubo.motion.hinges import BACKWARD, BENT
-from mrhubo.motion.orientations import PARALLEL, SHORTEST, TRIADS, Triad, rest_points
+from mrhubo.motion.orientations import Triad
 
 UPRIGHT_CONFIDENCE = 0.6
 """How sure the trunk is, at most, where no hip is seen and it is taken to be upright."""
-_REST: dict[str, Vector] = {name: (float(x), float(y), float(z)) for name, ((x, y, z),) in rest_points().items()}
 _HANGING: Vector = (0.0, -1.0, 0.0)
 _UP: Vector = (0.0, 1.0, 0.0)
 _SHOULDERS = [f"{side}_shoulder" for side in SIDES]
 _HIPS = [f"{side}_hip" for side in SIDES]
-_SHORTEST_BONE = 0.05
-"""What is shorter [m] is nobody's thigh or shin."""
 _LENGTHS = 60
 """So many frames, about, tell how long a person's legs are."""
 _POSED = {name: number for number, name in enumerate(POSED_JOINT_NAMES)}
@@ -116,7 +113,7 @@ class Body:
             sure: how sure the source is of points, 0..1; 1 where it does not say.
             in_world: whether points tell where the person is in the world, too.
         """
-        seen = _Points(points, sure)
+        seen = SeenPoints(points, sure)
         chest_sure, pelvis_sure = self._trunk(seen)
         if self.chest is None:
             return None
@@ -140,7 +137,7 @@ class Body:
         pose = _pose(world, found, chest_sure)
         return SeenPose(pose.local_J33, pose.sure_J, self._root(seen, world["pelvis"], in_world))
 
-    def _root(self, seen: _Points, pelvis: Rotation, in_world: bool) -> Root:
+    def _root(self, seen: SeenPoints, pelvis: Rotation, in_world: bool) -> Root:
         """Where the pelvis is: the middle of its hips, of a person whose legs are as long as our skeleton's."""
         turn_33 = np.array(pelvis).T
         if not in_world:
@@ -159,13 +156,13 @@ class Body:
         place = minus((ratio * self.hips[0], ratio * self.hips[1], ratio * self.hips[2]), apply(pelvis, _MIDDLE))
         return Root(turn_33, np.array(place))
 
-    def _trunk(self, seen: _Points) -> tuple[float, float]:
+    def _trunk(self, seen: SeenPoints) -> tuple[float, float]:
         """How the trunk is turned, and how sure that is of chest and pelvis."""
         chest, sure = seen.turn("spine3")
         pelvis, pelvis_sure = seen.turn("pelvis")
         if chest is None and seen.has(*_SHOULDERS):
             left, right = (seen.points[name] for name in _SHOULDERS)
-            chest = _turn_between(minus(left, right), _UP, Triad(((_SHOULDERS[1],), (_SHOULDERS[0],)), ((), ())))
+            chest = turn_between(minus(left, right), _UP, Triad(((_SHOULDERS[1],), (_SHOULDERS[0],)), ((), ())))
             sure = min(UPRIGHT_CONFIDENCE, seen.surety(*_SHOULDERS))
         if chest is None:
             return 0.0, 0.0
@@ -176,7 +173,7 @@ class Body:
 
 
 def _see_limb(
-    seen: _Points, limb: _Limb, side: str, joints: tuple[str, str, str], carrier: Rotation,
+    seen: SeenPoints, limb: _Limb, side: str, joints: tuple[str, str, str], carrier: Rotation,
     world: dict[str, Rotation], found: dict[str, float], carrier_sure: float, one_way: bool = False,
 ) -> None:  # fmt: skip
     """Upper bone, lower bone, and hand or foot, in the world, and how sure they are. `one_way`: as a knee bends."""
@@ -184,12 +181,12 @@ def _see_limb(
     upper, lower = (seen.way(*ends, carrier) for ends in ((start, hinge), (hinge, end)))
     limb.upper, limb.lower = upper or limb.upper, lower or limb.lower
     axis = _hinge_axis(limb, hinge, upper is not None and lower is not None, one_way)
-    bone, rest_axis = unit(minus(_REST[hinge], _REST[start])), hinge_axis(hinge)
-    at_rest = _frame(bone, rest_axis)
-    turned = _frame(limb.upper, axis)
+    bone, rest_axis = unit(minus(REST[hinge], REST[start])), hinge_axis(hinge)
+    at_rest = frame_of(bone, rest_axis)
+    turned = frame_of(limb.upper, axis)
     assert at_rest is not None and turned is not None  # both axes are at right angles to the bones
     upper_turn = chained(turned, transposed(at_rest))
-    lower_bone = unit(minus(_REST[end], _REST[hinge]))
+    lower_bone = unit(minus(REST[end], REST[hinge]))
     lower_turn = chained(shortest(apply(upper_turn, lower_bone), limb.lower), upper_turn)
     world[start], world[hinge] = chained(carrier, upper_turn), chained(carrier, lower_turn)
     tip, tip_sure = seen.turn(end)
@@ -201,86 +198,6 @@ def _see_limb(
     found[end] = min(tip_sure, carrier_sure)
 
 
-class _Points:
-    """The points of one frame."""
-
-    def __init__(self, points: Mapping[str, Vector], sure: Mapping[str, float]) -> None:
-        self.points, self._sure = points, sure
-
-    def has(self, *names: str) -> bool:
-        return all(name in self.points for name in names)
-
-    def surety(self, *names: str) -> float:
-        return min(self._sure.get(name, 1.0) for name in names)
-
-    def way(self, start: str, end: str, seen_from: Rotation) -> Vector | None:
-        """The direction of a bone, as a part sees it."""
-        if not self.has(start, end):
-            return None
-        way = minus(self.points[end], self.points[start])
-        return unit(undo(seen_from, way)) if norm(way) > SHORTEST else None
-
-    def length(self, *names: str) -> float | None:
-        """How long a chain of bones is [m]; None where a point is missing, or two are one."""
-        if not self.has(*names):
-            return None
-        ways = [norm(minus(self.points[b], self.points[a])) for a, b in pairwise(names)]
-        return sum(ways) if min(ways) > _SHORTEST_BONE else None
-
-    def turn(self, joint: str) -> tuple[Rotation | None, float]:
-        """How a part is turned in the world, relative to our rest pose, by the best of its triads that is seen."""
-        for triad, names in _TRIADS[joint]:
-            if self.has(*names):
-                first, second = (_between(vector, self.points) for vector in (triad.first, triad.second))
-                found = _turn_between(first, second, triad)
-                if found is not None:
-                    return found, self.surety(*names)
-        return None, 0.0
-
-
-_TRIADS = {joint: [(triad, tuple(triad.names)) for triad in triads] for joint, triads in TRIADS.items()}
-
-
-def _between(vector: tuple[tuple[str, ...], tuple[str, ...]], points: Mapping[str, Vector]) -> Vector:
-    start, end = (mean([points[name] for name in place]) for place in vector)
-    return minus(end, start)
-
-
-def _rest_frames() -> dict[Triad, Rotation]:
-    """Of each triad, the transpose of its frame at rest."""
-    found = {}
-    for triads in TRIADS.values():
-        for triad in triads:
-            frame = _frame(_between(triad.first, _REST), _between(triad.second, _REST))
-            if frame is not None:
-                found[triad] = transposed(frame)
-    return found
-
-
-def _turn_between(first: Vector, second: Vector, triad: Triad) -> Rotation | None:
-    """The turn of a part whose two vectors are these; None where they fix none."""
-    frame = _frame(first, second)
-    return None if frame is None else chained(frame, _REST_FRAMES.get(triad, _UPRIGHT))
-
-
-def _frame(first: Vector, second: Vector) -> Rotation | None:
-    """As `mrhubo.motion.orientations.frame_of`: None where the vectors are short or nearly parallel."""
-    length, other = norm(first), norm(second)
-    if length < SHORTEST or other < SHORTEST:
-        return None
-    x = unit(first)
-    side = across(second, x)
-    if norm(side) < PARALLEL * other:
-        return None
-    y = unit(side)
-    return x, y, cross(x, y)
-
-
-_UPRIGHT: Rotation = IDENTITY
-"""At rest the shoulders' line is the x axis, and up is y."""
-_REST_FRAMES = _rest_frames()
-
-
 def _hinge_axis(limb: _Limb, hinge: str, known: bool, one_way: bool) -> Vector:
     """A unit vector at right angles to the upper bone: of the plane of both bones where the hinge is bent, else as when
     it was bent last (`mrhubo.motion.hinges`).
@@ -288,7 +205,7 @@ def _hinge_axis(limb: _Limb, hinge: str, known: bool, one_way: bool) -> Vector:
     plane = cross(limb.upper, limb.lower)
     bend = math.atan2(norm(plane), dot(limb.upper, limb.lower))
     above = JOINT_NAMES[PARENTS[_POSED[hinge] + 1]]
-    at_rest = unit(minus(_REST[hinge], _REST[above])), hinge_axis(hinge)
+    at_rest = unit(minus(REST[hinge], REST[above])), hinge_axis(hinge)
     if one_way and bend < BACKWARD and dot(plane, apply(shortest(at_rest[0], limb.upper), at_rest[1])) < 0:
         plane, bend = (0.0, 0.0, 0.0), 0.0
     if known and bend > BENT:
@@ -304,9 +221,9 @@ def _hinge_axis(limb: _Limb, hinge: str, known: bool, one_way: bool) -> Vector:
     return axis if norm(axis) > 0.5 else own
 
 
-_MIDDLE: Vector = mean([_REST[name] for name in _HIPS])
+_MIDDLE: Vector = mean([REST[name] for name in _HIPS])
 """The middle of the hips, from the pelvis [m]."""
-LEG_LENGTH = sum(norm(minus(_REST[b], _REST[a])) for a, b in pairwise(("left_hip", "left_knee", "left_ankle")))
+LEG_LENGTH = sum(norm(minus(REST[b], REST[a])) for a, b in pairwise(("left_hip", "left_knee", "left_ankle")))
 """How long our skeleton's legs are [m], from hip to ankle."""
 _PLANE_DEG = BEND_DEG["plane_high_deg"] - BEND_DEG["plane_low_deg"]
 

@@ -27,9 +27,8 @@ import numpy as np
 
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.ground import WORLD, Base, Stance
-from mrhubo.fast.plain.robot import place
-from mrhubo.fast.plain.soles import carrier, turned_points
 from mrhubo.fast.rotations import matrix_to_axis_angle
+from mrhubo.live.leg_kinematics import LegKinematics, Soles
 from mrhubo.live.vectors import about
 
 FLAT, UP = [0, 1], 2
@@ -50,15 +49,6 @@ FASTEST, FASTEST_TURN = 12.0, 20.0
 """No base goes [m/s] or turns [rad/s] faster: what does is another place of the tracker's world."""
 PLANTED = 0.5
 """A foot is told to be planted if a contact of its counts more than this."""
-
-
-class _Soles(NamedTuple):
-    """A robot's soles at some joint angles, base frame."""
-
-    point_H3: np.ndarray
-    ball_J3: np.ndarray
-    turn_R33: np.ndarray
-    """How the feet are turned."""
 
 
 class _Place(NamedTuple):
@@ -85,7 +75,7 @@ class FloatingBase:
             brake_time: time in which joints come to stand [s].
         """
         assert description.legs is not None, "who has no feet stands on no floor"
-        self._kinematics, self._legs = description.kinematics, description.legs
+        self._kinematics = LegKinematics(description.kinematics, description.legs)
         self._period, self._brake_time = period, brake_time
         self._heading_33 = np.eye(3)
         """What turns the stream's world into the robot's."""
@@ -97,10 +87,10 @@ class FloatingBase:
         """[m/s], [rad/s]"""
         self._coasted, self._sinking, self._since = 0.0, 0.0, 0.0
         """For how long the robot has braked [s], how fast it comes down [m/s], and how old the stance is [s]."""
-        axes_33, root_3 = (found[0] for found in carrier(self._legs, place(self._kinematics, q_N[None])))
-        turn_33, (soles,) = np.eye(3)[WORLD] @ axes_33.T, self._soles(q_N)
+        (soles,), (axes_33, root_3) = self._kinematics.soles(q_N), self._kinematics.carrier(q_N)
+        turn_33 = np.eye(3)[WORLD] @ axes_33.T
         self._stop_soles = soles
-        point_H3, low_H = soles.point_H3 @ turn_33.T, self._lowest(soles, turn_33)
+        point_H3, low_H = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
         place_3 = -turn_33 @ root_3
         place_3[UP] = -low_H.min()
         self._anchor_H2, self._orient_R33 = (place_3 + point_H3)[:, FLAT], turn_33 @ soles.turn_R33
@@ -138,7 +128,7 @@ class FloatingBase:
             share: how fast the robot may follow, as a share of its full speed; 0: it is stopped, or its legs are held.
         """
         others = [] if stance is None or stance is self._stance else [stance.q_N]
-        soles, self._stop_soles, *theirs = self._soles(q_N, stop_N, *others)
+        soles, self._stop_soles, *theirs = self._kinematics.soles(q_N, stop_N, *others)
         before = self._at
         followed = stance if share > 0 else None
         free_33, planned_3 = self._coast() if followed is None else self._follow(followed, share)
@@ -167,18 +157,6 @@ class FloatingBase:
         base = self.standstill()
         self._stance, self._velocity_6, self._coasted = None, np.zeros(6), self._brake_time
         self._at = self._at._replace(place_3=base.place_3, turn_33=base.turn_33)
-
-    def _soles(self, *q_N: np.ndarray) -> list[_Soles]:
-        """Soles at some joint angles each, all at once, as that takes hardly longer than one."""
-        legs, placed = self._legs, place(self._kinematics, np.stack(q_N))
-        point_BH3 = turned_points(placed, legs.body_H, legs.point_H3)
-        ball_BJ3 = turned_points(placed, legs.ball_body_J, legs.ball_J3)
-        turn_BR33 = placed.rotation_BL33[:, legs.body_H[::2]]
-        return [_Soles(*found) for found in zip(point_BH3, ball_BJ3, turn_BR33, strict=True)]
-
-    def _lowest(self, soles: _Soles, turn_33: np.ndarray) -> np.ndarray:
-        height_J = soles.ball_J3 @ turn_33[UP] - self._legs.radius_J
-        return np.where(self._legs.near_HJ > 0, height_J, np.inf).min(axis=1)
 
     def _near(self, low: float, high: float) -> np.ndarray:
         """How far each point is at the floor (H,), 1 under a height [m], 0 above another one."""
@@ -273,12 +251,12 @@ class FloatingBase:
         most = LEVEL_SPEED * share * self._period
         return _rotation(off_3 * min(1.0, most / max(_norm(off_3), 1e-12))) @ turn_33
 
-    def _solve(self, soles: _Soles, free_33: np.ndarray, planned_3: np.ndarray) -> _Place:
+    def _solve(self, soles: Soles, free_33: np.ndarray, planned_3: np.ndarray) -> _Place:
         """The base that planted soles carry, and as far as none is planted, one that moves freely."""
         flat_R, weight_H, anchor_H2 = self._flat_R, self._weight_H, self._anchor_H2
         away_R3 = _turns(self._orient_R33 @ soles.turn_R33.mT @ free_33.T)
         turn_33 = _rotation(flat_R @ away_R3 / max(float(flat_R.sum()), 1.0)) @ free_33
-        point_H3, low_H = soles.point_H3 @ turn_33.T, self._lowest(soles, turn_33)
+        point_H3, low_H = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
         whole = float(weight_H.sum())
         rest = max(1.0 - whole, 0.0)
         place_3 = planned_3.copy()

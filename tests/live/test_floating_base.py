@@ -14,14 +14,15 @@ from mrhubo.fast.plain.soles import turned_points
 from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.live.floating_base import SINK_SPEED, FloatingBase
 from tests.live.walkers import make_legged
+from tests.reference.walkers import ROOTS
 
 PERIOD, BRAKE = 1 / 60, 5 / 60
 ALL, LEFT, NONE = np.ones(4), np.array([1.0, 1.0, 0.0, 0.0]), np.zeros(4)
 
 
-@pytest.fixture(scope="module")
-def legged(tmp_path_factory: pytest.TempPathFactory) -> FastRetargeter:
-    return make_legged(tmp_path_factory.mktemp("legged"))
+@pytest.fixture(scope="module", params=ROOTS)
+def legged(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> FastRetargeter:
+    return make_legged(tmp_path_factory.mktemp("legged"), request.param)
 
 
 def home(legged: FastRetargeter) -> np.ndarray:

@@ -26,9 +26,11 @@ from mrhubo.retargeter.nearest import NearestJoints
 from tests.reference.walkers import walker
 
 
-def make_legged(folder: Path) -> FastRetargeter:
-    """A robot of two legs and arms with a waist, answered by the optimiser, and by a confidence that knows nothing."""
-    body_map = walker(folder, "pelvis")
+def make_legged(folder: Path, root: str = "pelvis") -> FastRetargeter:
+    """A robot of two legs and arms with a waist, hung up at its pelvis or chest, answered by the optimiser, and by a
+    confidence that knows nothing.
+    """
+    body_map = walker(folder, root)
     torch.manual_seed(1)
     prior = BodyPrior(hidden=20).eval()
     return FastRetargeter(Retargeter(NearestJoints(body_map), body_map, prior, None, phi_threshold=0.01).describe())
