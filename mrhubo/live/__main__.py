@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from mrhubo.config import CommandParser, parse_arguments, run_command
 from mrhubo.config.arguments import number
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
+from mrhubo.video import fetching
 
 SETUP = "--setup"
+_SETTING_UP = f"mrhubo live {SETUP}"
 DESCRIPTION = (
     "A robot follows a person who is seen now: frames come in, joint angles go out at a fixed rate, inside limits of"
     " position, speed and acceleration, and of a robot with legs where its base is. It moves only while somebody holds"
@@ -18,11 +22,29 @@ DESCRIPTION = (
 )
 
 
+class _LiveParser(CommandParser[LiveConfig]):
+    """With `--setup`, the arguments are those of the command that fetches models."""
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:
+        """As `CommandParser.parse_args`."""
+        words = _after_setup(list(args or ()))
+        if words is None:
+            return super().parse_args(args, namespace)
+        return fetching.build_parser(_SETTING_UP).parse_args(words)
+
+
+def _after_setup(argv: list[str]) -> list[str] | None:
+    """The arguments beside `--setup`; None: it is not there, or help is asked for."""
+    if SETUP not in argv or "--help" in argv or "-h" in argv:
+        return None
+    return [word for word in argv if word != SETUP]
+
+
 def build_parser() -> CommandParser[LiveConfig]:
     """The command's arguments."""
     from mrhubo.live.kinds import SINKS, SOURCES
 
-    parser = CommandParser("mrhubo live", DESCRIPTION, LiveConfig, takes_config=False)
+    parser = _LiveParser("mrhubo live", DESCRIPTION, LiveConfig, takes_config=False)
     who = parser.add_mutually_exclusive_group(required=True)
     package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
@@ -55,10 +77,9 @@ def build_parser() -> CommandParser[LiveConfig]:
 
 def main(argv: list[str]) -> int:
     """The command; 128 and the signal's number where a signal other than Ctrl-C ended it."""
-    if SETUP in argv:
-        from mrhubo.video.fetching import fetch
-
-        fetch([word for word in argv if word != SETUP], f"mrhubo live {SETUP}")
+    words = _after_setup(argv)
+    if words is not None:
+        fetching.fetch(words, _SETTING_UP)
         return 0
     config, options = parse_arguments(build_parser(), argv)
     from mrhubo.config.command import Terminated
