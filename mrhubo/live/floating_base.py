@@ -27,9 +27,8 @@ import numpy as np
 
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.ground import WORLD, Base, Stance
-from mrhubo.fast.rotations import matrix_to_axis_angle
 from mrhubo.live.leg_kinematics import LegKinematics, Soles
-from mrhubo.live.vectors import about
+from mrhubo.live.turns import rotation_of, turn_of, turns_of
 
 FLAT, UP = [0, 1], 2
 """The horizontal axes of the world, and the upright one."""
@@ -141,14 +140,14 @@ class FloatingBase:
         # pulled back to where it was when the other one is lifted.
         self._anchor_H2, self._orient_R33 = (at.place_3 + at.point_H3)[:, FLAT], at.turn_33 @ soles.turn_R33
         if followed is not None:
-            turned_3 = _turn(at.turn_33 @ before.turn_33.T)
+            turned_3 = turn_of(at.turn_33 @ before.turn_33.T)
             self._velocity_6 = np.concatenate((at.place_3 - before.place_3, turned_3)) / self._period
 
     def standstill(self) -> Base:
         """Where the base comes to rest if joints brake from now on; who is in the air then is lowered afterwards."""
         left = max(self._brake_time - self._coasted, 0.0)
         way_6 = self._velocity_6 * (left * left / (2 * self._brake_time))
-        free_33 = _rotation(way_6[3:]) @ self._at.turn_33
+        free_33 = rotation_of(way_6[3:]) @ self._at.turn_33
         at = self._solve(self._stop_soles, free_33, self._at.place_3 + way_6[:3])
         return Base(at.place_3, at.turn_33)
 
@@ -174,7 +173,7 @@ class FloatingBase:
             self._begin(stance)
         elif last is not stance:
             way_3 = self._heading_33 @ (stance.base.place_3 - last.base.place_3)
-            turned_3 = _turn(self._heading_33 @ stance.base.turn_33 @ self._in_world(last).T)
+            turned_3 = turn_of(self._heading_33 @ stance.base.turn_33 @ self._in_world(last).T)
             if _norm(way_3) > FASTEST * self._since or _norm(turned_3) > FASTEST_TURN * self._since:
                 self._begin(stance)
             else:
@@ -184,7 +183,7 @@ class FloatingBase:
         self._path_6 = self._path_6 - now_6
         if last is not stance:
             self._since = 0.0
-        free_33 = _rotation(share * now_6[3:]) @ self._at.turn_33
+        free_33 = rotation_of(share * now_6[3:]) @ self._at.turn_33
         free_33 = self._toward(free_33, self._in_world(stance), share)
         planned_3 = self._at.place_3 + share * now_6[:3]
         planned_3[UP] = self._sunk(planned_3[UP], float(stance.weight_H.sum()) > PLANTED)
@@ -194,7 +193,7 @@ class FloatingBase:
         """The stream's world is turned so that its robot looks where this one does."""
         off_33 = self._at.turn_33 @ stance.base.turn_33.T
         angle = math.atan2(off_33[1, 0] - off_33[0, 1], off_33[0, 0] + off_33[1, 1])
-        self._heading_33 = _rotation(np.array([0.0, 0.0, angle]))
+        self._heading_33 = rotation_of(np.array([0.0, 0.0, angle]))
         self._path_6, self._since, self._begun = np.zeros(6), 0.0, True
 
     def _coast(self) -> tuple[np.ndarray, np.ndarray]:
@@ -205,7 +204,7 @@ class FloatingBase:
         way_6 = self._velocity_6 * ((left * left - after * after) / (2 * self._brake_time))
         planned_3 = self._at.place_3 + way_6[:3]
         planned_3[UP] = self._sunk(planned_3[UP], after == 0)
-        return _rotation(way_6[3:]) @ self._at.turn_33, planned_3
+        return rotation_of(way_6[3:]) @ self._at.turn_33, planned_3
 
     def _sunk(self, height: float, sinks: bool) -> float:
         """A height [m], or a lower one, if the robot is in the air and should not be."""
@@ -241,21 +240,21 @@ class FloatingBase:
         goes_on = turn_R33 is not None and self._stance is not None and not self._begun
         for foot in np.flatnonzero(np.minimum(theirs_R, self._flat_R) > 0):
             if goes_on:
-                turned_3 = _turn(self._theirs_R33[foot] @ last_33[foot].T)
-                self._orient_R33[foot] = _rotation(share * turned_3) @ self._orient_R33[foot]
+                turned_3 = turn_of(self._theirs_R33[foot] @ last_33[foot].T)
+                self._orient_R33[foot] = rotation_of(share * turned_3) @ self._orient_R33[foot]
             self._orient_R33[foot] = self._toward(self._orient_R33[foot], self._theirs_R33[foot], share)
 
     def _toward(self, turn_33: np.ndarray, other_33: np.ndarray, share: float) -> np.ndarray:
         """A rotation, turned towards another one as far as it may be in a period."""
-        off_3 = _turn(other_33 @ turn_33.T)
+        off_3 = turn_of(other_33 @ turn_33.T)
         most = LEVEL_SPEED * share * self._period
-        return _rotation(off_3 * min(1.0, most / max(_norm(off_3), 1e-12))) @ turn_33
+        return rotation_of(off_3 * min(1.0, most / max(_norm(off_3), 1e-12))) @ turn_33
 
     def _solve(self, soles: Soles, free_33: np.ndarray, planned_3: np.ndarray) -> _Place:
         """The base that planted soles carry, and as far as none is planted, one that moves freely."""
         flat_R, weight_H, anchor_H2 = self._flat_R, self._weight_H, self._anchor_H2
-        away_R3 = _turns(self._orient_R33 @ soles.turn_R33.mT @ free_33.T)
-        turn_33 = _rotation(flat_R @ away_R3 / max(float(flat_R.sum()), 1.0)) @ free_33
+        away_R3 = turns_of(self._orient_R33 @ soles.turn_R33.mT @ free_33.T)
+        turn_33 = rotation_of(flat_R @ away_R3 / max(float(flat_R.sum()), 1.0)) @ free_33
         point_H3, low_H = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
         whole = float(weight_H.sum())
         rest = max(1.0 - whole, 0.0)
@@ -264,36 +263,6 @@ class FloatingBase:
         rise = (-float(weight_H @ low_H) + rest * planned_3[UP]) / (whole + rest)
         place_3[UP] = max(rise, -float(low_H.min()))
         return _Place(turn_33, place_3, point_H3, low_H)
-
-
-def _turn(matrix_33: np.ndarray) -> np.ndarray:
-    """A rotation as axis times angle [rad]; one at a time, in a tenth of the time that functions of many need."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix_33.tolist()
-    x, y, z = h - f, c - g, d - b
-    twice_sine, twice_cosine = math.sqrt(x * x + y * y + z * z), a + e + i - 1.0
-    angle = math.atan2(twice_sine, twice_cosine)
-    if twice_sine > 1e-9:
-        return np.array((x, y, z)) * (angle / twice_sine)
-    if twice_cosine > 0:
-        return np.zeros(3)
-    return matrix_to_axis_angle(matrix_33)
-
-
-def _turns(matrix_R33: np.ndarray) -> np.ndarray:
-    return np.stack([_turn(matrix_33) for matrix_33 in matrix_R33])
-
-
-def _rotation(turn_3: np.ndarray) -> np.ndarray:
-    """Rodrigues' formula."""
-    x, y, z = turn_3.tolist()
-    angle = math.sqrt(x * x + y * y + z * z)
-    if angle < 1e-12:
-        return np.eye(3)
-    return np.array(about((x / angle, y / angle, z / angle), angle)).T
-
-
-def _rotations(turn_R3: np.ndarray) -> np.ndarray:
-    return np.stack([_rotation(turn_3) for turn_3 in turn_R3])
 
 
 def _norm(vector_3: np.ndarray) -> float:

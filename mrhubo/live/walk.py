@@ -9,14 +9,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrhubo.fast.plain.ground import Base, Stance
-from mrhubo.fast.plain.judging import quaternions
+from mrhubo.fast.plain.ground import Stance
 from mrhubo.live.body import SeenPose
 from mrhubo.live.floating_base import FloatingBase
 from mrhubo.live.governor import Governor
 from mrhubo.live.output import BasePose, Standing
 from mrhubo.live.robot import LiveRobot, StreamRoot
 from mrhubo.live.roots import Roots
+from mrhubo.live.turns import quaternion_of
 
 
 class Walk:
@@ -29,7 +29,7 @@ class Walk:
         self._legs_N = np.append(robot.legs_X, False)[robot.branch_N]
         self._roots, self._governor = Roots(robot.standing.legs), governor
         self._base = FloatingBase(robot.standing, governor.q_N, governor.period, governor.brake_time)
-        self._quaternion_4 = quaternion(self._base.base)
+        self._quaternion_4 = quaternion_of(self._base.base.turn_33)
         self._seen_since: float | None = None
         """Since when legs are seen [s]; None: they are in doubt."""
         self.stance: Stance | None = None
@@ -74,16 +74,10 @@ class Walk:
 
     def told(self) -> Standing:
         """Where the base is, where it comes to rest if the robot brakes, and which feet are planted."""
-        self._quaternion_4 = quaternion(self._base.base, self._quaternion_4)
+        self._quaternion_4 = quaternion_of(self._base.base.turn_33, self._quaternion_4)
         rest = self._base.standstill()
         return Standing(
             BasePose(self._base.base.place_3, self._quaternion_4),
-            BasePose(rest.place_3, quaternion(rest, self._quaternion_4)),
+            BasePose(rest.place_3, quaternion_of(rest.turn_33, self._quaternion_4)),
             dict(zip(self._names, self._base.planted_R.tolist(), strict=True)),
         )
-
-
-def quaternion(base: Base, near_4: np.ndarray | None = None) -> np.ndarray:
-    """The rotation of a base, w first; of the two that there are the nearer one to another quaternion."""
-    found_4 = quaternions(base.turn_33)[[3, 0, 1, 2]]
-    return -found_4 if near_4 is not None and found_4 @ near_4 < 0 else found_4

@@ -21,7 +21,7 @@ from mrhubo.lazy import import_optional
 from mrhubo.live.floating_base import FloatingBase
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
-from mrhubo.live.walk import quaternion
+from mrhubo.live.turns import quaternion_of
 
 _FREQUENCY = 10.0
 """Of every joint's controller [Hz]: gravity moves an arm of 0.3 m by half a degree."""
@@ -218,7 +218,7 @@ def _home(robot: LiveRobot) -> np.ndarray:
     """Where the base of a robot with legs is at home: position [m], quaternion with w first."""
     assert robot.standing is not None
     base = FloatingBase(robot.standing, robot.home_N, 1.0, 1.0).base
-    return np.concatenate((base.place_3, quaternion(base)))
+    return np.concatenate((base.place_3, quaternion_of(base.turn_33)))
 
 
 def _lowest(model: Any, data: Any, mujoco: Any) -> float:
