@@ -4,7 +4,9 @@
 
 PACKAGE is the folder of a trained retargeter, or the name of a robot, which the universal network then answers. A
 sender on this machine sends the 33 points of MediaPipe that a person of our skeleton has, with a centimetre of noise,
-as JSON in UDP datagrams, and is sent joint angles back; all of it on one thread, on 127.0.0.1. Times are from before
+as JSON in UDP datagrams, and is sent joint angles back; all of it on one thread, on 127.0.0.1. To a robot with legs,
+which tells where its base is, they are sent as they lie in the world, of a MOTION that tells where the person goes, and
+that is played forwards and backwards in turn. Times are from before
 the datagram is read to after the answer is sent: of the clock, and the thread's own, to which other programs add
 little. The long stream has 60 frames a second, of which 1% are lost and 1% are garbage; its clock is simulated, so that
 half an hour takes some minutes, and all that is measured is the program's own code. Its dead-man is held throughout.
@@ -41,20 +43,31 @@ _RATE = 60.0
 _SHARE = 0.01
 _MINUTE = 60.0
 _SLACK = 1e-6
+_FASTEST_BASE = 5.0
+"""No base of a robot that walks goes faster [m/s]."""
 
 
-def landmarks(file: Path) -> list[str]:
-    """A motion as MediaPipe's points, each frame as the text of a JSON list."""
+def landmarks(file: Path, in_world: bool = False) -> list[str]:
+    """A motion as MediaPipe's points, each frame as the text of a JSON list; in the world, where the root has them, and
+    forwards and backwards, so that nobody leaps.
+    """
     motion = read_motion(file)
     point_TK3, turn_TJ33 = Skeleton().keypoints_and_rotations(motion.local_TJ33)
     place = dict(zip(KEYPOINT_NAMES, point_TK3.numpy().transpose(1, 0, 2), strict=True))
     head_T33 = turn_TJ33[:, KEYPOINT_NAMES.index("head")].numpy()
     place |= {name: place["head"] + head_T33 @ np.array(offset) for name, offset in HEAD_POINTS.items()}
     nothing_T3 = np.zeros((len(motion), 3))
+    if in_world:
+        arrays = motion.arrays
+        if arrays.root_rotation_T33 is None or arrays.root_position_T3 is None:
+            raise SystemExit(f"{file}: does not tell where the person goes; give another one with --motion")
+        turn_T33, at_T3 = arrays.root_rotation_T33, arrays.root_position_T3
+        place = {n: (turn_T33 @ p_T3[..., None])[..., 0] + at_T3 for n, p_T3 in place.items()}
     rows_KT3 = np.stack([place.get(name, nothing_T3) for name in SETS["MediaPipe"]])
     noise_KT3 = np.random.default_rng(0).normal(0.0, _NOISE, rows_KT3.shape)
     rows_TK3 = ((rows_KT3 + noise_KT3) * [1.0, -1.0, -1.0]).transpose(1, 0, 2)
-    return [json.dumps(rows_K3.round(4).tolist()) for rows_K3 in rows_TK3]
+    told = [json.dumps(rows_K3.round(4).tolist()) for rows_K3 in rows_TK3]
+    return told + told[::-1] if in_world else told
 
 
 class Link:
@@ -62,6 +75,7 @@ class Link:
 
     def __init__(self, robot: LiveRobot, points: list[str]) -> None:
         self.points, self.number = points, 0
+        self.world = "true" if robot.standing is not None else "false"
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(1.0)
@@ -80,7 +94,9 @@ class Link:
     def send_frame(self, frame: int, now: float) -> None:
         """The landmarks of a frame."""
         points = self.points[frame % len(self.points)]
-        self.send("landmarks", now, f'"set":"mediapipe","points":{points},"visibility":{[0.99] * 33}')
+        self.send(
+            "landmarks", now, f'"set":"mediapipe","world":{self.world},"points":{points},"visibility":{[0.99] * 33}'
+        )
 
     def beat(self, now: float) -> None:
         """The button is held."""
@@ -117,6 +133,7 @@ class Soak:
         governor = link.session.pilot.governor
         self.governor, self.last_q = governor, governor.q_N
         self.last_v = np.zeros_like(self.last_q)
+        self.last_base: np.ndarray | None = None
 
     def minute(self) -> list[str]:
         """One minute: time of a step, age of what is followed, memory, and outputs outside limits."""
@@ -152,6 +169,11 @@ class Soak:
         inside = (output.q_N >= governor.lower_N).all() and (output.q_N <= governor.upper_N).all()
         inside &= bool((np.abs(velocity) <= governor.speed_N + _SLACK).all())
         inside &= bool((change <= config.acceleration + _SLACK).all())
+        if output.standing is not None:
+            base = output.standing.base.position_3
+            goes = 0.0 if self.last_base is None else float(np.linalg.norm(base - self.last_base)) * _RATE
+            inside &= goes <= _FASTEST_BASE  # nor NaN
+            self.last_base = base
         self.outside += not inside
         self.moved += bool(np.abs(velocity).max() > _SLACK)
         self.last_q, self.last_v = output.q_N, velocity
@@ -169,7 +191,8 @@ def main(argv: list[str]) -> None:
     with use_threads(1):
         print_header()
         make = LiveRobot.of_package if Path(options.package).is_dir() else LiveRobot.of_robot
-        robot, points = make(options.package, LiveConfig(rate=_RATE), options.form), landmarks(options.motion)
+        robot = make(options.package, LiveConfig(rate=_RATE), options.form)
+        points = landmarks(options.motion, robot.standing is not None)
         link = Link(robot, points)
         print("A frame, from its datagram to that of the joint angles [ms]:\n")
         print_table(["time", "p50", "p90", "p99", "longest"], measure_frames(link, options.frames))

@@ -1,35 +1,21 @@
-"""`mrhubo models`: fetches the models that find a body in the pictures of a camera."""
+"""`mrhubo models`: fetches the models that find a body in a camera's pictures; `mrhubo live --setup` is the same."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from mrhubo.config import CommandParser, run_command
+from mrhubo.video import fetching
 
-DESCRIPTION = (
-    "Fetches the models that find a human body in the pictures of a camera or a video, once: npm's @mediapipe/pose"
-    " (Apache-2.0, 40 MB). docs/camera.md says what they are."
-)
+_NAME = "mrhubo models"
 
 
 def build_parser() -> CommandParser[None]:
     """The command's arguments."""
-    parser = CommandParser[None]("mrhubo models", DESCRIPTION, None)
-    archive = "the package's archive (.tgz), in place of a download; `npm pack @mediapipe/pose@0.5.1675469404` saves it"
-    parser.add_argument("--from", metavar="FILE", help=archive)
-    folder = "where they go, if MRHUBO_POSE_MODELS then names it too; default: in the user's cache"
-    parser.add_argument("--out", metavar="FOLDER", help=folder)
-    return parser
+    return fetching.build_parser(_NAME)
 
 
 def main(argv: list[str]) -> None:
     """The command."""
-    options = build_parser().parse_args(argv)
-    from mrhubo.video import set_up
-
-    archive, out = getattr(options, "from"), options.out
-    folder = set_up(None if archive is None else Path(archive), None if out is None else Path(out))
-    print(f"models: {folder}")
+    fetching.fetch(argv, _NAME)
 
 
 if __name__ == "__main__":

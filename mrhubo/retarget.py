@@ -39,8 +39,10 @@ def build_parser() -> CommandParser[None]:
     robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
     parser.add_argument("--method", metavar="METHOD", help=f"with --robot: {METHOD_MEANING}")
+    what = parser.add_mutually_exclusive_group(required=True)
     motion = "motion files and videos, and folders of motion files"
-    parser.add_argument("--motion", metavar="FILE", nargs="+", required=True, help=motion)
+    what.add_argument("--motion", metavar="FILE", nargs="+", help=motion)
+    what.add_argument("--video", metavar="FILE", nargs="+", help="the same as --motion")
     out = "file to write; a folder with several motions, and where it ends in / or has no ending"
     parser.add_argument("--out", metavar="FILE", required=True, help=out)
     formats = "; ".join(f"{name}: {row.meaning}" for name, row in FORMATS.items())
@@ -80,7 +82,7 @@ def main(argv: list[str]) -> int:
         check_method(options.method, METHODS, options.retargeter is not None)
     if options.whole_body and options.retargeter is not None:
         raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
-    files = find_files([Path(name) for name in options.motion])
+    files = find_files([Path(name) for name in options.motion or options.video])
     places = plan_places(options.out, options.format, files)
     request = read_request(options, options.joint_order)
     if options.retargeter is not None:

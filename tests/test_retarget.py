@@ -96,6 +96,16 @@ def test_a_robot_without_a_package_is_answered(
     assert said in capsys.readouterr().out
 
 
+def test_a_video_has_a_flag_of_its_name(wave: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[str] = []
+    monkeypatch.setattr("mrhubo.retargeting.find_files", lambda paths: found.extend(map(str, paths)) or [wave])
+    for flag in ("--video", "--motion"):
+        assert main(["--robot", "nao", flag, "dance.mp4", "--out", str(tmp_path / f"{flag}.npz"), "--to", "0.1"]) == 0
+    assert found == ["dance.mp4"] * 2
+    with pytest.raises(UserError, match="not allowed with|go together|--video"):
+        main(["--robot", "nao", "--video", "dance.mp4", "--motion", "wave.npz", "--out", str(tmp_path / "x.npz")])
+
+
 def test_a_whole_bodys_base_is_written(tmp_path: Path) -> None:
     motion = squat(frames=6)
     turns_TJ3 = rotation.matrix_to_axis_angle(motion.local_TJ33).flatten(1).numpy()

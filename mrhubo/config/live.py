@@ -30,8 +30,9 @@ class LiveConfig:
     """Seconds from the last heartbeat until every joint stands still, at most. It has to be longer than
     `heartbeat_timeout` by three of the times between two sent angles."""
     doubt: str = choice("hold", "hold", "slow", "relax")
-    """What an arm or the head does while it is hardly seen: `hold`, it stays where it is; `slow`, it follows at a speed
-    that falls with the confidence; `relax`, it is held for `relax_after`, and then goes slowly to the rest pose."""
+    """What arms, head or legs do while they are hardly seen: `hold`, they stay where they are; `slow`, they follow at a
+    speed that falls with the confidence; `relax`, they are held for `relax_after`, and then go slowly to the rest
+    pose."""
     doubt_below: float = bounded(0.5, 0.0, 1.0)
     """Confidence of the source under which a part is hardly seen, 0 to 1."""
     relax_after: float = bounded(1.0, 0.0, 600.0)
@@ -43,7 +44,7 @@ class LiveConfig:
     late: float = bounded(0.25, 0.02, 10.0)
     """Frames that come so many seconds later than the quickest came are left out and counted."""
     home: str = choice("hanging", "hanging", "zero")
-    """Where the robot starts and rests: `hanging`, its answer to a person whose arms hang, or `zero`, the angles 0, or
-    the nearest to it inside the limits. The robot has to stand there when the session starts."""
+    """Where the robot starts and rests: `hanging`, its answer to a person who stands and whose arms hang, or `zero`,
+    the angles 0, or the nearest to it inside the limits. The robot has to stand there when the session starts."""
     avoid_collisions: bool = True
     """Whether answers in which the robot would touch itself give way."""

@@ -49,6 +49,11 @@ class Ground(Protocol):
         """Whether each foot is planted."""
         ...
 
+    @property
+    def weight_H(self) -> np.ndarray:
+        """How much the contact of each point of a sole counts, 0..1."""
+        ...
+
     def pass_by(self) -> None:
         """Nobody is seen in this frame."""
         ...

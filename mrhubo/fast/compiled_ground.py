@@ -43,6 +43,11 @@ class CompiledGround:
         """Whether each foot is planted."""
         return np.logical_or(self._f.planted_H[::2], self._f.planted_H[1::2])
 
+    @property
+    def weight_H(self) -> np.ndarray:
+        """As `PlainGround.weight_H`."""
+        return self._f.weight_H.copy()
+
     def pass_by(self) -> None:
         """As `PlainGround.pass_by`."""
         self._f.held_H[:] = self._f.planted_H

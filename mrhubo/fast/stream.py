@@ -19,7 +19,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.fast.answers import Ground
 from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, one_euro, room
-from mrhubo.fast.plain.ground import Base, Seen
+from mrhubo.fast.plain.ground import Base, Seen, Stance
 from mrhubo.fast.plain.human import orthonormal_columns
 from mrhubo.fast.plain.judging import quaternions
 from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse
@@ -137,6 +137,13 @@ class FastStream:
             "contact": self._ground.planted_R,
             "contact_names": tuple(self.retargeter.description.settings.facts["feet"]),
         }
+
+    @property
+    def stance(self) -> Stance | None:
+        """How the robot stood after the last frame; None where no root has come, or the robot has no feet."""
+        if self._base is None or self._ground is None:
+            return None
+        return Stance(self._base, self._ground.weight_H, self._joints.q_N.astype(np.float64))
 
     def joints(
         self, pose: Any, time: float | None = None, root: tuple[Any, Any] | None = None, contacts: Any = None

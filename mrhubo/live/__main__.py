@@ -2,30 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from mrhubo.config import CommandParser, parse_arguments, run_command
 from mrhubo.config.arguments import number
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
+from mrhubo.video import fetching
 
+SETUP = "--setup"
+_SETTING_UP = f"mrhubo live {SETUP}"
 DESCRIPTION = (
-    "A robot's arms, hands and head follow a person who is seen now: frames come in, joint angles go out at a fixed"
-    " rate, inside limits of position, speed and acceleration. It moves only while somebody holds the button, or as"
-    " long as a stream without one goes on. Ctrl-C stops the robot softly and ends. docs/live.md specifies all of it."
+    "A robot follows a person who is seen now: frames come in, joint angles go out at a fixed rate, inside limits of"
+    " position, speed and acceleration, and of a robot with legs where its base is. It moves only while somebody holds"
+    " the button, or as long as a stream without one goes on. Ctrl-C stops the robot softly and ends. docs/live.md"
+    " specifies all of it."
 )
+
+
+class _LiveParser(CommandParser[LiveConfig]):
+    """With `--setup`, the arguments are those of the command that fetches models."""
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:
+        """As `CommandParser.parse_args`."""
+        words = _after_setup(list(args or ()))
+        if words is None:
+            return super().parse_args(args, namespace)
+        return fetching.build_parser(_SETTING_UP).parse_args(words)
+
+
+def _after_setup(argv: list[str]) -> list[str] | None:
+    """The arguments beside `--setup`; None: it is not there, or help is asked for."""
+    if SETUP not in argv or "--help" in argv or "-h" in argv:
+        return None
+    return [word for word in argv if word != SETUP]
 
 
 def build_parser() -> CommandParser[LiveConfig]:
     """The command's arguments."""
     from mrhubo.live.kinds import SINKS, SOURCES
 
-    parser = CommandParser("mrhubo live", DESCRIPTION, LiveConfig, takes_config=False)
+    parser = _LiveParser("mrhubo live", DESCRIPTION, LiveConfig, takes_config=False)
     who = parser.add_mutually_exclusive_group(required=True)
     package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
     who.add_argument("--retargeter", metavar="FOLDER", help=package)
     robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
     who.add_argument("--robot", metavar="ROBOT", help=robot)
+    whole = "with the URDF of --robot: its legs, feet and waist move too, and not its arms and head alone"
+    parser.add_argument("--whole-body", action="store_true", help=whole)
     source = f"where frames come from, may be given several times; {'; '.join(SOURCES.values())}"
     parser.add_argument("--source", metavar="SOURCE", action="append", required=True, help=source)
     sink = f"where joint angles go, may be given several times; {'; '.join(SINKS.values())}"
@@ -44,11 +70,17 @@ def build_parser() -> CommandParser[LiveConfig]:
     parser.add_argument("--seconds", metavar="SECONDS", type=number(0), help="end after so long; default: never")
     form = "compiled (default where numba is installed; the first start ever takes a minute) or numpy"
     parser.add_argument("--form", choices=("compiled", "numpy"), help=form)
+    setup = "fetch the models that find a body in a camera's pictures, once, and end; the same as mrhubo models"
+    parser.add_argument(SETUP, action="store_true", help=f"{setup}, whose flags it takes")
     return parser
 
 
 def main(argv: list[str]) -> int:
     """The command; 128 and the signal's number where a signal other than Ctrl-C ended it."""
+    words = _after_setup(argv)
+    if words is not None:
+        fetching.fetch(words, _SETTING_UP)
+        return 0
     config, options = parse_arguments(build_parser(), argv)
     from mrhubo.config.command import Terminated
     from mrhubo.fast.kept import is_kept, numba_is_there
@@ -59,6 +91,8 @@ def main(argv: list[str]) -> int:
     certificate = None
     if options.certificate is not None and not options.https:
         raise UserError("--certificate goes with --https")
+    if options.whole_body and options.retargeter is not None:
+        raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
     if options.https:
         from mrhubo.live.certificate import open_certificate
 
@@ -72,8 +106,10 @@ def main(argv: list[str]) -> int:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
     if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
         print("compiling, which takes a minute, once for all sessions", flush=True)
-    make = LiveRobot.of_robot if options.retargeter is None else LiveRobot.of_package
-    robot = make(options.retargeter or options.robot, config, options.form)
+    if options.retargeter is None:
+        robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body)
+    else:
+        robot = LiveRobot.of_package(options.retargeter, config, options.form)
     print(f"robot '{robot.facts.name}', {len(robot.joint_names)} joints; {config.rate:g} joint angles a second")
 
     def started() -> None:

@@ -1,8 +1,9 @@
 """From points of a body, seen in one frame, to the pose that a stream takes; what is not seen stays as it was.
 
 It is what `mrhubo.motion.positions` makes of a whole motion, for who knows no later frame: a limb whose points are
-missing stays where it was last seen, as seen from the trunk, and a straight arm's elbow keeps the axis about which it
-bent last. Legs are left at rest: no stream moves them.
+missing stays where it was last seen, as seen from the trunk, and a straight limb's elbow or knee keeps the axis about
+which it bent last. Legs are read where a robot has some, else they are left at rest. Points that tell where the person
+is in the world tell the root's place, as far from 0 as a person with legs of our skeleton's length would go.
 
 World: y up, right-handed [m]. Human frame at rest: x to the body's left, y up, z forward.
 """
@@ -12,11 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from mrhubo.body.joints import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, SIDES, hinge_axis
 from mrhubo.fast.plain.human import BEND_DEG
+from mrhubo.live.seen_points import REST, SeenPoints, frame_of, turn_between
 from mrhubo.live.vectors import (
     IDENTITY,
     Rotation,
@@ -34,31 +38,41 @@ from mrhubo.live.vectors import (
     relative,
     shortest,
     transposed,
-    undo,
     unit,
 )
-from mrhubo.motion.hinges import BENT
-from mrhubo.motion.orientations import PARALLEL, SHORTEST, TRIADS, Triad, rest_points
+from mrhubo.motion.hinges import BACKWARD, BENT
+from mrhubo.motion.orientations import Triad
 
 UPRIGHT_CONFIDENCE = 0.6
 """How sure the trunk is, at most, where no hip is seen and it is taken to be upright."""
-_REST: dict[str, Vector] = {name: (float(x), float(y), float(z)) for name, ((x, y, z),) in rest_points().items()}
 _HANGING: Vector = (0.0, -1.0, 0.0)
 _UP: Vector = (0.0, 1.0, 0.0)
 _SHOULDERS = [f"{side}_shoulder" for side in SIDES]
+_HIPS = [f"{side}_hip" for side in SIDES]
+_LENGTHS = 60
+"""So many frames, about, tell how long a person's legs are."""
 _POSED = {name: number for number, name in enumerate(POSED_JOINT_NAMES)}
 
 
 @dataclass
-class _Arm:
-    """What is remembered of an arm, as seen from the chest."""
+class _Limb:
+    """What is remembered of an arm, as seen from the chest, or of a leg, as seen from the pelvis."""
 
     upper: Vector = _HANGING
     lower: Vector = _HANGING
     bent: tuple[Vector, Vector] | None = None
-    """The upper arm when the elbow was bent last, and the axis about which it was."""
-    hand: Rotation = IDENTITY
-    """As seen from the forearm."""
+    """The upper bone when the hinge was bent last, and the axis about which it was."""
+    tip: Rotation = IDENTITY
+    """The hand or foot, as seen from the lower bone."""
+
+
+class Root(NamedTuple):
+    """Where the pelvis of a person is, in a world whose y is up."""
+
+    turn_33: np.ndarray
+    """Its rotation, float64."""
+    place_3: np.ndarray | None
+    """[m]; None: it is not known, as of landmarks whose 0 is between the hips."""
 
 
 @dataclass(frozen=True)
@@ -69,27 +83,38 @@ class SeenPose:
     """Local rotations (21, 3, 3) of SMPL's joints 1..21, float32."""
     sure_J: np.ndarray
     """How sure (21,), 0..1; 0 where a joint stays as it was because it is not seen."""
+    root: Root | None = None
+    """None: the source does not tell, or nobody asks."""
 
 
 @dataclass
 class Body:
     """A person of whom points come frame by frame."""
 
+    has_legs: bool = False
+    """Whether legs and root are wanted."""
     chest: Rotation | None = None
     pelvis: Rotation = IDENTITY
     """As seen from the chest, as is the head."""
     head: Rotation = IDENTITY
-    arms: dict[str, _Arm] = field(default_factory=lambda: {side: _Arm() for side in SIDES})
+    arms: dict[str, _Limb] = field(default_factory=lambda: {side: _Limb() for side in SIDES})
+    legs: dict[str, _Limb] = field(default_factory=lambda: {side: _Limb() for side in SIDES})
+    hips: Vector | None = None
+    """Where the middle of the hips was last, in the world [m]."""
+    length: float | None = None
+    """Of a leg [m], from hip to ankle."""
+    _lengths: int = 0
 
-    def see(self, points: Mapping[str, Vector], sure: Mapping[str, float]) -> SeenPose | None:
+    def see(self, points: Mapping[str, Vector], sure: Mapping[str, float], in_world: bool = False) -> SeenPose | None:
         """The pose of one frame; None as long as nothing has told how the chest is turned.
 
         Args:
             points: those that are seen [m], by our names (`mrhubo.motion.readers.keypoint_sets`); finite numbers.
             sure: how sure the source is of points, 0..1; 1 where it does not say.
+            in_world: whether points tell where the person is in the world, too.
         """
-        seen = _Points(points, sure)
-        chest_sure = self._trunk(seen)
+        seen = SeenPoints(points, sure)
+        chest_sure, pelvis_sure = self._trunk(seen)
         if self.chest is None:
             return None
         world: dict[str, Rotation] = {"spine3": self.chest, "pelvis": chained(self.chest, self.pelvis)}
@@ -101,142 +126,105 @@ class Body:
         world["head"] = chained(self.chest, self.head)
         found["neck"] = found["head"] = min(head_sure, chest_sure)
         for side in SIDES:
-            self._arm(seen, side, world, found)
-        return _pose(world, found, chest_sure)
+            _see_limb(seen, self.arms[side], side, ("shoulder", "elbow", "wrist"), world["spine3"], world, found,
+                      found["spine3"])  # fmt: skip
+        if not self.has_legs:
+            return _pose(world, found, chest_sure)
+        for side in SIDES:
+            _see_limb(seen, self.legs[side], side, ("hip", "knee", "ankle"), world["pelvis"], world, found,
+                      pelvis_sure, one_way=True)  # fmt: skip
+            world[f"{side}_foot"], found[f"{side}_foot"] = world[f"{side}_ankle"], found[f"{side}_ankle"]
+        pose = _pose(world, found, chest_sure)
+        return SeenPose(pose.local_J33, pose.sure_J, self._root(seen, world["pelvis"], in_world))
 
-    def _trunk(self, seen: _Points) -> float:
-        """How the trunk is turned, and how sure that is."""
+    def _root(self, seen: SeenPoints, pelvis: Rotation, in_world: bool) -> Root:
+        """Where the pelvis is: the middle of its hips, of a person whose legs are as long as our skeleton's."""
+        turn_33 = np.array(pelvis).T
+        if not in_world:
+            return Root(turn_33, None)
+        lengths = [seen.length(*(f"{side}_{name}" for name in ("hip", "knee", "ankle"))) for side in SIDES]
+        told = [length for length in lengths if length is not None]
+        if told:
+            self._lengths = min(self._lengths + 1, _LENGTHS)
+            last = told[0] if self.length is None else self.length
+            self.length = last + (sum(told) / len(told) - last) / self._lengths
+        if seen.has(*_HIPS):
+            self.hips = mean([seen.points[name] for name in _HIPS])
+        if self.hips is None or self.length is None:
+            return Root(turn_33, None)
+        ratio = LEG_LENGTH / self.length
+        place = minus((ratio * self.hips[0], ratio * self.hips[1], ratio * self.hips[2]), apply(pelvis, _MIDDLE))
+        return Root(turn_33, np.array(place))
+
+    def _trunk(self, seen: SeenPoints) -> tuple[float, float]:
+        """How the trunk is turned, and how sure that is of chest and pelvis."""
         chest, sure = seen.turn("spine3")
-        pelvis, _ = seen.turn("pelvis")
+        pelvis, pelvis_sure = seen.turn("pelvis")
         if chest is None and seen.has(*_SHOULDERS):
             left, right = (seen.points[name] for name in _SHOULDERS)
-            chest = _turn_between(minus(left, right), _UP, Triad(((_SHOULDERS[1],), (_SHOULDERS[0],)), ((), ())))
+            chest = turn_between(minus(left, right), _UP, Triad(((_SHOULDERS[1],), (_SHOULDERS[0],)), ((), ())))
             sure = min(UPRIGHT_CONFIDENCE, seen.surety(*_SHOULDERS))
         if chest is None:
-            return 0.0
+            return 0.0, 0.0
         self.chest = chest
         if pelvis is not None:
             self.pelvis = relative(chest, pelvis)
-        return sure
-
-    def _arm(self, seen: _Points, side: str, world: dict[str, Rotation], found: dict[str, float]) -> None:
-        """Upper arm, forearm and hand, in the world, and how sure they are."""
-        arm, chest = self.arms[side], world["spine3"]
-        shoulder, elbow, wrist = (f"{side}_{name}" for name in ("shoulder", "elbow", "wrist"))
-        upper, lower = (seen.way(*ends, chest) for ends in ((shoulder, elbow), (elbow, wrist)))
-        arm.upper, arm.lower = upper or arm.upper, lower or arm.lower
-        axis = _elbow_axis(arm, elbow, upper is not None and lower is not None)
-        bone, rest_axis = unit(minus(_REST[elbow], _REST[shoulder])), hinge_axis(elbow)
-        at_rest = _frame(bone, rest_axis)
-        turned = _frame(arm.upper, axis)
-        assert at_rest is not None and turned is not None  # both axes are at right angles to the bones
-        upper_turn = chained(turned, transposed(at_rest))
-        lower_bone = unit(minus(_REST[wrist], _REST[elbow]))
-        lower_turn = chained(shortest(apply(upper_turn, lower_bone), arm.lower), upper_turn)
-        world[shoulder], world[elbow] = chained(chest, upper_turn), chained(chest, lower_turn)
-        hand, hand_sure = seen.turn(wrist)
-        if hand is not None:
-            arm.hand = relative(world[elbow], hand)
-        world[wrist] = chained(world[elbow], arm.hand)
-        trunk_sure = found["spine3"]
-        found[shoulder] = min(seen.surety(shoulder, elbow) if upper else 0.0, trunk_sure)
-        found[elbow] = min(seen.surety(elbow, wrist) if lower else 0.0, trunk_sure)
-        found[wrist] = min(hand_sure, trunk_sure)
+        return sure, min(sure, pelvis_sure)
 
 
-class _Points:
-    """The points of one frame."""
-
-    def __init__(self, points: Mapping[str, Vector], sure: Mapping[str, float]) -> None:
-        self.points, self._sure = points, sure
-
-    def has(self, *names: str) -> bool:
-        return all(name in self.points for name in names)
-
-    def surety(self, *names: str) -> float:
-        return min(self._sure.get(name, 1.0) for name in names)
-
-    def way(self, start: str, end: str, seen_from: Rotation) -> Vector | None:
-        """The direction of a bone, as a part sees it."""
-        if not self.has(start, end):
-            return None
-        way = minus(self.points[end], self.points[start])
-        return unit(undo(seen_from, way)) if norm(way) > SHORTEST else None
-
-    def turn(self, joint: str) -> tuple[Rotation | None, float]:
-        """How a part is turned in the world, relative to our rest pose, by the best of its triads that is seen."""
-        for triad, names in _TRIADS[joint]:
-            if self.has(*names):
-                first, second = (_between(vector, self.points) for vector in (triad.first, triad.second))
-                found = _turn_between(first, second, triad)
-                if found is not None:
-                    return found, self.surety(*names)
-        return None, 0.0
+def _see_limb(
+    seen: SeenPoints, limb: _Limb, side: str, joints: tuple[str, str, str], carrier: Rotation,
+    world: dict[str, Rotation], found: dict[str, float], carrier_sure: float, one_way: bool = False,
+) -> None:  # fmt: skip
+    """Upper bone, lower bone, and hand or foot, in the world, and how sure they are. `one_way`: as a knee bends."""
+    start, hinge, end = (f"{side}_{name}" for name in joints)
+    upper, lower = (seen.way(*ends, carrier) for ends in ((start, hinge), (hinge, end)))
+    limb.upper, limb.lower = upper or limb.upper, lower or limb.lower
+    axis = _hinge_axis(limb, hinge, upper is not None and lower is not None, one_way)
+    bone, rest_axis = unit(minus(REST[hinge], REST[start])), hinge_axis(hinge)
+    at_rest = frame_of(bone, rest_axis)
+    turned = frame_of(limb.upper, axis)
+    assert at_rest is not None and turned is not None  # both axes are at right angles to the bones
+    upper_turn = chained(turned, transposed(at_rest))
+    lower_bone = unit(minus(REST[end], REST[hinge]))
+    lower_turn = chained(shortest(apply(upper_turn, lower_bone), limb.lower), upper_turn)
+    world[start], world[hinge] = chained(carrier, upper_turn), chained(carrier, lower_turn)
+    tip, tip_sure = seen.turn(end)
+    if tip is not None:
+        limb.tip = relative(world[hinge], tip)
+    world[end] = chained(world[hinge], limb.tip)
+    found[start] = min(seen.surety(start, hinge) if upper else 0.0, carrier_sure)
+    found[hinge] = min(seen.surety(hinge, end) if lower else 0.0, carrier_sure)
+    found[end] = min(tip_sure, carrier_sure)
 
 
-_TRIADS = {joint: [(triad, tuple(triad.names)) for triad in triads] for joint, triads in TRIADS.items()}
-
-
-def _between(vector: tuple[tuple[str, ...], tuple[str, ...]], points: Mapping[str, Vector]) -> Vector:
-    start, end = (mean([points[name] for name in place]) for place in vector)
-    return minus(end, start)
-
-
-def _rest_frames() -> dict[Triad, Rotation]:
-    """Of each triad, the transpose of its frame at rest."""
-    found = {}
-    for triads in TRIADS.values():
-        for triad in triads:
-            frame = _frame(_between(triad.first, _REST), _between(triad.second, _REST))
-            if frame is not None:
-                found[triad] = transposed(frame)
-    return found
-
-
-def _turn_between(first: Vector, second: Vector, triad: Triad) -> Rotation | None:
-    """The turn of a part whose two vectors are these; None where they fix none."""
-    frame = _frame(first, second)
-    return None if frame is None else chained(frame, _REST_FRAMES.get(triad, _UPRIGHT))
-
-
-def _frame(first: Vector, second: Vector) -> Rotation | None:
-    """As `mrhubo.motion.orientations.frame_of`: None where the vectors are short or nearly parallel."""
-    length, other = norm(first), norm(second)
-    if length < SHORTEST or other < SHORTEST:
-        return None
-    x = unit(first)
-    side = across(second, x)
-    if norm(side) < PARALLEL * other:
-        return None
-    y = unit(side)
-    return x, y, cross(x, y)
-
-
-_UPRIGHT: Rotation = IDENTITY
-"""At rest the shoulders' line is the x axis, and up is y."""
-_REST_FRAMES = _rest_frames()
-
-
-def _elbow_axis(arm: _Arm, elbow: str, known: bool) -> Vector:
-    """A unit vector at right angles to the upper arm: of the plane of both bones where the elbow is bent, else as when
+def _hinge_axis(limb: _Limb, hinge: str, known: bool, one_way: bool) -> Vector:
+    """A unit vector at right angles to the upper bone: of the plane of both bones where the hinge is bent, else as when
     it was bent last (`mrhubo.motion.hinges`).
     """
-    plane = cross(arm.upper, arm.lower)
-    bend = math.atan2(norm(plane), dot(arm.upper, arm.lower))
+    plane = cross(limb.upper, limb.lower)
+    bend = math.atan2(norm(plane), dot(limb.upper, limb.lower))
+    above = JOINT_NAMES[PARENTS[_POSED[hinge] + 1]]
+    at_rest = unit(minus(REST[hinge], REST[above])), hinge_axis(hinge)
+    if one_way and bend < BACKWARD and dot(plane, apply(shortest(at_rest[0], limb.upper), at_rest[1])) < 0:
+        plane, bend = (0.0, 0.0, 0.0), 0.0
     if known and bend > BENT:
-        arm.bent = arm.upper, unit(plane)
-    shoulder = JOINT_NAMES[PARENTS[_POSED[elbow] + 1]]
-    start, own = arm.bent or (unit(minus(_REST[elbow], _REST[shoulder])), hinge_axis(elbow))
-    own = unit(across(apply(shortest(start, arm.upper), own), arm.upper))
-    if norm(own) < 0.5:  # the arm points to where it was opposite when the axis was known
-        own = unit(across((0.0, 0.0, 1.0) if abs(arm.upper[2]) < 0.7 else _UP, arm.upper))
+        limb.bent = limb.upper, unit(plane)
+    start, own = limb.bent or at_rest
+    own = unit(across(apply(shortest(start, limb.upper), own), limb.upper))
+    if norm(own) < 0.5:  # the limb points to where it was opposite when the axis was known
+        own = unit(across((0.0, 0.0, 1.0) if abs(limb.upper[2]) < 0.7 else _UP, limb.upper))
     share = min(1.0, max(0.0, (math.degrees(bend) - BEND_DEG["plane_low_deg"]) / _PLANE_DEG))
     share *= share * (3.0 - 2.0 * share)
     mixed = plus(apply(((share, 0.0, 0.0), (0.0, share, 0.0), (0.0, 0.0, share)), unit(plane)), own, 1.0 - share)
-    axis = unit(across(mixed, arm.upper))
+    axis = unit(across(mixed, limb.upper))
     return axis if norm(axis) > 0.5 else own
 
 
+_MIDDLE: Vector = mean([REST[name] for name in _HIPS])
+"""The middle of the hips, from the pelvis [m]."""
+LEG_LENGTH = sum(norm(minus(REST[b], REST[a])) for a, b in pairwise(("left_hip", "left_knee", "left_ankle")))
+"""How long our skeleton's legs are [m], from hip to ankle."""
 _PLANE_DEG = BEND_DEG["plane_high_deg"] - BEND_DEG["plane_low_deg"]
 
 

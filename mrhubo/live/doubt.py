@@ -29,6 +29,14 @@ class Doubt:
         """Whether some part is hardly seen."""
         return bool((self._sure_N < self._config.doubt_below).any())
 
+    @property
+    def share_of_legs(self) -> float:
+        """How fast legs and base follow the person, as a share of their full speed; 0: they are held."""
+        sure = float(self.sure_X[self._robot.legs_X].min(initial=1.0))
+        if sure >= self._config.doubt_below:
+            return 1.0
+        return sure / self._config.doubt_below if self._config.doubt == "slow" else 0.0
+
     def see(self, sure_J: np.ndarray | None) -> None:
         """How sure the joints of a person are (J,), 0..1; None: nobody is seen."""
         sees_XJ, branch_N = self._robot.sees_XJ, self._robot.branch_N
@@ -36,6 +44,9 @@ class Doubt:
             self.sure_X, least = np.zeros(len(sees_XJ)), 0.0
         else:
             self.sure_X, least = np.where(sees_XJ, sure_J, 1.0).min(axis=1), float(sure_J.min())
+            legs_X = self._robot.legs_X
+            if legs_X.any():  # no leg moves without the other: a robot stands on both
+                self.sure_X = np.where(legs_X, self.sure_X[legs_X].min(), self.sure_X)
         self._sure_N = np.where(branch_N >= 0, np.append(self.sure_X, least)[branch_N], least)
 
     def aim(self, answer_N: np.ndarray, passed: float) -> tuple[np.ndarray, np.ndarray]:

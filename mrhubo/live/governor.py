@@ -49,6 +49,8 @@ class Governor:
                 f"{config.heartbeat_timeout:g} at rate={config.rate:g}; give {least:.3g} or more, or another of them"
             )
         self.acceleration = config.acceleration
+        self.brake_time = steps * self.period
+        """In which every joint comes to stand [s], at most."""
         brakeable = config.acceleration * steps * self.period
         self.speed_N = np.minimum(facts.velocity.astype(np.float64) * config.speed, brakeable)
         acceleration_N = np.full(len(self.speed_N), config.acceleration)

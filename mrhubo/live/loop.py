@@ -139,7 +139,7 @@ class Session:
         try:
             for _ in range(_LONGEST_STOP_STEPS):
                 self._send(steps())
-                if self.pilot.governor.still:
+                if self.pilot.still:
                     break
         finally:
             self.close()

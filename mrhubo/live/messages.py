@@ -14,7 +14,7 @@ import numpy as np
 
 from mrhubo.body.joints import KEYPOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.fast.rotations import are_crooked, axis_angle_to_matrix, quaternion_to_matrix
-from mrhubo.live.body import SeenPose
+from mrhubo.live.body import Root, SeenPose
 from mrhubo.live.point_sets import POINT_SETS, PointSet
 from mrhubo.live.vectors import Vector
 from mrhubo.motion.orientations import HEAD_POINTS
@@ -44,6 +44,8 @@ class Landmarks:
     """Those that are seen [m], y up, right-handed, by our names."""
     sure: dict[str, float]
     """How sure the sender is of each, 0..1."""
+    in_world: bool = False
+    """Whether the points tell where the person is in the world, and not from the hips alone."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,10 @@ def _landmarks(told: dict[str, Any]) -> Landmarks:
         if weight >= UNSURE:
             points[ours] = known.signs[0] * x, known.signs[1] * y, known.signs[2] * z
             sure[ours] = weight
-    return Landmarks(points, sure)
+    in_world = told.get("world", known.in_world)
+    if not isinstance(in_world, bool):
+        raise Refused("malformed")
+    return Landmarks(points, sure, in_world)
 
 
 def _names(known: PointSet, told: dict[str, Any], count: int) -> list[str | None]:
@@ -168,7 +173,24 @@ def _rotations(told: dict[str, Any]) -> SeenPose:
         raise Refused("malformed")
     weights = told.get("confidence")
     weights = [1.0] * _JOINTS if weights is None else [_number(value, 1e6) for value in _list(weights, _JOINTS)]
-    return SeenPose(local_J33.astype(np.float32), np.clip(weights, 0.0, 1.0))
+    return SeenPose(local_J33.astype(np.float32), np.clip(weights, 0.0, 1.0), _root(told.get("root")))
+
+
+def _root(told: Any) -> Root | None:
+    """Where the pelvis is."""
+    if told is None:
+        return None
+    if not isinstance(told, dict):
+        raise Refused("malformed")
+    row = [_number(value, _MOST_TURN) for value in _list(told.get("rotation"))]
+    if len(row) not in (3, 4):
+        raise Refused("malformed")
+    turn_133 = axis_angle_to_matrix(np.array([row])) if len(row) == 3 else of_quaternions(np.array([row]))
+    if are_crooked(turn_133).any():
+        raise Refused("malformed")
+    place = told.get("place")
+    place_3 = None if place is None else np.array([_number(value, _FARTHEST) for value in _list(place, 3)])
+    return Root(turn_133[0], place_3)
 
 
 def of_quaternions(xyzw_J4: np.ndarray) -> np.ndarray:

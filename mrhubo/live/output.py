@@ -25,6 +25,30 @@ STATES = {
 
 
 @dataclass(frozen=True)
+class BasePose:
+    """Where a robot's base is, in a world with x forward, y left, z up, whose floor is at z = 0."""
+
+    position_3: np.ndarray
+    """[m]"""
+    quaternion_wxyz_4: np.ndarray
+
+    def told(self) -> dict[str, list[float]]:
+        """As messages have it."""
+        return {"position": _rounded(self.position_3), "quaternion_wxyz": _rounded(self.quaternion_wxyz_4)}
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a robot with legs stands."""
+
+    base: BasePose
+    stop: BasePose
+    """Where the base comes to rest if the robot brakes from now on."""
+    contact: Mapping[str, bool]
+    """Whether each foot is planted, by its name."""
+
+
+@dataclass(frozen=True)
 class Output:
     """The joint angles of one moment."""
 
@@ -49,6 +73,8 @@ class Output:
     """Another one each time that a session starts."""
     counts: Mapping[str, int] = field(default_factory=dict)
     """Messages that came until now, by kind."""
+    standing: Standing | None = None
+    """None: the robot's base is fixed."""
 
     def message(self, with_counts: bool = False) -> str:
         """The JSON message."""
@@ -65,6 +91,9 @@ class Output:
             "stop": {"angles": _rounded(self.stop_N), "in": round(self.stop_in, 6)},
             "confidence": {name: round(value, 4) for name, value in self.confidence.items()},
         }
+        if self.standing is not None:
+            told["base"], told["contact"] = self.standing.base.told(), dict(self.standing.contact)
+            told["stop"]["base"] = self.standing.stop.told()
         if with_counts:
             told["counts"] = dict(self.counts)
         return json.dumps(told, separators=(",", ":"))

@@ -19,6 +19,8 @@ from mrhubo.live.inbox import Frame, Inbox
 from mrhubo.live.messages import Landmarks, Nobody
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
+from mrhubo.live.roots import Jumped
+from mrhubo.live.walk import Walk
 
 
 class Pilot:
@@ -45,10 +47,20 @@ class Pilot:
         """Since when the robot may move [s]; None: it may not."""
         self._ticked = -math.inf
         """When the last moment was [s]."""
-        self._body = Body()
+        self._body = Body(has_legs=robot.standing is not None)
         self._answer_N, self._confidence_X = robot.home_N, np.zeros(len(robot.branch_names))
         self._met = False
         """Whether somebody has been seen."""
+        self.legs: Walk | None = None
+        """Of a robot with legs."""
+        if robot.standing is not None:
+            self.legs = Walk(robot, self.governor)
+            self.inbox.counts["jumped"] = 0
+
+    @property
+    def still(self) -> bool:
+        """Whether nothing of the robot moves."""
+        return self.governor.still and (self.legs is None or self.legs.still)
 
     def end(self) -> None:
         """From now on the robot brakes, and frames are left alone."""
@@ -58,6 +70,8 @@ class Pilot:
         """The joint angles of this moment; one period after the last. `now`: our clock [s]."""
         if now - self._ticked > self.config.stop_time:  # the process was held up, and the robot has stopped by itself
             self.governor.settle()
+            if self.legs is not None:
+                self.legs.settle()
             self._going_since = None
         self._ticked = now
         frame = self.inbox.take_frame()
@@ -65,15 +79,20 @@ class Pilot:
             self._look(frame, now)
         elif now - self.inbox.frame_at > self.config.unseen_after:
             self._doubt.see(None)
-        going = self._may_go(now)
+        going, ramp = self._may_go(now), 0.0
         if not going:
             self._going_since = None
             self.governor.brake()
         else:
             self._going_since = now if self._going_since is None else self._going_since
             goal_N, pace_N = self._doubt.aim(self._answer_N, self.governor.period)
-            self.governor.go(goal_N, pace_N * self._ramp(now - self._going_since))
+            ramp = self._ramp(now - self._going_since)
+            if self.legs is not None:
+                pace_N = self.legs.pace(pace_N, self._doubt.share_of_legs, now, self._ramp)
+            self.governor.go(goal_N, pace_N * ramp)
         stop_N, stop_in = self.governor.standstill()
+        if self.legs is not None:
+            self.legs.step(stop_N, ramp)
         self._number += 1
         sure_X = np.minimum(self._doubt.sure_X, self._confidence_X).tolist()
         return Output(
@@ -88,26 +107,38 @@ class Pilot:
             confidence=dict(zip(self.robot.branch_names, sure_X, strict=True)),
             session=self._session,
             counts=self.inbox.counts,
+            standing=None if self.legs is None else self.legs.told(),
         )
 
     def _look(self, frame: Frame, now: float) -> None:
         """Takes up what a frame shows."""
-        pose: SeenPose | None
-        if isinstance(frame, Landmarks):
-            pose = self._body.see(frame.points, frame.sure) if frame.points else None
-        else:
-            pose = None if isinstance(frame, Nobody) else frame
+        pose, root = self._pose(frame), None
+        if pose is not None and self.legs is not None:
+            try:
+                pose, root = self.legs.root(pose, now)
+            except Jumped:
+                self.inbox.counts["jumped"] += 1
+                return
         self._doubt.see(None if pose is None else pose.sure_J)
         if pose is None and not self._met:
             return
+        given = (None if pose is None else pose.local_J33, now)
         try:
-            answer = self.robot.answer(None if pose is None else pose.local_J33, now)
+            answer = self.robot.answer(*given) if root is None else self.robot.answer(*given, root)
         except UserError:  # the retargeter is stricter about rotations than the message's reader was
             self.inbox.counts["malformed"] += 1
             self._doubt.see(None)
             return
         self._met = True
         self._answer_N, self._confidence_X = answer.q_N, answer.confidence_X
+        if self.legs is not None:
+            self.legs.stance = answer.stance
+
+    def _pose(self, frame: Frame) -> SeenPose | None:
+        """The pose of a frame; None: nobody is seen."""
+        if isinstance(frame, Landmarks):
+            return self._body.see(frame.points, frame.sure, frame.in_world) if frame.points else None
+        return None if isinstance(frame, Nobody) else frame
 
     def _may_go(self, now: float) -> bool:
         inbox = self.inbox

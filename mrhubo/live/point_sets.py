@@ -36,6 +36,8 @@ class PointSet:
     """Our names of the sender's; None: the sender uses ours."""
     signs: Vector = (1.0, 1.0, 1.0)
     """What turns its axes into right-handed ones with y up."""
+    in_world: bool = False
+    """Whether points are told in a world that stays, unless a message says otherwise."""
 
 
 def _webxr() -> dict[str, str]:
@@ -44,8 +46,8 @@ def _webxr() -> dict[str, str]:
 
 POINT_SETS = {
     "mediapipe": PointSet(SETS["MediaPipe"], signs=(1.0, -1.0, -1.0)),
-    "pico": PointSet((*JOINT_NAMES, *(f"{side}_middle" for side in SIDES))),
-    "webxr": PointSet(None, _webxr()),
+    "pico": PointSet((*JOINT_NAMES, *(f"{side}_middle" for side in SIDES)), in_world=True),
+    "webxr": PointSet(None, _webxr(), in_world=True),
     "named": PointSet(None),
 }
 """By the name that a message gives."""

@@ -6,7 +6,7 @@ Legend: N joints, X branches (an arm, the head), J = 21 human joints.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,15 @@ from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.fast import Description, FastRetargeter, FastStream, StreamSettings
+from mrhubo.fast.plain.ground import Stance
 from mrhubo.retargeting.answering import has_feet
 from mrhubo.robot_motion import RobotFacts
 
 _CHEST = POSED_JOINT_NAMES.index("spine3")
+
+
+StreamRoot = tuple[np.ndarray, np.ndarray]
+"""A pelvis' rotation (3, 3) and place (3,) [m] in a world whose y is up."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,8 @@ class Answer:
     """Joint angles (N,) [rad]."""
     confidence_X: np.ndarray
     """The retargeter's (X,), 0..1."""
+    stance: Stance | None = None
+    """How a robot with legs stands; None: it has none, or nobody has been seen."""
 
 
 @dataclass(frozen=True)
@@ -45,27 +52,39 @@ class LiveRobot:
     """Which human joints each branch hangs on (X, J), bool."""
     home_N: np.ndarray
     """Joint angles (N,) [rad] at which it starts and rests."""
-    answer: Callable[[np.ndarray | None, float], Answer]
-    """To a pose (21, 3, 3), or to nobody, at a time [s]."""
+    answer: Callable[..., Answer]
+    """To a pose (21, 3, 3), or to nobody, at a time [s]; of a robot with legs a third argument is the `StreamRoot` of
+    the pose."""
     urdf: Path | None = None
     """Its model, where it is known; a package does not tell."""
     figure: Callable[[], dict[str, Any]] | None = None
     """How it looks on the page (`mrhubo.live.figure`); None: nobody knows."""
+    standing: Description | None = None
+    """What is known of a robot that stands on feet; None: it has none, and its base is fixed."""
+    legs_X: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    """Which branches are legs (X,), bool; empty: none."""
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """The feet on which it stands; none if it has no legs."""
+        return () if self.standing is None else tuple(self.standing.settings.facts["feet"])
 
     @classmethod
     def of_package(cls, source: str, config: LiveConfig, form: str | None = None) -> LiveRobot:
         """By a package, without PyTorch; `form` as for `mrhubo.load_fast`.
 
         Raises:
-            UserError: there is no such package, it is damaged, not for poses of our own skeleton, or moves the robot's
-                legs.
+            UserError: there is no such package, it is damaged, not for poses of our own skeleton, or moves legs without
+                knowing how they stand.
         """
         import mrhubo
 
         folder = mrhubo.package_folder(source)
         fast = mrhubo.load_fast(folder, form)
-        if has_feet(fast.description):
-            raise _moves_legs(f"--retargeter {source}: its robot")
+        if has_feet(fast.description) and fast.description.legs is None:
+            raise UserError(
+                f"--retargeter {source}: was made before packages told how a robot stands; `mrhubo fit` makes it anew"
+            )
         found = cls.of_retargeter(fast, config)
 
         def figure() -> dict[str, Any]:
@@ -77,18 +96,16 @@ class LiveRobot:
         return replace(found, figure=figure)
 
     @classmethod
-    def of_robot(cls, name: str, config: LiveConfig, form: str | None = None) -> LiveRobot:
-        """By the universal network, without training; as `mrhubo.for_robot`.
+    def of_robot(cls, name: str, config: LiveConfig, form: str | None = None, whole_body: bool = False) -> LiveRobot:
+        """By the universal network, without training; as `mrhubo.for_robot`, whose `whole_body` it is.
 
         Raises:
-            UserError: the robot cannot be used, or its config moves its legs, and nothing here keeps it on its feet.
+            UserError: the robot cannot be used.
         """
         from mrhubo.describing.run import open_robot
         from mrhubo.retargeter import untrained
 
-        robot = open_robot(name)
-        if robot.keypoints is not None and robot.keypoints.standing:
-            raise _moves_legs(f"--robot {name}: its config")
+        robot = open_robot(name, whole_body)
         retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
         found = cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
@@ -111,26 +128,28 @@ class LiveRobot:
         if not description.settings.own_rest:
             raise UserError("this retargeter is for a body model with a rest pose of its own, which no stream sends")
         lower_N, upper_N = description.cost.lower_N, description.cost.upper_N
-        home_N = np.clip(np.zeros(len(lower_N)), lower_N, upper_N)
-        if config.home == "hanging":
-            home_N = np.clip(retargeter.predict(hanging_pose(), 10).astype(np.float64), lower_N, upper_N)
+        stands = description.legs is not None
         settings = StreamSettings(avoid_collisions=config.avoid_collisions)
         stream = FastStream(retargeter, config.rate, settings)
+        home_N = np.clip(np.zeros(len(lower_N)), lower_N, upper_N)
+        if config.home == "hanging":
+            hanging_N = _standing(stream) if stands else retargeter.predict(hanging_pose(), 10)
+            home_N = np.clip(hanging_N.astype(np.float64), lower_N, upper_N)
         stream.reset(np.clip(home_N.astype(np.float32), lower_N.astype(np.float32), upper_N.astype(np.float32)))
 
-        def answer(pose: np.ndarray | None, time: float) -> Answer:
-            found = stream(pose, time)
+        def answer(pose: np.ndarray | None, time: float, root: StreamRoot | None = None) -> Answer:
+            found = stream(pose, time, root)
             assert found.branch_confidence is not None
-            return Answer(found.q.astype(np.float64), found.branch_confidence)
+            return Answer(found.q.astype(np.float64), found.branch_confidence, stream.stance)
 
         names = description.settings.joint_names, description.settings.branch_names
-        return cls(retargeter.facts, *names, *_branches(description), home_N, answer, urdf)
+        found = cls(retargeter.facts, *names, *_branches(description), home_N, answer, urdf)
+        return replace(found, standing=description, legs_X=_legs(description)) if stands else found
 
 
-def _moves_legs(what: str) -> UserError:
-    return UserError(
-        f"{what} moves its legs, and mrhubo live keeps no robot on its feet; name one of its arms, hands and head alone"
-    )
+def _standing(stream: FastStream) -> np.ndarray:
+    """Joint angles (N,) [rad] of a robot that stands on the floor like a person whose arms hang."""
+    return stream(hanging_pose(), root=(np.eye(3), np.zeros(3))).q
 
 
 def hanging_pose() -> np.ndarray:
@@ -141,6 +160,13 @@ def hanging_pose() -> np.ndarray:
         turn_33 = [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
         local_J33[POSED_JOINT_NAMES.index(f"{side}_shoulder")] = turn_33
     return local_J33
+
+
+def _legs(description: Description) -> np.ndarray:
+    """`legs_X`."""
+    assert description.legs is not None
+    of_legs_D = np.concatenate((description.legs.limb_R2, description.legs.foot_R2)).ravel()
+    return np.asarray((description.trust.column_XD[:, of_legs_D] > 0).any(axis=1))
 
 
 def _branches(description: Description) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from mrhubo.motion.gaps import Neighbours
 BENT = math.radians(12.0)
 """From which bend on the plane of two limbs tells the axis of the joint between them, whatever the upper limb's own
 turn (as in `mrhubo.robot.bending`)."""
-_BACKWARD = math.radians(30.0)
+BACKWARD = math.radians(30.0)
 """Knees do not bend backwards: up to this bend, what looks so is a straight leg and a noisy point."""
 
 
@@ -36,7 +36,7 @@ def hinge_axes(
     plane_T3 = normalize(cross_T3)
     told_T = known_T & (bend_T > BENT)
     reference_T3 = usual_T3 if own_T3 is None else own_T3
-    backward_T = one_way & (bend_T < _BACKWARD) & ((plane_T3 * reference_T3).sum(-1) < 0)
+    backward_T = one_way & (bend_T < BACKWARD) & ((plane_T3 * reference_T3).sum(-1) < 0)
     told_T &= ~backward_T
     if own_T3 is None:
         own_T3 = _carried(plane_T3, upper_T3, told_T) if told_T.any() else usual_T3

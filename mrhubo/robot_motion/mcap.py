@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -23,8 +23,8 @@ from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.ros2 import SECOND, from_points, points_of
 
 TOPIC = "/joint_trajectory"
-_BASE, _CONTACT = "/base_pose", "/contact/"
-_TYPE, _POSE, _BOOL = "trajectory_msgs/msg/JointTrajectory", "geometry_msgs/msg/PoseStamped", "std_msgs/msg/Bool"
+BASE_TOPIC, _CONTACT = "/base_pose", "/contact/"
+_TYPE, POSE, BOOL = "trajectory_msgs/msg/JointTrajectory", "geometry_msgs/msg/PoseStamped", "std_msgs/msg/Bool"
 _RULE = "=" * 80
 _HEADER = f"""\
 {_RULE}
@@ -53,7 +53,7 @@ MSG: builtin_interfaces/Duration
 int32 sec
 uint32 nanosec
 """,
-    _POSE: f"""\
+    POSE: f"""\
 std_msgs/Header header
 geometry_msgs/Pose pose
 {_HEADER}{_RULE}
@@ -72,7 +72,7 @@ float64 y
 float64 z
 float64 w
 """,
-    _BOOL: "bool data\n",
+    BOOL: "bool data\n",
 }
 """The messages that are written and read, by type."""
 _MAX_BAG = 2**30
@@ -111,21 +111,32 @@ def write_mcap(motion: RobotMotion, path: Path) -> None:
 
 def _beside(motion: RobotMotion, points: list[dict[str, Any]]) -> Iterator[tuple[float, str, str, dict[str, Any]]]:
     """Where the base is and which feet are planted: time [s], topic, type and message, frame after frame."""
-    topics: list[str] = []
-    for name in motion.contact_names:
-        topic = _CONTACT + re.sub(r"\W", "_", name, flags=re.ASCII)
-        topics.append(topic if topic not in topics else f"{topic}_{len(topics)}")
+    topics = contact_topics(motion.contact_names)
     for frame, point in enumerate(points):
         stamp = point["time_from_start"]
         time = stamp["sec"] + stamp["nanosec"] / SECOND
         if motion.root_position is not None and motion.root_quaternion_wxyz is not None:
-            x, y, z = motion.root_position[frame].tolist()
-            qw, qx, qy, qz = motion.root_quaternion_wxyz[frame].tolist()
-            pose = {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": qx, "y": qy, "z": qz, "w": qw}}
-            yield time, _BASE, _POSE, {"header": {"stamp": stamp, "frame_id": "world"}, "pose": pose}
+            place, turn = motion.root_position[frame], motion.root_quaternion_wxyz[frame]
+            yield time, BASE_TOPIC, POSE, pose_message(place, turn, stamp)
         for foot, topic in enumerate(topics):
             assert motion.contact is not None
-            yield time, topic, _BOOL, {"data": bool(motion.contact[frame, foot])}
+            yield time, topic, BOOL, {"data": bool(motion.contact[frame, foot])}
+
+
+def contact_topics(names: Sequence[str]) -> list[str]:
+    """The topic of each foot."""
+    topics: list[str] = []
+    for name in names:
+        topic = _CONTACT + re.sub(r"\W", "_", name, flags=re.ASCII)
+        topics.append(topic if topic not in topics else f"{topic}_{len(topics)}")
+    return topics
+
+
+def pose_message(position_3: np.ndarray, quaternion_wxyz_4: np.ndarray, stamp: Mapping[str, int]) -> dict[str, Any]:
+    """A PoseStamped of a base [m] in the frame `world`; `stamp`: `sec` and `nanosec`."""
+    (x, y, z), (qw, qx, qy, qz) = position_3.tolist(), quaternion_wxyz_4.tolist()
+    pose = {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": qx, "y": qy, "z": qz, "w": qw}}
+    return {"header": {"stamp": dict(stamp), "frame_id": "world"}, "pose": pose}
 
 
 class JointTrajectoryBag:
@@ -161,7 +172,7 @@ def read_mcap(path: Path) -> RobotMotion:
         UserError: the file is missing, damaged, too large, holds no such message, or mcap-ros2-support is not
             installed.
     """
-    decode = {kind: _decoder(kind) for kind in (_TYPE, _POSE)}
+    decode = {kind: _decoder(kind) for kind in (_TYPE, POSE)}
     messages: list[Any] = []
     poses: list[np.ndarray] = []
     contacts: dict[str, list[bool]] = {}
@@ -173,12 +184,12 @@ def read_mcap(path: Path) -> RobotMotion:
                 is_over = not _is_moment(message, messages)
                 if not is_over:
                     messages.append(message)
-                    most = max(most, len(message.points))
-            elif kind == _POSE and topic == _BASE and len(poses) < most:
-                pose = decode[_POSE](data).pose
+                    most = max(most, len(message.points), len(messages))
+            elif kind == POSE and topic == BASE_TOPIC and len(poses) < most:
+                pose = decode[POSE](data).pose
                 at, turn = pose.position, pose.orientation
                 poses.append(np.array([at.x, at.y, at.z, turn.w, turn.x, turn.y, turn.z]))
-            elif kind == _BOOL and topic.startswith(_CONTACT) and len(data) == _BOOL_BYTES:
+            elif kind == BOOL and topic.startswith(_CONTACT) and len(data) == _BOOL_BYTES:
                 name = topic.removeprefix(_CONTACT)
                 told = contacts.setdefault(name, []) if name in contacts or len(contacts) < _MOST_FEET else []
                 if len(told) < most:
@@ -193,18 +204,28 @@ def read_mcap(path: Path) -> RobotMotion:
     if not messages:
         raise UserError(f"{path}: holds no message of type {_TYPE}")
     first = messages[0]
-    more: dict[str, Any] = {}
     if len(messages) < _MOMENTS:
         points = [(p.time_from_start, p.positions) for p in first.points]
-        if len(poses) == len(points) > 0:
-            more = {"root_position": np.stack(poses)[:, :3], "root_quaternion_wxyz": np.stack(poses)[:, 3:]}
-        feet = [name for name, told in contacts.items() if name and len(told) == len(points) > 0]
-        if feet:
-            more |= {"contact": np.stack([contacts[name] for name in feet], axis=1), "contact_names": feet}
     else:
+        whole = _whole(len(messages), [poses, *contacts.values()])
+        messages, poses = messages[:whole], poses[:whole]
+        contacts = {name: told[:whole] for name, told in contacts.items()}
         points = [(message.header.stamp, message.points[0].positions) for message in messages]
+    more: dict[str, Any] = {}
+    if len(poses) == len(points) > 0:
+        more = {"root_position": np.stack(poses)[:, :3], "root_quaternion_wxyz": np.stack(poses)[:, 3:]}
+    feet = [name for name, told in contacts.items() if name and len(told) == len(points) > 0]
+    if feet:
+        more |= {"contact": np.stack([contacts[name] for name in feet], axis=1), "contact_names": feet}
     times = [(stamp.sec, stamp.nanosec) for stamp, _ in points]
     return from_points(path, list(first.joint_names), times, [list(positions) for _, positions in points], more)
+
+
+def _whole(moments: int, beside: Sequence[Sequence[Any]]) -> int:
+    """How many moments of a session are there with all that is told beside them: of one that ended early, the last may
+    lack some.
+    """
+    return min([moments, *(len(told) for told in beside if len(told) == moments - 1 > 0)])
 
 
 def _decoder(kind: str) -> Any:

@@ -14,8 +14,9 @@ from mrhubo.body.joints import KEYPOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.body.skeleton import Skeleton
 from mrhubo.fast.rotations import are_crooked
 from mrhubo.live.body import UPRIGHT_CONFIDENCE, Body, SeenPose
-from mrhubo.motion import read_motion
+from mrhubo.motion import Motion, read_motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
+from tests.reference.standing.steppers import moved, walk
 
 TOLD = [f"{side}_{name}" for side in ("left", "right")
         for name in ("shoulder", "elbow", "wrist", "hip", "index", "pinky", "eye")]  # fmt: skip
@@ -117,3 +118,60 @@ def test_arms_that_have_never_been_seen_hang(points: dict[str, np.ndarray]) -> N
         arm = turns[KEYPOINT_NAMES.index(f"{side}_wrist")] - turns[KEYPOINT_NAMES.index(f"{side}_shoulder")]
         chest_up = turns[KEYPOINT_NAMES.index("spine3")] - turns[KEYPOINT_NAMES.index("spine2")]
         assert arm @ chest_up < -0.95 * np.linalg.norm(arm) * np.linalg.norm(chest_up)
+
+
+# Legs and root
+
+
+def walking_points(motion: Motion, scale: float = 1.0) -> tuple[list[dict[str, tuple]], Motion]:
+    """Points of a person in the world, whose body is of another size."""
+    point_TK3 = Skeleton().keypoints(motion.local_TJ33).numpy().astype(np.float64)
+    arrays = motion.arrays
+    assert arrays.root_rotation_T33 is not None and arrays.root_position_T3 is not None
+    point_TK3 = point_TK3 @ arrays.root_rotation_T33.mT + arrays.root_position_T3[:, None]
+    return [dict(zip(KEYPOINT_NAMES, map(tuple, (scale * at_K3).tolist()), strict=True)) for at_K3 in point_TK3], motion
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.8])
+def test_legs_and_root_of_a_person_of_any_size(scale: float) -> None:
+    """Thighs, shins and feet point as they do, and the pelvis is where one of our skeleton would have it."""
+    told, motion = walking_points(moved(walk(40), 0.7, (2.0, 0.0, -1.0)), scale)
+    arrays, body = motion.arrays, Body(has_legs=True)
+    assert arrays.root_rotation_T33 is not None and arrays.root_position_T3 is not None
+    for t, points in enumerate(told):
+        found = body.see(points, {}, in_world=True)
+        assert found is not None and found.root is not None and found.root.place_3 is not None
+        assert (
+            found.sure_J[[joint(f"{s}_{n}") for s in ("left", "right") for n in ("hip", "knee", "ankle")]] == 1
+        ).all()
+        np.testing.assert_allclose(found.root.turn_33, arrays.root_rotation_T33[t], atol=1e-4)
+        np.testing.assert_allclose(found.root.place_3, arrays.root_position_T3[t], atol=1e-4)
+        seen_K3, wanted_K3 = (
+            Skeleton().keypoints(torch.as_tensor(local, dtype=torch.float32)[None])[0].numpy()
+            for local in (found.local_J33, arrays.local_TJ33[t])
+        )
+        legs = [i for i, name in enumerate(KEYPOINT_NAMES) if name.split("_")[-1] in ("knee", "ankle", "toe", "heel")]
+        np.testing.assert_allclose(seen_K3[legs], wanted_K3[legs], atol=1e-3)
+
+
+def test_legs_that_are_hidden_are_not_sure_and_stay() -> None:
+    told, _ = walking_points(walk(30))
+    body = Body(has_legs=True)
+    before = body.see(told[0], {}, in_world=True)
+    without = {name: at for name, at in told[-1].items() if not name.startswith(("left_knee", "right_ankle"))}
+    after = body.see(without, {}, in_world=True)
+    assert before is not None and after is not None
+    for name, sure in (("left_hip", 0), ("left_knee", 0), ("right_hip", 1), ("right_knee", 0), ("left_shoulder", 1)):
+        assert after.sure_J[joint(name)] == sure, name
+    hip = joint("left_hip")
+    np.testing.assert_allclose(after.local_J33[hip] @ [0, -1, 0], before.local_J33[hip] @ [0, -1, 0], atol=0.02)
+    assert after.root is not None and after.root.place_3 is not None and np.isfinite(after.root.place_3).all()
+    hips_hidden = {name: at for name, at in told[-1].items() if not name.endswith("hip")}
+    assert max(body.see(hips_hidden, {}, in_world=True).sure_J[joint(f"{s}_hip")] for s in ("left", "right")) == 0  # pyright: ignore
+
+
+def test_who_has_no_legs_is_seen_as_ever(points: dict[str, np.ndarray]) -> None:
+    told, _ = walking_points(walk(3))
+    found = Body().see(told[-1], {}, in_world=True)
+    assert found is not None and found.root is None
+    assert (found.local_J33[[joint(f"{s}_{n}") for s in ("left", "right") for n in ("hip", "knee", "ankle")]] == np.eye(3)).all()  # fmt: skip

@@ -16,6 +16,7 @@ pytest.importorskip("websockets")
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
+from mrhubo.fast.rotations import quaternion_to_matrix
 from mrhubo.live.endpoints import TOKEN_VARIABLE, Endpoint
 from mrhubo.live.figure import figure_of
 from mrhubo.live.server import PageSink, Server
@@ -65,9 +66,19 @@ def test_the_page_draws_what_forward_kinematics_say(
         before = browser.ask(pixels)
         script = f"import('/robot.js').then(m => fetch('/robot.json').then(a => a.json()).then(f => m.places(f.bodies, {angles_N.tolist()})))"
         places_B44 = np.array(browser.ask(script))
+        turn_4, at_3 = np.array([0.5, -0.5, 0.1, 0.7]) / np.linalg.norm([0.5, -0.5, 0.1, 0.7]), [0.3, -1.2, 0.4]
+        base = json.dumps({"position": at_3, "quaternion_wxyz": turn_4.tolist()})
+        moved_B44 = np.array(browser.ask(script.replace(f"{angles_N.tolist()})", f"{angles_N.tolist()}, {base})")))
         server.show(message(angles_N, tuple(nao.joint_names)))
         browser.until(f"{pixels} !== {before}")
+        pen = browser.ask(pixels)
+        told = json.loads(message(angles_N, tuple(nao.joint_names))) | {"base": json.loads(base)}
+        server.show(json.dumps(told))
+        browser.until(f"{pixels} !== {pen}")
         assert browser.complaints() == []
+    base_44 = np.eye(4)
+    base_44[:3, :3], base_44[:3, 3] = quaternion_to_matrix(turn_4[[1, 2, 3, 0]]), at_3
+    np.testing.assert_allclose(moved_B44, base_44 @ places_B44, atol=1e-9)
     parsed = nao.description.parsed
     wanted = robot_solids(read_geometry(parsed), link_poses(parsed, nao.configuration(angles_N)))
     drawn = []

@@ -22,7 +22,6 @@ from mrhubo.live.inbox import Inbox
 from mrhubo.live.loop import Periods, Session
 from mrhubo.live.output import STATES, Output
 from mrhubo.live.plan import Plan
-from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.file import FileSink
 from mrhubo.live.sinks.udp import UdpSink
 from mrhubo.live.sources.replay import ReplaySource
@@ -295,8 +294,3 @@ def test_source_and_sink_on_one_port_share_a_server() -> None:
     plan.add_sink("ws:8112")
     assert plan.sources[0].server is plan.sinks[0].server is not plan.sinks[1].server  # pyright: ignore
     assert [said.split(" ")[0] for said in plan.told()] == ["page:", "page:"]
-
-
-def test_a_robot_on_its_feet_is_refused(root: Path) -> None:
-    with pytest.raises(UserError, match="keeps no robot on its feet"):
-        LiveRobot.of_robot(str(root / "conf" / "nao-whole-body.yaml"), LiveConfig())

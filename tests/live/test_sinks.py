@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import re
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +21,7 @@ from mrhubo.errors import InputWarning, UserError
 from mrhubo.live.output import Output
 from mrhubo.live.pilot import Pilot
 from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.file import FileSink
 from mrhubo.live.sinks.mcap import McapSink
 from mrhubo.live.sinks.mujoco import MujocoSink
 from mrhubo.live.sinks.ros2 import Ros2Sink
@@ -25,6 +29,9 @@ from mrhubo.live.sinks.trajectory import trajectory
 from mrhubo.robot_motion import FollowingJoint, RobotFacts
 from tests.live.messages import message
 from tests.live.robots import NAMES, UPPER, make_robot
+from tests.live.walkers import drive, make_legged, poses_of
+from tests.reference.standing.steppers import walk
+from tests.reference.walkers import write_urdf
 
 CONFIG = LiveConfig(ramp_time=0.0)
 
@@ -65,6 +72,74 @@ def test_a_bag_of_a_session_is_its_motion(tmp_path: Path, outputs: list[Output])
     path.write_bytes(as_killed[:60])
     with pytest.raises(UserError):
         mrhubo.read_robot_motion(path)
+
+
+@pytest.fixture(scope="module")
+def walking(tmp_path_factory: pytest.TempPathFactory) -> tuple[LiveRobot, list[Output]]:
+    """A robot with legs, which walks."""
+    pilot, sent = drive(make_legged(tmp_path_factory.mktemp("legged")), poses_of(walk(40)), CONFIG)
+    assert np.ptp(sent.place_T3[:, 0]) > 0.1 and len({str(output.standing) for output in sent.outputs}) == 40
+    return pilot.robot, sent.outputs
+
+
+@pytest.mark.parametrize("kind", [FileSink, McapSink])
+def test_files_and_bags_tell_where_the_base_is(
+    tmp_path: Path, walking: tuple[LiveRobot, list[Output]], kind: Callable[[Path], FileSink | McapSink]
+) -> None:
+    pytest.importorskip("mcap_ros2")
+    robot, outputs = walking
+    path = tmp_path / ("session.npz" if kind is FileSink else "session.mcap")
+    sink = kind(path)
+    sink.open(robot, CONFIG)
+    for output in outputs:
+        sink.send(output)
+    as_killed = path.read_bytes() if kind is McapSink else b""
+    sink.close()
+    found = mrhubo.read_robot_motion(path)
+    told = [output.standing for output in outputs if output.standing is not None]
+    assert len(told) == len(found) == 40
+    np.testing.assert_allclose(found.q, [output.q_N for output in outputs], atol=1e-6)
+    assert found.root_position is not None and found.root_quaternion_wxyz is not None
+    np.testing.assert_allclose(found.root_position, [one.base.position_3 for one in told], atol=1e-6)
+    np.testing.assert_allclose(found.root_quaternion_wxyz, [one.base.quaternion_wxyz_4 for one in told], atol=1e-6)
+    assert found.contact_names == robot.foot_names and found.contact is not None
+    assert found.contact.tolist() == [list(one.contact.values()) for one in told]
+    for cut in (0, 1, 90, 400) if kind is McapSink else ():  # what is read of a part has all that belongs together
+        path.write_bytes(as_killed[: len(as_killed) - cut])
+        with pytest.warns(InputWarning, match="ends early"):
+            early = mrhubo.read_robot_motion(path)
+        assert 5 < len(early) < 40 and early.root_position is not None and early.contact is not None
+        np.testing.assert_array_equal(early.root_position, found.root_position[: len(early)])
+
+
+def test_messages_tell_where_the_base_is(walking: tuple[LiveRobot, list[Output]]) -> None:
+    output = walking[1][-1]
+    told, standing = json.loads(output.message()), output.standing
+    assert standing is not None and told["contact"] == standing.contact and told["mrhubo"] == 1
+    np.testing.assert_allclose(told["base"]["position"], standing.base.position_3, atol=1e-9)
+    np.testing.assert_allclose(told["base"]["quaternion_wxyz"], standing.base.quaternion_wxyz_4, atol=1e-9)
+    assert set(told["stop"]) == {"angles", "in", "base"} and set(told["stop"]["base"]) == set(told["base"])
+    fixed = json.loads(dataclasses.replace(output, standing=None).message())
+    assert set(told) - set(fixed) == {"base", "contact"} and set(fixed["stop"]) == {"angles", "in"}
+
+
+def test_a_simulated_robot_with_legs_begins_on_its_soles(
+    tmp_path: Path, walking: tuple[LiveRobot, list[Output]]
+) -> None:
+    pytest.importorskip("mujoco")
+    robot, outputs = walking
+    text = write_urdf(tmp_path / "walker.urdf").read_text()
+    inertial = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'  # fmt: skip
+    (tmp_path / "walker.urdf").write_text(re.sub(r'<link name="([^"]*)">', rf'<link name="\1">{inertial}', text))
+    sink = MujocoSink(tmp_path / "walker.urdf", free=True)
+    sink.open(robot, CONFIG)
+    pilot = Pilot(robot, CONFIG, True)
+    home = pilot.tick(0.0).standing
+    assert home is not None
+    np.testing.assert_allclose(sink.data.qpos[:3], home.base.position_3, atol=1e-3)
+    np.testing.assert_allclose(sink.data.qpos[3:7], home.base.quaternion_wxyz_4, atol=1e-6)
+    sink.send(outputs[0])
+    assert "the base, which is free, was" in sink.told()
 
 
 def test_a_trajectory_ends_where_the_robot_would_stand(outputs: list[Output]) -> None:
@@ -108,6 +183,31 @@ def test_ros2_publishes_the_same(monkeypatch: pytest.MonkeyPatch, outputs: list[
     assert [point.time_from_start.nanosec for point in told.points] == [
         point["time_from_start"]["nanosec"] for point in wanted
     ]
+
+
+def test_ros2_publishes_the_base_too(monkeypatch: pytest.MonkeyPatch, walking: tuple[LiveRobot, list[Output]]) -> None:
+    robot, outputs = walking
+    sent: dict[str, Any] = {}
+    node = SimpleNamespace(
+        create_publisher=lambda kind, topic, depth: SimpleNamespace(publish=lambda told: sent.update({topic: told})),
+        destroy_node=lambda: None,
+    )
+    point = lambda: SimpleNamespace(time_from_start=SimpleNamespace())  # noqa: E731
+    pose = lambda: SimpleNamespace(  # noqa: E731
+        header=SimpleNamespace(), pose=SimpleNamespace(position=SimpleNamespace(), orientation=SimpleNamespace())
+    )
+    trajectories = SimpleNamespace(JointTrajectory=lambda: SimpleNamespace(points=[]), JointTrajectoryPoint=point)
+    monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace(ok=lambda: True, create_node=lambda name: node))
+    monkeypatch.setitem(sys.modules, "trajectory_msgs.msg", trajectories)
+    monkeypatch.setitem(sys.modules, "geometry_msgs.msg", SimpleNamespace(PoseStamped=pose))
+    sink = Ros2Sink()
+    sink.open(robot, CONFIG)
+    sink.send(outputs[-1])
+    told, standing = sent["/base_pose"], outputs[-1].standing
+    assert standing is not None and told.header.frame_id == "world" and set(sent) == {"/base_pose", "/joint_trajectory"}
+    turn = told.pose.orientation
+    assert [turn.w, turn.x, turn.y, turn.z] == standing.base.quaternion_wxyz_4.tolist()
+    assert told.pose.position.z == standing.base.position_3[2]
 
 
 @pytest.fixture(scope="module")

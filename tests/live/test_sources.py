@@ -21,7 +21,7 @@ from mrhubo import rotation
 from mrhubo.body.joints import JOINT_NAMES, PARENTS, POSED_JOINT_NAMES, REST_K3
 from mrhubo.body.skeleton import Skeleton
 from mrhubo.errors import UserError
-from mrhubo.live.body import Body, SeenPose
+from mrhubo.live.body import LEG_LENGTH, Body, SeenPose
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Nobody, Refused
@@ -36,9 +36,9 @@ UNITY_OFFSETS = {
 """Our skeleton in Unity's axes: x to the right, y up, z forward, where the avatar looks."""
 
 
-def osc(bone: str, xyzw: Any, address: str = ADDRESS) -> Any:
+def osc(bone: str, xyzw: Any, address: str = ADDRESS, place: Any = (0.0, 1.0, 0.0)) -> Any:
     builder = OscMessageBuilder(address)
-    for value in (bone, 0.0, 1.0, 0.0, *map(float, xyzw)):
+    for value in (bone, *map(float, place), *map(float, xyzw)):
         builder.add_arg(value)
     return builder.build()
 
@@ -86,6 +86,40 @@ def test_a_left_arm_that_is_lowered_in_unity_is_our_left_arm_lowered() -> None:
     assert way[1] < -0.9 * np.linalg.norm(way) and way[0] > 0
     sure_J = bones.pose.sure_J
     assert sure_J[POSED_JOINT_NAMES.index("left_shoulder")] == 1 and sure_J[POSED_JOINT_NAMES.index("right_elbow")] == 0
+
+
+def test_hips_and_the_avatars_place_are_the_root() -> None:
+    """As Unity draws them, mirrored; of an avatar whose legs are half as long as our skeleton's, twice as far away."""
+    generator, bones = np.random.default_rng(4), Bones()
+    assert bones.take(osc("LeftHand", [0, 0, 0, 1]).dgram) and bones.pose.root is None
+    turns = [q / np.linalg.norm(q) for q in generator.normal(size=(2, 4)) + [0, 0, 0, 2]]
+    places = [np.array([0.3, 0.9, -0.2]), np.array([2.0, 0.1, 5.0])]
+    assert bones.take(osc("Hips", turns[0], place=places[0]).dgram)
+    root = bones.pose.root
+    assert root is not None and root.place_3 is not None
+    np.testing.assert_allclose(root.place_3, places[0] * [-1, 1, 1], atol=1e-6)
+    assert bones.take(osc("avatar", turns[1], vmc.ROOT, places[1]).dgram)
+    legs = {name: LEG_LENGTH / 4 for name in ("LeftLowerLeg", "LeftFoot")}
+    for name, length in legs.items():
+        bones.take(osc(name, [0, 0, 0, 1], place=[0.0, -length, 0.0]).dgram)
+    root = bones.pose.root
+    assert root is not None and root.place_3 is not None
+    wanted_3 = places[1] + rotate(turns[1], places[0])
+    np.testing.assert_allclose(root.place_3, 2 * wanted_3 * [-1, 1, 1], atol=1e-5)
+    both = times(turns[1], turns[0])
+    for axis_3 in np.eye(3):
+        np.testing.assert_allclose(root.turn_33 @ (axis_3 * [-1, 1, 1]), rotate(both, axis_3) * [-1, 1, 1], atol=1e-6)
+
+
+@pytest.mark.parametrize("place", [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, 1e6]])
+@pytest.mark.parametrize(("bone", "address"), [("Hips", ADDRESS), ("avatar", vmc.ROOT), ("LeftFoot", ADDRESS)])
+def test_places_that_are_none_are_refused(place: list[float], bone: str, address: str) -> None:
+    bones = Bones()
+    bones.take(osc("Hips", [0, 0, 0, 1], place=[0, 1, 0]).dgram)
+    with pytest.raises(Refused, match="malformed"):
+        bones.take(osc(bone, [0, 0, 0, 1], address, place).dgram)
+    root = bones.pose.root
+    assert root is not None and root.place_3 is not None and root.place_3.tolist() == [0, 1, 0]
 
 
 @pytest.fixture

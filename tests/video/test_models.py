@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from mrhubo.errors import Unreachable, UserError
+from mrhubo.live.__main__ import main as live
 from mrhubo.models import main
 from mrhubo.video import models
 from mrhubo.video.models import FILES, INTEGRITY, find_models, models_folder, set_up
@@ -77,6 +78,19 @@ def test_nothing_but_the_very_archive_is_unpacked(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such file"):
         set_up(tmp_path / "nothing.tgz")
     assert not (tmp_path / "cache").exists()
+
+
+def test_the_command_has_two_names(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """`mrhubo live --setup` is `mrhubo models`, with its flags, and asks for no robot."""
+    asked: list[tuple[Path | None, Path | None]] = []
+    monkeypatch.setattr("mrhubo.video.set_up", lambda *given: asked.append(given) or Path("there"))
+    for command, words in ((main, []), (live, ["--setup"])):
+        command([*words, "--from", "pose.tgz", "--out", "models"])
+        command(words)
+    assert asked == [(Path("pose.tgz"), Path("models")), (None, None)] * 2
+    assert capsys.readouterr().out == "models: there\n" * 4
+    with pytest.raises(UserError, match="--robot"):
+        live(["--robot", "nao", "--setup"])
 
 
 @pytest.mark.parametrize(

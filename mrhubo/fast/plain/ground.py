@@ -60,6 +60,16 @@ class Base(NamedTuple):
     turn_33: np.ndarray
 
 
+class Stance(NamedTuple):
+    """How a robot stands or goes after a frame."""
+
+    base: Base
+    weight_H: np.ndarray
+    """How much the contact of each point of a sole counts, 0..1."""
+    q_N: np.ndarray
+    """Joint angles [rad] with which the base is there, float64."""
+
+
 @dataclass(frozen=True)
 class GroundState:
     """What is remembered of the ground."""
@@ -107,6 +117,11 @@ class PlainGround:
     def planted_R(self) -> np.ndarray:
         """Whether each foot is planted."""
         return self._state.contacts.planted_BP[0].reshape(-1, 2).any(axis=1)
+
+    @property
+    def weight_H(self) -> np.ndarray:
+        """How much the contact of each point of a sole counts, 0..1."""
+        return self._state.contacts.weight_BP[0]
 
     def pass_by(self) -> None:
         """Nobody is seen in this frame: contacts stay as they are."""

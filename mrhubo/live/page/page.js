@@ -26,7 +26,7 @@ function tell(state, why) {
 
 function show(message) {
   tell(message.state, WHY[message.state] ?? "");
-  robot.show(message.angles);
+  robot.show(message.angles, message.base);
   if (rows.length !== message.names.length) {
     rows = message.names.map((name) => { const row = make("tr"); row.append(make("td", name), make("td"), make("td")); return row; });
     at("joints").replaceChildren(...rows);

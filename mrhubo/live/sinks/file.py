@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from mrhubo.live.robot import LiveRobot
 from mrhubo.robot_motion import FORMATS, RobotMotion, find_format, write_robot_motion
 
 PART = ".part"
+_BASE = 7
+"""Numbers of a row that tell where the base is."""
 
 
 class FileSink:
@@ -47,13 +49,14 @@ class FileSink:
             raise UserError(f"{self._part}: cannot be written: {error.strerror or error}") from error
 
     def send(self, output: Output) -> None:
-        """Appends a row: the joint angles, and the least confidence.
+        """Appends a row: the joint angles, where the base is and which feet are planted, and the least confidence.
 
         Raises:
             UserError: the disk refuses it.
         """
         if self._file is not None:
-            row = np.append(output.q_N, min(output.confidence.values(), default=0.0)).astype(np.float32)
+            least = min(output.confidence.values(), default=0.0)
+            row = np.concatenate((output.q_N, _base_row(output), [least])).astype(np.float32)
             try:
                 self._file.write(row.tobytes())
             except OSError as error:
@@ -70,12 +73,35 @@ class FileSink:
             return
         try:
             file.close()
-            rows_TX = np.fromfile(self._part, np.float32).reshape(-1, len(self._robot.joint_names) + 1)
+            joints, feet = len(self._robot.joint_names), self._robot.foot_names
+            base = _BASE + len(feet) if feet else 0
+            rows_TX = np.fromfile(self._part, np.float32).reshape(-1, joints + base + 1)
         except OSError as error:
             raise UserError(f"{self._part}: cannot be written: {error.strerror or error}") from error
         motion = RobotMotion(
-            rows_TX[:, :-1], self._robot.joint_names, self._rate, name=self.path.stem, source="a live session",
-            robot=self._robot.facts, confidence=rows_TX[:, -1],
+            rows_TX[:, :joints], self._robot.joint_names, self._rate, name=self.path.stem, source="a live session",
+            robot=self._robot.facts, confidence=rows_TX[:, -1], **_base_of(rows_TX[:, joints:-1], feet),
         )  # fmt: skip
         write_robot_motion(motion, self.path)
         self._part.unlink(missing_ok=True)
+
+
+def _base_row(output: Output) -> np.ndarray:
+    """Position, quaternion and contacts; nothing of a robot whose base is fixed."""
+    if output.standing is None:
+        return np.zeros(0)
+    base, contact = output.standing.base, output.standing.contact
+    return np.concatenate((base.position_3, base.quaternion_wxyz_4, list(contact.values())))
+
+
+def _base_of(rows_TX: np.ndarray, feet: tuple[str, ...]) -> dict[str, Any]:
+    """The fields of a motion that `_base_row` made rows of."""
+    if not feet:
+        return {}
+    turn_T4 = rows_TX[:, 3:_BASE]
+    return {
+        "root_position": rows_TX[:, :3],
+        "root_quaternion_wxyz": turn_T4 / np.linalg.norm(turn_T4, axis=1, keepdims=True),
+        "contact": rows_TX[:, _BASE:] > 0,
+        "contact_names": feet,
+    }

@@ -1,4 +1,6 @@
-"""The session as a ROS 2 bag that grows: if the process is killed, all but the last third of a second is there."""
+"""The session as a ROS 2 bag that grows, with base and contacts of a robot with legs: if the process is killed, all but
+the last third of a second is there.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,17 @@ from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
-from mrhubo.live.sinks.trajectory import trajectory
-from mrhubo.robot_motion.mcap import TOPIC, JointTrajectoryBag, import_mcap
+from mrhubo.live.sinks.trajectory import stamped, trajectory
+from mrhubo.robot_motion.mcap import (
+    BASE_TOPIC,
+    BOOL,
+    POSE,
+    TOPIC,
+    JointTrajectoryBag,
+    contact_topics,
+    import_mcap,
+    pose_message,
+)
 
 
 class McapSink:
@@ -54,6 +65,12 @@ class McapSink:
         stamp = (output.number - self._first) * self._period
         try:
             self._bag.write(TOPIC, trajectory(output, self._period, stamp), output.time)
+            if output.standing is not None:
+                base, contact = output.standing.base, output.standing.contact
+                pose = pose_message(base.position_3, base.quaternion_wxyz_4, stamped(stamp))
+                self._bag.write(BASE_TOPIC, pose, output.time, POSE)
+                for topic, planted in zip(contact_topics(tuple(contact)), contact.values(), strict=True):
+                    self._bag.write(topic, {"data": planted}, output.time, BOOL)
         except OSError as error:
             raise self._refused(error) from error
 

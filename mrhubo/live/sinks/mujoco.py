@@ -18,8 +18,10 @@ from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError, first_line, listed, shortened
 from mrhubo.files.regular import check_regular
 from mrhubo.lazy import import_optional
+from mrhubo.live.floating_base import FloatingBase
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
+from mrhubo.live.turns import quaternion_of
 
 _FREQUENCY = 10.0
 """Of every joint's controller [Hz]: gravity moves an arm of 0.3 m by half a degree."""
@@ -55,6 +57,8 @@ class MujocoSink:
         self._others: list[tuple[int, int | None, float, float]] = []
         self._substeps = 1
         self._off: list[float] = [0.0, 0.0, 0.0]
+        self._base_off: list[float] = []
+        """How far the base has been from where it was told to be [m]: now, and at most; empty: it is fixed."""
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Loads the model, and puts the robot where it starts.
@@ -145,6 +149,9 @@ class MujocoSink:
         data.qpos[self._place] = data.ctrl
         mujoco.mj_forward(model, data)
         if self._free and model.nq > model.nv:
+            if robot.standing is not None:
+                data.qpos[:7] = _home(robot)
+                mujoco.mj_forward(model, data)
             data.qpos[2] -= _lowest(model, data, mujoco)
             mujoco.mj_forward(model, data)
         inertia_VV = np.zeros((model.nv, model.nv))
@@ -172,6 +179,9 @@ class MujocoSink:
             self._mujoco.mj_step(self.model, self.data)
         if not np.isfinite(self.data.qpos).all():
             raise UserError("--sink mujoco: the simulation has become unstable")
+        if self._free and output.standing is not None:
+            off = float(np.linalg.norm(self.data.qpos[:3] - output.standing.base.position_3))
+            self._base_off = [off, max(self._base_off[1] if self._base_off else 0.0, off)]
         off_N = np.abs(self.joints - output.q_N)
         self._off = [self._off[0] + 1, self._off[1] + float(off_N.mean()), max(self._off[2], float(off_N.max()))]
 
@@ -183,7 +193,10 @@ class MujocoSink:
     def told(self) -> str:
         """How well the simulated robot has followed."""
         count, total, most = self._off
-        return f"mujoco: joints were off by {total / max(count, 1):.4f} rad on average, {most:.4f} at most"
+        said = f"mujoco: joints were off by {total / max(count, 1):.4f} rad on average, {most:.4f} at most"
+        if self._base_off:
+            said += "; the base, which is free, was {1:.3f} m off at most, {0:.3f} in the end".format(*self._base_off)
+        return said
 
     def close(self) -> None:
         """`model` and `data` stay as they are."""
@@ -199,6 +212,13 @@ def _drop_missing_meshes(spec: Any, file: Path) -> None:
     for mesh in list(spec.meshes):
         if mesh.name in gone:
             spec.delete(mesh)
+
+
+def _home(robot: LiveRobot) -> np.ndarray:
+    """Where the base of a robot with legs is at home: position [m], quaternion with w first."""
+    assert robot.standing is not None
+    base = FloatingBase(robot.standing, robot.home_N, 1.0, 1.0).base
+    return np.concatenate((base.place_3, quaternion_of(base.turn_33)))
 
 
 def _lowest(model: Any, data: Any, mujoco: Any) -> float:

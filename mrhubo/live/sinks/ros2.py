@@ -1,4 +1,6 @@
-"""A ROS 2 topic of JointTrajectory messages, where `rclpy` is there (it comes with ROS 2, not from a registry)."""
+"""A ROS 2 topic of JointTrajectory messages, and of a robot with legs one of its base's pose, where `rclpy` is there,
+which comes with ROS 2, not from a registry.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from mrhubo.lazy import import_optional
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.trajectory import trajectory
-from mrhubo.robot_motion.mcap import TOPIC
+from mrhubo.robot_motion.mcap import BASE_TOPIC, TOPIC
 
 
 class Ros2Sink:
@@ -23,6 +25,7 @@ class Ros2Sink:
         self._trajectories = import_optional("trajectory_msgs.msg", missing)
         self._node: Any = None
         self._publisher: Any = None
+        self._poses: Any = None
         self._period = 0.0
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
@@ -32,6 +35,9 @@ class Ros2Sink:
             self._rclpy.init()
         self._node = self._rclpy.create_node("mrhubo_live")
         self._publisher = self._node.create_publisher(self._trajectories.JointTrajectory, self.topic, 1)
+        if robot.standing is not None:
+            messages = import_optional("geometry_msgs.msg", "--sink ros2: ROS 2's geometry_msgs is not there")
+            self._poses = messages.PoseStamped, self._node.create_publisher(messages.PoseStamped, BASE_TOPIC, 1)
 
     def send(self, output: Output) -> None:
         """Publishes a trajectory that begins now: its stamp is 0, as controllers take it."""
@@ -47,6 +53,14 @@ class Ros2Sink:
             point.time_from_start.nanosec = row["time_from_start"]["nanosec"]
             message.points.append(point)
         self._publisher.publish(message)
+        if self._poses is not None and output.standing is not None:
+            kind, publisher = self._poses
+            pose, base = kind(), output.standing.base
+            pose.header.frame_id = "world"
+            at, turn = pose.pose.position, pose.pose.orientation
+            at.x, at.y, at.z = base.position_3.tolist()
+            turn.w, turn.x, turn.y, turn.z = base.quaternion_wxyz_4.tolist()
+            publisher.publish(pose)
 
     def close(self) -> None:
         """Ends the node."""

@@ -34,7 +34,7 @@ def trajectory(output: Output, period: float, stamp: float) -> dict[str, Any]:
         (output.stop_N.tolist(), still, period + max(output.stop_in, period)),
     ]
     return {
-        "header": {"stamp": _named(stamp), "frame_id": ""},
+        "header": {"stamp": stamped(stamp), "frame_id": ""},
         "joint_names": list(output.joint_names),
         "points": [
             {
@@ -42,13 +42,14 @@ def trajectory(output: Output, period: float, stamp: float) -> dict[str, Any]:
                 "velocities": velocities,
                 "accelerations": [],
                 "effort": [],
-                "time_from_start": _named(after),
+                "time_from_start": stamped(after),
             }
             for positions, velocities, after in points
         ],
     }
 
 
-def _named(seconds: float) -> dict[str, int]:
+def stamped(seconds: float) -> dict[str, int]:
+    """As messages tell times."""
     sec, nanosec = time_of(seconds)
     return {"sec": sec, "nanosec": nanosec}

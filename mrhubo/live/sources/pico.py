@@ -37,7 +37,7 @@ def to_landmarks(poses: Any) -> Landmarks:
         raise Refused("malformed")
     names = POINT_SETS["pico"].names or ()
     points = {name: (x, y, z) for name, (x, y, z) in zip(names, pose_K7[:, :3].tolist(), strict=True)}
-    return Landmarks(points, {})
+    return Landmarks(points, {}, in_world=True)
 
 
 class PicoSource:

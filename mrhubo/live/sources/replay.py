@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.live.body import SeenPose
+from mrhubo.live.body import Root, SeenPose
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Message
 from mrhubo.motion import Motion, ReadOptions, read_motion, resample
@@ -26,6 +26,7 @@ class ReplaySource:
         arrays = motion.arrays
         self._local_TJ33, self._rate, self._loop = arrays.local_TJ33, motion.frame_rate, loop
         sure_TJ = arrays.confidence_TJ
+        self._root_T33, self._place_T3 = arrays.root_rotation_T33, arrays.root_position_T3
         self._sure_TJ = np.ones(self._local_TJ33.shape[:2]) if sure_TJ is None else sure_TJ
         self._begun: float | None = None
         self._last = -1
@@ -53,9 +54,15 @@ class ReplaySource:
             return False
         if due > self._last:
             self._last = due
-            pose = SeenPose(self._local_TJ33[due % frames], self._sure_TJ[due % frames])
+            pose = SeenPose(self._local_TJ33[due % frames], self._sure_TJ[due % frames], self._root(due % frames))
             inbox.offer(Message(_NAME, due, now, pose), _NAME, now)
         return True
+
+    def _root(self, frame: int) -> Root | None:
+        if self._root_T33 is None:
+            return None
+        place_3 = None if self._place_T3 is None else self._place_T3[frame].astype(np.float64)
+        return Root(self._root_T33[frame].astype(np.float64), place_3)
 
     def close(self) -> None:
         """Nothing is open."""

@@ -1,9 +1,9 @@
 """The Virtual Motion Capture protocol: rotations of an avatar's bones, as OSC messages over UDP.
 
 Protocol: https://protocol.vmc.info/english (`/VMC/Ext/Bone/Pos` with the name of a Unity humanoid bone, its position
-and its rotation, both relative to the bone above it). Unity's axes are left-handed: x to the right, y up, z forward,
-which is where an avatar looks. Mirrored in x they are ours. A bone's rotation refers to the avatar's T-pose, in which
-VRM has all rotations 0, as our rest pose has.
+and its rotation, both relative to the bone above it; `/VMC/Ext/Root/Pos` with the place of the whole avatar). Unity's
+axes are left-handed: x to the right, y up, z forward, which is where an avatar looks. Mirrored in x they are ours. A
+bone's rotation refers to the avatar's T-pose, in which VRM has all rotations 0, as our rest pose has.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
 from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
-from mrhubo.live.body import SeenPose
+from mrhubo.live.body import LEG_LENGTH, Root, SeenPose
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES, Message, Refused, of_quaternions
@@ -26,7 +26,7 @@ from mrhubo.live.sources.udp import DatagramSource
 
 PORT = 39_539
 """On which programs that receive VMC listen by default."""
-ADDRESS = "/VMC/Ext/Bone/Pos"
+ADDRESS, ROOT = "/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"
 _ARGUMENTS = 8
 _CENTRAL = {"Spine": "spine1", "Chest": "spine2", "UpperChest": "spine3", "Neck": "neck", "Head": "head"}
 _SIDED = {
@@ -38,6 +38,10 @@ BONES = {
     **{f"{side.capitalize()}{bone}": f"{side}_{joint}" for side in SIDES for bone, joint in _SIDED.items()},
 }
 """Our joints, by Unity's names of bones."""
+_HIPS, _LEG = "Hips", ("LeftLowerLeg", "LeftFoot")
+"""The bone of the pelvis, and the bones whose positions tell how long a leg is."""
+_SHORTEST_LEG = 0.05
+_FARTHEST = 1e3
 _PLACE = {bone: POSED_JOINT_NAMES.index(joint) for bone, joint in BONES.items()}
 _ARMS = [POSED_JOINT_NAMES.index(f"{side}_{name}") for side in SIDES for name in ("shoulder", "elbow")]
 
@@ -48,6 +52,10 @@ class Bones:
     def __init__(self) -> None:
         self._xyzw_J4 = np.tile([0.0, 0.0, 0.0, 1.0], (len(POSED_JOINT_NAMES), 1))
         self._seen_J = np.zeros(len(POSED_JOINT_NAMES), bool)
+        self._poses: dict[str, Root] = {}
+        """Hips, and the avatar's own place in the world, mirrored in x."""
+        self._lengths: dict[str, float] = {}
+        """Of the bones above `_LEG` [m]."""
 
     def take(self, datagram: bytes) -> bool:
         """Takes the bones of one datagram, all or none; whether there were any.
@@ -58,18 +66,27 @@ class Bones:
         if len(datagram) > MAX_BYTES:
             raise Refused("too_long")
         found: dict[int, tuple[float, ...]] = {}
+        poses: dict[str, Root] = {}
+        lengths: dict[str, float] = {}
         for address, arguments in _osc(datagram):
-            if address != ADDRESS:
+            if address not in (ADDRESS, ROOT):
                 continue
             if len(arguments) != _ARGUMENTS or not isinstance(arguments[0], str):
                 raise Refused("malformed")
-            place = _PLACE.get(arguments[0])
+            name = ROOT if address == ROOT else arguments[0]
+            if name in (ROOT, _HIPS):
+                poses[name] = _pose(arguments)
+            if name in _LEG:
+                lengths[name] = float(np.linalg.norm(_position(arguments)))
+            place = None if address == ROOT else _PLACE.get(name)
             if place is not None:
                 found[place] = _quaternion(arguments[4:])
         for place, (x, y, z, w) in found.items():
             self._xyzw_J4[place] = x, -y, -z, w  # mirrored in x
             self._seen_J[place] = True
-        return bool(found)
+        self._poses |= poses
+        self._lengths |= lengths
+        return bool(found or poses)
 
     @property
     def pose(self) -> SeenPose:
@@ -77,7 +94,31 @@ class Bones:
         sure_J = np.ones(len(self._seen_J))
         for place in _ARMS:
             sure_J[place] = self._seen_J[place]
-        return SeenPose(of_quaternions(self._xyzw_J4).astype(np.float32), sure_J)
+        return SeenPose(of_quaternions(self._xyzw_J4).astype(np.float32), sure_J, self._root())
+
+    def _root(self) -> Root | None:
+        """Where the pelvis is, of a person whose legs are as long as our skeleton's; None as long as no hips came."""
+        hips = self._poses.get(_HIPS)
+        if hips is None or hips.place_3 is None:
+            return None
+        turn_33, place_3 = hips.turn_33, hips.place_3
+        avatar = self._poses.get(ROOT)
+        if avatar is not None and avatar.place_3 is not None:
+            turn_33, place_3 = avatar.turn_33 @ turn_33, avatar.place_3 + avatar.turn_33 @ place_3
+        length = sum(self._lengths.values()) if len(self._lengths) == len(_LEG) else 0.0
+        return Root(turn_33, place_3 * (LEG_LENGTH / length if length > _SHORTEST_LEG else 1.0))
+
+
+def _position(arguments: list[Any]) -> np.ndarray:
+    numbers = [float(value) for value in arguments[1:4] if isinstance(value, int | float) and abs(value) <= _FARTHEST]
+    if len(numbers) != 3:  # nor NaN
+        raise Refused("malformed")
+    return np.array(numbers) * [-1.0, 1.0, 1.0]
+
+
+def _pose(arguments: list[Any]) -> Root:
+    x, y, z, w = _quaternion(arguments[4:])
+    return Root(of_quaternions(np.array([[x, -y, -z, w]]))[0], _position(arguments))
 
 
 def _quaternion(values: Any) -> tuple[float, ...]:
