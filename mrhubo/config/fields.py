@@ -11,9 +11,9 @@ def bounded(default: Any, low: float | None = None, high: float | None = None) -
     return field(default=default, metadata={"low": low, "high": high})
 
 
-def choice(default: str, *choices: str) -> Any:
-    """A field that takes one of the given words."""
-    return field(default=default, metadata={"choices": choices})
+def choice(default: str, *choices: str, left_out: bool = False) -> Any:
+    """A field that takes one of the given words; `left_out`: as of the function of that name."""
+    return field(default=default, metadata={"choices": choices, "left_out": left_out})
 
 
 def left_out(default: Any = None) -> Any:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -177,6 +177,7 @@ class Robot(nn.Module):
         hold: Mapping[str, float] | None = None,
         name: str | None = None,
         max_speed: float = MAX_SPEED,
+        root_follows: str = "pelvis",
     ) -> Robot:
         """A robot that knows which of its links stand for which part of a human body.
 
@@ -189,11 +190,12 @@ class Robot(nn.Module):
             hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
             name: short name; default: the URDF file's.
             max_speed: no joint turns faster [rad/s], whatever the URDF gives.
+            root_follows: how the base is turned, as `robot.root_follows` of a config.
 
         Raises:
             UserError: the URDF cannot be used; a joint, link or body part does not exist (with the nearest name).
         """
-        parts = read_keypoints(keypoints)
+        parts = replace(read_keypoints(keypoints), root_follows=root_follows)
         known = urdf if isinstance(urdf, Description) else Path(urdf)
         robot = cls(known, joints, [*parts.links, *key_links], ranges, hold, name, max_speed)
         robot.keypoints, robot.key_links = parts, tuple(key_links)
@@ -212,7 +214,7 @@ class Robot(nn.Module):
             check_names(robot, description)
             return cls.from_urdf(
                 description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name,
-                robot.max_speed,
+                robot.max_speed, robot.root_follows,
             )  # fmt: skip
 
     def without(self, joints: Collection[str]) -> Robot:

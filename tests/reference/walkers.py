@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 from mrhubo.body import Skeleton
@@ -58,12 +59,17 @@ def entries() -> dict[str, object]:
     return found
 
 
-def walker(folder: Path, root: str = "pelvis", waist: bool = True, **changes: object) -> BodyMap:
-    """The body map of the robot; without a waist, its chest is the pelvis. Entries that are None are left out."""
+def walker(
+    folder: Path, root: str = "pelvis", waist: bool = True, follows: str = "pelvis", **changes: object
+) -> BodyMap:
+    """The body map of the robot; without a waist, its chest is the pelvis. `follows`: `robot.root_follows`. Entries that
+    are None are left out.
+    """
     urdf = write_urdf(folder / f"walker_{root}.urdf", root)
     names = [f"{s}_{n}" for s in "lr" for n in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle", "shoulder_pitch",
                                                 "shoulder_roll", "elbow")]  # fmt: skip
     given = {**entries(), **({} if waist else {"chest": root, "pelvis": root}), **changes}
     keypoints = read_keypoints({name: entry for name, entry in given.items() if entry is not None})
+    keypoints = dataclasses.replace(keypoints, root_follows=follows)
     robot = Robot(urdf, [*(["waist"] if waist else []), *names], keypoints.links, hold={} if waist else {"waist": 0.0})
     return BodyMap.of(robot, keypoints, Skeleton())

@@ -167,6 +167,17 @@ class Legs(nn.Module):
         ]
         return LegPoses(*(base_B3[:, None] + place_BX3 @ base_B33.mT for place_BX3 in found))
 
+    def asked(self, local_BJ33: Tensor, turns_BJ33: Tensor) -> Tensor:
+        """Human axes (B, 3, 3) that what carries the legs is to have, relative to the person's root: the person's, or
+        as `robot.root_follows` says.
+
+        Args:
+            local_BJ33: local rotations (B, 21, 3, 3) of human poses.
+            turns_BJ33: rotations (B, 22, 3, 3) of their joints relative to the root.
+        """
+        carrier_B33, root_turn = turns_BJ33[:, self.joint], self.body_map.shared.root_turn
+        return carrier_B33 if root_turn is None else carrier_B33 @ root_turn(local_BJ33)
+
     def heading(self, poses: LinkPoses, base_B33: Tensor) -> Tensor:
         """Human axes (B, 3, 3) of what carries the legs, in the robot's world: columns are its left, up and forward."""
         return base_B33 @ poses.rotation_BL33[:, self._carrier_row] @ self.axes_33
