@@ -1,14 +1,15 @@
 """Whole bodies: the optimiser's answers to clips with a root, on robots with legs, as whole motions and as streams.
 
     python benchmarks/whole_body.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--rate 60] [--collisions avoid]
-        [--ways motion,stream,fast] [--root pelvis,chest,between] [--picture FILE.png]
+        [--ways motion,stream,fast] [--root pelvis,chest,between] [--balance 0]
+        [--picture FILE.png]
 
 A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
 planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
 than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
 conf/ROBOT-whole-body.yaml. Of a robot without feet, whose base stays where it is, there are angles, speeds, steps and
-time alone. `--root`: a table for each `robot.root_follows`. The picture shows moments of the first clip, the person
-above the robots.
+time alone. `--root`: a table for each `robot.root_follows`; `--balance`: `robot.balance`. The
+picture shows moments of the first clip, the person above the robots.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from common import print_header, print_table, read_options, whole_body_clips
+from common import beginning, print_header, print_table, read_options, whole_body_clips
 from PIL.Image import Image
 
 from mrhubo import rotation
@@ -59,7 +60,7 @@ _PARTS = {"knee": "thigh", "ankle": "shin", "trunk": "chest", "foot": "feet", "e
 def main(argv: list[str]) -> None:
     """Prints a table a robot."""
     options, rest = read_options(
-        argv, robots="g1", clips="all", rate="", collisions="", ways="motion", root="pelvis", picture=""
+        argv, robots="g1", clips="all", rate="", collisions="", ways="motion", root="pelvis", balance="0", picture=""
     )
     ways = options["ways"].split(",")
     if rest or not set(ways) <= set(_WAYS):
@@ -70,7 +71,10 @@ def main(argv: list[str]) -> None:
     for name, root in itertools.product(options["robots"].split(","), options["root"].split(",")):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
-            config = load_config(Path(f"conf/{name}-whole-body.yaml"), [f"robot.root_follows={root}"])
+            config = load_config(
+                Path(f"conf/{name}-whole-body.yaml"),
+                [f"robot.root_follows={root}", f"robot.balance={options['balance']}"],
+            )
             retargeter = OptimizationRetargeter(build_body_map(config.robot))
         motions = [_motion(path, options["rate"]) for path in whole_body_clips(options["clips"])]
         if not retargeter.body_map.keypoints.standing:
@@ -82,7 +86,7 @@ def main(argv: list[str]) -> None:
             rows_of_pictures[name] = _robot(retargeter, motions[0])
         for way in ways:
             answers = _WAYS[way](retargeter, bool(options["collisions"]))
-            answers(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+            answers(beginning(motions[0], 10))  # not timed
             found = [_measure(retargeter, motion, answers) for motion in motions]
             parts = [part for part in _PARTS if part in found[0][0].parts_deg]
             rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
@@ -143,11 +147,6 @@ def _motion(path: Path, rate: str) -> Motion:
     return resample(motion, float(rate)) if rate else motion
 
 
-def _cut(motion: Motion, frames: int) -> dict[str, object]:
-    arrays = vars(motion.arrays)
-    return {name: array[:frames] for name, array in arrays.items() if array is not None}
-
-
 def _as_motion(retargeter: OptimizationRetargeter, avoid: bool) -> Callable[[Motion], Answer]:
     """All frames at once."""
     return lambda motion: retargeter(motion, avoid_collisions=avoid)
@@ -200,7 +199,7 @@ def _print_without_feet(
 ) -> None:
     """The table of a robot with arms, head and waist alone."""
     body_map, answers = retargeter.body_map, _WAYS[way](retargeter, avoid)
-    answers(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+    answers(beginning(motions[0], 10))  # not timed
     regions = {
         "chest": "chest_", "upper arm": "_elbow", "forearm": "_wrist", "hand": "_hand_", "head": "head_",
     }  # fmt: skip

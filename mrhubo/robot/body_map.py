@@ -191,6 +191,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     description = describe(config.urdf)
     check_names(config, description)
     robot = Robot(description, config.joints, links, config.ranges, config.hold, config.name, config.max_speed)
+    robot.balance = config.balance
     body_map = BodyMap.of(robot, keypoints, skeleton, manual)
     check_key_links(robot, config.key_links)
     return body_map

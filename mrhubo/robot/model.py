@@ -90,6 +90,8 @@ class Robot(nn.Module):
         """Which links stand for which body parts, where `from_urdf` or `from_config` has been told."""
         self.key_links: tuple[str, ...] = ()
         """Links whose position error is the link error."""
+        self.balance = 0.0
+        """How much the centre of mass is kept over planted soles in whole motions: 0 to 1."""
         if not joints:
             raise UserError("robot.joints: is empty; name at least one joint")
         repeated = sorted({j for j in joints if list(joints).count(j) > 1})
@@ -178,6 +180,7 @@ class Robot(nn.Module):
         name: str | None = None,
         max_speed: float = MAX_SPEED,
         root_follows: str = "pelvis",
+        balance: float = 0.0,
     ) -> Robot:
         """A robot that knows which of its links stand for which part of a human body.
 
@@ -191,6 +194,7 @@ class Robot(nn.Module):
             name: short name; default: the URDF file's.
             max_speed: no joint turns faster [rad/s], whatever the URDF gives.
             root_follows: how the base is turned, as `robot.root_follows` of a config.
+            balance: how much the centre of mass is kept over planted soles, as `robot.balance` of a config.
 
         Raises:
             UserError: the URDF cannot be used; a joint, link or body part does not exist (with the nearest name).
@@ -198,7 +202,7 @@ class Robot(nn.Module):
         parts = replace(read_keypoints(keypoints), root_follows=root_follows)
         known = urdf if isinstance(urdf, Description) else Path(urdf)
         robot = cls(known, joints, [*parts.links, *key_links], ranges, hold, name, max_speed)
-        robot.keypoints, robot.key_links = parts, tuple(key_links)
+        robot.keypoints, robot.key_links, robot.balance = parts, tuple(key_links), balance
         return robot
 
     @classmethod
@@ -214,7 +218,7 @@ class Robot(nn.Module):
             check_names(robot, description)
             return cls.from_urdf(
                 description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name,
-                robot.max_speed, robot.root_follows,
+                robot.max_speed, robot.root_follows, robot.balance,
             )  # fmt: skip
 
     def without(self, joints: Collection[str]) -> Robot:
@@ -229,7 +233,7 @@ class Robot(nn.Module):
 
     def _again(self, joints: Sequence[str], **changed: Any) -> Robot:
         robot = Robot(self.description, joints, name=self.name, **{**self._made_with, **changed})
-        robot.keypoints, robot.key_links = self.keypoints, self.key_links
+        robot.keypoints, robot.key_links, robot.balance = self.keypoints, self.key_links, self.balance
         return robot.to(self.lower_N.device)
 
     def link_index(self, link: str) -> int:

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, keypoint_indices
-from mrhubo.errors import InputWarning
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.frames import human_to_world
 from mrhubo.robot import BodyMap, LinkPoses
 from mrhubo.robot.parts import LimbPart
@@ -57,11 +57,20 @@ class Legs(nn.Module):
     radius_K: Tensor
 
     def __init__(self, body_map: BodyMap) -> None:
-        """Looks links and lengths up; warns of feet whose soles nothing tells."""
+        """Looks links and lengths up; warns of feet whose soles nothing tells.
+
+        Raises:
+            UserError: the robot has no feet, but a weight of its balance.
+        """
         super().__init__()
         self.body_map, self.soles = body_map, find_soles(body_map)
         self.has_feet = bool(self.soles)
         if not self.has_feet:
+            if body_map.robot.balance:
+                raise UserError(
+                    f"robot.balance: '{body_map.robot.name}' has no feet over which its centre of mass could be; "
+                    "take the entry out"
+                )
             return
         for sole in (sole for sole in self.soles if not sole.known):
             name, link = sole.part.name, sole.link
