@@ -10,7 +10,7 @@ from pathlib import Path
 
 import torch
 
-from mrhubo.motion import motion_files
+from mrhubo.motion import Motion, motion_files
 from mrhubo.runtime.locations import project_root
 from mrhubo.runtime.provenance import git_commit
 from mrhubo.runtime.tables import markdown
@@ -40,6 +40,12 @@ def whole_body_clips(clips: str) -> list[Path]:
     if clips == "all" or Path(clips).is_dir():
         return motion_files(_WHOLE_BODY if clips == "all" else Path(clips))
     return [_WHOLE_BODY / f"{name}.npz" for name in clips.split(",")]
+
+
+def beginning(motion: Motion, frames: int) -> Motion:
+    """The first frames of a motion."""
+    arrays = vars(motion.arrays)
+    return motion.changed(**{name: array[:frames] for name, array in arrays.items() if array is not None})
 
 
 def print_header() -> None:

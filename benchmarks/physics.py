@@ -1,15 +1,17 @@
 """Whole-body motions as MuJoCo sees them: what the floor and the motors would have to do, and how long a robot stands.
 
     python benchmarks/physics.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--own wave,stretch] [--rate 60]
+        [--balance 0]
 
 Robots are shipped as conf/ROBOT-whole-body.yaml, or the path of a config; their URDFs have to tell masses (`g1`
-does; `nao` and `coman` do not, and MuJoCo refuses one of `romeo`'s). Two tables a robot:
+does; `nao` and `coman` do not, and MuJoCo refuses one of `romeo`'s). `--balance`: `robot.balance`. Two tables a robot:
 
 The optimiser's answers to clips, played as they are. Depth is that of the deepest contact of sole and floor. By inverse
 dynamics, the floor has to hold the robot with a force (share of its weight) and at a point (ZMP): `in flight` are
 frames in which it would have to pull; `supported`, of the frames in which the robot's own feet are planted, those whose
 ZMP is under planted feet or within 2 cm of them. `effort` is the torque that joints need by what the URDF allows (99th
-percentile of the frames' highest), with ankles and all.
+percentile of the frames' highest), with ankles and all. `balanced`, of the frames in which the person stands still,
+are those in which the centre of mass is over planted feet.
 
 Motions of the upper body, above legs that stand straight: the robot is free, every joint has a position controller
 whose torque is the highest the URDF allows from 0.2 rad on, with damping, and nothing balances. Seconds until its base
@@ -38,7 +40,8 @@ from mrhubo.errors import InputWarning, first_line
 from mrhubo.lazy import import_optional
 from mrhubo.motion import Motion, read_motion, resample
 from mrhubo.reference import OptimizationResult, OptimizationRetargeter
-from mrhubo.reference.standing import Legs
+from mrhubo.reference.standing import Legs, read_steps
+from mrhubo.reference.standing.balance import stillness
 from mrhubo.robot import Robot
 
 _OWN = Path("data/motions")
@@ -55,7 +58,7 @@ _FALLEN = math.cos(math.radians(45))
 
 def main(argv: list[str]) -> None:
     """Prints two tables a robot."""
-    options, rest = read_options(argv, robots="g1", clips="all", own=_UPPER_BODY, rate="60")
+    options, rest = read_options(argv, robots="g1", clips="all", own=_UPPER_BODY, rate="60", balance="0")
     if rest:
         sys.exit(f"{rest[0]}: is unknown")
     mujoco = import_optional("mujoco", "benchmarks/physics.py needs MuJoCo: pip install 'mrhubo[mjcf]'")
@@ -65,12 +68,15 @@ def main(argv: list[str]) -> None:
         config = name if name.endswith(".yaml") else f"conf/{name}-whole-body.yaml"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
-            retargeter = OptimizationRetargeter(Robot.from_config(config))
+            robot = Robot.from_config(config)
+            robot.balance = float(options["balance"])
+            retargeter = OptimizationRetargeter(robot)
         simulated = Simulated(mujoco, retargeter)
         motions = [resample(read_motion(path), float(options["rate"])) for path in whole_body_clips(options["clips"])]
         rows = [[motion.name, *simulated.played(motion)] for motion in motions]
         print(f"## {Path(name).stem}, {simulated.mass:.1f} kg: clips played as they are\n")
-        print_table(["clip", "depth [cm]", "force, median", "force, p99", "in flight", "supported", "effort, p99"],
+        print_table(["clip", "depth [cm]", "force, median", "force, p99", "in flight", "supported", "effort, p99",
+                     "balanced"],
                     [[row[0], *simulated.told(row[1:])] for row in rows]
                     + [["mean", *simulated.told(np.nanmean([row[1:] for row in rows], axis=0))]])  # fmt: skip
         print(f"\n## {Path(name).stem}: standing, with controllers alone\n")
@@ -147,7 +153,7 @@ class Simulated:
             sys.exit(f"{urdf}: MuJoCo cannot load it: {first_line(error)}")
 
     def played(self, motion: Motion) -> list[float]:
-        """Depth [m], force (median, p99), in flight, supported, effort."""
+        """Depth [m], force (median, p99), in flight, supported, effort, balanced."""
         result = self.retargeter(motion)
         place_TQ, rate = self._places(result), motion.frame_rate
         speed_TV = np.zeros((len(place_TQ), self.model.nv))
@@ -157,12 +163,14 @@ class Simulated:
             self.mujoco.mj_differentiatePos(self.model, speed_TV[t], seconds, place_TQ[early], place_TQ[late])
         turned_TV = np.gradient(speed_TV, 1 / rate, axis=0)
         depth, wrench_T6, effort_T = 0.0, np.zeros((len(place_TQ), 6)), np.zeros(len(place_TQ))
+        mass_T3 = np.zeros((len(place_TQ), 3))
         for t in range(1, len(place_TQ) - 1):
             data = self.data
             data.qpos[:], data.qvel[:], data.qacc[:] = place_TQ[t], speed_TV[t], turned_TV[t]
             self.model.opt.disableflags = 0
             self.mujoco.mj_fwdPosition(self.model, data)
             depth = max(depth, -float(data.contact.dist.min(initial=0.0)))
+            mass_T3[t] = data.subtree_com[1]
             self.model.opt.disableflags = int(self.mujoco.mjtDisableBit.mjDSBL_CONTACT)
             self.mujoco.mj_inverse(self.model, data)
             wrench_T6[t] = data.qfrc_inverse[:6]
@@ -172,13 +180,17 @@ class Simulated:
         force_T3, torque_T3 = wrench_T6[inner, :3], wrench_T6[inner, 3:]
         share_T = force_T3[:, 2] / (self.mass * _GRAVITY)
         zmp_T2 = _zero_moment(place_TQ[inner, :3], force_T3, torque_T3)
+        steps = read_steps(motion, motion.for_skeleton(self.retargeter.body_map.skeleton).local_TJ33, self.legs)
+        assert steps is not None
+        still_T = stillness(steps)[inner] > 0.5
         return [
             depth,
             float(np.median(share_T)),
             float(np.percentile(share_T, 99)),
             float((share_T < 0).mean()),
-            self._supported(result, zmp_T2, inner),
+            self._supported(result, zmp_T2, inner, _NEAR_M, np.full(len(zmp_T2), True)),
             float(np.percentile(effort_T[inner], 99)),
+            self._supported(result, mass_T3[inner, :2], inner, 0.0, still_T),
         ]
 
     def _places(self, result: OptimizationResult) -> np.ndarray:
@@ -189,8 +201,10 @@ class Simulated:
         place_TQ[:, self.place_N] = result.q.numpy()
         return place_TQ
 
-    def _supported(self, result: OptimizationResult, zmp_T2: np.ndarray, inner: slice) -> float:
-        """Share of the frames with planted feet whose ZMP is under these."""
+    def _supported(
+        self, result: OptimizationResult, point_T2: np.ndarray, inner: slice, near: float, counts_T: np.ndarray
+    ) -> float:
+        """Share of the frames with planted feet, of those that count, whose points are over these, or so near [m]."""
         assert result.contact is not None and result.root_position is not None
         assert result.root_quaternion_wxyz is not None
         base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
@@ -199,9 +213,9 @@ class Simulated:
         foot_K = np.repeat(np.arange(len(self.legs.soles)), [len(sole.balls_K4) for sole in self.legs.soles])
         planted_TS = result.contact.numpy()[inner]
         found = [
-            _off(ball_K2[planted_S[foot_K]], zmp_2) <= _NEAR_M
-            for ball_K2, planted_S, zmp_2 in zip(ball_TK2, planted_TS, zmp_T2, strict=True)
-            if planted_S.any()
+            _off(ball_K2[planted_S[foot_K]], point_2) <= near
+            for ball_K2, planted_S, point_2, counts in zip(ball_TK2, planted_TS, point_T2, counts_T, strict=True)
+            if planted_S.any() and counts
         ]
         return float(np.mean(found)) if found else float("nan")
 
@@ -230,9 +244,9 @@ class Simulated:
     @staticmethod
     def told(values: Any) -> list[str]:
         """What `played` found, as the table has it."""
-        depth, median, most, flight, supported, effort = values
+        depth, median, most, flight, supported, effort, balanced = values
         return [f"{100 * depth:.2f}", f"{median:.2f}", f"{most:.2f}", f"{flight:.1%}", f"{supported:.0%}",
-                f"{effort:.2f}"]  # fmt: skip
+                f"{effort:.2f}", "-" if balanced != balanced else f"{balanced:.0%}"]  # fmt: skip
 
 
 def _zero_moment(place_T3: np.ndarray, force_T3: np.ndarray, torque_T3: np.ndarray) -> np.ndarray:

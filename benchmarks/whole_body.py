@@ -1,18 +1,21 @@
 """Whole bodies: the optimiser's answers to clips with a root, on robots with legs, as whole motions and as streams.
 
     python benchmarks/whole_body.py [--robots g1] [--clips 16_15,02_06 | all | FOLDER] [--rate 60] [--collisions avoid]
-        [--ways motion,stream,fast] [--picture FILE.png]
+        [--ways motion,stream,fast] [--root pelvis,chest,between] [--balance 0]
+        [--picture FILE.png]
 
 A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
 planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
 than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
 conf/ROBOT-whole-body.yaml. Of a robot without feet, whose base stays where it is, there are angles, speeds, steps and
-time alone. The picture shows moments of the first clip, the person above the robots.
+time alone. `--root`: a table for each `robot.root_follows`; `--balance`: `robot.balance`. The
+picture shows moments of the first clip, the person above the robots.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import statistics
 import sys
 import time
@@ -22,11 +25,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from common import print_header, print_table, read_options, whole_body_clips
+from common import beginning, print_header, print_table, read_options, whole_body_clips
 from PIL.Image import Image
 
 from mrhubo import rotation
 from mrhubo.body import Skeleton
+from mrhubo.config import load_config
 from mrhubo.errors import InputWarning
 from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
 from mrhubo.fast import FastRetargeter, FastStream
@@ -36,7 +40,7 @@ from mrhubo.reference import OptimizationResult, OptimizationRetargeter
 from mrhubo.reference.metrics import direction_error
 from mrhubo.reference.standing import Legs, has_root, motion_root
 from mrhubo.retargeter import RetargetResult, optimised
-from mrhubo.robot import Robot
+from mrhubo.robot import build_body_map
 from mrhubo.robot_motion import RobotMotion
 from mrhubo.robot_motion.motion import PER_FRAME
 from mrhubo.streaming import Stream, StreamSettings
@@ -55,17 +59,23 @@ _PARTS = {"knee": "thigh", "ankle": "shin", "trunk": "chest", "foot": "feet", "e
 
 def main(argv: list[str]) -> None:
     """Prints a table a robot."""
-    options, rest = read_options(argv, robots="g1", clips="all", rate="", collisions="", ways="motion", picture="")
+    options, rest = read_options(
+        argv, robots="g1", clips="all", rate="", collisions="", ways="motion", root="pelvis", balance="0", picture=""
+    )
     ways = options["ways"].split(",")
     if rest or not set(ways) <= set(_WAYS):
         sys.exit(f"{[*rest, *(way for way in ways if way not in _WAYS)][0]}: is unknown")
     torch.set_num_threads(1)
     print_header()
     rows_of_pictures: dict[str, list[Image]] = {}
-    for name in options["robots"].split(","):
+    for name, root in itertools.product(options["robots"].split(","), options["root"].split(",")):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
-            retargeter = OptimizationRetargeter(Robot.from_config(f"conf/{name}-whole-body.yaml"))
+            config = load_config(
+                Path(f"conf/{name}-whole-body.yaml"),
+                [f"robot.root_follows={root}", f"robot.balance={options['balance']}"],
+            )
+            retargeter = OptimizationRetargeter(build_body_map(config.robot))
         motions = [_motion(path, options["rate"]) for path in whole_body_clips(options["clips"])]
         if not retargeter.body_map.keypoints.standing:
             for way in ways:
@@ -76,13 +86,14 @@ def main(argv: list[str]) -> None:
             rows_of_pictures[name] = _robot(retargeter, motions[0])
         for way in ways:
             answers = _WAYS[way](retargeter, bool(options["collisions"]))
-            answers(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+            answers(beginning(motions[0], 10))  # not timed
             found = [_measure(retargeter, motion, answers) for motion in motions]
             parts = [part for part in _PARTS if part in found[0][0].parts_deg]
             rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
-            print(f"## {name}, as a {way}: {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
-            heads = ["slide, own [cm/s]", "over 1 cm/s", "sunk", "floats (max [cm])", "path [cm/m]", "heading [deg]",
-                     "speed", "jumps", "touches", "ms a frame"]  # fmt: skip
+            follows = "" if root == "pelvis" else f", whose root follows {root}"
+            print(f"## {name}{follows}, as a {way}: {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
+            heads = ["chest, in the world [deg]", "slide, own [cm/s]", "over 1 cm/s", "sunk", "floats (max [cm])",
+                     "path [cm/m]", "heading [deg]", "speed", "jumps", "touches", "ms a frame"]  # fmt: skip
             columns = ["clip", *(f"{_PARTS[part]} [deg]" for part in parts), *heads]
             print_table(columns, [*rows, _row("mean", found, parts)])
             print()
@@ -134,11 +145,6 @@ def _pictures(figures: list[Solids], middle: float) -> list[Image]:
 def _motion(path: Path, rate: str) -> Motion:
     motion = read_motion(path)
     return resample(motion, float(rate)) if rate else motion
-
-
-def _cut(motion: Motion, frames: int) -> dict[str, object]:
-    arrays = vars(motion.arrays)
-    return {name: array[:frames] for name, array in arrays.items() if array is not None}
 
 
 def _as_motion(retargeter: OptimizationRetargeter, avoid: bool) -> Callable[[Motion], Answer]:
@@ -193,7 +199,7 @@ def _print_without_feet(
 ) -> None:
     """The table of a robot with arms, head and waist alone."""
     body_map, answers = retargeter.body_map, _WAYS[way](retargeter, avoid)
-    answers(motions[0].changed(**_cut(motions[0], 10)))  # not timed
+    answers(beginning(motions[0], 10))  # not timed
     regions = {
         "chest": "chest_", "upper arm": "_elbow", "forearm": "_wrist", "hand": "_hand_", "head": "head_",
     }  # fmt: skip
@@ -241,6 +247,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: lis
     return [
         name,
         *(f"{statistics.fmean(score.parts_deg[part] for score in scores):.1f}" for part in parts),
+        f"{mean('chest_deg'):.1f}",
         f"{mean('slide_cm_s'):.1f}, {mean('human_slide_cm_s'):.1f}",
         f"{mean('sliding'):.0%}",
         f"{mean('sunk'):.1%} ({most('sunk_max_cm'):.1f})",

@@ -6,14 +6,16 @@ from dataclasses import field
 from typing import Any
 
 
-def bounded(default: Any, low: float | None = None, high: float | None = None) -> Any:
-    """A field whose number must lie in [low, high]; None leaves that side open."""
-    return field(default=default, metadata={"low": low, "high": high})
+def bounded(default: Any, low: float | None = None, high: float | None = None, left_out: bool = False) -> Any:
+    """A field whose number must lie in [low, high]; None leaves that side open. `left_out`: as of the function of that
+    name.
+    """
+    return field(default=default, metadata={"low": low, "high": high, "left_out": left_out})
 
 
-def choice(default: str, *choices: str) -> Any:
-    """A field that takes one of the given words."""
-    return field(default=default, metadata={"choices": choices})
+def choice(default: str, *choices: str, left_out: bool = False) -> Any:
+    """A field that takes one of the given words; `left_out`: as of the function of that name."""
+    return field(default=default, metadata={"choices": choices, "left_out": left_out})
 
 
 def left_out(default: Any = None) -> Any:

@@ -74,6 +74,13 @@ class RobotConfig:
     max_speed: float = bounded(12.0, 0.01, 1_000.0)
     """No joint of a motion turns faster [rad/s], nor faster than its limit in the URDF, where that tells one (it does
     not where it is 0). The default is 0.5 rad in 1/24 s, from where on a step counts as a jump."""
+    root_follows: str = choice("pelvis", "pelvis", "chest", "between", left_out=True)
+    """How the base of a robot with feet is turned, where its waist cannot do what the person's back does: `pelvis` = as
+    the person's pelvis; `chest` = so that the robot's chest is turned as the person's, as far as its legs let it;
+    `between` = half-way from one to the other."""
+    balance: float = bounded(0.0, 0.0, 1.0, left_out=True)
+    """How much a robot with feet keeps its centre of mass over planted soles in whole motions, while the person stands
+    still: 0 = nothing looks at it, 1 = all the way. The URDF has to tell masses."""
     scale: str = choice("auto", "auto", "manual", "search")
     """How lengths are matched: `auto` keeps the robot's limb directions and gives each limb the human's length;
     `manual` takes the numbers of `manual` (the paper); `search` looks for better ones first, as `search` says."""

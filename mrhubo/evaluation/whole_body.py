@@ -18,13 +18,15 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from mrhubo.body.skeleton import PAIRED_KEYPOINTS
+from mrhubo import rotation
+from mrhubo.body.skeleton import JOINT_NAMES, PAIRED_KEYPOINTS
 from mrhubo.errors import UserError
-from mrhubo.frames import human_to_world
+from mrhubo.frames import human_axes, human_to_world
 from mrhubo.motion import Motion
 from mrhubo.reference import angle_between
 from mrhubo.reference.standing import HumanSteps, Legs, read_steps
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, LinkPoses
+from mrhubo.robot.parts import CHEST
 
 SUNK_M, FLOATING_M = 0.01, 0.02
 """From where on a sole is under the floor, and, while it is planted, above it."""
@@ -42,6 +44,8 @@ class WholeBodyScore:
     parts_deg: dict[str, float]
     """Mean angle to the person: of limbs by the point where they end (knee: thighs; ankle: shins; elbow: upper arms),
     of oriented parts by their region (trunk, foot, hand, head); of both sides together."""
+    chest_deg: float
+    """Mean angle by which the robot's chest is turned otherwise in the world than the person's; NaN: it has none."""
     slide_cm_s: float
     """Mean horizontal speed of points of soles while the person's are planted."""
     human_slide_cm_s: float
@@ -57,7 +61,7 @@ class WholeBodyScore:
     path_cm_m: float
     """Mean horizontal distance of the root to the person's path, scaled by the legs' length, for each metre of it."""
     heading_deg: float
-    """Mean angle between where the robot's pelvis looks and the person's, seen from above."""
+    """Mean angle between where the robot's pelvis looks and what it follows (`robot.root_follows`), seen from above."""
     speed_max: float
     """The highest speed of a joint by its limit."""
     over_limit: float
@@ -104,6 +108,7 @@ def score_whole_body(
     outside_TN = torch.maximum(robot.lower_N - q_TN, q_TN - robot.upper_N)
     return WholeBodyScore(
         parts_deg=_by_part(body_map, angle_TD),
+        chest_deg=chest_error(body_map, motion, local_TJ33, poses, base_T33),
         slide_cm_s=100 * _mean(sliding_TP[planted_TP]),
         human_slide_cm_s=100 * _mean(human_TP[planted_TP]),
         sliding=_mean(sliding_TP[planted_TP] > SLIDING),
@@ -159,6 +164,18 @@ def heading_error(axes_T33: Tensor, steps: HumanSteps) -> float:
     robot_T2, human_T2 = axes_T33[:, :2, 2], human_to_world(steps.turn_T33[..., 2])[:, :2].to(axes_T33)
     cross_T = robot_T2[:, 0] * human_T2[:, 1] - robot_T2[:, 1] * human_T2[:, 0]
     return float(torch.rad2deg(torch.atan2(cross_T, (robot_T2 * human_T2).sum(-1)).abs()).mean())
+
+
+def chest_error(body_map: BodyMap, motion: Motion, local_TJ33: Tensor, poses: LinkPoses, base_T33: Tensor) -> float:
+    """Mean angle [deg] between how the robot's chest and the person's are turned in the world; NaN: it has no chest."""
+    end = body_map.keypoints.ends.get(CHEST.name)
+    if end is None or motion.root_rotation_T33 is None:
+        return nan
+    row = body_map.robot.link_index(end.link)
+    robot_T33 = base_T33 @ poses.rotation_BL33[:, row] @ human_axes(end.axes_23).to(base_T33)
+    turn_T33 = body_map.skeleton.global_rotations(local_TJ33)[:, JOINT_NAMES.index(CHEST.joint)]
+    human_T33 = human_to_world((motion.root_rotation_T33.to(turn_T33) @ turn_T33).mT).mT
+    return float(torch.rad2deg(rotation.geodesic_distance(robot_T33, human_T33)).mean())
 
 
 def _by_part(body_map: BodyMap, angle_TD: Tensor) -> dict[str, float]:

@@ -32,17 +32,22 @@ DIRECTIONS = (
 )
 
 
-def describe_networks(retargeter: Retargeter) -> Description:
-    """The arrays of a retargeter with networks of its own.
+def describe_networks(retargeter: Retargeter, inputs: str = "poses") -> Description:
+    """The arrays of a retargeter with networks of its own, for a file that is given `inputs`.
 
     Raises:
-        UserError: it has none.
+        UserError: it has none, or a file that is given poses would have to know how the robot's base is turned.
     """
     description = retargeter.describe()
     if description.universal is not None:
         raise UserError(
             "the universal network is an optimiser on the robot's geometry, and no file of layers; without PyTorch"
             " mrhubo.load_fast runs it"
+        )
+    if description.root is not None and inputs == "poses" and description.settings.features == "directions":
+        raise UserError(
+            "robot.root_follows: legs are seen from a base that is not turned as the person's pelvis, and files of "
+            "layers do not work that out; export an ONNX file with --input directions, or use mrhubo.load_fast"
         )
     return description
 

@@ -45,7 +45,7 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
     import_optional("onnx.reference", missing)
     if inputs not in INPUTS:
         raise UserError(f"inputs must be one of {', '.join(INPUTS)}, found {inputs!r}")
-    description = describe_networks(retargeter)
+    description = describe_networks(retargeter, inputs)
     if inputs == "directions" and description.settings.features != "directions":
         raise UserError("these networks see rotations, not directions (model.input_frame: local); export --input poses")
     model = _model(onnx, description, inputs)

@@ -13,7 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mrhubo.fast.description import Description
-    from mrhubo.fast.leg_section import Legs
+    from mrhubo.fast.leg_section import Legs, RootTurn
     from mrhubo.fast.sections import Layers, Part, Universal
 
 _JOINTS = 21
@@ -26,6 +26,8 @@ _CONSTANTS = (
 _INPUTS = ("bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M")
 _MOST = 1e6
 """No constant is larger."""
+_ROUNDED = 1e-3
+"""How far lengths of axes may be from 1."""
 _LARGEST = 1024
 """Nor is a size of the universal network."""
 
@@ -44,6 +46,7 @@ def check(d: Description) -> None:
         "I": len(d.features.input_I), "W": len(d.features.bend_W), "O": len(d.features.first_O),
         "M": len(d.features.limb_M), "F": len(d.features.center_F), "S": len(capsules.body_S),
         "Y": len(capsules.pair_Y2), "E": 0 if d.universal is None else len(d.universal.block_E),
+        "G": 0 if d.root is None else len(d.root.axis_G3),
         **({} if d.legs is None else {"R": len(d.legs.hip_R3), "H": 2 * len(d.legs.hip_R3),
                                       "J": len(d.legs.radius_J), "L": len(d.legs.joint_L)}),
     }  # fmt: skip
@@ -92,6 +95,8 @@ def check(d: Description) -> None:
         _check_starts(d)
     if d.legs is not None:
         _check_legs(d, d.legs, sizes)
+    if d.root is not None:
+        _check_root(d.root)
     _check_prior(d, sizes)
 
 
@@ -177,6 +182,16 @@ def _check_legs(d: Description, legs: Legs, sizes: dict[str, int]) -> None:
     names = [d.settings.facts.get(name) for name in ("feet", "contact_points")]
     counts = [len(names) if isinstance(names, list) and _are_names(names) else 0 for names in names]
     _refuse(counts != [sizes["R"], sizes["H"]], "feet have other names than there are numbers for")
+
+
+def _check_root(root: RootTurn) -> None:
+    for name, array, most in (("spine_3", root.spine_3, _JOINTS), ("leg_D", root.leg_D, 2)):
+        _refuse(not _are_places(array, most), f"root.{name} names what is not there")
+    _refuse(float(root.share_1[0]) not in (0.5, 1.0), "root.share_1 is neither a half nor the whole")
+    _refuse(bool((root.limit_G2[:, 0] > root.limit_G2[:, 1]).any()), "root.limit_G2 ends before it begins")
+    lengths_G, crooked_33 = (root.axis_G3**2).sum(-1), root.rest_33.T @ root.rest_33 - np.eye(3)
+    off = max(np.abs(lengths_G - 1).max(initial=0.0), np.abs(crooked_33).max())
+    _refuse(bool(off > _ROUNDED), "root holds axes that are no unit vectors")
 
 
 def _check_prior(d: Description, sizes: dict[str, int]) -> None:

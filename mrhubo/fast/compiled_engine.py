@@ -19,6 +19,7 @@ from mrhubo.fast.description import Description
 from mrhubo.fast.kept import is_kept, note_kept
 from mrhubo.fast.plain import steps
 from mrhubo.fast.plain.avoidance import Avoidance
+from mrhubo.fast.plain.root_turn import turned_back
 from mrhubo.fast.plain.steps import Model
 from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import SKEW
@@ -71,8 +72,9 @@ class CompiledEngine:
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
         target_BD3, q_BN = self._room(local_BJ33)
-        if not self.description.post:
+        if not self.description.post or self.description.root is not None:
             refuse(self._look(self._check | self._direct, local_BJ33, target_BD3, q_BN), shape)
+            target_BD3 = turned_back(self.description.root, target_BD3, local_BJ33)
             return target_BD3, self.network(local_BJ33, target_BD3)
         refuse(self._look(self._check | self._direct | self._answer, local_BJ33, target_BD3, q_BN), shape)
         return target_BD3, q_BN
@@ -85,7 +87,7 @@ class CompiledEngine:
         """As `Engine.directions`."""
         target_BD3, q_BN = self._room(local_BJ33)
         self._look(self._direct, local_BJ33, target_BD3, q_BN)
-        return target_BD3
+        return turned_back(self.description.root, target_BD3, local_BJ33)
 
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""

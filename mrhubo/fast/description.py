@@ -17,7 +17,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.fast.checks import check
-from mrhubo.fast.leg_section import Legs
+from mrhubo.fast.leg_section import Legs, RootTurn
 from mrhubo.fast.sections import (
     SECTIONS,
     Capsules,
@@ -66,6 +66,8 @@ class Description:
     """In place of `pre` and `post`, which are then none."""
     legs: Legs | None = None
     """Of a robot that stands on feet."""
+    root: RootTurn | None = None
+    """Of one whose base is not turned as the person's pelvis."""
 
     @cached_property
     def standing(self) -> Description:
@@ -93,8 +95,9 @@ class Description:
         if self.universal is not None:
             found |= {f"universal.{name}": getattr(self.universal, name) for name in _UNIVERSAL}
             found |= {f"{_WEIGHTS}{name}": array for name, array in self.universal.weights.items()}
-        if self.legs is not None:
-            found |= {f"legs.{field.name}": getattr(self.legs, field.name) for field in fields(Legs)}
+        for name, section in (("legs", self.legs), ("root", self.root)):
+            if section is not None:
+                found |= {f"{name}.{field.name}": getattr(section, field.name) for field in fields(section)}
         return found
 
     def metadata(self) -> dict[str, str]:
@@ -116,8 +119,9 @@ class Description:
         prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
         universal = _universal(arrays) if "universal.block_E" in arrays else None
         legs = _section(Legs, "legs", arrays) if "legs.body_H" in arrays else None
+        root = _section(RootTurn, "root", arrays) if "root.leg_D" in arrays else None
         settings = Settings(**{**told, **names})
-        return cls(prior=prior, settings=settings, universal=universal, legs=legs, **sections, **stages)
+        return cls(prior=prior, settings=settings, universal=universal, legs=legs, root=root, **sections, **stages)
 
     @classmethod
     def read(cls, path: Path) -> Description:

@@ -17,6 +17,7 @@ from mrhubo.fast.kept import numba_is_there
 from mrhubo.fast.plain import collision, human, judging, networks, robot, steps, universal
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.plain.ground import PlainGround
+from mrhubo.fast.plain.root_turn import turned_back
 from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import are_crooked
 from mrhubo.fast.together.avoiding import GivingWay, make_giving_way
@@ -50,7 +51,8 @@ class NumpyEngine:
 
     def directions(self, local_BJ33: np.ndarray) -> np.ndarray:
         """As `Engine.directions`."""
-        return human.directions_of(self.description.human, self.description.settings.constants, local_BJ33)
+        found_BD3 = human.directions_of(self.description.human, self.description.settings.constants, local_BJ33)
+        return turned_back(self.description.root, found_BD3, local_BJ33)
 
     def network(self, local_BJ33: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.network`."""

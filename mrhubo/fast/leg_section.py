@@ -62,3 +62,21 @@ class Legs:
     block_N: np.ndarray
     """As of `Cost`, where the places of soles cost too; more joints may hang together then."""
     block_D: np.ndarray
+
+
+@dataclass(frozen=True)
+class RootTurn:
+    """Of a robot whose base is not turned as the person's pelvis: G joints of its waist (`mrhubo.robot.root_turn`)."""
+
+    spine_3: np.ndarray
+    """Which of the 21 posed joints turn a person's chest against the pelvis, from there upwards."""
+    leg_D: np.ndarray
+    """1 for directions that are turned back by what the base does."""
+    share_1: np.ndarray
+    """How much of what the waist cannot do the base does: 1 or 0.5."""
+    axis_G3: np.ndarray
+    """Axes of the waist's joints with the robot at home, in the axes of its pelvis, from there upwards,"""
+    limit_G2: np.ndarray
+    """how far they turn from there [rad],"""
+    rest_33: np.ndarray
+    """and the axes of its chest there, as columns."""

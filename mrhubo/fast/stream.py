@@ -22,6 +22,7 @@ from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cros
 from mrhubo.fast.plain.ground import Base, Seen, Stance
 from mrhubo.fast.plain.human import orthonormal_columns
 from mrhubo.fast.plain.judging import quaternions
+from mrhubo.fast.plain.root_turn import root_turn
 from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.roots import read_root
@@ -206,7 +207,7 @@ class FastStream:
         """Directions of a person, filtered, and the same with places of soles after them, where there is a floor."""
         raw_X3, partial_X = target_D3, self._cost.partial_D
         if person is not None:  # the turn of what carries the legs is filtered along
-            raw_X3 = np.concatenate((target_D3, person.turn_33[:, :2].T))
+            raw_X3 = np.concatenate((target_D3, self._carrier(person)[:, :2].T))
             partial_X = np.append(partial_X, (0, 0))
         if self._filtered is None:
             self._filtered = Filtered(raw_X3, np.zeros_like(raw_X3), raw_X3)
@@ -217,6 +218,11 @@ class FastStream:
             return aim_X3, aim_X3
         passed = self._longest_step if math.isinf(self._unseen) else self._unseen
         return self._ground.look(person, aim_X3[:-2], orthonormal_columns(aim_X3[-2:].T), passed)
+
+    def _carrier(self, person: Seen) -> np.ndarray:
+        """Human axes (3, 3) that what carries the robot's legs is to have, in the world."""
+        root = self.retargeter.description.root
+        return person.turn_33 if root is None else person.turn_33 @ root_turn(root, person.local_J33[None])[0]
 
     def _begin(self, local_1J33: np.ndarray, aim_D3: np.ndarray, wanted_X3: np.ndarray) -> None:
         """Takes up the whole answer to a person who is seen for the first time."""

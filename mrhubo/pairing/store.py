@@ -33,7 +33,7 @@ before alignment, cost, mean keypoint distance [m], norm of z."""
 SCHEMA = "mrhubo.pairs/5"
 _NOT_IN_PAIRS = ("count", "reverse_share", "dir", "workers", "filter", "filter_k")
 """Keys of `pairs` that do not change what a shard holds."""
-_NOT_IN_ROBOT = ("urdf", "key_links", "max_speed", "unsure")
+_NOT_IN_ROBOT = ("urdf", "key_links", "max_speed", "unsure", "balance")
 
 
 def pose_settings(config: Config) -> dict[str, Any]:

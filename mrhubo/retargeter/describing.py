@@ -38,7 +38,7 @@ from mrhubo.fast.sections import (
 from mrhubo.files.storage import write_tensors
 from mrhubo.reference import polish
 from mrhubo.retargeter import confidence
-from mrhubo.retargeter.describing_legs import describe_legs
+from mrhubo.retargeter.describing_legs import describe_legs, describe_root_turn
 from mrhubo.retargeter.describing_robot import (
     Bodies,
     describe_capsules,
@@ -111,6 +111,7 @@ def describe(retargeter: Retargeter) -> Description:
         ),
         describe_universal(network, bodies) if isinstance(network, UniversalJoints) else None,
         legs,
+        describe_root_turn(body_map),
     )
 
 

@@ -10,10 +10,11 @@ import torch
 from torch import Tensor
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_JOINT, KEYPOINT_NAMES, PARENTS, ancestors
-from mrhubo.fast.leg_section import Legs
+from mrhubo.fast.leg_section import Legs, RootTurn
 from mrhubo.reference import standing
 from mrhubo.retargeter.describing_robot import Bodies, real, whole
 from mrhubo.robot import BodyMap
+from mrhubo.robot.parts import CHEST
 
 Names = dict[str, list[str]]
 
@@ -55,6 +56,22 @@ def describe_legs(body_map: BodyMap, bodies: Bodies) -> tuple[Legs | None, Names
         block_D=whole(block_D),
     )
     return found, names
+
+
+def describe_root_turn(body_map: BodyMap) -> RootTurn | None:
+    """How the base is turned further than the person's pelvis; None: it is not."""
+    root = body_map.shared.root_turn
+    if root is None:
+        return None
+    chest = JOINT_NAMES.index(CHEST.joint)
+    return RootTurn(
+        spine_3=whole(sorted(joint - 1 for joint in ancestors(chest) if joint)),
+        leg_D=whole(body_map.shared.turned_D),
+        share_1=real([root.share]),
+        axis_G3=real(root.axis_W3),
+        limit_G2=real(root.limit_W2),
+        rest_33=real(root.rest_33),
+    )
 
 
 def _person(legs: standing.Legs) -> dict[str, np.ndarray]:

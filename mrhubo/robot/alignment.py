@@ -17,6 +17,10 @@ from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
 from mrhubo.robot.bending import bend_axis
 from mrhubo.robot.body_map import BodyMap
 from mrhubo.robot.parts import BendPart, LimbPart, OrientedPart
+from mrhubo.robot.root_turn import is_turned_back
+
+_ROOT = "root"
+"""What sees legs where the base is not turned as the person's pelvis."""
 
 
 def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor, hinged: bool = False) -> Tensor:
@@ -30,21 +34,27 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor, hin
         body_map: the robot's body map.
         local_BJ33: local rotations (B, 21, 3, 3) of the poses to start from.
         direction_BD3: directions (B, D, 3), as of `BodyMap.robot_directions` or `BodyMap.human_directions`.
-        hinged: let limbs bend about a human's axes also where the robot has no such axis.
+        hinged: let limbs bend about a human's axes also where the robot has no such axis. A pose is read so, and then
+            legs hang on the robot's root as it is turned, whatever `robot.root_follows` says.
     """
     pose = _Pose(local_BJ33, body_map.skeleton.global_rotations(local_BJ33))
     rest_K3 = body_map.skeleton.rest_K3
     column = {name: i for i, name in enumerate(body_map.direction_names)}
     view_joint = {part.name: JOINT_NAMES.index(part.joint) for part in body_map.keypoints.parts}
+    root_turn = None if hinged else body_map.shared.root_turn
     from_pelvis: dict[str, Tensor] = {}
     """All directions, by the part from which they are seen: a part is turned before others are seen from it."""
     for part in body_map.keypoints.parts:
         there = set(part.direction_names) <= column.keys()
         if not part.seen_from or not (there or (hinged and isinstance(part, BendPart))):
             continue
-        if part.seen_from not in from_pelvis:
-            from_pelvis[part.seen_from] = direction_BD3 @ pose.of(view_joint[part.seen_from]).mT
-        wanted = [from_pelvis[part.seen_from][:, column[name]] for name in part.direction_names if there]
+        view = _ROOT if root_turn is not None and is_turned_back(part) else part.seen_from
+        if view not in from_pelvis:
+            turn_B33 = pose.of(view_joint[part.seen_from])
+            if root_turn is not None and view == _ROOT:
+                turn_B33 = turn_B33 @ root_turn(pose.local())
+            from_pelvis[view] = direction_BD3 @ turn_B33.mT
+        wanted = [from_pelvis[view][:, column[name]] for name in part.direction_names if there]
         joint = JOINT_NAMES.index(part.joint)
         if isinstance(part, LimbPart):
             start, end = (KEYPOINT_NAMES.index(name) for name in (part.start, part.end))
@@ -52,7 +62,7 @@ def align_pose(body_map: BodyMap, local_BJ33: Tensor, direction_BD3: Tensor, hin
             pose.turn(joint, rotation.shortest_turn(pose.of(joint) @ bone_3, wanted[0]))
         elif isinstance(part, BendPart):
             limbs = (limb.direction_names[0] for limb in body_map.keypoints.parts if limb.name in part.limbs)
-            upper, lower = (from_pelvis[part.seen_from][:, column[name]] for name in limbs)
+            upper, lower = (from_pelvis[view][:, column[name]] for name in limbs)
             own_B3 = pose.of(joint) @ pose.of(joint).new_tensor(part.rest)
             axis_B3 = bend_axis(upper, lower, wanted[0] if there else own_B3)[0]
             pose.turn(joint, _turn_about(upper, own_B3, axis_B3))

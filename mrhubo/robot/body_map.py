@@ -177,7 +177,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
         UserError: the URDF, a joint, a link or a keypoint entry is wrong; says which, and the nearest valid name.
             Or the body map as a whole cannot be right.
     """
-    keypoints = read_keypoints(config.keypoints)
+    keypoints = dataclasses.replace(read_keypoints(config.keypoints), root_follows=config.root_follows)
     if config.scale != "auto" and config.manual is None:
         raise UserError(f"robot.manual: is missing; `scale: {config.scale}` needs its numbers")
     if config.scale == "search" and config.search is None:
@@ -191,6 +191,7 @@ def build_body_map(config: RobotConfig, skeleton: Skeleton | None = None) -> Bod
     description = describe(config.urdf)
     check_names(config, description)
     robot = Robot(description, config.joints, links, config.ranges, config.hold, config.name, config.max_speed)
+    robot.balance = config.balance
     body_map = BodyMap.of(robot, keypoints, skeleton, manual)
     check_key_links(robot, config.key_links)
     return body_map

@@ -21,6 +21,7 @@ from mrhubo.frames import human_axes
 from mrhubo.robot.bending import BendAxis, bend_axis, find_bend_axes
 from mrhubo.robot.keypoints import Axis, Keypoints, Limb
 from mrhubo.robot.model import LinkPoses, Robot
+from mrhubo.robot.root_turn import is_turned_back, make_root_turn
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class Directions(nn.Module):
     order_D: Tensor
     view_axes_V33: Tensor
     view_D: Tensor
+    turned_D: Tensor
 
     def __init__(self, robot: Robot, keypoints: Keypoints, skeleton: Skeleton) -> None:
         """Looks links and human joints up."""
@@ -93,9 +95,12 @@ class Directions(nn.Module):
             "order_D": torch.tensor([i for i, _ in (*limbs, *axes, *bends)]).argsort(),
             "view_axes_V33": torch.stack([human_axes(keypoints.ends[name].axes_23) for name in self.views]),
             "view_D": torch.tensor(views),
+            "turned_D": torch.tensor([is_turned_back(d.part) for d in self.all]),
         }
         for name, tensor in tensors.items():
             self.register_buffer(name, tensor, persistent=False)
+        self.root_turn = make_root_turn(robot, keypoints)
+        """How the base is turned further than the person's pelvis; None: it is not."""
 
     def view_robot(self, poses: LinkPoses) -> RobotView:
         """The robot's directions, with what they were worked out from."""
@@ -132,7 +137,10 @@ class Directions(nn.Module):
             upper_BX3, lower_BX3 = (found_BD3[:, places] for places in self._bent_limbs)
             bend_BX3, needed_BX = bend_axis(upper_BX3, lower_BX3, found_BD3[:, -self._bends :])
             found_BD3 = torch.cat((found_BD3[:, : -self._bends], bend_BX3 * needed_BX[..., None]), dim=1)
-        return self.seen(found_BD3.index_select(1, self.order_D), list(turns_BX33[:, :views].unbind(1)))
+        seen_BD3 = self.seen(found_BD3.index_select(1, self.order_D), list(turns_BX33[:, :views].unbind(1)))
+        if self.root_turn is None:
+            return seen_BD3
+        return torch.where(self.turned_D[:, None], seen_BD3 @ self.root_turn(local_BJ33), seen_BD3)
 
     def input_joints(self, directions: Iterable[int] | None = None) -> tuple[str, ...]:
         """The human joints that tell about all directions, or about some of them, in SMPL's order."""

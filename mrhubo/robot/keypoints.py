@@ -53,6 +53,8 @@ class Keypoints:
     """Ends of limbs, by human keypoint."""
     ends: dict[str, End]
     """Link and axes of the oriented parts, by part."""
+    root_follows: str = "pelvis"
+    """How the base is turned (`mrhubo.robot.root_turn`): "pelvis", "chest" or "between"."""
 
     @property
     def links(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +90,8 @@ class Robot(nn.Module):
         """Which links stand for which body parts, where `from_urdf` or `from_config` has been told."""
         self.key_links: tuple[str, ...] = ()
         """Links whose position error is the link error."""
+        self.balance = 0.0
+        """How much the centre of mass is kept over planted soles in whole motions: 0 to 1."""
         if not joints:
             raise UserError("robot.joints: is empty; name at least one joint")
         repeated = sorted({j for j in joints if list(joints).count(j) > 1})
@@ -177,6 +179,8 @@ class Robot(nn.Module):
         hold: Mapping[str, float] | None = None,
         name: str | None = None,
         max_speed: float = MAX_SPEED,
+        root_follows: str = "pelvis",
+        balance: float = 0.0,
     ) -> Robot:
         """A robot that knows which of its links stand for which part of a human body.
 
@@ -189,14 +193,16 @@ class Robot(nn.Module):
             hold: angle in rad at which another joint is held; default 0, clamped to the joint's limits.
             name: short name; default: the URDF file's.
             max_speed: no joint turns faster [rad/s], whatever the URDF gives.
+            root_follows: how the base is turned, as `robot.root_follows` of a config.
+            balance: how much the centre of mass is kept over planted soles, as `robot.balance` of a config.
 
         Raises:
             UserError: the URDF cannot be used; a joint, link or body part does not exist (with the nearest name).
         """
-        parts = read_keypoints(keypoints)
+        parts = replace(read_keypoints(keypoints), root_follows=root_follows)
         known = urdf if isinstance(urdf, Description) else Path(urdf)
         robot = cls(known, joints, [*parts.links, *key_links], ranges, hold, name, max_speed)
-        robot.keypoints, robot.key_links = parts, tuple(key_links)
+        robot.keypoints, robot.key_links, robot.balance = parts, tuple(key_links), balance
         return robot
 
     @classmethod
@@ -212,7 +218,7 @@ class Robot(nn.Module):
             check_names(robot, description)
             return cls.from_urdf(
                 description, robot.joints, robot.keypoints, robot.key_links, robot.ranges, robot.hold, robot.name,
-                robot.max_speed,
+                robot.max_speed, robot.root_follows, robot.balance,
             )  # fmt: skip
 
     def without(self, joints: Collection[str]) -> Robot:
@@ -227,7 +233,7 @@ class Robot(nn.Module):
 
     def _again(self, joints: Sequence[str], **changed: Any) -> Robot:
         robot = Robot(self.description, joints, name=self.name, **{**self._made_with, **changed})
-        robot.keypoints, robot.key_links = self.keypoints, self.key_links
+        robot.keypoints, robot.key_links, robot.balance = self.keypoints, self.key_links, self.balance
         return robot.to(self.lower_N.device)
 
     def link_index(self, link: str) -> int:

@@ -101,11 +101,11 @@ class Ground:
         return GroundState.none(people, len(self.legs.contacts), self.legs.root_3)
 
     def carrier(self, seen: Seen) -> tuple[Tensor, Tensor]:
-        """A person's keypoints (B, K, 3) [m] from the root, along the world's axes, and the human axes (B, 3, 3) of
-        what carries the legs.
+        """A person's keypoints (B, K, 3) [m] from the root, along the world's axes, and the human axes (B, 3, 3) that
+        what carries the robot's legs is to have.
         """
         point_BK3, turn_BJ33 = self.legs.body_map.skeleton.keypoints_and_rotations(seen.local_BJ33)
-        return point_BK3 @ seen.turn_B33.mT, seen.turn_B33 @ turn_BJ33[:, self.legs.joint]
+        return point_BK3 @ seen.turn_B33.mT, seen.turn_B33 @ self.legs.asked(seen.local_BJ33, turn_BJ33)
 
     def look(
         self, state: GroundState, point_BK3: Tensor, turn_B33: Tensor, seen: Seen, passed_B: np.ndarray

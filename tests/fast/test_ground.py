@@ -29,7 +29,7 @@ from mrhubo.robot_motion import RobotMotion
 from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.streaming import Stream
 from tests.fast.exact import double, in_double
-from tests.reference.standing.steppers import jump, moved, squat, walk
+from tests.reference.standing.steppers import bow, jump, moved, squat, walk
 from tests.reference.walkers import walker, write_urdf
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -40,7 +40,9 @@ FORM = pytest.mark.parametrize("form", FORMS)
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Retargeter]:
-    """Function of a robot's name: NAO, whose legs share a joint, or one hung up at its pelvis or at its chest."""
+    """Function of a robot's name: NAO, whose legs share a joint, or one hung up at its pelvis or at its chest, and what
+    its root follows.
+    """
     found: dict[str, Retargeter] = {}
 
     def of(name: str) -> Retargeter:
@@ -48,7 +50,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Retargeter
             body_map = (
                 BodyMap.of(Robot.from_config("nao-whole-body"))
                 if name == "nao"
-                else walker(tmp_path_factory.mktemp(name), name)
+                else walker(
+                    tmp_path_factory.mktemp("walker"), **dict(zip(("root", "follows"), name.split(), strict=False))
+                )
             )
             torch.manual_seed(1)
             prior = BodyPrior(hidden=20).eval()
@@ -108,6 +112,11 @@ def touching() -> Frames:
     return found
 
 
+def bowing() -> Frames:
+    """A back that bends farther than a waist can."""
+    return frames_of(bow(16, 30.0))
+
+
 def flying() -> Frames:
     """A jump, elsewhere."""
     return frames_of(moved(jump(24, 30.0), 1.0, (0.3, 0.4, 1.0)))
@@ -138,7 +147,15 @@ def quickly(fast: FastRetargeter, frames: Frames, settings: StreamSettings) -> l
 
 @pytest.mark.parametrize(
     ("name", "frames"),
-    [("pelvis", striding), ("chest", told), ("pelvis", flying), ("nao", touching), ("chest", flying)],
+    [
+        ("pelvis", striding),
+        ("chest", told),
+        ("pelvis", flying),
+        ("nao", touching),
+        ("chest", flying),
+        ("pelvis chest", bowing),
+        ("chest between", bowing),
+    ],
 )
 def test_the_numbers_are_those_of_the_stream_in_pytorch(
     made: Callable[[str], Retargeter], make_fast: Callable[[str, str], FastRetargeter], name: str,
@@ -231,10 +248,10 @@ def test_a_robot_of_which_there_is_a_model_alone_stands(tmp_path: Path, monkeypa
 
 def test_one_file_stands(made: Callable[[str], Retargeter], tmp_path: Path) -> None:
     """Which is refused where it is damaged: compiled functions would read what is not theirs."""
-    retargeter = made("pelvis")
+    retargeter = made("pelvis chest")
     file = retargeter.save_description(tmp_path)
     assert file == tmp_path / FILE
-    frames = frames_of(squat(3, 30.0))
+    frames = frames_of(bow(3, 30.0))
     read, own = (quickly(each, frames, StreamSettings()) for each in (
         mrhubo.load_fast(file, "numpy"), FastRetargeter(retargeter.describe(), "numpy")))  # fmt: skip
     np.testing.assert_array_equal(read[-1].root_position, own[-1].root_position)
@@ -243,8 +260,8 @@ def test_one_file_stands(made: Callable[[str], Retargeter], tmp_path: Path) -> N
     write_tensors(tmp_path / "changed.safetensors", cells, metadata)
     with pytest.raises(UserError, match="a start without a pose"):
         Description.read(tmp_path / "changed.safetensors")
-    names = [name for name in tensors if name.startswith("legs.")]
-    assert len(names) > 20
+    names = [name for name in tensors if name.startswith(("legs.", "root."))]
+    assert len(names) > 25
     for name in names:
         wrongs = [tensors[name][:-1].contiguous()]
         if not tensors[name].is_floating_point():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 from mrhubo.body import Skeleton
@@ -12,8 +13,10 @@ SOLE = (0.05, 0.15, 0.06)
 """How far it reaches backwards, forwards and down from the ankle [m]."""
 
 
-def write_urdf(path: Path, root: str = "pelvis") -> Path:
-    """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs."""
+def write_urdf(path: Path, root: str = "pelvis", masses: bool = False) -> Path:
+    """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs. With masses,
+    it carries a load in front of its chest.
+    """
     limit = '<limit lower="{}" upper="{}" effort="1" velocity="10"/>'
 
     def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float, high: float) -> str:
@@ -40,6 +43,12 @@ def write_urdf(path: Path, root: str = "pelvis") -> Path:
     box = (f'<collision><origin xyz="{(ahead - back) / 2} 0 {-down / 2}"/><geometry><box size="{ahead + back} 0.08 {down}"/>'
            "</geometry></collision>")  # fmt: skip
     solid = {name: box for name in links if name.endswith("foot")}
+    if masses:
+        inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        for name in links:
+            place, kilograms = ("0.25 0.05 0.2", 60) if name == "chest" else ("0.02 0 -0.1", 1)
+            mass = f'<inertial><origin xyz="{place}"/><mass value="{kilograms}"/>{inertia}</inertial>'
+            solid[name] = mass + solid.get(name, "")
     text = "".join(f'<link name="{name}">{solid.get(name, "")}</link>' for name in links)
     path.write_text(f'<robot name="walker">{text}{"".join(rows)}</robot>')
     return path
@@ -58,12 +67,24 @@ def entries() -> dict[str, object]:
     return found
 
 
-def walker(folder: Path, root: str = "pelvis", waist: bool = True, **changes: object) -> BodyMap:
-    """The body map of the robot; without a waist, its chest is the pelvis. Entries that are None are left out."""
-    urdf = write_urdf(folder / f"walker_{root}.urdf", root)
+def walker(
+    folder: Path,
+    root: str = "pelvis",
+    waist: bool = True,
+    follows: str = "pelvis",
+    balance: float = 0.0,
+    masses: bool = False,
+    **changes: object,
+) -> BodyMap:
+    """The body map of the robot; without a waist, its chest is the pelvis. `follows`: `robot.root_follows`; `balance`:
+    `robot.balance`; `masses`: of its links. Entries that are None are left out.
+    """
+    urdf = write_urdf(folder / f"walker_{root}.urdf", root, masses)
     names = [f"{s}_{n}" for s in "lr" for n in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle", "shoulder_pitch",
                                                 "shoulder_roll", "elbow")]  # fmt: skip
     given = {**entries(), **({} if waist else {"chest": root, "pelvis": root}), **changes}
     keypoints = read_keypoints({name: entry for name, entry in given.items() if entry is not None})
+    keypoints = dataclasses.replace(keypoints, root_follows=follows)
     robot = Robot(urdf, [*(["waist"] if waist else []), *names], keypoints.links, hold={} if waist else {"waist": 0.0})
+    robot.balance = balance
     return BodyMap.of(robot, keypoints, Skeleton())

@@ -14,6 +14,8 @@ from mrhubo.body import BodyPrior, Skeleton, VPoser, build_skeleton, open_prior,
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
+from mrhubo.exporting.meaning import describe_networks
+from mrhubo.fast import FastRetargeter
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter, direction_error
@@ -48,6 +50,24 @@ def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: 
     pose = human(20)
     torch.testing.assert_close(opened.predict(pose), made.predict(pose))
     torch.testing.assert_close(opened.retarget(pose).confidence, made.retarget(pose).confidence)
+
+
+def test_a_package_knows_what_its_root_follows(root: Path, tmp_path: Path) -> None:
+    """And its networks answer alike in all forms; files of layers alone cannot, and say so."""
+    config = load_config(root / "conf" / "coman-whole-body.yaml", ["model.hidden=8", "robot.root_follows=chest"])
+    body_map = build_body_map(config.robot)
+    torch.manual_seed(0)
+    made = Retargeter(build_network(config, body_map), body_map, BodyPrior(hidden=8).eval(), config, phi_threshold=0.01)
+    made.save(tmp_path, {"run_id": "abc"})
+    opened, pose = Retargeter.load(tmp_path), human(8)
+    assert opened.body_map.keypoints.root_follows == "chest"
+    fast, expected = FastRetargeter.load(tmp_path, "numpy"), made.retarget(pose)
+    np.testing.assert_allclose(fast.predict(pose), made.predict(pose), atol=1e-5)
+    np.testing.assert_allclose(fast.directions(pose), body_map.human_directions(pose), atol=1e-5)
+    np.testing.assert_allclose(fast(pose).direction_error_deg, expected.direction_error_deg, atol=1e-2)
+    with pytest.raises(UserError, match="robot.root_follows: legs are seen from a base"):
+        describe_networks(opened)
+    assert describe_networks(opened, "directions").root is not None
 
 
 def test_arms_and_head_have_networks_of_their_own(made: Retargeter) -> None:

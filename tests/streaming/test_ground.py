@@ -74,14 +74,17 @@ def test_who_jumps_flies_as_high_as_the_person(biped: Retargeter) -> None:
 
 @pytest.mark.parametrize("rate", [24.0, 60.0])
 def test_a_person_elsewhere_who_looks_elsewhere_is_followed_there(biped: Retargeter, rate: float) -> None:
-    motion = squat(16, rate)
+    """From a cold start, whichever way that is."""
+    motion, turns = squat(16, rate), (-2 * np.pi * np.random.default_rng(0).random(5)).tolist()
     stream = Stream(biped, settings=SETTINGS)
-    here, there = stream.retarget_all([motion, moved(motion, 1.0, (0.4, -0.7, 2.0))])
-    assert here.root_position is not None and there.root_position is not None
-    torch.testing.assert_close(there.q, here.q, atol=3e-4, rtol=0)
-    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, 1.0]))
+    here, *others = stream.retarget_all([motion, *(moved(motion, turn, (0.4, -0.7, 2.0)) for turn in turns)])
+    assert here.root_position is not None
     away_3 = stream._legs.scale * human_to_world(torch.tensor([0.4, 0.0, 2.0]))
-    torch.testing.assert_close(there.root_position, here.root_position @ turn_33.T + away_3, atol=1e-3, rtol=0)
+    for turn, there in zip(turns, others, strict=True):
+        assert there.root_position is not None
+        torch.testing.assert_close(there.q, here.q, atol=3e-4, rtol=0)
+        turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, turn]))
+        torch.testing.assert_close(there.root_position, here.root_position @ turn_33.T + away_3, atol=1e-3, rtol=0)
 
 
 def test_a_walk_goes_as_far_as_the_person_and_its_feet_keep_still(biped: Retargeter) -> None:

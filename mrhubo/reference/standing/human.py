@@ -26,7 +26,7 @@ class HumanSteps:
     """Of one motion."""
 
     turn_T33: Tensor
-    """Human axes of what carries the legs, in the world."""
+    """Human axes that what carries the robot's legs is to have, in the world: the person's, or as the config says."""
     path_T3: Tensor
     """The root on the person's path, made to fit the skeleton's legs, and scaled to the robot's."""
     contacts: FootContacts
@@ -55,7 +55,7 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | N
     contacts = find_contacts(place_TP3, motion.frame_rate, given_TP=given_contacts(motion, legs))
     path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
     return HumanSteps(
-        root_T33 @ turns_TJ33[:, legs.joint], legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
+        root_T33 @ legs.asked(local_TJ33, turns_TJ33), legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
     )
 
 

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, keypoint_indices
-from mrhubo.errors import InputWarning
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.frames import human_to_world
 from mrhubo.robot import BodyMap, LinkPoses
 from mrhubo.robot.parts import LimbPart
@@ -57,11 +57,20 @@ class Legs(nn.Module):
     radius_K: Tensor
 
     def __init__(self, body_map: BodyMap) -> None:
-        """Looks links and lengths up; warns of feet whose soles nothing tells."""
+        """Looks links and lengths up; warns of feet whose soles nothing tells.
+
+        Raises:
+            UserError: the robot has no feet, but a weight of its balance.
+        """
         super().__init__()
         self.body_map, self.soles = body_map, find_soles(body_map)
         self.has_feet = bool(self.soles)
         if not self.has_feet:
+            if body_map.robot.balance:
+                raise UserError(
+                    f"robot.balance: '{body_map.robot.name}' has no feet over which its centre of mass could be; "
+                    "take the entry out"
+                )
             return
         for sole in (sole for sole in self.soles if not sole.known):
             name, link = sole.part.name, sole.link
@@ -166,6 +175,17 @@ class Legs(nn.Module):
             for rows, local_X3 in ((self._point_rows, self.points_P3), (self._ball_rows, self.balls_K3))
         ]
         return LegPoses(*(base_B3[:, None] + place_BX3 @ base_B33.mT for place_BX3 in found))
+
+    def asked(self, local_BJ33: Tensor, turns_BJ33: Tensor) -> Tensor:
+        """Human axes (B, 3, 3) that what carries the legs is to have, relative to the person's root: the person's, or
+        as `robot.root_follows` says.
+
+        Args:
+            local_BJ33: local rotations (B, 21, 3, 3) of human poses.
+            turns_BJ33: rotations (B, 22, 3, 3) of their joints relative to the root.
+        """
+        carrier_B33, root_turn = turns_BJ33[:, self.joint], self.body_map.shared.root_turn
+        return carrier_B33 if root_turn is None else carrier_B33 @ root_turn(local_BJ33)
 
     def heading(self, poses: LinkPoses, base_B33: Tensor) -> Tensor:
         """Human axes (B, 3, 3) of what carries the legs, in the robot's world: columns are its left, up and forward."""

@@ -28,6 +28,7 @@ from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import nearest_slow, speed_bound
+from mrhubo.reference.standing.balance import Balance
 from mrhubo.reference.standing.human import HumanSteps
 from mrhubo.reference.standing.legs import Legs
 from mrhubo.reference.standing.path import carry
@@ -74,6 +75,11 @@ class _Carried:
     low_TP: np.ndarray
     """Height of the lowest ball at each of them."""
 
+    def shifted(self, shift_T3: np.ndarray) -> _Carried:
+        """The same with a root that is elsewhere, by so much [m], and soles with it."""
+        point_TP3, low_TP = self.point_TP3 + shift_T3[:, None], self.low_TP + shift_T3[:, [_UP]]
+        return _Carried(self.root_T3 + shift_T3, self.place_K2, point_TP3, low_TP)
+
 
 class Standing(nn.Module):
     """Stands one robot on the floor."""
@@ -85,6 +91,8 @@ class Standing(nn.Module):
         moved = set().union(*SoleTerm(legs).couplings())
         legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
         self._avoidance: Avoidance | None = None
+        self.balance = Balance(legs) if self.robot.balance else None
+        """What shifts the root of whole motions; None: nothing looks at the centre of mass."""
         self._legs_N = legs_N.to(self.robot.lower_N.device)
 
     @property
@@ -122,6 +130,9 @@ class Standing(nn.Module):
                     break
                 carried = _lifted(carried, steps.frame_rate)
                 wanted = self._reached(carried, steps, wanted[1])
+            elif self.balance is not None:
+                off_TP3, poses = wanted[0] - carried.point_TP3, self.robot.forward(q_TN)
+                carried = carried.shifted(self.balance.shift(poses, steps, carried.root_T3, off_TP3))
             extended_TX3 = self._extended(target_TD3, carried, wanted, steps)
             q_TN = self._give_way(q_TN, extended_TX3, free_T, steps.frame_rate, smoothness, avoid_collisions)
             carried = self._carried(q_TN, steps, carried.place_K2)
@@ -249,11 +260,9 @@ def _lifted(carried: _Carried, frame_rate: float) -> _Carried:
     """A root that is lifted so, smoothly and by no less."""
     width = 2 * round(LIFT_S * frame_rate) + 1
     lift_T = uniform_filter1d(maximum_filter1d(_lift(carried), width, mode="nearest"), width, mode="nearest")
-    up_T13 = np.zeros((len(lift_T), 1, 3))
-    up_T13[:, 0, _UP] = lift_T
-    return _Carried(
-        carried.root_T3 + up_T13[:, 0], carried.place_K2, carried.point_TP3 + up_T13, carried.low_TP + lift_T[:, None]
-    )
+    shift_T3 = np.zeros_like(carried.root_T3)
+    shift_T3[:, _UP] = lift_T
+    return carried.shifted(shift_T3)
 
 
 def standing_fields(position_T3: Tensor, rotation_T33: Tensor, planted_TS: np.ndarray, legs: Legs) -> dict[str, Any]:

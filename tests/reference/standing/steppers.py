@@ -17,6 +17,16 @@ def squat(frames: int = 48, rate: float = 24.0, sway: float = 0.2) -> Motion:
     return _standing(0.3 + 0.25 * torch.cos(phase_T), sway * torch.sin(phase_T), rate, 0.0)
 
 
+def bow(frames: int = 48, rate: float = 24.0) -> Motion:
+    """Squats and sways, and bends the back forwards by up to 50 degrees and to both sides."""
+    standing = squat(frames, rate)
+    phase_T, local_TJ33 = torch.linspace(0, 2 * torch.pi, frames), standing.local_TJ33.clone()
+    turn_T3 = torch.stack((0.15 * (1 - phase_T.cos()), 0.1 * phase_T.sin(), 0.08 * phase_T.sin()), dim=1)
+    for name in ("spine1", "spine2", "spine3"):
+        local_TJ33[:, POSED_JOINT_NAMES.index(name)] = rotation.axis_angle_to_matrix(turn_T3)
+    return standing.changed(local_TJ33=local_TJ33)
+
+
 def jump(frames: int = 48, rate: float = 24.0) -> Motion:
     """Squats, and is off the floor for the middle quarter."""
     phase_T = torch.linspace(0, 1, frames)

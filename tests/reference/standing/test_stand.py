@@ -17,7 +17,7 @@ from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.standing import Legs
 from mrhubo.robot import Robot
-from tests.reference.standing.steppers import jump, lunge, moved, squat
+from tests.reference.standing.steppers import bow, jump, lunge, moved, squat
 from tests.reference.walkers import ROOTS, walker
 
 
@@ -50,6 +50,23 @@ def test_planted_feet_keep_still_and_flat(retargeter: OptimizationRetargeter) ->
     assert np.ptp(point_TP3[..., :2], axis=0).max() < 0.01
 
 
+@pytest.mark.parametrize(("waist", "most_deg"), [(False, 0.1), (True, 1.5)])
+def test_the_root_may_do_what_the_waist_cannot(tmp_path: Path, waist: bool, most_deg: float) -> None:
+    """The chest is then turned in the world as the person's, and feet stand as they do otherwise; arms see nothing of it."""
+    found = {}
+    for follows in ("pelvis", "between", "chest"):
+        retargeter, motion = OptimizationRetargeter(walker(tmp_path, waist=waist, follows=follows)), bow(24, 12.0)
+        result = retargeter(motion)
+        score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+        assert score.slide_cm_s < 0.5 and score.sunk_max_cm < 0.05 and score.floating_max_cm < 1.5
+        assert score.parts_deg["knee"] < 8 and score.parts_deg["ankle"] < 8
+        names = retargeter.body_map.robot.joint_names
+        found[follows] = score.chest_deg, result.q[:, ["shoulder" in name or "elbow" in name for name in names]]
+    assert found["chest"][0] < most_deg and found["pelvis"][0] > 15
+    assert found["between"][0] == pytest.approx(found["pelvis"][0] / 2, abs=1.0)
+    torch.testing.assert_close(found["chest"][1], found["pelvis"][1], atol=1e-5, rtol=0)
+
+
 def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: OptimizationRetargeter) -> None:
     """The ankle of the hind leg ends where the person's does not: its toe is to lift the robot off neither foot."""
     motion = lunge()
@@ -61,14 +78,17 @@ def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: Optimizat
 
 
 def test_the_world_may_be_turned_and_its_floor_be_anywhere(retargeter: OptimizationRetargeter) -> None:
-    plain, other = retargeter(squat()), retargeter(moved(squat(), 2.0, (3.0, -1.2, 7.0)))
-    torch.testing.assert_close(other.q, plain.q, atol=2e-3, rtol=0)
-    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, 2.0]))
-    (place_T3, turn_T33), (other_T3, other_T33) = base(plain), base(other)
-    scale = Legs(retargeter.body_map).scale
-    expected_T3 = place_T3 @ turn_33.T + scale * torch.tensor([7.0, 3.0, 0.0])
-    torch.testing.assert_close(other_T3, expected_T3, atol=5e-3, rtol=0)
-    torch.testing.assert_close(other_T33, turn_33 @ turn_T33, atol=1e-4, rtol=0)
+    """From a cold start, whichever way the person looks."""
+    motion, scale = squat(24), Legs(retargeter.body_map).scale
+    plain = retargeter(motion)
+    for turn in (-2 * np.pi * np.random.default_rng(0).random(3)).tolist():
+        other = retargeter(moved(motion, turn, (3.0, -1.2, 7.0)))
+        torch.testing.assert_close(other.q, plain.q, atol=2e-3, rtol=0)
+        turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, turn]))
+        (place_T3, turn_T33), (other_T3, other_T33) = base(plain), base(other)
+        expected_T3 = place_T3 @ turn_33.T + scale * torch.tensor([7.0, 3.0, 0.0])
+        torch.testing.assert_close(other_T3, expected_T3, atol=5e-3, rtol=0)
+        torch.testing.assert_close(other_T33, turn_33 @ turn_T33, atol=1e-4, rtol=0)
 
 
 def test_a_pelvis_that_was_lost_for_a_frame_turns_no_base(retargeter: OptimizationRetargeter) -> None:
