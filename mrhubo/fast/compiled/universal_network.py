@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.lanes import LANES
 from mrhubo.fast.compiled.networks import P0, P1, P2, P3, P4, P5, Q1, Q2, Q3, Q4, SILU, TANH_END, activate
 from mrhubo.fast.compiled.tables import FIRST_C, INNER, size, whole
 from mrhubo.fast.compiled.tile import COLUMNS, ROWS, multiply, whole_tiles
@@ -98,13 +99,14 @@ class Room(NamedTuple):
 
 
 @njit(**INNER)
-def make_room(t, w, joints, outputs, several):
-    """Room for one robot's joints and so many hypotheses at a time."""
+def make_room(t, w, joints, outputs, several, times):
+    """Room for one robot's joints and so many hypotheses at a time, and for outputs of as often so many."""
     blocks, width, wide, full = size(t, FIRST_C) - 1, w.norm_52W.shape[2], w.mix_LWO.shape[2] + COLUMNS, 0
     for c in range(blocks):
         full = max(full, whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c))
     full += -full % COLUMNS
     tokens, rows = several * joints + 2 * ROWS, several * blocks + 2 * ROWS
+    answers = times * several * joints + 2 * ROWS
     far_CN = np.full((blocks, full), -_FAR, np.float32)
     for c in range(blocks):
         far_CN[c, : whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)] = _ZERO
@@ -113,7 +115,7 @@ def make_room(t, w, joints, outputs, several):
         np.zeros((rows, w.branch_FW.shape[1]), np.float32), np.zeros((tokens, w.joint_FW.shape[1]), np.float32),
         np.zeros((tokens, wide), np.float32), np.zeros((tokens, wide), np.float32),
         np.zeros((width, full), np.float32), np.zeros((tokens, w.heads * full), np.float32),
-        far_CN, np.zeros((1, wide), np.float32), np.zeros((tokens, outputs + COLUMNS), np.float32),
+        far_CN, np.zeros((1, wide), np.float32), np.zeros((answers, outputs + COLUMNS), np.float32),
     )  # fmt: skip
 
 
@@ -212,8 +214,9 @@ def _attend(t, w, room, several):
 
 
 @njit(**INNER)
-def answer(t, w, room, first, several):
-    """Outputs into `room.out_TO` of what stands in `room.feature_TF` and `room.seen_XF`, for so many hypotheses.
+def answer(t, w, room, first, several, z):
+    """Outputs into `room.out_TO` of what stands in `room.feature_TF` and `room.seen_XF`, for so many hypotheses, the
+    `z`th time that there are as many as lanes.
 
     Layer after layer in a loop, as each place that calls a function is compiled by itself.
     """
@@ -224,7 +227,7 @@ def answer(t, w, room, first, several):
     x_TW, one_TE, two_TE = room.x_TW, room.one_TE, room.two_TE
     for number in range(2 + 4 * 2 + 1):
         layer, kind = (number - 2) // 4, (number - 2) % 4
-        last, rows, inputs = number == 10, tokens, width
+        last, rows, inputs, out_at = number == 10, tokens, width, 0
         if number < 2:
             given, weight_IO, bias, out, inputs = room.feature_TF, w.joint_FW, w.joint_bias, one_TE, FEATURES
             if number == 0:
@@ -232,6 +235,7 @@ def answer(t, w, room, first, several):
                 rows, inputs = several * blocks, SEEN
         elif last:
             given, weight_IO, bias, out = two_TE, w.later_WO, w.later_bias, room.out_TO
+            out_at = z * LANES * joints
             if first:
                 weight_IO, bias = w.first_WO, w.first_bias
         elif kind == 0:
@@ -260,8 +264,9 @@ def answer(t, w, room, first, several):
         else:
             for i in range(rows):
                 for o in range(outputs):
-                    out[i, o] = bias[o]
-        multiply(given, 0, weight_IO, 0, out, 0, out.shape[1], out, 0, rows, outputs, inputs)
+                    out[out_at + i, o] = bias[o]
+        at = out_at * out.shape[1]
+        multiply(given, 0, weight_IO, 0, out, at, out.shape[1], out, at, rows, outputs, inputs)
         if number == 1 or (number >= 2 and not last and kind == 2):
             activate(SILU, one_TE, x_TW if number == 1 else two_TE, tokens, width if number == 1 else 2 * width)
         elif number >= 2 and not last and kind == 0:
