@@ -177,13 +177,15 @@ def place(t, work, q_N):
         if whole(t, ROTARY_A, a):
             sine, cosine = sine_cosine(angle)
             rest, slide = 1 - cosine, alike(angle, 0.0)
-        for i in range(3):
-            for j in range(3):
-                x = 9 * a + 3 * i + j
-                work.scratch_133[0, i, j] = (
-                    real(t, ORIGIN_A33, x) + sine * real(t, ACROSS_A33, x) + rest * real(t, TWICE_A33, x)
-                )
-        multiply(rotation_L33, parent, work.scratch_133, 0, rotation_L33, a + 1)
+        x = 9 * a
+        for j in range(3):
+            column = (
+                real(t, ORIGIN_A33, x + j) + sine * real(t, ACROSS_A33, x + j) + rest * real(t, TWICE_A33, x + j),
+                real(t, ORIGIN_A33, x + j + 3) + sine * real(t, ACROSS_A33, x + j + 3) + rest * real(t, TWICE_A33, x + j + 3),
+                real(t, ORIGIN_A33, x + j + 6) + sine * real(t, ACROSS_A33, x + j + 6) + rest * real(t, TWICE_A33, x + j + 6),
+            )
+            column = turn(rotation_L33, parent, column)
+            rotation_L33[a + 1, 0, j], rotation_L33[a + 1, 1, j], rotation_L33[a + 1, 2, j] = column
         moved = turn(rotation_L33, parent, vector(t, POSITION_A3, a))
         axis = turn(rotation_L33, a + 1, vector(t, AXIS_A3, a))
         put(work.axis_A3, a, axis)
@@ -193,10 +195,11 @@ def place(t, work, q_N):
             above[2] + moved[2] + slide * axis[2],
         ))  # fmt: skip
     for v in range(size(t, VIEW_BODY_V)):
-        for i in range(3):
-            for j in range(3):
-                work.scratch_133[0, i, j] = real(t, VIEW_V33, 9 * v + 3 * i + j)
-        multiply(rotation_L33, whole(t, VIEW_BODY_V, v), work.scratch_133, 0, work.view_V33, v)
+        for j in range(3):
+            x = 9 * v + j
+            column = (real(t, VIEW_V33, x), real(t, VIEW_V33, x + 3), real(t, VIEW_V33, x + 6))
+            column = turn(rotation_L33, whole(t, VIEW_BODY_V, v), column)
+            work.view_V33[v, 0, j], work.view_V33[v, 1, j], work.view_V33[v, 2, j] = column
     for d in range(size(t, LIMB_D)):
         end_body = whole(t, END_BODY_D, d)
         end = turn(rotation_L33, end_body, vector(t, END_D3, d))

@@ -88,7 +88,7 @@ class Room(NamedTuple):
     one_TE: np.ndarray
     two_TE: np.ndarray
     key_EN: np.ndarray
-    """Keys of a block's joints, side by side."""
+    """Keys of a block's joints side by side, block after block, of two hypotheses."""
     score_TE: np.ndarray
     """How much a joint takes from each of its block's, head by head; each head has as many columns as `key_EN`."""
     far_CN: np.ndarray
@@ -114,7 +114,7 @@ def make_room(t, w, joints, outputs, several, times):
         np.zeros((tokens, FEATURES), np.float32), np.zeros((rows, SEEN), np.float32),
         np.zeros((rows, w.branch_FW.shape[1]), np.float32), np.zeros((tokens, w.joint_FW.shape[1]), np.float32),
         np.zeros((tokens, wide), np.float32), np.zeros((tokens, wide), np.float32),
-        np.zeros((width, full), np.float32), np.zeros((tokens, w.heads * full), np.float32),
+        np.zeros((2 * blocks * width, full), np.float32), np.zeros((tokens, w.heads * full), np.float32),
         far_CN, np.zeros((1, wide), np.float32), np.zeros((answers, outputs + COLUMNS), np.float32),
     )  # fmt: skip
 
@@ -148,17 +148,24 @@ def exponential(x):
 
 
 @njit(**INNER)
-def _score(t, w, room, at, c):
-    """How well the joints of a block go together, from a token on, into `score_TE`; others' columns are far off."""
-    width, full = room.key_EN.shape
-    each, one_TE, key_EN, wide = width // w.heads, room.one_TE, room.key_EN, room.score_TE.shape[1]
-    scale, count = _ONE / np.float32(math.sqrt(each)), whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
-    for j in range(count):
+def _turn_keys(t, w, room, at, c, key_at):
+    """Keys of a block's joints, from a token on, side by side into rows of `key_EN`, with the scale of scores."""
+    width, one_TE, key_EN = w.norm_52W.shape[2], room.one_TE, room.key_EN
+    scale = _ONE / np.float32(math.sqrt(width // w.heads))
+    for j in range(whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)):
         for e in range(width):
-            key_EN[e, j] = one_TE[at + j, width + e] * scale
+            key_EN[key_at + e, j] = one_TE[at + j, width + e] * scale
+
+
+@njit(**INNER)
+def _score(t, w, room, at, c, key_at):
+    """How well the joints of a block go together, from a token on, into `score_TE`; others' columns are far off."""
+    width, full = w.norm_52W.shape[2], room.key_EN.shape[1]
+    each, one_TE, wide = width // w.heads, room.one_TE, room.score_TE.shape[1]
+    count = whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
     for h in range(w.heads):
         multiply(
-            one_TE, at * one_TE.shape[1] + h * each, key_EN, h * each * full, room.far_CN, c * full, 0,
+            one_TE, at * one_TE.shape[1] + h * each, room.key_EN, (key_at + h * each) * full, room.far_CN, c * full, 0,
             room.score_TE, at * wide + h * full, count, count, each,
         )  # fmt: skip
 
@@ -186,7 +193,7 @@ def _soften(w, room, tokens):
 @njit(**INNER)
 def _share(t, w, room, at, c):
     """What the joints of a block take from each other, from a token on, into `two_TE`."""
-    width, full = room.key_EN.shape
+    width, full = w.norm_52W.shape[2], room.key_EN.shape[1]
     each, one_TE, two_TE, wide = width // w.heads, room.one_TE, room.two_TE, room.score_TE.shape[1]
     count = whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
     for h in range(w.heads):  # what is beyond a head's numbers is the next one's, which writes over it
@@ -204,9 +211,17 @@ def _attend(t, w, room, several):
     """
     blocks = size(t, FIRST_C) - 1
     joints = whole(t, FIRST_C, blocks)
-    for k in range(several):
-        for c in range(blocks):
-            _score(t, w, room, k * joints + whole(t, FIRST_C, c), c)
+    # A processor waits where it reads at once several numbers that it has just written one by one; so keys of the next
+    # hypothesis are turned before the present one's are read.
+    width = w.norm_52W.shape[2]
+    for k in range(several + 1):
+        if k < several:
+            for c in range(blocks):
+                _turn_keys(t, w, room, k * joints + whole(t, FIRST_C, c), c, (k % 2 * blocks + c) * width)
+        if k > 0:
+            for c in range(blocks):
+                key_at = ((k - 1) % 2 * blocks + c) * width
+                _score(t, w, room, (k - 1) * joints + whole(t, FIRST_C, c), c, key_at)
     _soften(w, room, several * joints)
     for k in range(several):
         for c in range(blocks):
