@@ -278,9 +278,14 @@ class CompiledEngine:
         self, polish: int, avoid: bool, judge: bool, q_BN: np.ndarray, target_BD3: np.ndarray, shake_BX: np.ndarray,
         into: Answers,
     ) -> None:  # fmt: skip
+        together = polish > 0 and len(q_BN) > FEW
+        avoid = avoid and polish > 0
+
         def part(rows: slice) -> None:
+            if together:
+                self._kernels.polish(self._tables, polish, target_BD3[rows], q_BN[rows])
             self._kernels.retarget(
-                self._tables, self._activation, polish, avoid, judge, target_BD3[rows], q_BN[rows], shake_BX[rows],
+                self._tables, self._activation, 0 if together else polish, avoid, judge, target_BD3[rows], q_BN[rows], shake_BX[rows],
                 into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],
             )  # fmt: skip
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import avoidance, collision, judging, networks, steps, tables
+from mrhubo.fast.compiled import avoidance, collision, judging, networks, polishing, steps, tables
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import robot as robots
 from mrhubo.fast.kept import checksum, drop_others
@@ -30,6 +30,7 @@ class Kernels(NamedTuple):
     follow: Callable[..., Any]
     avoid: Callable[..., Any]
     retarget: Callable[..., Any]
+    polish: Callable[..., Any]
 
 
 CHECK, DIRECT, ANSWER = 1, 2, 4
@@ -123,10 +124,13 @@ def make_kernels() -> Kernels:
             count = min(at_once, frames - first)
             for k in range(count):
                 b, free = first + k, False
-                if polish:
+                if polish or avoid:
                     for n in range(joints):
                         q_N[n] = q_BN[b, n]
-                    steps.polish(t, work, target_BD3, b, q_N, polish)
+                    if polish:
+                        steps.polish(t, work, target_BD3, b, q_N, polish)
+                    else:
+                        steps.aim(t, work, target_BD3, b)
                     if avoid:
                         free = avoidance.avoid(t, work, q_N)
                     for n in range(joints):
@@ -157,5 +161,11 @@ def make_kernels() -> Kernels:
                     trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
                     phi_B[b] = max(phi_B[b], phi)
 
+    @njit(cache=True, **tables.COMPILED)
+    def polish(t, steps, target_BD3, q_BN):
+        """Makes steps from `q_BN` of many frames, where the answers will stand."""
+        _ = version
+        polishing.polish_all(t, target_BD3, q_BN, steps)
+
     drop_others(look.stats.cache_path)
-    return Kernels(look, follow, avoid, retarget)
+    return Kernels(look, follow, avoid, retarget, polish)

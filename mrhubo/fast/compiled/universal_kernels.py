@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import lanes, robot, steps, tables, universal
+from mrhubo.fast.compiled import lanes, polishing, robot, tables, universal
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -29,17 +29,14 @@ def make_universal_kernel() -> Callable[..., Any]:
         work, tried = robot.make_lane_work(t), universal.make_tried(t, u)
         room = universal.make_layers(t, u, w)
         target_1D3 = lanes.zeros(lanes.filled(0.0), (1, directions, 3))
-        at, frames = 0, len(target_BD3)
+        at, frames, frame_L = 0, len(target_BD3), np.empty(lanes.LANES, np.intp)
         while at < frames:
             count, together = min(lanes.LANES, frames - at), 1
             while together < count:
                 together *= 2
             for lane in range(lanes.LANES):
-                b = at + min(lane % together, count - 1)
-                for d in range(directions):
-                    for i in range(3):
-                        target_1D3.array[0, d, i, lane] = target_BD3[b, d, i]
-            steps.aim(t, work, target_1D3, 0)
+                frame_L[lane] = at + min(lane % together, count - 1)
+            polishing.aim_at(t, work, target_1D3, target_BD3, frame_L)
             universal.unroll(t, u, w, work, tried, room, together)
             for n in range(joints):
                 low, high = np.float32(tables.real(t, tables.LOWER_N, n)), np.float32(tables.real(t, tables.UPPER_N, n))
