@@ -270,6 +270,7 @@ class CompiledEngine:
             self.giving_way.problem.directions(nobody_0N)
             self.giving_way.close(nobody_0N)
             self.avoid(nobody_0N, nothing_0D3)
+            self._kernels.polish(self._tables, 0, nothing_0D3, nobody_0N.astype(np.float32))
             kernels = [*self._kernels, *self._motion_kernels]
             kernels += [] if self._unroll is None else [self._universal_kernel]
             note_kept((kernel.stats.cache_path for kernel in kernels), self._unroll is not None)
