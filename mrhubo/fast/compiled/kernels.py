@@ -59,8 +59,7 @@ def make_kernels() -> Kernels:
         nets = tables.whole(t, tables.COUNT_6, tables.STAGES)
         frames, widest = len(local_BJ33), networks.widest(t, nets)
         at_once = min(AT_ONCE, frames) if what & ANSWER else 1
-        one_BE = np.empty((at_once, widest), np.float32)
-        two_BE, three_BE = np.empty_like(one_BE), np.empty_like(one_BE)
+        one_BE, two_BE, three_BE = networks.make_rooms(at_once, widest)
         link_BM = np.empty((at_once, 6 * out_BN.shape[1]), np.float32)
         feature_BF = np.empty((at_once, tables.size(t, tables.CENTER_F)), np.float32)
         unit_I3 = np.empty((tables.size(t, tables.INPUT_I), 3))
@@ -113,8 +112,7 @@ def make_kernels() -> Kernels:
         frames, turned = len(target_BD3), tables.size(t, tables.PARENT_T)
         nets = tables.whole(t, tables.COUNT_6, tables.STAGES) + 2
         at_once = min(FEWER_AT_ONCE, frames) if judge else 1
-        one_BE = np.empty((at_once, networks.widest(t, nets) if judge else 1), np.float32)
-        two_BE, three_BE = np.empty_like(one_BE), np.empty_like(one_BE)
+        one_BE, two_BE, three_BE = networks.make_rooms(at_once, networks.widest(t, nets) if judge else 1)
         turn_T33, local_BT33 = np.empty((turned + 1, 3, 3)), np.empty((at_once, turned, 3, 3))
         between_333, free_B = np.empty((3, 3, 3)), np.empty(at_once, np.bool_)
         angle_D, error_T, excess_T = np.empty(target_BD3.shape[1]), np.empty(turned), np.empty(turned)

@@ -181,8 +181,12 @@ def place(t, work, q_N):
         for j in range(3):
             column = (
                 real(t, ORIGIN_A33, x + j) + sine * real(t, ACROSS_A33, x + j) + rest * real(t, TWICE_A33, x + j),
-                real(t, ORIGIN_A33, x + j + 3) + sine * real(t, ACROSS_A33, x + j + 3) + rest * real(t, TWICE_A33, x + j + 3),
-                real(t, ORIGIN_A33, x + j + 6) + sine * real(t, ACROSS_A33, x + j + 6) + rest * real(t, TWICE_A33, x + j + 6),
+                real(t, ORIGIN_A33, x + j + 3)
+                + sine * real(t, ACROSS_A33, x + j + 3)
+                + rest * real(t, TWICE_A33, x + j + 3),
+                real(t, ORIGIN_A33, x + j + 6)
+                + sine * real(t, ACROSS_A33, x + j + 6)
+                + rest * real(t, TWICE_A33, x + j + 6),
             )
             column = turn(rotation_L33, parent, column)
             rotation_L33[a + 1, 0, j], rotation_L33[a + 1, 1, j], rotation_L33[a + 1, 2, j] = column

@@ -17,8 +17,8 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.lanes import LANES
 from mrhubo.fast.compiled.networks import P0, P1, P2, P3, P4, P5, Q1, Q2, Q3, Q4, SILU, TANH_END, activate
-from mrhubo.fast.compiled.tables import FIRST_C, INNER, size, whole
-from mrhubo.fast.compiled.tile import COLUMNS, ROWS, multiply, whole_tiles
+from mrhubo.fast.compiled.tables import COLUMNS, FIRST_C, INNER, size, whole
+from mrhubo.fast.compiled.tile import ROWS, multiply, whole_tiles
 from mrhubo.fast.sections import Universal
 
 FEATURES, SEEN, OUTPUTS = 44, 37, 4
