@@ -286,8 +286,9 @@ class CompiledEngine:
             if together:
                 self._kernels.polish(self._tables, polish, target_BD3[rows], q_BN[rows])
             self._kernels.retarget(
-                self._tables, self._activation, 0 if together else polish, avoid, judge, target_BD3[rows], q_BN[rows], shake_BX[rows],
-                into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],
+                self._tables, self._activation, 0 if together else polish, avoid, judge, target_BD3[rows],
+                q_BN[rows], shake_BX[rows], into.error_BM[rows], into.phi_B[rows], into.collision_B[rows],
+                into.trust_BX[rows],
             )  # fmt: skip
 
         self._shared(len(q_BN), part)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit  # pyright: ignore[reportMissingImports]
-from numba.extending import overload  # pyright: ignore[reportMissingImports]
+from llvmlite import ir  # pyright: ignore[reportMissingImports]
+from numba import njit, types  # pyright: ignore[reportMissingImports]
+from numba.extending import intrinsic, overload  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.lanes import Lanes, choose, parts, quadrant, rounded
+from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, Truths, choose, nearest
 from mrhubo.fast.compiled.tables import INNER
 
 # Minimax polynomials up to pi/4, of FreeBSD's msun (k_sin.c, k_cos.c).
@@ -17,6 +18,61 @@ _S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969
 _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
 _HALF_PI, _LN2 = math.pi / 2, math.log(2.0)
+
+
+_WORDS = ir.VectorType(ir.IntType(64), LANES)
+
+
+@njit(**INNER)
+def _rounded(a):
+    """The nearest whole number, and two to its power, which is between -1022 and 1023."""
+    found = nearest(a)
+    return found, _power(found)
+
+
+@intrinsic
+def _power(typing_context: Any, a: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        place = builder.add(_whole(builder, values[0]), _constant(_WORDS, 1023))
+        return builder.bitcast(builder.shl(place, _constant(_WORDS, 52)), NUMBERS)
+
+    return Lanes(a), generate
+
+
+def _whole(builder: Any, value: Any) -> Any:
+    return builder.sext(builder.fptosi(value, ir.VectorType(ir.IntType(32), LANES)), _WORDS)
+
+
+@intrinsic
+def _quadrant(typing_context: Any, a: Any) -> Any:
+    """Whether a whole number is odd, and whether its second binary digit is 1."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        bits, none = _whole(builder, values[0]), _constant(_WORDS, 0)
+        found = [builder.icmp_unsigned("!=", builder.and_(bits, _constant(_WORDS, k)), none) for k in (1, 2)]
+        return context.make_tuple(builder, signature.return_type, found)
+
+    return types.UniTuple(Truths, 2)(a), generate
+
+
+@intrinsic
+def _parts(typing_context: Any, a: Any) -> Any:
+    """Mantissa, from 1 to 2, and exponent of a positive number."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        bits = builder.bitcast(values[0], _WORDS)
+        small = builder.and_(bits, _constant(_WORDS, 2**52 - 1))
+        mantissa = builder.bitcast(builder.or_(small, _constant(_WORDS, 1023 << 52)), NUMBERS)
+        # A whole number below 2^52 stands in the last binary digits of 2^52 and itself.
+        power = builder.or_(builder.lshr(bits, _constant(_WORDS, 52)), _constant(_WORDS, 1075 << 52))
+        exponent = builder.fsub(builder.bitcast(power, NUMBERS), _constant(NUMBERS, 2.0**52 + 1023))
+        return context.make_tuple(builder, signature.return_type, (mantissa, exponent))
+
+    return types.UniTuple(Lanes, 2)(a), generate
+
+
+def _constant(vector: Any, value: float) -> Any:
+    return ir.Constant(vector, [value] * LANES)
 
 
 def sine_cosine(x: Any) -> Any:
@@ -30,8 +86,8 @@ def _sine_cosine(x):
         return lambda x: (math.sin(x), math.cos(x))
 
     def of_lanes(x):
-        turns, _ = rounded(x * (1 / _HALF_PI))
-        odd, back = quadrant(turns)
+        turns, _ = _rounded(x * (1 / _HALF_PI))
+        odd, back = _quadrant(turns)
         r = x - turns * _HALF_PI
         s = r * r
         sine = r + r * s * (_S1 + s * (_S2 + s * (_S3 + s * (_S4 + s * (_S5 + s * _S6)))))
@@ -46,7 +102,7 @@ def _sine_cosine(x):
 def exponential(x):
     """e to the power of lanes, from -700 to 700."""
     turns = x * (1 / _LN2)
-    whole, power = rounded(turns)
+    whole, power = _rounded(turns)
     r = x - whole * _LN2
     high = 1 / 5040 + r * (1 / 40320 + r * (1 / 362880 + r * (1 / 3628800 + r * (1 / 39916800))))
     found = 1 + r * (1 + r * (1 / 2 + r * (1 / 6 + r * (1 / 24 + r * (1 / 120 + r * (1 / 720 + r * high))))))
@@ -56,7 +112,7 @@ def exponential(x):
 @njit(**INNER)
 def logarithm(x):
     """The natural logarithm of positive lanes."""
-    mantissa, exponent = parts(x)
+    mantissa, exponent = _parts(x)
     large = mantissa > 1.4142135623730951
     mantissa, exponent = choose(large, mantissa * 0.5, mantissa), choose(large, exponent + 1, exponent)
     r = (mantissa - 1) / (mantissa + 1)

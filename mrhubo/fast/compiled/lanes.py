@@ -2,8 +2,8 @@
 
 numba makes good use of a processor's vectors in short loops over arrays alone; kinematics and steps are neither. So a
 value of `Lanes` holds one number of each of eight frames, and adds, multiplies and compares as a number does: functions
-that know nothing of it work on eight frames, where they are given such values. LLVM cuts eight numbers to what the
-processor has. `LaneArray` is an array of such values, whose places are not negative.
+that know nothing of it work on eight frames, where they are given such values, and arrays of them
+(`mrhubo.fast.compiled.lane_arrays`). LLVM cuts eight numbers to what the processor has.
 
 What depends on a number, which may be true in one frame and false in another, is written as `choose(condition, a, b)`;
 `some(condition)` tells whether it is true anywhere. Both take a single number's condition too.
@@ -16,9 +16,8 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import ir  # pyright: ignore[reportMissingImports]
-from numba import njit, types  # pyright: ignore[reportMissingImports]
+from numba import types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
 from numba.core.typeconv import Conversion  # pyright: ignore[reportMissingImports]
 from numba.extending import (  # pyright: ignore[reportMissingImports]
@@ -26,16 +25,12 @@ from numba.extending import (  # pyright: ignore[reportMissingImports]
     lower_cast,
     models,
     overload,
-    overload_attribute,
     register_model,
 )
 
-from mrhubo.fast.compiled.tables import INNER
-
 LANES = 8
-_NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
+NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 _TRUTHS = ir.VectorType(ir.IntType(1), LANES)
-_WORDS = ir.VectorType(ir.IntType(64), LANES)
 _FAST = ("reassoc", "contract", "nsz")
 """As `COMPILED` has it for single numbers."""
 
@@ -56,20 +51,13 @@ class _TruthsType(types.Type):
         super().__init__(name="Truths")
 
 
-class _LaneArrayType(types.Type):
-    def __init__(self, axes: int) -> None:
-        self.axes = axes
-        self.array = types.Array(types.float64, axes + 1, "C")
-        super().__init__(name=f"LaneArray({axes})")
-
-
 Lanes, Truths = _LanesType(), _TruthsType()
 
 
 @register_model(_LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _NUMBERS)
+        super().__init__(manager, kind, NUMBERS)
 
 
 @register_model(_TruthsType)
@@ -78,13 +66,7 @@ class _TruthsModel(models.PrimitiveModel):
         super().__init__(manager, kind, _TRUTHS)
 
 
-@register_model(_LaneArrayType)
-class _LaneArrayModel(models.StructModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, [("array", kind.array)])
-
-
-def _everywhere(builder: Any, value: Any, vector: Any) -> Any:
+def everywhere(builder: Any, value: Any, vector: Any) -> Any:
     """One number in all lanes."""
     unset = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(unset, value, ir.Constant(ir.IntType(32), 0))
@@ -96,17 +78,17 @@ def _is_number(kind: Any) -> bool:
     return isinstance(kind, types.Float | types.Integer)
 
 
-def _spread(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+def spread(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """Lanes of lanes or of a number."""
     if kind == Lanes:
         return value
-    return _everywhere(builder, context.cast(builder, value, kind, types.float64), _NUMBERS)
+    return everywhere(builder, context.cast(builder, value, kind, types.float64), NUMBERS)
 
 
 @lower_cast(types.Float, _LanesType)
 @lower_cast(types.Integer, _LanesType)
 def _cast(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
-    return _spread(context, builder, given, value)
+    return spread(context, builder, given, value)
 
 
 def _elementwise(build: Callable[..., Any], result: Any) -> Any:
@@ -119,7 +101,7 @@ def _elementwise(build: Callable[..., Any], result: Any) -> Any:
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             given = zip(signature.args, values, strict=True)
-            return build(builder, *(_spread(context, builder, kind, value) for kind, value in given))
+            return build(builder, *(spread(context, builder, kind, value) for kind, value in given))
 
         return result(a, b), generate
 
@@ -159,7 +141,7 @@ def _of_one(name: str) -> Any:
     @intrinsic
     def apply(typing_context: Any, a: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            kind = ir.FunctionType(_NUMBERS, [_NUMBERS])
+            kind = ir.FunctionType(NUMBERS, [NUMBERS])
             function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64")
             return builder.call(function, values)
 
@@ -168,6 +150,8 @@ def _of_one(name: str) -> Any:
     return apply
 
 
+nearest = _of_one("rint")
+"""The nearest whole number."""
 _root, _size = _of_one("sqrt"), _of_one("fabs")
 
 
@@ -191,7 +175,7 @@ def _of_truths(name: str) -> Any:
     def apply(typing_context: Any, a: Any, b: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             both = [
-                value if kind == Truths else _everywhere(builder, value, _TRUTHS)
+                value if kind == Truths else everywhere(builder, value, _TRUTHS)
                 for kind, value in zip(signature.args, values, strict=True)
             ]
             return getattr(builder, name)(*both)
@@ -217,7 +201,7 @@ def _or(a, b):
 @intrinsic
 def _chosen(typing_context: Any, condition: Any, a: Any, b: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        one, two = (_spread(context, builder, signature.args[k], values[k]) for k in (1, 2))
+        one, two = (spread(context, builder, signature.args[k], values[k]) for k in (1, 2))
         return builder.select(values[0], one, two)
 
     return Lanes(condition, a, b), generate
@@ -269,7 +253,7 @@ def filled(typing_context: Any, number: Any) -> Any:
     """A number in all lanes."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return _spread(context, builder, signature.args[0], values[0])
+        return spread(context, builder, signature.args[0], values[0])
 
     return Lanes(number), generate
 
@@ -290,184 +274,3 @@ def _not(typing_context: Any, condition: Any) -> Any:
 @overload(no)
 def _no(condition):
     return (lambda condition: _not(condition)) if condition == Truths else (lambda condition: not condition)
-
-
-@intrinsic
-def side_by_side(typing_context: Any, array: Any) -> Any:
-    """The `LaneArray` of an array of float64 whose last axis has as many numbers as there are lanes."""
-    kind = _LaneArrayType(array.ndim - 1)
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        made = cgutils.create_struct_proxy(kind)(context, builder)
-        made.array = values[0]
-        context.nrt.incref(builder, kind.array, values[0])
-        return made._getvalue()
-
-    return (kind(array), generate) if array == kind.array else None
-
-
-def zeros(kind: Any, shape: Any) -> Any:
-    """An array, or a `LaneArray` if the kind is that of lanes."""
-    raise NotImplementedError("compiled alone")
-
-
-@overload(zeros)
-def _zeros(kind, shape):
-    if kind == Lanes:
-        return lambda kind, shape: side_by_side(np.zeros((*shape, LANES)))
-    return lambda kind, shape: np.zeros(shape)
-
-
-@intrinsic
-def _inside(typing_context: Any, lanes: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        array = cgutils.create_struct_proxy(signature.args[0])(context, builder, values[0]).array
-        context.nrt.incref(builder, signature.return_type, array)
-        return array
-
-    return (lanes.array(lanes), generate) if isinstance(lanes, _LaneArrayType) else None
-
-
-@overload_attribute(_LaneArrayType, "array")
-def _array_of(lanes):
-    """The array itself, with lanes last."""
-    return lambda lanes: _inside(lanes)
-
-
-@overload_attribute(_LaneArrayType, "shape")
-def _shape_of(lanes):
-    """Its axes, with lanes last."""
-    return lambda lanes: _inside(lanes).shape
-
-
-@overload(len)
-def _length(lanes):
-    return (lambda lanes: len(_inside(lanes))) if isinstance(lanes, _LaneArrayType) else None
-
-
-def _address(context: Any, builder: Any, kind: Any, value: Any, place_kind: Any, place: Any) -> Any:
-    array = cgutils.create_struct_proxy(kind)(context, builder, value).array
-    array = context.make_array(kind.array)(context, builder, array)
-    places = cgutils.unpack_tuple(builder, place) if isinstance(place_kind, types.BaseTuple) else [place]
-    kinds = list(place_kind) if isinstance(place_kind, types.BaseTuple) else [place_kind]
-    at, sizes = None, cgutils.unpack_tuple(builder, array.shape)
-    for axis, (own_kind, own) in enumerate(zip(kinds, places, strict=True)):
-        own = context.cast(builder, own, own_kind, types.intp)
-        at = own if at is None else builder.add(builder.mul(at, sizes[axis], flags=("nsw",)), own, flags=("nsw",))
-    at = builder.mul(at, ir.Constant(at.type, LANES), flags=("nsw",))
-    return builder.bitcast(builder.gep(array.data, [at], inbounds=True), _NUMBERS.as_pointer())
-
-
-def _fits(lanes: Any, place: Any) -> bool:
-    if not isinstance(lanes, _LaneArrayType):
-        return False
-    axes = len(place) if isinstance(place, types.BaseTuple) else 1
-    return axes == lanes.axes
-
-
-@intrinsic
-def _get(typing_context: Any, lanes: Any, place: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        address = _address(context, builder, signature.args[0], values[0], signature.args[1], values[1])
-        return builder.load(address, align=8)
-
-    return Lanes(lanes, place), generate
-
-
-@intrinsic
-def _put(typing_context: Any, lanes: Any, place: Any, number: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        address = _address(context, builder, signature.args[0], values[0], signature.args[1], values[1])
-        builder.store(_spread(context, builder, signature.args[2], values[2]), address, align=8)
-        return context.get_dummy_value()
-
-    return types.void(lanes, place, number), generate
-
-
-@overload(operator.getitem)
-def _getitem(lanes, place):
-    return (lambda lanes, place: _get(lanes, place)) if _fits(lanes, place) else None
-
-
-@overload(operator.setitem)
-def _setitem(lanes, place, number):
-    return (lambda lanes, place, number: _put(lanes, place, number)) if _fits(lanes, place) else None
-
-
-_nearest = _of_one("rint")
-
-
-@njit(**INNER)
-def rounded(a):
-    """The nearest whole number, and two to its power, which is between -1022 and 1023."""
-    nearest = _nearest(a)
-    return nearest, _power(nearest)
-
-
-@intrinsic
-def _power(typing_context: Any, a: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        place = builder.add(_whole(builder, values[0]), _constant(_WORDS, 1023))
-        return builder.bitcast(builder.shl(place, _constant(_WORDS, 52)), _NUMBERS)
-
-    return Lanes(a), generate
-
-
-def _whole(builder: Any, value: Any) -> Any:
-    return builder.sext(builder.fptosi(value, ir.VectorType(ir.IntType(32), LANES)), _WORDS)
-
-
-@intrinsic
-def quadrant(typing_context: Any, a: Any) -> Any:
-    """Whether a whole number is odd, and whether its second binary digit is 1."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        bits, none = _whole(builder, values[0]), _constant(_WORDS, 0)
-        found = [builder.icmp_unsigned("!=", builder.and_(bits, _constant(_WORDS, k)), none) for k in (1, 2)]
-        return context.make_tuple(builder, signature.return_type, found)
-
-    return types.UniTuple(Truths, 2)(a), generate
-
-
-@intrinsic
-def parts(typing_context: Any, a: Any) -> Any:
-    """Mantissa, from 1 to 2, and exponent of a positive number."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        bits = builder.bitcast(values[0], _WORDS)
-        small = builder.and_(bits, _constant(_WORDS, 2**52 - 1))
-        mantissa = builder.bitcast(builder.or_(small, _constant(_WORDS, 1023 << 52)), _NUMBERS)
-        # A whole number below 2^52 stands in the last binary digits of 2^52 and itself.
-        power = builder.or_(builder.lshr(bits, _constant(_WORDS, 52)), _constant(_WORDS, 1075 << 52))
-        exponent = builder.fsub(builder.bitcast(power, _NUMBERS), _constant(_NUMBERS, 2.0**52 + 1023))
-        return context.make_tuple(builder, signature.return_type, (mantissa, exponent))
-
-    return types.UniTuple(Lanes, 2)(a), generate
-
-
-def _constant(vector: Any, value: float) -> Any:
-    return ir.Constant(vector, [value] * LANES)
-
-
-@intrinsic
-def scatter(typing_context: Any, lanes: Any, array: Any, row: Any, step: Any, column: Any) -> Any:
-    """Lanes into a column of a float32 array (rows, columns): the first into a row, the next so many rows below."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        single = builder.fptrunc(values[0], ir.VectorType(ir.FloatType(), LANES))
-        for lane, address in enumerate(_column(context, builder, signature.args[1], *values[1:])):
-            builder.store(builder.extract_element(single, ir.Constant(ir.IntType(32), lane)), address)
-        return context.get_dummy_value()
-
-    kinds = (Lanes, types.Array(types.float32, 2, "C"), types.intp, types.intp, types.intp)
-    return types.void(*kinds), generate
-
-
-def _column(context: Any, builder: Any, kind: Any, value: Any, row: Any, step: Any, column: Any) -> list[Any]:
-    """Addresses in a column."""
-    array = context.make_array(kind)(context, builder, value)
-    width = cgutils.unpack_tuple(builder, array.shape)[1]
-    found, jump = [builder.add(builder.mul(row, width), column)], builder.mul(step, width)
-    for _ in range(LANES - 1):
-        found.append(builder.add(found[-1], jump))
-    return [builder.gep(array.data, [place], inbounds=True) for place in found]

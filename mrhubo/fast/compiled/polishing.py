@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.lanes import LANES, filled, zeros
+from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lanes import LANES, filled
 from mrhubo.fast.compiled.robot import make_lane_work, make_work
 from mrhubo.fast.compiled.steps import aim, minimise, near
 from mrhubo.fast.compiled.tables import (

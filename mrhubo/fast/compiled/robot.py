@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.functions import sine_cosine
-from mrhubo.fast.compiled.human import add, cross, dot, identity, multiply, put, put3, row, row3, turn
-from mrhubo.fast.compiled.lanes import alike, filled, zeros
+from mrhubo.fast.compiled.human import add, cross, dot, identity, put, put3, row, row3, turn
+from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lanes import alike, filled
 from mrhubo.fast.compiled.tables import (
     ACROSS_A33,
     AXIS_A3,
@@ -60,7 +61,6 @@ class Work(NamedTuple):
     length_D: np.ndarray
     view_V33: np.ndarray
     jacobian_DN3: np.ndarray
-    scratch_133: np.ndarray
     goal_D3: np.ndarray
     """The human's directions, length 1."""
     weight_D: np.ndarray
@@ -133,7 +133,6 @@ def _make_work(t, kind):
         zeros(kind, (directions,)),
         zeros(kind, (size(t, VIEW_BODY_V), 3, 3)),
         zeros(kind, (directions, joints, 3)),
-        zeros(kind, (1, 3, 3)),
         zeros(kind, (directions, 3)),
         zeros(kind, (directions,)),
         zeros(kind, (blocks,)),
@@ -167,6 +166,12 @@ def _make_work(t, kind):
 
 
 @njit(**INNER)
+def _column(t, key, place):
+    """Three numbers of a table of float64 that stand below each other in a matrix (3, 3)."""
+    return real(t, key, place), real(t, key, place + 3), real(t, key, place + 6)
+
+
+@njit(**INNER)
 def place(t, work, q_N):
     """Bodies and directions at joint angles [rad], base frame."""
     rotation_L33, position_L3 = work.rotation_L33, work.position_L3
@@ -177,18 +182,10 @@ def place(t, work, q_N):
         if whole(t, ROTARY_A, a):
             sine, cosine = sine_cosine(angle)
             rest, slide = 1 - cosine, alike(angle, 0.0)
-        x = 9 * a
         for j in range(3):
-            column = (
-                real(t, ORIGIN_A33, x + j) + sine * real(t, ACROSS_A33, x + j) + rest * real(t, TWICE_A33, x + j),
-                real(t, ORIGIN_A33, x + j + 3)
-                + sine * real(t, ACROSS_A33, x + j + 3)
-                + rest * real(t, TWICE_A33, x + j + 3),
-                real(t, ORIGIN_A33, x + j + 6)
-                + sine * real(t, ACROSS_A33, x + j + 6)
-                + rest * real(t, TWICE_A33, x + j + 6),
-            )
-            column = turn(rotation_L33, parent, column)
+            x = 9 * a + j
+            column = add(_column(t, ORIGIN_A33, x), _column(t, ACROSS_A33, x), sine)
+            column = turn(rotation_L33, parent, add(column, _column(t, TWICE_A33, x), rest))
             rotation_L33[a + 1, 0, j], rotation_L33[a + 1, 1, j], rotation_L33[a + 1, 2, j] = column
         moved = turn(rotation_L33, parent, vector(t, POSITION_A3, a))
         axis = turn(rotation_L33, a + 1, vector(t, AXIS_A3, a))
@@ -200,9 +197,7 @@ def place(t, work, q_N):
         ))  # fmt: skip
     for v in range(size(t, VIEW_BODY_V)):
         for j in range(3):
-            x = 9 * v + j
-            column = (real(t, VIEW_V33, x), real(t, VIEW_V33, x + 3), real(t, VIEW_V33, x + 6))
-            column = turn(rotation_L33, whole(t, VIEW_BODY_V, v), column)
+            column = turn(rotation_L33, whole(t, VIEW_BODY_V, v), _column(t, VIEW_V33, 9 * v + j))
             work.view_V33[v, 0, j], work.view_V33[v, 1, j], work.view_V33[v, 2, j] = column
     for d in range(size(t, LIMB_D)):
         end_body = whole(t, END_BODY_D, d)

@@ -48,9 +48,9 @@ and its radius. clear_Y: distance [m] that a pair is to keep. Pairs stand group 
 (`mrhubo.fast.plain.broad_phase`). reach_Z: how far [m] a group's capsule and ball must be apart so that no pair is
 nearer than that. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
 network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in `number`, and 1 where
-the weights are among `shorts`, whose scales stand after the biases then; turned: the same for many frames at a time, as `_turned` lays a layer out, which begins
-where turned_G says, -1: not there; column: all columns; count_6: networks of the
-first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
+the weights are among `shorts`, whose scales stand after the biases then; turned: the same for many frames at a time,
+as `_turned` lays a layer out, which begins where turned_G says, -1: not there; column: all columns; count_6: networks
+of the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
 distance. pool_CUX: the pool's directions, block after block. block_H: the block whose joints move a point of a sole,
 -1: none does. What is of legs is empty for robots without feet.
 """

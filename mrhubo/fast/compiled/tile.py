@@ -17,7 +17,8 @@ from numba.extending import intrinsic  # pyright: ignore[reportMissingImports]
 from mrhubo.fast.compiled.tables import COLUMNS, INNER
 
 ROWS = 4
-"""Of a tile, beside `COLUMNS`. Arrays have room for whole ones: what is beyond a product's own rows and columns is written over."""
+"""Of a tile, and `COLUMNS`. Arrays have room for whole ones: what is beyond a product's own rows and columns is
+written over."""
 _ROUNDED_ONCE = ("contract",)
 """A product and its sum, where the processor can."""
 

@@ -12,7 +12,8 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import add, dot, row, turn_back
-from mrhubo.fast.compiled.lanes import LANES, alike, choose, filled, zeros
+from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lanes import LANES, alike, choose, filled
 from mrhubo.fast.compiled.robot import place
 from mrhubo.fast.compiled.steps import minimise
 from mrhubo.fast.compiled.tables import (

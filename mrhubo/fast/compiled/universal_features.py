@@ -14,7 +14,8 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.functions import asinh, exponential, logarithm, tanh
 from mrhubo.fast.compiled.human import add, dot, row, row3, turn_back
-from mrhubo.fast.compiled.lanes import LANES, alike, choose, scatter
+from mrhubo.fast.compiled.lane_arrays import scatter
+from mrhubo.fast.compiled.lanes import LANES, alike, choose
 from mrhubo.fast.compiled.tables import (
     FIRST_C,
     INNER,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import lanes, polishing, robot, tables, universal
+from mrhubo.fast.compiled import lane_arrays, lanes, polishing, robot, tables, universal
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -28,7 +28,7 @@ def make_universal_kernel() -> Callable[..., Any]:
         joints, directions = out_BN.shape[1], target_BD3.shape[1]
         work, tried = robot.make_lane_work(t), universal.make_tried(t, u)
         room = universal.make_layers(t, u, w)
-        target_1D3 = lanes.zeros(lanes.filled(0.0), (1, directions, 3))
+        target_1D3 = lane_arrays.zeros(lanes.filled(0.0), (1, directions, 3))
         at, frames, frame_L = 0, len(target_BD3), np.empty(lanes.LANES, np.intp)
         while at < frames:
             count, together = min(lanes.LANES, frames - at), 1
