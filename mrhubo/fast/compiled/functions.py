@@ -7,9 +7,9 @@ from typing import Any
 
 from llvmlite import ir  # pyright: ignore[reportMissingImports]
 from numba import njit, types  # pyright: ignore[reportMissingImports]
-from numba.extending import intrinsic, overload  # pyright: ignore[reportMissingImports]
+from numba.extending import overload  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, Truths, choose, nearest
+from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, Truths, choose, in_llvm, nearest
 from mrhubo.fast.compiled.tables import INNER
 
 # Minimax polynomials up to pi/4, of FreeBSD's msun (k_sin.c, k_cos.c).
@@ -30,7 +30,7 @@ def _rounded(a):
     return found, _power(found)
 
 
-@intrinsic
+@in_llvm
 def _power(typing_context: Any, a: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         place = builder.add(_whole(builder, values[0]), _constant(_WORDS, 1023))
@@ -43,7 +43,7 @@ def _whole(builder: Any, value: Any) -> Any:
     return builder.sext(builder.fptosi(value, ir.VectorType(ir.IntType(32), LANES)), _WORDS)
 
 
-@intrinsic
+@in_llvm
 def _quadrant(typing_context: Any, a: Any) -> Any:
     """Whether a whole number is odd, and whether its second binary digit is 1."""
 
@@ -55,7 +55,7 @@ def _quadrant(typing_context: Any, a: Any) -> Any:
     return types.UniTuple(Truths, 2)(a), generate
 
 
-@intrinsic
+@in_llvm
 def _parts(typing_context: Any, a: Any) -> Any:
     """Mantissa, from 1 to 2, and exponent of a positive number."""
 

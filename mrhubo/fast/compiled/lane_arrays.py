@@ -14,14 +14,13 @@ from llvmlite import ir  # pyright: ignore[reportMissingImports]
 from numba import types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
 from numba.extending import (  # pyright: ignore[reportMissingImports]
-    intrinsic,
     models,
     overload,
     overload_attribute,
     register_model,
 )
 
-from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, spread
+from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, in_llvm, spread
 
 
 class _LaneArrayType(types.Type):
@@ -37,7 +36,7 @@ class _LaneArrayModel(models.StructModel):
         super().__init__(manager, kind, [("array", kind.array)])
 
 
-@intrinsic
+@in_llvm
 def side_by_side(typing_context: Any, array: Any) -> Any:
     """The `LaneArray` of an array of float64 whose last axis has as many numbers as there are lanes."""
     kind = _LaneArrayType(array.ndim - 1)
@@ -63,8 +62,10 @@ def _zeros(kind, shape):
     return lambda kind, shape: np.zeros(shape)
 
 
-@intrinsic
-def _inside(typing_context: Any, lanes: Any) -> Any:
+@in_llvm
+def inside(typing_context: Any, lanes: Any) -> Any:
+    """The array itself of a `LaneArray`."""
+
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         array = cgutils.create_struct_proxy(signature.args[0])(context, builder, values[0]).array
         context.nrt.incref(builder, signature.return_type, array)
@@ -73,32 +74,27 @@ def _inside(typing_context: Any, lanes: Any) -> Any:
     return (lanes.array(lanes), generate) if isinstance(lanes, _LaneArrayType) else None
 
 
-@overload_attribute(_LaneArrayType, "array")
-def _array_of(lanes):
-    """The array itself, with lanes last."""
-    return lambda lanes: _inside(lanes)
-
-
 @overload_attribute(_LaneArrayType, "shape")
 def _shape_of(lanes):
     """Its axes, with lanes last."""
-    return lambda lanes: _inside(lanes).shape
+    return lambda lanes: inside(lanes).shape
 
 
 @overload(len)
 def _length(lanes):
-    return (lambda lanes: len(_inside(lanes))) if isinstance(lanes, _LaneArrayType) else None
+    return (lambda lanes: len(inside(lanes))) if isinstance(lanes, _LaneArrayType) else None
 
 
 def _address(context: Any, builder: Any, kind: Any, value: Any, place_kind: Any, place: Any) -> Any:
     array = cgutils.create_struct_proxy(kind)(context, builder, value).array
     array = context.make_array(kind.array)(context, builder, array)
     places = cgutils.unpack_tuple(builder, place) if isinstance(place_kind, types.BaseTuple) else [place]
-    kinds = list(place_kind) if isinstance(place_kind, types.BaseTuple) else [place_kind]
+    kinds = list(place_kind) if isinstance(place_kind, types.BaseTuple) else [place_kind]  # pyright: ignore[reportArgumentType]
     at, sizes = None, cgutils.unpack_tuple(builder, array.shape)
     for axis, (own_kind, own) in enumerate(zip(kinds, places, strict=True)):
         own = context.cast(builder, own, own_kind, types.intp)
         at = own if at is None else builder.add(builder.mul(at, sizes[axis], flags=("nsw",)), own, flags=("nsw",))
+    assert at is not None, "a place names at least one axis"
     at = builder.mul(at, ir.Constant(at.type, LANES), flags=("nsw",))
     return builder.bitcast(builder.gep(array.data, [at], inbounds=True), NUMBERS.as_pointer())
 
@@ -110,7 +106,7 @@ def _fits(lanes: Any, place: Any) -> bool:
     return axes == lanes.axes
 
 
-@intrinsic
+@in_llvm
 def _get(typing_context: Any, lanes: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         address = _address(context, builder, signature.args[0], values[0], signature.args[1], values[1])
@@ -119,7 +115,7 @@ def _get(typing_context: Any, lanes: Any, place: Any) -> Any:
     return Lanes(lanes, place), generate
 
 
-@intrinsic
+@in_llvm
 def _put(typing_context: Any, lanes: Any, place: Any, number: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         address = _address(context, builder, signature.args[0], values[0], signature.args[1], values[1])
@@ -139,7 +135,7 @@ def _setitem(lanes, place, number):
     return (lambda lanes, place, number: _put(lanes, place, number)) if _fits(lanes, place) else None
 
 
-@intrinsic
+@in_llvm
 def scatter(typing_context: Any, lanes: Any, array: Any, row: Any, step: Any, column: Any) -> Any:
     """Lanes into a column of a float32 array (rows, columns): the first into a row, the next so many rows below."""
 

@@ -19,7 +19,7 @@ from typing import Any
 from llvmlite import ir  # pyright: ignore[reportMissingImports]
 from numba import types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
-from numba.core.typeconv import Conversion  # pyright: ignore[reportMissingImports]
+from numba.core.typeconv.castgraph import Conversion  # pyright: ignore[reportMissingImports]
 from numba.extending import (  # pyright: ignore[reportMissingImports]
     intrinsic,
     lower_cast,
@@ -33,6 +33,11 @@ NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
 _TRUTHS = ir.VectorType(ir.IntType(1), LANES)
 _FAST = ("reassoc", "contract", "nsz")
 """As `COMPILED` has it for single numbers."""
+
+
+def in_llvm(define: Callable[..., Any]) -> Any:
+    """`numba.extending.intrinsic`: a function of LLVM's own operations, without its definition's typing context."""
+    return intrinsic(define)
 
 
 class _LanesType(types.Type):
@@ -94,7 +99,7 @@ def _cast(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> An
 def _elementwise(build: Callable[..., Any], result: Any) -> Any:
     """A function of lanes and numbers, of which LLVM has the operation."""
 
-    @intrinsic(prefer_literal=False)
+    @in_llvm
     def apply(typing_context: Any, a: Any, b: Any) -> Any:
         if Lanes not in (a, b) or not all(kind == Lanes or _is_number(kind) for kind in (a, b)):
             return None
@@ -138,7 +143,7 @@ _overloaded(max, lambda builder, a, b: builder.select(builder.fcmp_ordered(">", 
 
 
 def _of_one(name: str) -> Any:
-    @intrinsic
+    @in_llvm
     def apply(typing_context: Any, a: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             kind = ir.FunctionType(NUMBERS, [NUMBERS])
@@ -171,7 +176,7 @@ def _neg(a):
 
 
 def _of_truths(name: str) -> Any:
-    @intrinsic
+    @in_llvm
     def apply(typing_context: Any, a: Any, b: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             both = [
@@ -198,7 +203,7 @@ def _or(a, b):
     return (lambda a, b: _either(a, b)) if Truths in (a, b) else None
 
 
-@intrinsic
+@in_llvm
 def _chosen(typing_context: Any, condition: Any, a: Any, b: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         one, two = (spread(context, builder, signature.args[k], values[k]) for k in (1, 2))
@@ -207,7 +212,7 @@ def _chosen(typing_context: Any, condition: Any, a: Any, b: Any) -> Any:
     return Lanes(condition, a, b), generate
 
 
-@intrinsic
+@in_llvm
 def _any(typing_context: Any, condition: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         bits = builder.bitcast(values[0], ir.IntType(LANES))
@@ -248,7 +253,7 @@ def _alike(other, number):
     return (lambda other, number: filled(number)) if other == Lanes else (lambda other, number: float(number))
 
 
-@intrinsic
+@in_llvm
 def filled(typing_context: Any, number: Any) -> Any:
     """A number in all lanes."""
 
@@ -263,7 +268,7 @@ def no(condition: Any) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@intrinsic
+@in_llvm
 def _not(typing_context: Any, condition: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return builder.not_(values[0])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lane_arrays import inside, zeros
 from mrhubo.fast.compiled.lanes import LANES, filled
 from mrhubo.fast.compiled.robot import make_lane_work, make_work
 from mrhubo.fast.compiled.steps import aim, minimise, near
@@ -30,7 +30,7 @@ from mrhubo.fast.compiled.tables import (
 @njit(**INNER)
 def aim_at(t, work, target_1D3, target_BD3, frame_L):
     """Takes as goals the directions of a frame in each lane. `target_1D3`: room."""
-    target_1D3L = target_1D3.array
+    target_1D3L = inside(target_1D3)
     for lane in range(LANES):
         for d in range(target_BD3.shape[1]):
             for i in range(3):
@@ -40,7 +40,7 @@ def aim_at(t, work, target_1D3, target_BD3, frame_L):
 
 @njit(**INNER)
 def _begin(work, q_BN, frame_L):
-    start_NL = work.start_N.array
+    start_NL = inside(work.start_N)
     for lane in range(LANES):
         for n in range(q_BN.shape[1]):
             start_NL[n, lane] = q_BN[frame_L[lane], n]
@@ -59,7 +59,7 @@ def polish_all(t, target_BD3, q_BN, steps):
         aim_at(t, work, target_1D3, target_BD3, frame_L)
         _begin(work, q_BN, frame_L)
         minimise(t, work, work.start_N, steps)
-        cost_CL, weight_CL, start_NL = work.cost_C.array, work.weight_C.array, work.start_N.array
+        cost_CL, weight_CL, start_NL = inside(work.cost_C), inside(work.weight_C), inside(work.start_N)
         for lane in range(min(LANES, frames - first)):
             b, is_far = first + lane, False
             for n in range(joints):
@@ -83,8 +83,8 @@ def polish_all(t, target_BD3, q_BN, steps):
 def _start_again(t, work, alone, target_BD3, q_BN, enough_BC, frame_L, steps, count):
     """From other places, for the goals in `work`: a few steps from each; on from the best of them."""
     joints, blocks, starts = q_BN.shape[1], enough_BC.shape[1], int(real(t, POLISH_4, STARTS))
-    start_NL, begin_NL = work.start_N.array, work.begin_N.array
-    best_CL, cost_CL = work.best_C.array, work.cost_C.array
+    start_NL, begin_NL = inside(work.start_N), inside(work.begin_N)
+    best_CL, cost_CL = inside(work.best_C), inside(work.cost_C)
     best_CL[:] = np.inf
     for number in range(starts + 1):
         last = number == starts

@@ -12,7 +12,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import add, dot, row, turn_back
-from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lane_arrays import inside, zeros
 from mrhubo.fast.compiled.lanes import LANES, alike, choose, filled
 from mrhubo.fast.compiled.robot import place
 from mrhubo.fast.compiled.steps import minimise
@@ -99,7 +99,7 @@ def cost(t, work, q_N, cost_C):
 @njit(**INNER)
 def _keep(t, tried, frames, count, keep):
     """The cheapest of so many hypotheses of each frame, block by block, into `kept_ZN`; and the best of all."""
-    cost_ZCL, q_ZNL, kept_ZNL = tried.cost_ZC.array, tried.q_ZN.array, tried.kept_ZN.array
+    cost_ZCL, q_ZNL, kept_ZNL = inside(tried.cost_ZC), inside(tried.q_ZN), inside(tried.kept_ZN)
     for f in range(frames):
         for c in range(size(t, FIRST_C) - 1):
             for k in range(keep):
@@ -173,9 +173,9 @@ def unroll(t, u, w, work, tried, room, frames):
             if first:
                 for f in range(frames):
                     for c in range(blocks):
-                        tried.best_FC[f, c] = work.cost_C.array[c, f]
+                        tried.best_FC[f, c] = inside(work.cost_C)[c, f]
                     for n in range(joints):
-                        tried.best_FN[f, n] = work.start_N.array[n, f]
+                        tried.best_FN[f, n] = inside(work.start_N)[n, f]
             if learnt:
                 answer(t, w, room, first, min(LANES, count * frames - z * LANES), z)
         if first:
@@ -198,4 +198,4 @@ def unroll(t, u, w, work, tried, room, frames):
         for n in range(joints):
             if not u.known_C[whole(t, BLOCK_N, n)]:
                 for f in range(frames):
-                    tried.best_FN[f, n] = work.start_N.array[n, f]
+                    tried.best_FN[f, n] = inside(work.start_N)[n, f]

@@ -14,7 +14,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.functions import asinh, exponential, logarithm, tanh
 from mrhubo.fast.compiled.human import add, dot, row, row3, turn_back
-from mrhubo.fast.compiled.lane_arrays import scatter
+from mrhubo.fast.compiled.lane_arrays import inside, scatter
 from mrhubo.fast.compiled.lanes import LANES, alike, choose
 from mrhubo.fast.compiled.tables import (
     FIRST_C,
@@ -135,8 +135,8 @@ def move(t, u, room, step_ZPN, kept_ZN, z, frames, out_4, step_P, other_N):
     hypotheses they are, a lane is the hypothesis after those in the lanes and packs before it; 0: it is its own one's
     only answer. `out_4` and `step_P`: room.
     """
-    joints, lane_OL, lane_PL = len(other_N), out_4.array, step_P.array
-    out_TO, step_ZPNL = room.out_TO, step_ZPN.array
+    joints, lane_OL, lane_PL = len(other_N), inside(out_4), inside(step_P)
+    out_TO, step_ZPNL = room.out_TO, inside(step_ZPN)
     for place in range(joints):
         n = whole(t, ORDER_N, place)
         begin = kept_ZN[0 if frames else z, n]
