@@ -272,6 +272,7 @@ class CompiledEngine:
             self.giving_way.problem.directions(nobody_0N)
             self.giving_way.close(nobody_0N)
             self.avoid(nobody_0N, nothing_0D3)
+            self._kernels.polish(self._tables, 0, nothing_0D3, nobody_0N.astype(np.float32))
             kernels = [*self._kernels, *self._motion_kernels]
             kernels += [] if self._unroll is None else [self._universal_kernel]
             note_kept((kernel.stats.cache_path for kernel in kernels), self._unroll is not None)
@@ -280,10 +281,16 @@ class CompiledEngine:
         self, polish: int, avoid: bool, judge: bool, q_BN: np.ndarray, target_BD3: np.ndarray, shake_BX: np.ndarray,
         into: Answers,
     ) -> None:  # fmt: skip
+        together = polish > 0 and len(q_BN) > FEW
+        avoid = avoid and polish > 0
+
         def part(rows: slice) -> None:
+            if together:
+                self._kernels.polish(self._tables, polish, target_BD3[rows], q_BN[rows])
             self._kernels.retarget(
-                self._tables, self._activation, polish, avoid, judge, target_BD3[rows], q_BN[rows], shake_BX[rows],
-                into.error_BM[rows], into.phi_B[rows], into.collision_B[rows], into.trust_BX[rows],
+                self._tables, self._activation, 0 if together else polish, avoid, judge, target_BD3[rows],
+                q_BN[rows], shake_BX[rows], into.error_BM[rows], into.phi_B[rows], into.collision_B[rows],
+                into.trust_BX[rows],
             )  # fmt: skip
 
         self._shared(len(q_BN), part)

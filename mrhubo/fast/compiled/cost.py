@@ -5,6 +5,7 @@ from __future__ import annotations
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.human import add, dot, row, row3, turn
+from mrhubo.fast.compiled.lanes import alike
 from mrhubo.fast.compiled.robot import jacobian, place
 from mrhubo.fast.compiled.soles import add_soles
 from mrhubo.fast.compiled.tables import (
@@ -30,7 +31,7 @@ def quadratic(t, work, q_N, cost_C, gradient_N, hessian_NN):
     jacobian(t, work)
     for c in range(len(cost_C)):
         first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
-        found = 0.0
+        found = alike(cost_C[0], 0.0)
         for x in range(first, last):
             n = whole(t, ORDER_N, x)
             off = q_N[n] - real(t, MIDDLE_N, n)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import avoidance, collision, judging, networks, steps, tables
+from mrhubo.fast.compiled import avoidance, collision, judging, networks, polishing, steps, tables
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import robot as robots
 from mrhubo.fast.kept import checksum, drop_others
@@ -30,6 +30,7 @@ class Kernels(NamedTuple):
     follow: Callable[..., Any]
     avoid: Callable[..., Any]
     retarget: Callable[..., Any]
+    polish: Callable[..., Any]
 
 
 CHECK, DIRECT, ANSWER = 1, 2, 4
@@ -58,8 +59,7 @@ def make_kernels() -> Kernels:
         nets = tables.whole(t, tables.COUNT_6, tables.STAGES)
         frames, widest = len(local_BJ33), networks.widest(t, nets)
         at_once = min(AT_ONCE, frames) if what & ANSWER else 1
-        one_BE = np.empty((at_once, widest), np.float32)
-        two_BE, three_BE = np.empty_like(one_BE), np.empty_like(one_BE)
+        one_BE, two_BE, three_BE = networks.make_rooms(at_once, widest)
         link_BM = np.empty((at_once, 6 * out_BN.shape[1]), np.float32)
         feature_BF = np.empty((at_once, tables.size(t, tables.CENTER_F)), np.float32)
         unit_I3 = np.empty((tables.size(t, tables.INPUT_I), 3))
@@ -112,8 +112,7 @@ def make_kernels() -> Kernels:
         frames, turned = len(target_BD3), tables.size(t, tables.PARENT_T)
         nets = tables.whole(t, tables.COUNT_6, tables.STAGES) + 2
         at_once = min(FEWER_AT_ONCE, frames) if judge else 1
-        one_BE = np.empty((at_once, networks.widest(t, nets) if judge else 1), np.float32)
-        two_BE, three_BE = np.empty_like(one_BE), np.empty_like(one_BE)
+        one_BE, two_BE, three_BE = networks.make_rooms(at_once, networks.widest(t, nets) if judge else 1)
         turn_T33, local_BT33 = np.empty((turned + 1, 3, 3)), np.empty((at_once, turned, 3, 3))
         between_333, free_B = np.empty((3, 3, 3)), np.empty(at_once, np.bool_)
         angle_D, error_T, excess_T = np.empty(target_BD3.shape[1]), np.empty(turned), np.empty(turned)
@@ -123,10 +122,13 @@ def make_kernels() -> Kernels:
             count = min(at_once, frames - first)
             for k in range(count):
                 b, free = first + k, False
-                if polish:
+                if polish or avoid:
                     for n in range(joints):
                         q_N[n] = q_BN[b, n]
-                    steps.polish(t, work, target_BD3, b, q_N, polish)
+                    if polish:
+                        steps.polish(t, work, target_BD3, b, q_N, polish)
+                    else:
+                        steps.aim(t, work, target_BD3, b)
                     if avoid:
                         free = avoidance.avoid(t, work, q_N)
                     for n in range(joints):
@@ -157,5 +159,11 @@ def make_kernels() -> Kernels:
                     trust_BX[b, x] = judging.confidence(t, moving, miss, phi, over, shake_BX[b, x] if moving else 0.0)
                     phi_B[b] = max(phi_B[b], phi)
 
+    @njit(cache=True, **tables.COMPILED)
+    def polish(t, steps, target_BD3, q_BN):
+        """Makes steps from `q_BN` of many frames, where the answers will stand."""
+        _ = version
+        polishing.polish_all(t, target_BD3, q_BN, steps)
+
     drop_others(look.stats.cache_path)
-    return Kernels(look, follow, avoid, retarget)
+    return Kernels(look, follow, avoid, retarget, polish)

@@ -13,6 +13,7 @@ from mrhubo.fast.compiled.tables import (
     BEND_W,
     CENTER_F,
     COLUMN,
+    COLUMNS,
     COUNT_6,
     FIRST_O,
     FIRST_STAGE,
@@ -31,6 +32,8 @@ from mrhubo.fast.compiled.tables import (
     SEES_DIRECTIONS,
     STAGES,
     TANH_BOUND,
+    TURNED,
+    TURNED_G,
     UPPER_N,
     UPPER_W,
     real,
@@ -38,6 +41,7 @@ from mrhubo.fast.compiled.tables import (
     size,
     whole,
 )
+from mrhubo.fast.compiled.tile import ROWS, multiply
 from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
 
 _ZERO, _ONE, _HALF, _ROOT, _END = (
@@ -91,11 +95,17 @@ def activate(kind, x_BE, out_BE, frames, count):
 
 @njit(**INNER)
 def affine(t, layer, x_BI, out_BO, frames):
-    """A layer: weights x + biases."""
+    """A layer: weights x + biases. Arrays are as long and as wide as whole tiles are."""
     inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
-    number, begin = t[2], t[0][2 * NUMBER]
+    number, begin, begin_turned = t[2], t[0][2 * NUMBER], t[0][2 * TURNED]
     weights, biases = whole(t, LAYER_G5, 5 * layer + 2), begin + whole(t, LAYER_G5, 5 * layer + 3)
     # A view tells that places are not negative, without which numba is five times slower.
+    if frames >= ROWS and whole(t, TURNED_G, layer) >= 0:
+        at, wide = begin_turned + whole(t, TURNED_G, layer), outputs + -outputs % COLUMNS
+        weight_IO = number[at : at + inputs * wide].reshape(inputs, wide)
+        bias_O = number[at + inputs * wide : at + (inputs + 1) * wide]
+        multiply(x_BI, 0, weight_IO, 0, bias_O, 0, 0, out_BO, 0, frames, outputs, inputs)
+        return
     if whole(t, LAYER_G5, 5 * layer + 4):
         _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
         for b in range(frames):
@@ -235,6 +245,13 @@ def features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k):
                     feature_BF[k, 6 * i + 3 * column + line] = local_BJ33[b, chosen, line, column]
     for f in range(size(t, CENTER_F)):
         feature_BF[k, f] = (feature_BF[k, f] - single(t, CENTER_F, f)) * single(t, SCALE_F, f)
+
+
+@njit(**INNER)
+def make_rooms(frames, width):
+    """Three arrays for numbers between layers."""
+    shape = (frames + -frames % ROWS, width + -width % COLUMNS)
+    return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
 
 
 @njit(**INNER)

@@ -1,4 +1,4 @@
-"""As `mrhubo.fast.plain.robot`, for one frame."""
+"""As `mrhubo.fast.plain.robot`, for one frame, or for several side by side (`mrhubo.fast.compiled.lanes`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.human import add, cross, dot, identity, multiply, put, put3, row, row3, turn
+from mrhubo.fast.compiled.functions import sine_cosine
+from mrhubo.fast.compiled.human import add, cross, dot, identity, put, put3, row, row3, turn
+from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lanes import alike, filled
 from mrhubo.fast.compiled.tables import (
     ACROSS_A33,
     AXIS_A3,
@@ -58,7 +61,6 @@ class Work(NamedTuple):
     length_D: np.ndarray
     view_V33: np.ndarray
     jacobian_DN3: np.ndarray
-    scratch_133: np.ndarray
     goal_D3: np.ndarray
     """The human's directions, length 1."""
     weight_D: np.ndarray
@@ -94,30 +96,79 @@ class Work(NamedTuple):
     """Human axes of what carries the legs, base frame."""
     wanted_X: np.ndarray
     """A block's directions, weighted, one number after the other."""
+    right_N: np.ndarray
+    """Right side and solution of a block's system, in its order;"""
+    free_N: np.ndarray
+    """1 for its joints that move, 0 for those that are held."""
 
 
 @njit(**INNER)
 def make_work(t):
     """Room for one frame."""
+    return _make_work(t, 0.0)
+
+
+@njit(**INNER)
+def make_lane_work(t):
+    """Room for as many frames as there are lanes, on which the same functions work."""
+    return _make_work(t, filled(0.0))
+
+
+@njit(**INNER)
+def _make_work(t, kind):
     bodies, joints, directions = size(t, PARENT_A) + 1, size(t, BLOCK_N), size(t, LIMB_D)
-    blocks = size(t, FIRST_C) - 1
-    rotation_L33 = np.zeros((bodies, 3, 3))
+    blocks, soles = size(t, FIRST_C) - 1, size(t, BODY_H)
+    rotation_L33 = zeros(kind, (bodies, 3, 3))
     identity(rotation_L33, 0)
-    lower_N, upper_N = np.empty(joints), np.empty(joints)
+    lower_N, upper_N = zeros(kind, (joints,)), zeros(kind, (joints,))
     for n in range(joints):
         lower_N[n], upper_N[n] = real(t, LOWER_N, n), real(t, UPPER_N, n)
     return Work(
-        rotation_L33, np.zeros((bodies, 3)), np.empty((bodies - 1, 3)), np.zeros((directions, 3)),
-        np.empty((directions, 3)), np.empty((directions, 3)), np.empty(directions),
-        np.empty((size(t, VIEW_BODY_V), 3, 3)), np.zeros((directions, joints, 3)), np.empty((1, 3, 3)),
-        np.empty((directions, 3)), np.empty(directions), np.empty(blocks), np.empty(joints),
-        np.zeros((joints, joints)), np.empty(blocks), np.empty(joints), np.zeros((joints, joints)), np.empty(joints),
-        np.empty(blocks), np.empty((joints, joints)), np.empty(joints), np.empty(blocks), lower_N, upper_N,
-        np.empty(blocks), np.empty(blocks), np.empty(joints), np.empty(joints),
-        np.empty((3 * size(t, BODY_S), 3)), np.empty((size(t, BODY_G), 3)), np.empty(joints),
-        np.empty((size(t, BODY_H), 3)), np.zeros(size(t, BODY_H)), np.zeros((joints, 3)), np.empty((1, 3, 3)),
-        np.empty(3 * directions),
-    )  # fmt: skip
+        rotation_L33,
+        zeros(kind, (bodies, 3)),
+        zeros(kind, (bodies - 1, 3)),
+        zeros(kind, (directions, 3)),
+        zeros(kind, (directions, 3)),
+        zeros(kind, (directions, 3)),
+        zeros(kind, (directions,)),
+        zeros(kind, (size(t, VIEW_BODY_V), 3, 3)),
+        zeros(kind, (directions, joints, 3)),
+        zeros(kind, (directions, 3)),
+        zeros(kind, (directions,)),
+        zeros(kind, (blocks,)),
+        zeros(kind, (joints,)),
+        zeros(kind, (joints, joints)),
+        zeros(kind, (blocks,)),
+        zeros(kind, (joints,)),
+        zeros(kind, (joints, joints)),
+        zeros(kind, (joints,)),
+        zeros(kind, (blocks,)),
+        zeros(kind, (joints, joints)),
+        zeros(kind, (joints,)),
+        zeros(kind, (blocks,)),
+        lower_N,
+        upper_N,
+        zeros(kind, (blocks,)),
+        zeros(kind, (blocks,)),
+        zeros(kind, (joints,)),
+        zeros(kind, (joints,)),
+        zeros(kind, (3 * size(t, BODY_S), 3)),
+        zeros(kind, (size(t, BODY_G), 3)),
+        zeros(kind, (joints,)),
+        zeros(kind, (soles, 3)),
+        zeros(kind, (soles,)),
+        zeros(kind, (joints, 3)),
+        zeros(kind, (1, 3, 3)),
+        zeros(kind, (3 * directions,)),
+        zeros(kind, (joints,)),
+        zeros(kind, (joints,)),
+    )
+
+
+@njit(**INNER)
+def _column(t, key, place):
+    """Three numbers of a table of float64 that stand below each other in a matrix (3, 3)."""
+    return real(t, key, place), real(t, key, place + 3), real(t, key, place + 6)
 
 
 @njit(**INNER)
@@ -127,16 +178,15 @@ def place(t, work, q_N):
     for a in range(size(t, PARENT_A)):
         angle = q_N[whole(t, COLUMN_A, a)] * real(t, RATIO_A, a) + real(t, OFFSET_A, a)
         parent = whole(t, PARENT_A, a)
-        sine, rest, slide = 0.0, 0.0, angle
+        sine, rest, slide = alike(angle, 0.0), alike(angle, 0.0), angle
         if whole(t, ROTARY_A, a):
-            sine, rest, slide = math.sin(angle), 1 - math.cos(angle), 0.0
-        for i in range(3):
-            for j in range(3):
-                x = 9 * a + 3 * i + j
-                work.scratch_133[0, i, j] = (
-                    real(t, ORIGIN_A33, x) + sine * real(t, ACROSS_A33, x) + rest * real(t, TWICE_A33, x)
-                )
-        multiply(rotation_L33, parent, work.scratch_133, 0, rotation_L33, a + 1)
+            sine, cosine = sine_cosine(angle)
+            rest, slide = 1 - cosine, alike(angle, 0.0)
+        for j in range(3):
+            x = 9 * a + j
+            column = add(_column(t, ORIGIN_A33, x), _column(t, ACROSS_A33, x), sine)
+            column = turn(rotation_L33, parent, add(column, _column(t, TWICE_A33, x), rest))
+            rotation_L33[a + 1, 0, j], rotation_L33[a + 1, 1, j], rotation_L33[a + 1, 2, j] = column
         moved = turn(rotation_L33, parent, vector(t, POSITION_A3, a))
         axis = turn(rotation_L33, a + 1, vector(t, AXIS_A3, a))
         put(work.axis_A3, a, axis)
@@ -146,20 +196,20 @@ def place(t, work, q_N):
             above[2] + moved[2] + slide * axis[2],
         ))  # fmt: skip
     for v in range(size(t, VIEW_BODY_V)):
-        for i in range(3):
-            for j in range(3):
-                work.scratch_133[0, i, j] = real(t, VIEW_V33, 9 * v + 3 * i + j)
-        multiply(rotation_L33, whole(t, VIEW_BODY_V, v), work.scratch_133, 0, work.view_V33, v)
+        for j in range(3):
+            column = turn(rotation_L33, whole(t, VIEW_BODY_V, v), _column(t, VIEW_V33, 9 * v + j))
+            work.view_V33[v, 0, j], work.view_V33[v, 1, j], work.view_V33[v, 2, j] = column
     for d in range(size(t, LIMB_D)):
         end_body = whole(t, END_BODY_D, d)
-        start, end = (0.0, 0.0, 0.0), turn(rotation_L33, end_body, vector(t, END_D3, d))
-        if whole(t, LIMB_D, d):
+        end = turn(rotation_L33, end_body, vector(t, END_D3, d))
+        along = end
+        if whole(t, LIMB_D, d):  # others begin at 0
             start_body = whole(t, START_BODY_D, d)
             start = add(turn(rotation_L33, start_body, vector(t, START_D3, d)), row(position_L3, start_body), 1.0)
             end = add(end, row(position_L3, end_body), 1.0)
-        put(work.start_D3, d, start)
+            along = add(end, start, -1.0)
+            put(work.start_D3, d, start)
         put(work.end_D3, d, end)
-        along = add(end, start, -1.0)
         length = math.sqrt(dot(along, along))
         work.length_D[d] = length
         put(work.direction_D3, d, (along[0] / length, along[1] / length, along[2] / length))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.human import add, cross, dot, put, row, turn
+from mrhubo.fast.compiled.lanes import some
 from mrhubo.fast.compiled.tables import (
     AXES_33,
     BLOCK_H,
@@ -38,10 +39,11 @@ def carrier(t, work):
     body = whole(t, CARRIER_1, 0)
     for i in range(3):
         for j in range(3):
-            found = 0.0
-            for k in range(3):
-                found += work.rotation_L33[body, i, k] * real(t, AXES_33, 3 * k + j)
-            work.carrier_133[0, i, j] = found
+            work.carrier_133[0, i, j] = (
+                work.rotation_L33[body, i, 0] * real(t, AXES_33, j)
+                + work.rotation_L33[body, i, 1] * real(t, AXES_33, 3 + j)
+                + work.rotation_L33[body, i, 2] * real(t, AXES_33, 6 + j)
+            )
     return turned_point(work, body, vector(t, ROOT_3, 0))
 
 
@@ -50,8 +52,8 @@ def add_soles(t, work, cost_C, gradient_N, hessian_NN):
     """Adds what places of soles cost, where the robot is placed, to a model."""
     root = carrier(t, work)
     for h in range(size(t, BODY_H)):
-        c, weight = whole(t, BLOCK_H, h), work.counts_H[h]
-        if c < 0 or weight <= 0:
+        c, weight = whole(t, BLOCK_H, h), max(work.counts_H[h], 0.0)
+        if c < 0 or not some(weight > 0):
             continue
         point = turned_point(work, whole(t, BODY_H, h), vector(t, POINT_H3, h))
         goal = add(turn(work.carrier_133, 0, row(work.wanted_H3, h)), root, 1.0)

@@ -1,4 +1,4 @@
-"""As `mrhubo.fast.plain.steps`, for one frame."""
+"""As `mrhubo.fast.plain.steps`, for one frame; some of it for several side by side (`mrhubo.fast.compiled.lanes`)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import math
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled import systems
 from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import dot, put, row3
+from mrhubo.fast.compiled.lanes import alike, choose, no, some
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
     BODY_H,
@@ -37,7 +39,6 @@ from mrhubo.fast.compiled.tables import (
 from mrhubo.fast.plain.steps import (
     DAMPING,
     EASIER,
-    FLOOR,
     FOLLOWED,
     HARDER,
     LEAST,
@@ -54,45 +55,15 @@ def solve(t, work, q_N, first, last, damping, pull):
     """The damped step of those joints of some of `order_N`, a block's or all, that no limit holds, into `work.step_N`.
     `pull`: what is added to the Hessian's diagonal; the gradient has it already.
     """
-    count, system, lower_N, upper_N = last - first, work.system_NN, work.lower_N, work.upper_N
-    for x in range(count):
-        n = whole(t, ORDER_N, first + x)
-        held = _held(q_N[n], work.gradient_N[n], lower_N[n], upper_N[n])
-        work.step_N[n] = 0.0 if held else -work.gradient_N[n]
-        for y in range(x):
-            m = whole(t, ORDER_N, first + y)
-            held_m = _held(q_N[m], work.gradient_N[m], lower_N[m], upper_N[m])
-            system[x, y] = 0.0 if held or held_m else work.hessian_NN[n, m]
-        diagonal = work.hessian_NN[n, n] + pull
-        system[x, x] = (diagonal if not held else 0.0) + (1.0 if held else damping * (diagonal + FLOOR))
-    for x in range(count):  # Cholesky
-        for y in range(x + 1):
-            found = system[x, y]
-            for k in range(y):
-                found -= system[x, k] * system[y, k]
-            system[x, y] = math.sqrt(found) if x == y else found / system[y, y]
-    for x in range(count):
-        n = whole(t, ORDER_N, first + x)
-        found = work.step_N[n]
-        for k in range(x):
-            found -= system[x, k] * work.step_N[whole(t, ORDER_N, first + k)]
-        work.step_N[n] = found / system[x, x]
-    for x in range(count - 1, -1, -1):
-        n = whole(t, ORDER_N, first + x)
-        found = work.step_N[n]
-        for k in range(x + 1, count):
-            found -= system[k, x] * work.step_N[whole(t, ORDER_N, first + k)]
-        work.step_N[n] = found / system[x, x]
+    systems.begin(t, work, q_N, first, last - first)
+    systems.solve(t, work, first, last - first, damping, pull)
+    for x in range(first, last):
+        work.step_N[whole(t, ORDER_N, x)] = work.right_N[x - first]
 
 
 @njit(**INNER)
 def _solve_block(t, work, q_N, c, pull):
     solve(t, work, q_N, whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1), work.damping_C[c], pull)
-
-
-@njit(**INNER)
-def _held(q, gradient, lower, upper):
-    return (q <= lower and gradient > 0) or (q >= upper and gradient < 0)
 
 
 @njit(**INNER)
@@ -118,41 +89,49 @@ def aim(t, work, target_BD3, b):
 
 
 @njit(**INNER)
-def accept(t, work, c, q_N):
-    """Takes a block's trial."""
-    work.cost_C[c] = work.next_cost_C[c]
-    for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
+def accept(t, work, c, q_N, better):
+    """Takes a block's trial where it is better."""
+    if not some(better):
+        return
+    first, last = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
+    work.cost_C[c] = choose(better, work.next_cost_C[c], work.cost_C[c])
+    for x in range(first, last):
         n = whole(t, ORDER_N, x)
-        q_N[n] = work.trial_N[n]
-        work.gradient_N[n] = work.next_gradient_N[n]
-        for y in range(whole(t, FIRST_C, c), x + 1):
-            work.hessian_NN[n, whole(t, ORDER_N, y)] = work.next_hessian_NN[n, whole(t, ORDER_N, y)]
+        q_N[n] = choose(better, work.trial_N[n], q_N[n])
+        work.gradient_N[n] = choose(better, work.next_gradient_N[n], work.gradient_N[n])
+        for y in range(first, x + 1):
+            m = whole(t, ORDER_N, y)
+            work.hessian_NN[n, m] = choose(better, work.next_hessian_NN[n, m], work.hessian_NN[n, m])
 
 
 @njit(**INNER)
 def minimise(t, work, q_N, steps):
-    """Makes as many steps at most; `q_N` are the joint angles before and after [rad], `work.cost_C` their costs."""
-    blocks = len(work.cost_C)
+    """Makes as many steps at most; `q_N` are the joint angles before and after [rad], `work.cost_C` their costs. Frames
+    side by side stand still from where each has converged.
+    """
+    blocks, live = len(work.cost_C), alike(work.cost_C[0], 1.0)
     for c in range(blocks):
         work.damping_C[c], work.cost_C[c] = DAMPING, np.inf
     for n in range(len(q_N)):
         work.trial_N[n] = q_N[n]
     for number in range(steps + 1):  # the first looks at where it begins
         quadratic(t, work, work.trial_N, work.next_cost_C, work.next_gradient_N, work.next_hessian_NN)
-        going = number == 0
+        going = alike(live, 0.0)
         for c in range(blocks):
-            better = work.next_cost_C[c] < work.cost_C[c] or number == 0
-            moved = 0.0
+            better = (live > 0) & ((work.next_cost_C[c] < work.cost_C[c]) | (number == 0))
+            moved = alike(live, 0.0)
             for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
                 n = whole(t, ORDER_N, x)
                 moved = max(moved, abs(work.trial_N[n] - q_N[n]))
-            if not (moved < TOLERANCE or (not better and work.damping_C[c] > STUCK)):
-                going = True
-            if better:
-                accept(t, work, c, q_N)
+            done = (moved < TOLERANCE) | (no(better) & (work.damping_C[c] > STUCK))
+            going = choose(done, going, live)
+            accept(t, work, c, q_N, better)
             if number:
-                work.damping_C[c] = min(max(work.damping_C[c] * (EASIER if better else HARDER), LEAST), MOST)
-        if not going or number == steps:
+                damping = work.damping_C[c] * choose(better, EASIER, HARDER)
+                work.damping_C[c] = min(max(damping, LEAST), MOST)
+        if number:
+            live = going
+        if not some(live > 0) or number == steps:
             break
         for c in range(blocks):
             _solve_block(t, work, q_N, c, 0.0)
@@ -180,7 +159,7 @@ def follow(t, work, target_BD3, b, pull, q_N):
                 more += pull * (trial * trial - own * own)
             better = number == 0 or work.next_cost_C[c] + more < work.cost_C[c]
             if better:
-                accept(t, work, c, q_N)
+                accept(t, work, c, q_N, better)
                 for x in range(first, last):  # the gradient has the pull from here on, the cost has not
                     n = whole(t, ORDER_N, x)
                     work.gradient_N[n] += pull * (q_N[n] - work.begin_N[n])

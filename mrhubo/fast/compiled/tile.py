@@ -14,10 +14,11 @@ from numba import njit, types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
 from numba.extending import intrinsic  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.tables import INNER
+from mrhubo.fast.compiled.tables import COLUMNS, INNER
 
-ROWS, COLUMNS = 4, 16
-"""Of a tile. Arrays have room for whole ones: what is beyond a product's own rows and columns is written over."""
+ROWS = 4
+"""Of a tile, and `COLUMNS`. Arrays have room for whole ones: what is beyond a product's own rows and columns is
+written over."""
 _ROUNDED_ONCE = ("contract",)
 """A product and its sum, where the processor can."""
 

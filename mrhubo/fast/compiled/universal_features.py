@@ -1,7 +1,7 @@
 """What the universal network (`mrhubo.universal.network`) sees of a robot, and how its outputs are read.
 
 Legend: N joints, C blocks, D directions, S = 5 slots, P damped steps; T tokens and X blocks of
-`mrhubo.fast.compiled.universal_network`.
+`mrhubo.fast.compiled.universal_network`; Z and L as in `mrhubo.fast.compiled.universal`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.human import add, dot, put, row, row3, turn_back
+from mrhubo.fast.compiled.functions import asinh, exponential, logarithm, tanh
+from mrhubo.fast.compiled.human import add, dot, row, row3, turn_back
+from mrhubo.fast.compiled.lane_arrays import inside, scatter
+from mrhubo.fast.compiled.lanes import LANES, alike, choose
 from mrhubo.fast.compiled.tables import (
     FIRST_C,
     INNER,
@@ -24,7 +27,7 @@ from mrhubo.fast.compiled.tables import (
     real,
     whole,
 )
-from mrhubo.fast.compiled.universal_network import exponential
+from mrhubo.fast.compiled.universal_network import OUTPUTS
 from mrhubo.fast.description import Description
 from mrhubo.fast.plain.universal import DAMPINGS, REACH
 from mrhubo.fast.sections import Universal
@@ -63,81 +66,95 @@ def look_up(description: Description, universal: Universal) -> Lookup:
 
 
 @njit(**INNER)
-def see(t, u, work, room, miss_S3, step_PN, q_N, k, c, first):
-    """Features of a block and its joints, whose model stands in `work`, as the `k`th hypothesis. `miss_S3`: room."""
-    seen_XF, blocks = room.seen_XF, len(work.cost_C)
-    x, token = k * blocks + c, k * len(q_N)
+def see(t, u, work, room, step_ZPN, z, c, first):
+    """Features of a block and its joints, whose model stands in `work`, where the hypotheses in `work.start_N` are."""
+    blocks, joints = len(work.cost_C), len(work.start_N)
     for s in range(5):
         d = u.slot_CS[c, s]
-        weight = work.weight_D[d] if d >= 0 else 0.0
-        own, goal = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        if weight > 0:
-            own = turn_back(work.view_V33, whole(t, SEEN_D, d), row(work.direction_D3, d))
-            goal = row(work.goal_D3, d)
-        put(miss_S3, s, add(own, goal, -1.0))
+        weight = work.weight_D[max(d, 0)] * (1.0 if d >= 0 else 0.0)
+        own = turn_back(work.view_V33, whole(t, SEEN_D, max(d, 0)), row(work.direction_D3, max(d, 0)))
+        goal, there = row(work.goal_D3, max(d, 0)), choose(weight > 0, 1.0, 0.0)
         for j in range(3):
-            seen_XF[x, 3 * s + j] = own[j] * u.flip_CS3[c, s, j]
-            seen_XF[x, 15 + 3 * s + j] = goal[j] * u.flip_CS3[c, s, j]
-        seen_XF[x, 30 + s] = math.sqrt(weight)
-    seen_XF[x, 35] = math.log(work.cost_C[c] + 1e-4) / 5
-    seen_XF[x, 36] = 1.0 if first else 0.0
+            scatter(own[j] * there * u.flip_CS3[c, s, j], room.seen_XF, c, blocks, 3 * s + j)
+            scatter(goal[j] * there * u.flip_CS3[c, s, j], room.seen_XF, c, blocks, 15 + 3 * s + j)
+        root = math.sqrt(weight)
+        scatter(root, room.seen_XF, c, blocks, 30 + s)
+        for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
+            n = whole(t, ORDER_N, x)
+            turned = turn_back(work.view_V33, whole(t, SEEN_D, max(d, 0)), row3(work.jacobian_DN3, max(d, 0), n))
+            pull = dot(turned, add(own, goal, -1.0)) * weight * u.sense_N[n]
+            for j in range(3):
+                scatter(
+                    turned[j] * root * (u.flip_CS3[c, s, j] * u.sense_N[n]), room.feature_TF, x, joints, 3 + 3 * s + j
+                )
+            scatter(pull, room.feature_TF, x, joints, 18 + s)
+    scatter(logarithm(work.cost_C[c] + 1e-4) * 0.2, room.seen_XF, c, blocks, 35)
+    scatter(alike(work.cost_C[c], 1.0 if first else 0.0), room.seen_XF, c, blocks, 36)
     begin, end = whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)
-    for i in range(begin, end):
-        n = whole(t, ORDER_N, i)
-        line_F, sense = room.feature_TF[token + i], u.sense_N[n]
+    for x in range(begin, end):
+        n = whole(t, ORDER_N, x)
         axis = turn_back(work.view_V33, u.view_C[c], row(work.axis_A3, u.joint_N[n]))
         for j in range(3):
-            line_F[j] = axis[j] * u.axial_C3[c, j] * sense
-        for s in range(5):
-            d = u.slot_CS[c, s]
-            if d >= 0:
-                root = seen_XF[x, 30 + s] * sense
-                own = turn_back(work.view_V33, whole(t, SEEN_D, d), row3(work.jacobian_DN3, d, n))
-                for j in range(3):
-                    line_F[3 + 3 * s + j] = own[j] * u.flip_CS3[c, s, j] * root
-                line_F[18 + s] = dot(own, row(miss_S3, s)) * work.weight_D[d] * sense
-        _see_joint(t, work, step_PN, line_F, q_N[n], n, sense)
-        line_F[43] = 1.0 / (end - begin)
-
-
-@njit(**INNER)
-def _asinh(x):
-    return math.copysign(math.log(abs(x) + math.sqrt(x * x + 1)), x)
-
-
-@njit(**INNER)
-def _see_joint(t, work, step_PN, line_F, q, n, sense):
-    gradient, diagonal = work.gradient_N[n], work.hessian_NN[n, n]
-    lower, upper = real(t, LOWER_N, n), real(t, UPPER_N, n)
-    up, down, half = upper - q, q - lower, (upper - lower) / 2
-    frozen = (down <= 0 and gradient > 0) or (up <= 0 and gradient < 0)
-    if sense < 0:
-        up, down = down, up
-    for p in range(SEEN_STEPS):
-        moved = step_PN[p, n] * sense
-        line_F[23 + p] = min(max(moved, -1.5), 1.5)
-        line_F[26 + p] = _asinh(10 * moved)
-    line_F[29], line_F[30], line_F[31] = _asinh(30 * gradient * sense), math.sqrt(max(diagonal, 0.0)), diagonal
-    line_F[32], line_F[33] = min(up, 3.0), min(down, 3.0)
-    near_up, near_down = math.exp(-2 * up), math.exp(-2 * down)
-    line_F[34], line_F[35] = near_up**5, near_down**5
-    line_F[36], line_F[37] = near_up, near_down
-    away = (q - real(t, MIDDLE_N, n)) * sense
-    line_F[38], line_F[39], line_F[40] = away / half, min(half, 3.0), 1.0
-    line_F[41], line_F[42] = 0.0 if frozen else 1.0, min(max(away, -3.0), 3.0)
-
-
-@njit(**INNER)
-def move(t, u, room, step_PN, q_N, k, at, out_N):
-    """The network's next angles from `q_N`, the `k`th hypothesis, by outputs from a column on, into `out_N`."""
-    out_TO = room.out_TO
-    for place in range(len(q_N)):
-        n, i = whole(t, ORDER_N, place), k * len(q_N) + place
-        most = max(max(out_TO[i, at], out_TO[i, at + 1]), out_TO[i, at + 2])
-        total, moved = 0.0, 0.0
+            scatter(axis[j] * (u.axial_C3[c, j] * u.sense_N[n]), room.feature_TF, x, joints, j)
         for p in range(SEEN_STEPS):
-            share = exponential(out_TO[i, at + p] - most)
+            moved = step_ZPN[z, p, n] * u.sense_N[n]
+            scatter(min(max(moved, -1.5), 1.5), room.feature_TF, x, joints, 23 + p)
+            scatter(asinh(10 * moved), room.feature_TF, x, joints, 26 + p)
+        _see_joint(t, u, work, room.feature_TF, x, n)
+        scatter(alike(work.cost_C[c], 1 / (end - begin)), room.feature_TF, x, joints, 43)
+
+
+@njit(**INNER)
+def _see_joint(t, u, work, feature_TF, x, n):
+    q, gradient, diagonal, sense = work.start_N[n], work.gradient_N[n], work.hessian_NN[n, n], u.sense_N[n]
+    lower, upper, joints = real(t, LOWER_N, n), real(t, UPPER_N, n), len(work.start_N)
+    above, below, half = upper - q, q - lower, (upper - lower) / 2
+    frozen = ((below <= 0) & (gradient > 0)) | ((above <= 0) & (gradient < 0))
+    up, down = above, below
+    if sense < 0:
+        up, down = below, above
+    near_up, near_down = exponential(max(-2 * up, -100.0)), exponential(max(-2 * down, -100.0))
+    away = (q - real(t, MIDDLE_N, n)) * sense
+    numbers = (
+        asinh(30 * gradient * sense), math.sqrt(max(diagonal, 0.0)), diagonal, min(up, 3.0), min(down, 3.0),
+        _fifth(near_up), _fifth(near_down), near_up, near_down, away * (1 / half), alike(q, min(half, 3.0)),
+        alike(q, 1.0), choose(frozen, 0.0, 1.0), min(max(away, -3.0), 3.0),
+    )  # fmt: skip
+    for k in range(len(numbers)):
+        scatter(numbers[k], feature_TF, x, joints, 29 + k)
+
+
+@njit(**INNER)
+def _fifth(x):
+    return x * x * (x * x) * x
+
+
+@njit(**INNER)
+def move(t, u, room, step_ZPN, kept_ZN, z, frames, out_4, step_P, other_N):
+    """The network's next angles, from outputs of what is kept, into `other_N`. Of so many frames, the first of whose
+    hypotheses they are, a lane is the hypothesis after those in the lanes and packs before it; 0: it is its own one's
+    only answer. `out_4` and `step_P`: room.
+    """
+    joints, lane_OL, lane_PL = len(other_N), inside(out_4), inside(step_P)
+    out_TO, step_ZPNL = room.out_TO, inside(step_ZPN)
+    for place in range(joints):
+        n = whole(t, ORDER_N, place)
+        begin = kept_ZN[0 if frames else z, n]
+        for lane in range(LANES):
+            from_z, from_lane, at = z, lane, 0
+            if frames:
+                from_z, from_lane = 0, lane % frames
+                at = OUTPUTS * min((z * LANES + lane) // frames, u.hypotheses - 1)
+            i = (from_z * LANES + from_lane) * joints + place
+            for o in range(OUTPUTS):
+                lane_OL[o, lane] = out_TO[i, at + o]
+            for p in range(SEEN_STEPS):
+                lane_PL[p, lane] = step_ZPNL[from_z, p, n, from_lane]
+        most = max(max(out_4[0], out_4[1]), out_4[2])
+        total, moved = alike(most, 0.0), alike(most, 0.0)
+        for p in range(SEEN_STEPS):
+            share = exponential(max(out_4[p] - most, -100.0))
             total += share
-            moved += share * step_PN[p, n]
-        moved = moved / total + REACH * math.tanh(out_TO[i, at + 3]) * u.sense_N[n]
-        out_N[n] = min(max(q_N[n] + moved, real(t, LOWER_N, n)), real(t, UPPER_N, n))
+            moved += share * step_P[p]
+        moved = moved / total + REACH * tanh(out_4[3]) * u.sense_N[n]
+        other_N[n] = min(max(begin + moved, real(t, LOWER_N, n)), real(t, UPPER_N, n))

@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.lanes import LANES
 from mrhubo.fast.compiled.networks import P0, P1, P2, P3, P4, P5, Q1, Q2, Q3, Q4, SILU, TANH_END, activate
-from mrhubo.fast.compiled.tables import FIRST_C, INNER, size, whole
-from mrhubo.fast.compiled.tile import COLUMNS, ROWS, multiply, whole_tiles
+from mrhubo.fast.compiled.tables import COLUMNS, FIRST_C, INNER, size, whole
+from mrhubo.fast.compiled.tile import ROWS, multiply, whole_tiles
 from mrhubo.fast.sections import Universal
 
 FEATURES, SEEN, OUTPUTS = 44, 37, 4
@@ -87,7 +88,7 @@ class Room(NamedTuple):
     one_TE: np.ndarray
     two_TE: np.ndarray
     key_EN: np.ndarray
-    """Keys of a block's joints, side by side."""
+    """Keys of a block's joints side by side, block after block, of two hypotheses."""
     score_TE: np.ndarray
     """How much a joint takes from each of its block's, head by head; each head has as many columns as `key_EN`."""
     far_CN: np.ndarray
@@ -98,13 +99,14 @@ class Room(NamedTuple):
 
 
 @njit(**INNER)
-def make_room(t, w, joints, outputs, several):
-    """Room for one robot's joints and so many hypotheses at a time."""
+def make_room(t, w, joints, outputs, several, times):
+    """Room for one robot's joints and so many hypotheses at a time, and for outputs of as often so many."""
     blocks, width, wide, full = size(t, FIRST_C) - 1, w.norm_52W.shape[2], w.mix_LWO.shape[2] + COLUMNS, 0
     for c in range(blocks):
         full = max(full, whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c))
     full += -full % COLUMNS
     tokens, rows = several * joints + 2 * ROWS, several * blocks + 2 * ROWS
+    answers = times * several * joints + 2 * ROWS
     far_CN = np.full((blocks, full), -_FAR, np.float32)
     for c in range(blocks):
         far_CN[c, : whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)] = _ZERO
@@ -112,8 +114,8 @@ def make_room(t, w, joints, outputs, several):
         np.zeros((tokens, FEATURES), np.float32), np.zeros((rows, SEEN), np.float32),
         np.zeros((rows, w.branch_FW.shape[1]), np.float32), np.zeros((tokens, w.joint_FW.shape[1]), np.float32),
         np.zeros((tokens, wide), np.float32), np.zeros((tokens, wide), np.float32),
-        np.zeros((width, full), np.float32), np.zeros((tokens, w.heads * full), np.float32),
-        far_CN, np.zeros((1, wide), np.float32), np.zeros((tokens, outputs + COLUMNS), np.float32),
+        np.zeros((2 * blocks * width, full), np.float32), np.zeros((tokens, w.heads * full), np.float32),
+        far_CN, np.zeros((1, wide), np.float32), np.zeros((answers, outputs + COLUMNS), np.float32),
     )  # fmt: skip
 
 
@@ -146,17 +148,24 @@ def exponential(x):
 
 
 @njit(**INNER)
-def _score(t, w, room, at, c):
-    """How well the joints of a block go together, from a token on, into `score_TE`; others' columns are far off."""
-    width, full = room.key_EN.shape
-    each, one_TE, key_EN, wide = width // w.heads, room.one_TE, room.key_EN, room.score_TE.shape[1]
-    scale, count = _ONE / np.float32(math.sqrt(each)), whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
-    for j in range(count):
+def _turn_keys(t, w, room, at, c, key_at):
+    """Keys of a block's joints, from a token on, side by side into rows of `key_EN`, with the scale of scores."""
+    width, one_TE, key_EN = w.norm_52W.shape[2], room.one_TE, room.key_EN
+    scale = _ONE / np.float32(math.sqrt(width // w.heads))
+    for j in range(whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)):
         for e in range(width):
-            key_EN[e, j] = one_TE[at + j, width + e] * scale
+            key_EN[key_at + e, j] = one_TE[at + j, width + e] * scale
+
+
+@njit(**INNER)
+def _score(t, w, room, at, c, key_at):
+    """How well the joints of a block go together, from a token on, into `score_TE`; others' columns are far off."""
+    width, full = w.norm_52W.shape[2], room.key_EN.shape[1]
+    each, one_TE, wide = width // w.heads, room.one_TE, room.score_TE.shape[1]
+    count = whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
     for h in range(w.heads):
         multiply(
-            one_TE, at * one_TE.shape[1] + h * each, key_EN, h * each * full, room.far_CN, c * full, 0,
+            one_TE, at * one_TE.shape[1] + h * each, room.key_EN, (key_at + h * each) * full, room.far_CN, c * full, 0,
             room.score_TE, at * wide + h * full, count, count, each,
         )  # fmt: skip
 
@@ -184,7 +193,7 @@ def _soften(w, room, tokens):
 @njit(**INNER)
 def _share(t, w, room, at, c):
     """What the joints of a block take from each other, from a token on, into `two_TE`."""
-    width, full = room.key_EN.shape
+    width, full = w.norm_52W.shape[2], room.key_EN.shape[1]
     each, one_TE, two_TE, wide = width // w.heads, room.one_TE, room.two_TE, room.score_TE.shape[1]
     count = whole(t, FIRST_C, c + 1) - whole(t, FIRST_C, c)
     for h in range(w.heads):  # what is beyond a head's numbers is the next one's, which writes over it
@@ -202,9 +211,17 @@ def _attend(t, w, room, several):
     """
     blocks = size(t, FIRST_C) - 1
     joints = whole(t, FIRST_C, blocks)
-    for k in range(several):
-        for c in range(blocks):
-            _score(t, w, room, k * joints + whole(t, FIRST_C, c), c)
+    # A processor waits where it reads at once several numbers that it has just written one by one; so keys of the next
+    # hypothesis are turned before the present one's are read.
+    width = w.norm_52W.shape[2]
+    for k in range(several + 1):
+        if k < several:
+            for c in range(blocks):
+                _turn_keys(t, w, room, k * joints + whole(t, FIRST_C, c), c, (k % 2 * blocks + c) * width)
+        if k > 0:
+            for c in range(blocks):
+                key_at = ((k - 1) % 2 * blocks + c) * width
+                _score(t, w, room, (k - 1) * joints + whole(t, FIRST_C, c), c, key_at)
     _soften(w, room, several * joints)
     for k in range(several):
         for c in range(blocks):
@@ -212,8 +229,9 @@ def _attend(t, w, room, several):
 
 
 @njit(**INNER)
-def answer(t, w, room, first, several):
-    """Outputs into `room.out_TO` of what stands in `room.feature_TF` and `room.seen_XF`, for so many hypotheses.
+def answer(t, w, room, first, several, z):
+    """Outputs into `room.out_TO` of what stands in `room.feature_TF` and `room.seen_XF`, for so many hypotheses, the
+    `z`th time that there are as many as lanes.
 
     Layer after layer in a loop, as each place that calls a function is compiled by itself.
     """
@@ -224,7 +242,7 @@ def answer(t, w, room, first, several):
     x_TW, one_TE, two_TE = room.x_TW, room.one_TE, room.two_TE
     for number in range(2 + 4 * 2 + 1):
         layer, kind = (number - 2) // 4, (number - 2) % 4
-        last, rows, inputs = number == 10, tokens, width
+        last, rows, inputs, out_at = number == 10, tokens, width, 0
         if number < 2:
             given, weight_IO, bias, out, inputs = room.feature_TF, w.joint_FW, w.joint_bias, one_TE, FEATURES
             if number == 0:
@@ -232,6 +250,7 @@ def answer(t, w, room, first, several):
                 rows, inputs = several * blocks, SEEN
         elif last:
             given, weight_IO, bias, out = two_TE, w.later_WO, w.later_bias, room.out_TO
+            out_at = z * LANES * joints
             if first:
                 weight_IO, bias = w.first_WO, w.first_bias
         elif kind == 0:
@@ -260,8 +279,9 @@ def answer(t, w, room, first, several):
         else:
             for i in range(rows):
                 for o in range(outputs):
-                    out[i, o] = bias[o]
-        multiply(given, 0, weight_IO, 0, out, 0, out.shape[1], out, 0, rows, outputs, inputs)
+                    out[out_at + i, o] = bias[o]
+        at = out_at * out.shape[1]
+        multiply(given, 0, weight_IO, 0, out, at, out.shape[1], out, at, rows, outputs, inputs)
         if number == 1 or (number >= 2 and not last and kind == 2):
             activate(SILU, one_TE, x_TW if number == 1 else two_TE, tokens, width if number == 1 else 2 * width)
         elif number >= 2 and not last and kind == 0:
