@@ -30,12 +30,14 @@ from tests.reference.walkers import entries, write_urdf
 from tests.video.films import needs_models
 
 SCRIPTS = [
+    "ablation",
     "camera",
     "collisions",
     "confidence",
     "continuity",
     "discovery",
     "files",
+    "headings",
     "inference",
     "many_robots",
     "missing_points",
@@ -217,6 +219,19 @@ def test_whole_body(run: Run, clips: Path, tmp_path: Path, monkeypatch: pytest.M
     found = rows(text, "clip")
     assert [row[0] for row in found] == ["boxing", "wave", "mean"] and "as a stream: 2 clips" in text
     assert (tmp_path / "moments.png").stat().st_size > 1000
+
+
+def test_ablation(run: Run, clips: Path) -> None:
+    found = rows(run("ablation", "--robots", "nao", "--clips", clips, "--rate", 12, "--parts", "2"), "without")
+    assert [row[0] for row in found] == ["nothing", "2. flat feet", "limits of speed"]
+    assert found[0][-1] == "1.00" and float(found[0][8]) <= 1.01
+
+
+def test_headings(run: Run, clips: Path) -> None:
+    text = run("headings", "--robots", "nao", "--clips", clips, "--headings", 2, "--seconds", 0.2)
+    found = rows(text, "robot")
+    assert [row[1:3] for row in found] == [[clip, way] for clip in ("boxing", "wave") for way in ("motion", "stream")]
+    assert all(float(row[3]) < 1 and row[-1] == "0 of 2" for row in found)
 
 
 def test_physics(run: Run, clips: Path, tmp_path: Path) -> None:

@@ -301,7 +301,7 @@ def test_roots_that_jump_are_counted_and_change_nothing(legged: FastRetargeter, 
 def test_a_robot_of_a_config_stands_at_home_with_its_soles_on_the_floor(
     root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(without_training, "calibrate", lambda _: STANDARD)  # it takes some seconds
+    monkeypatch.setattr(without_training, "calibrated", lambda _: STANDARD)  # it takes some seconds
     robot = LiveRobot.of_robot(str(root / "conf" / "nao-whole-body.yaml"), LiveConfig(), "numpy")
     for home_N in (robot.home_N, LiveRobot.of_robot("nao-whole-body", LiveConfig(home="zero"), "numpy").home_N):
         sent = Sent.of(robot, [Pilot(dataclasses.replace(robot, home_N=home_N), LiveConfig(), True).tick(0.0)])
