@@ -41,7 +41,7 @@ class FastRetargeter:
         Args:
             description: the retargeter's arrays.
             form: "compiled" (needs numba), or "numpy"; None: compiled where numba is installed. The first use of the
-                compiled form ever takes some twenty seconds, for compiling; what it made is kept for the next.
+                compiled form ever takes half a minute or more, for compiling; what it made is kept for the next.
 
         Raises:
             UserError: there is no such form, or numba is missing.
