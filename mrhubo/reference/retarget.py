@@ -109,11 +109,12 @@ class OptimizationRetargeter(nn.Module):
             UserError: the array has another shape, holds NaN, infinite numbers or what is no rotation (says in which
                 frame), or the frame rate is not positive.
         """
-        if isinstance(motion, Motion) and self._legs.has_feet:
-            motion = steady_root(motion)
+        as_seen = motion if isinstance(motion, Motion) else None
+        if as_seen is not None and self._legs.has_feet:
+            motion = steady_root(as_seen)
         poses = read_poses(motion, frame_rate, self.body_map.skeleton)
         local_TJ33, shape = poses.local_TJ33.to(self.problem.device), poses.shape
-        steps = read_steps(motion, local_TJ33, self._legs) if isinstance(motion, Motion) else None
+        steps = read_steps(motion, local_TJ33, self._legs, as_seen) if isinstance(motion, Motion) else None
         stand = None if steps is None else self._stand(local_TJ33, steps, avoid_collisions)
         clips = local_TJ33.split(max(1, shape[-1])) if shape and poses.frame_rate is not None else [local_TJ33]
         options = (poses.frame_rate, avoid_collisions)

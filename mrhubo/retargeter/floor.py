@@ -31,8 +31,8 @@ def standing_of(body_map: BodyMap) -> Standing | None:
 
 
 def stand(
-    retargeter: Retargeter, motion: MotionLike, parts: Sequence[Tensor], targets: Sequence[Tensor], polish: int,
-    avoid_collisions: bool,
+    retargeter: Retargeter, motion: MotionLike, as_seen: MotionLike, parts: Sequence[Tensor],
+    targets: Sequence[Tensor], polish: int, avoid_collisions: bool,
 ) -> tuple[Tensor, dict[str, Any]] | None:  # fmt: skip
     """Joint angles (T, N) [rad] of a motion on the floor, and what a result tells of it (`standing_fields`); None where
     the robot has no feet, or the motion tells no root.
@@ -40,6 +40,7 @@ def stand(
     Args:
         retargeter: of the robot.
         motion: a `Motion` may tell root and contacts; an array tells none.
+        as_seen: it, before its pelvis was made steady.
         parts: its poses, for the retargeter's skeleton and on its device.
         targets: their directions.
         polish: as for `Retargeter.predict`.
@@ -50,7 +51,8 @@ def stand(
     """
     if not isinstance(motion, Motion) or (standing := retargeter.standing) is None:
         return None
-    steps = read_steps(motion, torch.cat(list(parts)), standing.legs)
+    seen = as_seen if isinstance(as_seen, Motion) else None
+    steps = read_steps(motion, torch.cat(list(parts)), standing.legs, seen)
     if steps is None:
         return None
     target_TD3 = flatten(torch.cat(list(targets)), steps, standing.legs)

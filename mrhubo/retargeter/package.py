@@ -224,11 +224,14 @@ class Retargeter(nn.Module):
             raise UserError("together=True needs the frame rate: frame_rate=..., or a Motion, which has its own")
         joined_at = None if together is False else frame_rate
         check_frame_rate(joined_at)
+        as_seen = local_TJ33
         if joined_at is not None and isinstance(local_TJ33, Motion) and self.standing is not None:
             local_TJ33 = steady_root(local_TJ33)
         parts = checked_parts(local_TJ33, self.body_map.skeleton, self.device, polish)
         targets = [self.body_map.human_directions(part) for part in parts]
-        stands = None if joined_at is None else stand(self, local_TJ33, parts, targets, polish, avoid_collisions)
+        stands = (
+            None if joined_at is None else stand(self, local_TJ33, as_seen, parts, targets, polish, avoid_collisions)
+        )
         q_TN, told = stands or (self.follow(parts, targets, polish, joined_at, avoid_collisions), {})
         shake_TD = None if frame_rate is None else shake(torch.cat(targets), frame_rate)
         sizes = [len(target) for target in targets]

@@ -35,13 +35,15 @@ class HumanSteps:
     """The person's own points, where the skeleton's are with the root's way made to fit."""
 
 
-def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | None:
+def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion | None = None) -> HumanSteps | None:
     """The steps of a person; None where the motion tells no root, or the robot has no feet.
 
     Args:
         motion: tells the root and the frame rate.
         local_TJ33: its rotations (T, 21, 3, 3), for the legs' skeleton.
         legs: the robot's.
+        as_seen: the motion before its pelvis was made steady (`mrhubo.motion.steady`), which moves feet by millimetres;
+            it tells when they are planted. None: there is no other.
 
     Raises:
         UserError: the root holds NaN, infinite numbers or places out of this world; says in which frame.
@@ -51,7 +53,12 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs) -> HumanSteps | N
     root_T33, way_T3 = motion_root(motion, local_TJ33, legs)
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
     world_TK3 = points_TK3 @ root_T33.mT + way_T3[:, None]
-    place_TP3 = world_TK3[:, legs.contacts].double().cpu().numpy()
+    soles_TP3 = world_TK3[:, legs.contacts]
+    if as_seen is not None and as_seen.root_rotation_T33 is not None:
+        skeleton = legs.body_map.skeleton
+        points_TK3 = skeleton.keypoints(as_seen.for_skeleton(skeleton).local_TJ33.to(local_TJ33))
+        soles_TP3 = points_TK3[:, legs.contacts] @ as_seen.root_rotation_T33.to(local_TJ33).mT + way_T3[:, None]
+    place_TP3 = soles_TP3.double().cpu().numpy()
     contacts = find_contacts(place_TP3, motion.frame_rate, given_TP=given_contacts(motion, legs))
     path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
     return HumanSteps(
