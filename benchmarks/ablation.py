@@ -15,12 +15,12 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
-from common import print_header, print_table, read_options, whole_body_clips
+from common import mean_of, most_of, print_header, print_table, read_options, whole_body_clips
 
 from mrhubo import rotation
 from mrhubo.errors import InputWarning
@@ -71,7 +71,7 @@ def main(argv: list[str]) -> None:
         sys.exit(f"{rest[0]}: is unknown")
     torch.set_num_threads(1)
     print_header()
-    motions = [_read(path, float(options["rate"])) for path in whole_body_clips(options["clips"])]
+    motions = [resample(read_motion(path), float(options["rate"])) for path in whole_body_clips(options["clips"])]
     columns = ["without", "thigh [deg]", "shin [deg]", "feet [deg]", "slide, own [cm/s]", "sunk (max [cm])",
                "floats (max [cm])", "path [cm/m]", "speed", "base turns [deg a frame]", "legs' jerk"]  # fmt: skip
     for name in options["robots"].split(","):
@@ -106,10 +106,6 @@ def _switched(changes: list[tuple[Any, str, Any]]) -> Iterator[None]:
         setattr(module, name, value)
 
 
-def _read(path: Path, rate: float) -> Motion:
-    return resample(read_motion(path), rate)
-
-
 def _measure(
     retargeter: OptimizationRetargeter, motion: Motion, speed_N: torch.Tensor | None = None
 ) -> tuple[WholeBodyScore, float, float, float]:
@@ -118,7 +114,7 @@ def _measure(
     """
     result = retargeter(motion)
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
-    base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    base_T33 = rotation.wxyz_to_matrix(result.root_quaternion_wxyz)
     body_map = retargeter.body_map
     score = score_whole_body(body_map, motion, result.q, result.root_position, base_T33)
     turned_T = torch.rad2deg(rotation.geodesic_distance(base_T33[1:], base_T33[:-1]))
@@ -131,12 +127,7 @@ def _measure(
 
 def _row(part: str, found: list[tuple[WholeBodyScore, float, float, float]], smooth: float) -> list[str]:
     scores = [score for score, *_ in found]
-
-    def mean(key: str) -> float:
-        return statistics.fmean(getattr(score, key) for score in scores)
-
-    def most(key: str) -> float:
-        return max(getattr(score, key) for score in scores)
+    mean, most = partial(mean_of, scores), partial(most_of, scores)
 
     angles = [statistics.fmean(score.parts_deg[joint] for score in scores) for joint in ("knee", "ankle", "foot")]
     return [

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import platform
 import shlex
+import statistics
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -46,6 +48,16 @@ def beginning(motion: Motion, frames: int) -> Motion:
     """The first frames of a motion."""
     arrays = vars(motion.arrays)
     return motion.changed(**{name: array[:frames] for name, array in arrays.items() if array is not None})
+
+
+def mean_of(scores: Sequence[Any], key: str) -> float:
+    """The mean of an attribute."""
+    return statistics.fmean(getattr(score, key) for score in scores)
+
+
+def most_of(scores: Sequence[Any], key: str) -> float:
+    """The largest of an attribute."""
+    return max(getattr(score, key) for score in scores)
 
 
 def print_header() -> None:

@@ -82,7 +82,7 @@ def differences(found: Sequence[Answer], turns: Sequence[float]) -> list[str]:
 
 def _turned_base(answer: Answer, back_33: Tensor) -> tuple[Tensor, Tensor]:
     assert answer.root_position is not None and answer.root_quaternion_wxyz is not None
-    base_T33 = rotation.quaternion_to_matrix(answer.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    base_T33 = rotation.wxyz_to_matrix(answer.root_quaternion_wxyz)
     return answer.root_position @ back_33.T, back_33 @ base_T33
 
 

@@ -207,7 +207,7 @@ class Simulated:
         """Share of the frames with planted feet, of those that count, whose points are over these, or so near [m]."""
         assert result.contact is not None and result.root_position is not None
         assert result.root_quaternion_wxyz is not None
-        base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+        base_T33 = rotation.wxyz_to_matrix(result.root_quaternion_wxyz)
         poses = self.retargeter.body_map.robot.forward(result.q)
         ball_TK2 = self.legs.on_floor(poses, result.root_position, base_T33).ball_BK3[..., :2].double().numpy()[inner]
         foot_K = np.repeat(np.arange(len(self.legs.soles)), [len(sole.balls_K4) for sole in self.legs.soles])

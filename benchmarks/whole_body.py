@@ -21,11 +21,12 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
-from common import beginning, print_header, print_table, read_options, whole_body_clips
+from common import beginning, mean_of, most_of, print_header, print_table, read_options, whole_body_clips
 from PIL.Image import Image
 
 from mrhubo import rotation
@@ -123,7 +124,7 @@ def _person(motion: Motion) -> list[Image]:
 def _robot(retargeter: OptimizationRetargeter, motion: Motion) -> list[Image]:
     robot, result = retargeter.body_map.robot, retargeter(motion, avoid_collisions=True)
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
-    base_T33 = rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    base_T33 = rotation.wxyz_to_matrix(result.root_quaternion_wxyz)
     artist, figures = Artist(robot), []
     for t in _moments(motion).astype(int):
         pose_44 = np.eye(4)
@@ -188,7 +189,7 @@ def _measure(
     seconds = time.process_time() - start
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
     q_TN, place_T3, quaternion_T4 = map(torch.as_tensor, (result.q, result.root_position, result.root_quaternion_wxyz))
-    base_T33 = rotation.quaternion_to_matrix(quaternion_T4[:, [1, 2, 3, 0]])
+    base_T33 = rotation.wxyz_to_matrix(quaternion_T4)
     score = score_whole_body(retargeter.body_map, motion, q_TN, place_T3, base_T33)
     touches = float("nan") if result.collision is None else float(torch.as_tensor(result.collision).float().mean())
     return score, touches, 1000 * seconds / len(motion)
@@ -236,12 +237,7 @@ def _print_without_feet(
 
 def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: list[str]) -> list[str]:
     scores = [score for score, *_ in found]
-
-    def mean(key: str) -> float:
-        return statistics.fmean(getattr(score, key) for score in scores)
-
-    def most(key: str) -> float:
-        return max(getattr(score, key) for score in scores)
+    mean, most = partial(mean_of, scores), partial(most_of, scores)
 
     touches = statistics.fmean(touches for _, touches, _ in found)
     return [

@@ -100,6 +100,11 @@ def quaternion_to_matrix(quaternion_xyzw: Tensor) -> Tensor:
     return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
+def wxyz_to_matrix(quaternion_wxyz: Tensor) -> Tensor:
+    """(..., 4) quaternions (w, x, y, z), as answers tell a base's, of any length but zero, to (..., 3, 3)."""
+    return quaternion_to_matrix(quaternion_wxyz[..., [1, 2, 3, 0]])
+
+
 def matrix_to_quaternion(matrix: Tensor) -> Tensor:
     """(..., 3, 3) to (..., 4) unit quaternions (x, y, z, w).
 

@@ -109,7 +109,7 @@ def score_ways(body_map: BodyMap, motions: Sequence[Motion], ways: Ways) -> Whol
 
 def _score(body_map: BodyMap, motion: Motion, answer: Answer) -> WholeBodyScore:
     assert answer.root_position is not None and answer.root_quaternion_wxyz is not None
-    base_T33 = rotation.quaternion_to_matrix(answer.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    base_T33 = rotation.wxyz_to_matrix(answer.root_quaternion_wxyz)
     return score_whole_body(body_map, motion, answer.q, answer.root_position, base_T33)
 
 

@@ -29,14 +29,12 @@ def figure_of(robot: Robot, joint_names: Sequence[str]) -> dict[str, Any]:
         robot: whose URDF tells.
         joint_names: those of the messages, in their order.
     """
-    from mrhubo.robot import bare_sticks, read_geometry
+    from mrhubo.robot import bare_sticks, drawn_shapes
     from mrhubo.view import Solids, robot_solids
     from mrhubo.viewer.bodies import body_sticks, read_bodies
 
     description = robot.description
-    geometry = read_geometry(description.parsed)
-    shaped = {shape.link for shape in geometry}
-    geometry += [shape for shape in description.solids.of_meshes if shape.link not in shaped]
+    geometry = drawn_shapes(description)
     bodies = read_bodies(robot, joint_names)
     sticks = body_sticks(bodies, bare_sticks(description, {shape.link for shape in geometry}))
     solids = [

@@ -25,6 +25,7 @@ from mrhubo import rotation
 from mrhubo.body.skeleton import JOINT_NAMES
 from mrhubo.body.turns import JointTurns
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.fast.plain.root_turn import SETTLED_RAD, SWEEPS
 from mrhubo.frames import human_axes
 from mrhubo.robot.keypoints import Keypoints
 from mrhubo.robot.model import Robot
@@ -32,8 +33,6 @@ from mrhubo.robot.parts import CHEST, PELVIS, BodyPart
 
 SHARES = {"pelvis": 0.0, "chest": 1.0, "between": 0.5}
 """Of what the waist cannot do, how much the base does."""
-SWEEPS, SETTLED_RAD = 40, 1e-8
-"""Joints of a waist are turned one after the other so often at most, or until none turns by more."""
 _SEEN = [1, 2]
 """Columns of a chest's axes by whose directions the optimiser knows it: up and forward."""
 

@@ -14,7 +14,7 @@ from PIL.Image import Image
 from mrhubo.body import KEYPOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.frames import base_to_human
-from mrhubo.robot import bare_sticks, read_geometry
+from mrhubo.robot import bare_sticks, drawn_shapes
 from mrhubo.view import Solids, animated_frames, figure_sheet, human_solids, robot_solids, save_gif, save_png
 from mrhubo.viewer.film import save_mp4
 from mrhubo.viewer.performance import Performance
@@ -76,9 +76,7 @@ def _person_solids(person: Person, standing: Standing, frames: Sequence[int]) ->
 def _robot_solids(robot: Performance, standing: Standing, frames: Sequence[int]) -> list[Solids]:
     """From shapes alone: of meshes the painter draws the capsules that stand for them in collisions."""
     description = robot.robot.description
-    geometry = read_geometry(description.parsed)
-    shaped = {shape.link for shape in geometry}
-    geometry += [shape for shape in description.solids.of_meshes if shape.link not in shaped]
+    geometry = drawn_shapes(description)
     sticks = bare_sticks(description, {shape.link for shape in geometry})
     names, poses_TL44 = robot.links()
     poses_TL44 = poses_TL44[list(frames)]

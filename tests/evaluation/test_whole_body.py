@@ -24,7 +24,7 @@ class _Measured:
         self.body_map, self.motion = walker(folder), squat(FRAMES)
         found = OptimizationRetargeter(self.body_map)(self.motion)
         assert found.root_position is not None and found.root_quaternion_wxyz is not None
-        turn_T33 = rotation.quaternion_to_matrix(found.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+        turn_T33 = rotation.wxyz_to_matrix(found.root_quaternion_wxyz)
         self.answer = (found.q, found.root_position, turn_T33)
 
     def score(self, q=None, shift=None, turn=None) -> WholeBodyScore:  # noqa: ANN001 (tensors)

@@ -9,7 +9,6 @@ import pytest
 
 pytest.importorskip("websockets")
 
-from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.server import Server
 from tests.live.browser import Browser, find_browser
@@ -19,18 +18,10 @@ USUAL = "space bar, or press and hold"
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    found = Server(Endpoint("127.0.0.1", 0))
-    found.open()
-    yield found
-    found.close()
-
-
-@pytest.fixture(scope="module")
-def browser(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def browser(open_server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     find_browser()
     with Browser(tmp_path_factory.mktemp("browser") / "profile") as found:
-        found.go(server.url)
+        found.go(open_server.url)
         yield found
 
 
@@ -41,14 +32,14 @@ def test_a_page_without_the_keyboard_says_so(browser: Browser) -> None:
 
 
 @pytest.fixture
-def held(browser: Browser, server: Server) -> Iterator[Callable[[bool], None]]:
+def held(browser: Browser, open_server: Server) -> Iterator[Callable[[bool], None]]:
     """Waits until the session hears that the button is held, or not. In the beginning the page is connected."""
     inbox = Inbox(10.0)
 
     def wait(wanted: bool) -> None:
         end = time.monotonic() + 60
         while True:
-            server.take(inbox, time.monotonic())
+            open_server.take(inbox, time.monotonic())
             if inbox.held == wanted == (browser.ask("document.getElementById('hold').ariaPressed") == "true"):
                 return
             assert time.monotonic() < end, f"held is {inbox.held}; {browser.ask(HINT)}; {browser.complaints()}"
@@ -63,18 +54,18 @@ def held(browser: Browser, server: Server) -> Iterator[Callable[[bool], None]]:
 
 
 def test_a_press_that_finds_no_connection_is_told_and_takes_another(
-    browser: Browser, server: Server, held: Callable[[bool], None]
+    browser: Browser, open_server: Server, held: Callable[[bool], None]
 ) -> None:
     browser.key("keyDown")
     held(True)
-    server.close()
+    open_server.close()
     browser.until("document.getElementById('state').textContent === 'closed'")
     browser.until(f"{HINT}.includes('press again')")  # it was held when the connection went
     browser.key("keyUp")
     browser.until(f"{HINT} === '{USUAL}'")
     browser.key("keyDown")
     browser.until(f"{HINT}.includes('press again')")  # pressed while there is none
-    server.open()
+    open_server.open()
     browser.until("document.getElementById('state').textContent === 'connected'")
     browser.key("keyDown", repeat=True)
     held(False)

@@ -124,7 +124,7 @@ def test_robots_without_shapes_and_with_many(root: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(room, "_MOST", 10)
     assert sum(len(body["capsules"]) for body in figure_of(nao, nao.joint_names)["bodies"]) <= 10
     monkeypatch.undo()
-    monkeypatch.setattr("mrhubo.robot.read_geometry", lambda parsed: [])
+    monkeypatch.setattr("mrhubo.robot.bare.read_geometry", lambda parsed: [])
     bodies = figure_of(nao, nao.joint_names)["bodies"]
     for number, body in enumerate(bodies):
         hanging = [other["origin"] for other in bodies if other["parent"] == number]

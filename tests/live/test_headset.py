@@ -17,7 +17,6 @@ from mrhubo import rotation
 from mrhubo.body import KEYPOINT_NAMES, Skeleton
 from mrhubo.body.joints import JOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.live.body import Body
-from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Nobody
 from mrhubo.live.point_sets import POINT_SETS
@@ -57,19 +56,11 @@ LEFT, RIGHT = "fake.left ??= {}", "fake.right ??= {}"
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    found = Server(Endpoint("127.0.0.1", 0))
-    found.open()
-    yield found
-    found.close()
-
-
-@pytest.fixture(scope="module")
-def browser(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def browser(open_server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     find_browser()
     with Browser(tmp_path_factory.mktemp("browser") / "profile") as found:
         found.call("Page.addScriptToEvaluateOnNewDocument", source=DEVICE)
-        found.go(server.url)
+        found.go(open_server.url)
         found.until("document.getElementById('state').textContent === 'connected'")
         yield found
 
@@ -103,11 +94,11 @@ class Listener:
 
 
 @pytest.fixture
-def listener(browser: Browser, server: Server) -> Iterator[Listener]:
+def listener(browser: Browser, open_server: Server) -> Iterator[Listener]:
     """In the session."""
     browser.ask("document.getElementById('headset-start').click()")
     browser.until("fake.session && document.getElementById('headset-start').textContent === 'Leave'")
-    yield Listener(server)
+    yield Listener(open_server)
     browser.ask("fake.session?.end()")
     browser.until("document.getElementById('headset-start').textContent !== 'Leave'")
 

@@ -33,7 +33,7 @@ def test_planted_feet_stay_and_the_robot_goes_where_the_person_goes(biped: Retar
     assert found.root_position is not None and found.root_quaternion_wxyz is not None and found.contact is not None
     assert found.root_position.shape == (90, 3) and found.contact.shape == (90, 2)
     assert found.contact_names == ("left_foot", "right_foot") and found.frame_rate == motion.frame_rate
-    turn_T33 = rotation.quaternion_to_matrix(found.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    turn_T33 = rotation.wxyz_to_matrix(found.root_quaternion_wxyz)
     score = score_whole_body(biped.body_map, motion, found.q, found.root_position, turn_T33)
     assert score.slide_cm_s < 1 and score.sunk == score.floating == score.outside == score.jumps == 0
     assert score.speed_max <= 1 and score.path_cm_m < 3 and max(score.parts_deg.values()) < 10

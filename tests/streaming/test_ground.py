@@ -35,7 +35,7 @@ def followed(retargeter: Retargeter, motion: Motion, **options: object) -> tuple
     """Joint angles, places and rotations of the base of a motion that is followed."""
     found = Stream(retargeter, motion.frame_rate, settings=SETTINGS, **options).retarget(motion)  # pyright: ignore
     assert found.root_position is not None and found.root_quaternion_wxyz is not None
-    return found.q, found.root_position, rotation.quaternion_to_matrix(found.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    return found.q, found.root_position, rotation.wxyz_to_matrix(found.root_quaternion_wxyz)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from mrhubo.fast.leg_section import RootTurn
 from mrhubo.fast.plain.human import cross, orthonormal_columns, rodrigues
 
 SWEEPS, SETTLED_RAD = 40, 1e-8
-"""As of `mrhubo.robot.root_turn`."""
+"""Joints of a waist are turned one after the other so often at most, or until none turns by more."""
 _SEEN = [1, 2]
 
 

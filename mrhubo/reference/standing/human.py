@@ -54,7 +54,7 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion |
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
     world_TK3 = points_TK3 @ root_T33.mT + way_T3[:, None]
     soles_TP3 = world_TK3[:, legs.contacts]
-    if as_seen is not None and as_seen.root_rotation_T33 is not None:
+    if as_seen is not None and as_seen is not motion and as_seen.root_rotation_T33 is not None:
         skeleton = legs.body_map.skeleton
         points_TK3 = skeleton.keypoints(as_seen.for_skeleton(skeleton).local_TJ33.to(local_TJ33))
         soles_TP3 = points_TK3[:, legs.contacts] @ as_seen.root_rotation_T33.to(local_TJ33).mT + way_T3[:, None]

@@ -24,7 +24,7 @@ from tests.reference.walkers import ROOTS, walker
 
 def base(result: OptimizationResult) -> tuple[Tensor, Tensor]:
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
-    return result.root_position, rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    return result.root_position, rotation.wxyz_to_matrix(result.root_quaternion_wxyz)
 
 
 def off_support(body_map: BodyMap, result: OptimizationResult) -> Tensor:

@@ -28,7 +28,7 @@ def retargeter(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 
 def base(result: OptimizationResult) -> tuple[Tensor, Tensor]:
     assert result.root_position is not None and result.root_quaternion_wxyz is not None
-    return result.root_position, rotation.quaternion_to_matrix(result.root_quaternion_wxyz[:, [1, 2, 3, 0]])
+    return result.root_position, rotation.wxyz_to_matrix(result.root_quaternion_wxyz)
 
 
 def soles(retargeter: OptimizationRetargeter, result: OptimizationResult) -> tuple[np.ndarray, np.ndarray]:
