@@ -48,7 +48,7 @@ def _checksum(retargeter: Retargeter) -> str:
     body_map, digest = retargeter.body_map, xxhash.xxh3_128(_sources())
     robot, network = body_map.robot, retargeter.network
     told = (torch.__version__, type(network).__name__, robot.description.kinematics, robot.links, robot.joint_names)
-    digest.update(repr((*told, body_map.direction_names)).encode())
+    digest.update(repr((*told, body_map.direction_names, body_map.keypoints.root_follows)).encode())
     for module in (network, body_map, retargeter.prior):
         for name, tensor in itertools.chain(module.named_parameters(), module.named_buffers()):
             digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode() + _bytes(tensor))

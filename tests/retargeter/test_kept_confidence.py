@@ -13,6 +13,7 @@ from mrhubo.retargeter import Retargeter, kept_confidence, optimised
 from mrhubo.retargeter.calibration import calibrate
 from mrhubo.retargeter.kept_confidence import calibrated
 from mrhubo.robot import build_body_map
+from tests.reference.walkers import walker
 
 
 @pytest.fixture
@@ -45,6 +46,11 @@ def test_a_robot_that_is_known_is_not_asked_again(found: list[int], make: Callab
 def test_another_robot_is(found: list[int], make: Callable[..., Retargeter], setting: str) -> None:
     first, other = make(), make(setting)
     assert found == [id(first), id(other)]
+
+
+def test_one_whose_root_follows_another_part_is(found: list[int], tmp_path: Path) -> None:
+    made = [optimised(walker(tmp_path, follows=part)) for part in ("chest", "between", "chest")]
+    assert found == [id(retargeter) for retargeter in made[:2]]
 
 
 def test_other_weights_are(found: list[int], make: Callable[..., Retargeter]) -> None:
