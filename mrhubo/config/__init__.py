@@ -37,6 +37,7 @@ from mrhubo.config.schema import (
 )
 from mrhubo.config.shipped import find_config, is_config, shipped_root
 from mrhubo.config.sweeps import SpaceEntry, SpaceRange, SweepConfig
+from mrhubo.config.tuning import usual_trainer
 from mrhubo.config.typed import typed_value
 from mrhubo.config.universal import SHIPPED_UNIVERSAL, UniversalConfig
 
@@ -91,6 +92,7 @@ __all__ = [
     "to_plain",
     "to_yaml",
     "typed_value",
+    "usual_trainer",
     "where",
     "whole_number",
     "with_places",

@@ -11,6 +11,7 @@ from mrhubo.config.kinds import example
 from mrhubo.config.places import keep_places
 from mrhubo.config.schema import Config
 from mrhubo.config.tree import MAX_DEPTH, Node, command_line, parse_typed, read_file
+from mrhubo.config.tuning import fill_in_trainer
 from mrhubo.config.typed import build
 from mrhubo.errors import UserError
 
@@ -32,6 +33,8 @@ def load_config(
     interpolate(root, environment)
     config = build(schema, root)
     keep_places(config, root)
+    if isinstance(config, Config):
+        fill_in_trainer(config)
     return config
 
 

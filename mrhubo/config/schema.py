@@ -193,19 +193,20 @@ class TrainerConfig:
     """The training."""
 
     max_steps: int = bounded(7_500, 1, 1_000_000_000)
-    """Optimiser steps."""
+    """Optimiser steps; with `model.start: universal` 200."""
     batch_size: int = bounded(512, 1, 10_000_000)
-    """Pairs per step."""
+    """Pairs per step; with `model.start: universal` 64."""
     loss: str = choice("l1", "l1", "mse")
     """Distance of links and joint angles from the pair's: `l1` = mean absolute, `mse` = mean square (the paper)."""
     lr: float = bounded(8e-3, 1e-9, 10.0)
-    """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps."""
+    """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps. With `model.start: universal`
+    0.001."""
     weight_decay: float = bounded(1e-6, 0.0, 10.0)
     """Weight decay of AdamW."""
     precision: str = choice("32", "32", "bf16")
     """`32`, or `bf16` for bf16 autocast (faster, slightly less accurate)."""
     validate_every: int = bounded(500, 1, 1_000_000_000)
-    """Steps between validations; a checkpoint is written at each."""
+    """Steps between validations; a checkpoint is written at each. With `model.start: universal` 100."""
     seed: int = bounded(0, 0, 2**32 - 1)
     """Seed of the initial weights and of the draws."""
     accelerator: str = choice("auto", "auto", "cpu", "gpu")

@@ -7,7 +7,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from mrhubo.config import Config, changed_settings
+from mrhubo.config import Config, changed_settings, usual_trainer
 from mrhubo.config.secrets import redacted
 from mrhubo.runtime.database import database_uri
 
@@ -17,8 +17,9 @@ _SIZES = ("count", "max_steps", "seed")
 
 def run_name(config: Config) -> str:
     """The robot's name and the settings that differ from the defaults: `nao stages=1 filter=none`."""
-    sections = (config.body, config.pairs, config.model, config.trainer)
+    sections = (config.body, config.pairs, config.model)
     changed = {name: value for section in sections for name, value in changed_settings(section).items()}
+    changed |= changed_settings(config.trainer, usual_trainer(config))
     changed.pop("workers", None)  # the result does not depend on it
     if config.robot.scale != "auto":
         changed["scale"] = config.robot.scale
