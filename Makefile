@@ -35,9 +35,12 @@ demo: .venv/.view
 test: .venv/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
-	$(BIN)/python -m pytest -n auto $(PYTEST_ARGS)
-	$(BIN)/mkdocs build --strict --quiet
+	@echo "$(BIN)/pyright and $(BIN)/mkdocs build --strict --quiet, beside the tests; what they say comes after them"
+	@said=$$(mktemp); trap 'rm -f "$$said"' EXIT; trap 'kill $$beside 2>/dev/null; exit 130' INT TERM; \
+	{ $(BIN)/pyright && $(BIN)/mkdocs build --strict --quiet; } > "$$said" 2>&1 & beside=$$!; \
+	echo "$(BIN)/python -m pytest -n auto $(PYTEST_ARGS)"; \
+	$(BIN)/python -m pytest -n auto $(PYTEST_ARGS); tests=$$?; \
+	wait $$beside; beside=$$?; cat "$$said"; exit $$((tests ? tests : beside))
 
 dashboard: export MLFLOW_SERVER_ENABLE_JOB_EXECUTION = false
 dashboard: export MLFLOW_DISABLE_TELEMETRY = true
