@@ -21,6 +21,7 @@ from mrhubo.fast.compiled.tables import (
     INPUT_I,
     LAYER_G5,
     LIMB_M,
+    LINEAR,
     LOWER_N,
     LOWER_W,
     NET_H6,
@@ -30,6 +31,7 @@ from mrhubo.fast.compiled.tables import (
     SECOND_O,
     SEEN_M,
     SEES_DIRECTIONS,
+    SHORT,
     STAGES,
     TANH_BOUND,
     TURNED,
@@ -106,7 +108,7 @@ def affine(t, layer, x_BI, out_BO, frames):
         bias_O = number[at + inputs * wide : at + (inputs + 1) * wide]
         multiply(x_BI, 0, weight_IO, 0, bias_O, 0, 0, out_BO, 0, frames, outputs, inputs)
         return
-    if whole(t, LAYER_G5, 5 * layer + 4):
+    if whole(t, LAYER_G5, 5 * layer + 4) & SHORT:
         _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
         for b in range(frames):
             for o in range(outputs):
@@ -172,8 +174,11 @@ def mlp(t, net, kind, residual, one_BE, two_BE, three_BE, frames):
             one_BE[b, e] = three_BE[b, e]
     for layer in range(first + 1, first + layers):
         before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
-        activate(kind, one_BE, two_BE, frames, before)
-        affine(t, layer, two_BE, three_BE, frames)
+        given_BE = one_BE
+        if not whole(t, LAYER_G5, 5 * layer + 4) & LINEAR:
+            activate(kind, one_BE, two_BE, frames, before)
+            given_BE = two_BE
+        affine(t, layer, given_BE, three_BE, frames)
         adds = residual and layer < first + layers - 1
         for b in range(frames):
             for e in range(width):

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.narrowing import LARGE, narrowed
 from mrhubo.fast.description import Description
 from mrhubo.fast.leg_section import Legs
 from mrhubo.fast.plain.avoidance import CLEARANCE
@@ -18,7 +19,7 @@ from mrhubo.fast.plain.broad_phase import make_groups, reaches
 from mrhubo.fast.plain.collision import clearances
 from mrhubo.fast.plain.human import skew
 from mrhubo.fast.plain.soles import moved_points
-from mrhubo.fast.sections import SECTIONS, Layers, Part
+from mrhubo.fast.sections import SECTIONS, Part
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -47,8 +48,9 @@ their first steps. scale_4: good and excessive angle, shaking [degrees], usual p
 and its radius. clear_Y: distance [m] that a pair is to keep. Pairs stand group by group
 (`mrhubo.fast.plain.broad_phase`). reach_Z: how far [m] a group's capsule and ball must be apart so that no pair is
 nearer than that. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
-network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in `number`, and 1 where
-the weights are among `shorts`, whose scales stand after the biases then; turned: the same for many frames at a time,
+network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in `number`, and SHORT
+where the weights are among `shorts`, whose scales stand after the biases then, LINEAR where no activation stands before
+the layer; turned: the same for many frames at a time,
 as `_turned` lays a layer out, which begins where turned_G says, -1: not there; column: all columns; count_6: networks
 of the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
 distance. pool_CUX: the pool's directions, block after block. block_H: the block whose joints move a point of a sole,
@@ -81,8 +83,10 @@ FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL, APART = np.arange(6)
 
 COLUMNS = 16
 """Of a tile (`mrhubo.fast.compiled.tile`)."""
-_LARGE, _STEPS = 2**16, 32_767
-"""Weights of a layer that is large, and the largest number of 16 bits."""
+SHORT, LINEAR = np.arange(1, 3)
+"""What is added up in layer_G5."""
+_STEPS = 32_767
+"""The largest number of 16 bits."""
 _ROUNDED = 1e-5
 """Distance [m] by which no robot moves where its joint angles are rounded to float32."""
 
@@ -167,23 +171,28 @@ def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np
     nets, layers, columns, numbers = [], [], [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
     places, turned = [], [np.zeros(0, np.float32)]
 
-    def add(part: Part, coarse: bool) -> None:
+    def add(part: Part) -> None:
         nets.append([len(layers), len(part.layers), *_append(columns, part.input), *_append(columns, part.output)])
         for weight, bias in part.layers:
-            short = coarse and weight.size >= _LARGE
-            if short:
-                scale_O = np.abs(weight).max(axis=1).clip(1e-30) / _STEPS
-                place, _ = _append(shorts, np.round(weight / scale_O[:, None]).astype(np.int16).reshape(-1))
-                bias = np.concatenate((bias, scale_O.astype(np.float32)))
-            else:
-                place, _ = _append(numbers, weight.reshape(-1))
-            places.append(-1 if short else _append(turned, _turned(weight, bias))[0])
-            layers.append([weight.shape[1], weight.shape[0], place, _append(numbers, bias)[0], int(short)])
+            add_layer(weight, bias, False, False)
+
+    def add_layer(weight: np.ndarray, bias: np.ndarray, short: bool, linear: bool) -> None:
+        if short:
+            scale_O = np.abs(weight).max(axis=1).clip(1e-30) / _STEPS
+            place, _ = _append(shorts, np.round(weight / scale_O[:, None]).astype(np.int16).reshape(-1))
+            bias = np.concatenate((bias, scale_O.astype(np.float32)))
+        else:
+            place, _ = _append(numbers, weight.reshape(-1))
+        places.append(-1 if short else _append(turned, _turned(weight, bias))[0])
+        kind = SHORT * short + LINEAR * linear
+        layers.append([weight.shape[1], weight.shape[0], place, _append(numbers, bias)[0], kind])
 
     for part in (*d.pre, *d.post):
-        add(part, coarse=False)
-    for coder in (d.prior.encoder, d.prior.decoder):
-        add(_alone(coder), coarse=True)
+        add(part)
+    for coder in (narrowed(d), [(*layer, False) for layer in d.prior.decoder]):
+        nets.append([len(layers), len(coder), 0, 0, 0, 0])
+        for weight, bias, linear in coder:
+            add_layer(weight, bias, weight.size >= LARGE, linear)
     kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
         "net_H6": np.array(nets, np.int64), "layer_G5": np.array(layers, np.int64), "column": np.concatenate(columns),
@@ -198,11 +207,6 @@ def _turned(weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """
     more = -len(bias) % COLUMNS
     return np.pad(np.vstack((weight.T, bias)), [(0, 0), (0, more)]).reshape(-1)
-
-
-def _alone(layers: Layers) -> Part:
-    nothing = np.zeros(0, np.int64)
-    return Part(nothing, nothing, layers)
 
 
 def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:
