@@ -23,7 +23,7 @@ LARGE = 2**16
 """Weights of a layer that is large."""
 LOST = 1e-3
 """Share of the length of the numbers between layers that may be lost, as root mean square over the poses. NAO's phi
-changed by 3 in a thousand at most, less than by 16 bits."""
+changed by 5 in a thousand at most."""
 _POSES, _MOST, _EACH, _JOINTS = 512, 192, 16, 21
 """Poses that are drawn; dimensions at most, and their step."""
 _SMALL, _WILD = (0.02, 0.6), (0.1, 2.5)
