@@ -21,6 +21,7 @@ from mrhubo.fast.compiled.tables import (
     INPUT_I,
     LAYER_G5,
     LIMB_M,
+    LINEAR,
     LOWER_N,
     LOWER_W,
     NET_H6,
@@ -30,10 +31,10 @@ from mrhubo.fast.compiled.tables import (
     SECOND_O,
     SEEN_M,
     SEES_DIRECTIONS,
+    SHORT,
     STAGES,
     TANH_BOUND,
     TURNED,
-    TURNED_G,
     UPPER_N,
     UPPER_W,
     real,
@@ -41,7 +42,7 @@ from mrhubo.fast.compiled.tables import (
     size,
     whole,
 )
-from mrhubo.fast.compiled.tile import ROWS, multiply
+from mrhubo.fast.compiled.tile import ROWS, multiply, multiply_row
 from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
 
 _ZERO, _ONE, _HALF, _ROOT, _END = (
@@ -98,25 +99,22 @@ def affine(t, layer, x_BI, out_BO, frames):
     """A layer: weights x + biases. Arrays are as long and as wide as whole tiles are."""
     inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
     number, begin, begin_turned = t[2], t[0][2 * NUMBER], t[0][2 * TURNED]
-    weights, biases = whole(t, LAYER_G5, 5 * layer + 2), begin + whole(t, LAYER_G5, 5 * layer + 3)
+    weights = whole(t, LAYER_G5, 5 * layer + 2)
     # A view tells that places are not negative, without which numba is five times slower.
-    if frames >= ROWS and whole(t, TURNED_G, layer) >= 0:
-        at, wide = begin_turned + whole(t, TURNED_G, layer), outputs + -outputs % COLUMNS
+    if not whole(t, LAYER_G5, 5 * layer + 4) & SHORT:
+        at, wide = begin_turned + weights, outputs + -outputs % COLUMNS
         weight_IO = number[at : at + inputs * wide].reshape(inputs, wide)
         bias_O = number[at + inputs * wide : at + (inputs + 1) * wide]
-        multiply(x_BI, 0, weight_IO, 0, bias_O, 0, 0, out_BO, 0, frames, outputs, inputs)
+        if frames == 1:
+            multiply_row(x_BI, weight_IO, bias_O, out_BO, outputs)
+        else:
+            multiply(x_BI, 0, weight_IO, 0, bias_O, 0, 0, out_BO, 0, frames, outputs, inputs)
         return
-    if whole(t, LAYER_G5, 5 * layer + 4):
-        _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
-        for b in range(frames):
-            for o in range(outputs):
-                out_BO[b, o] = out_BO[b, o] * number[biases + outputs + o] + number[biases + o]
-        return
-    weights += begin
-    _products(number[weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
+    biases = begin + whole(t, LAYER_G5, 5 * layer + 3)
+    _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
     for b in range(frames):
         for o in range(outputs):
-            out_BO[b, o] += number[biases + o]
+            out_BO[b, o] = out_BO[b, o] * number[biases + outputs + o] + number[biases + o]
 
 
 @njit(**INNER)
@@ -172,8 +170,11 @@ def mlp(t, net, kind, residual, one_BE, two_BE, three_BE, frames):
             one_BE[b, e] = three_BE[b, e]
     for layer in range(first + 1, first + layers):
         before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
-        activate(kind, one_BE, two_BE, frames, before)
-        affine(t, layer, two_BE, three_BE, frames)
+        given_BE = one_BE
+        if not whole(t, LAYER_G5, 5 * layer + 4) & LINEAR:
+            activate(kind, one_BE, two_BE, frames, before)
+            given_BE = two_BE
+        affine(t, layer, given_BE, three_BE, frames)
         adds = residual and layer < first + layers - 1
         for b in range(frames):
             for e in range(width):

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.narrowing import LARGE, narrowed
 from mrhubo.fast.description import Description
 from mrhubo.fast.leg_section import Legs
 from mrhubo.fast.plain.avoidance import CLEARANCE
@@ -18,7 +19,7 @@ from mrhubo.fast.plain.broad_phase import make_groups, reaches
 from mrhubo.fast.plain.collision import clearances
 from mrhubo.fast.plain.human import skew
 from mrhubo.fast.plain.soles import moved_points
-from mrhubo.fast.sections import SECTIONS, Layers, Part
+from mrhubo.fast.sections import SECTIONS, Part
 
 _KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -31,7 +32,7 @@ _KEYS = (
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
     "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S", "clear_Y",
     "first_Z", "capsule_Z", "ball_Z", "reach_Z", "body_G", "centre_G3",
-    "net_H6", "layer_G5", "column", "count_6", "number", "turned_G", "turned",
+    "net_H6", "layer_G5", "column", "count_6", "number", "turned",
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
     "joint_L", "parent_L", "offset_L3", "start_R", "sole_H", "sole_H3", "carrier_1", "axes_33", "root_3", "body_H",
@@ -47,9 +48,9 @@ their first steps. scale_4: good and excessive angle, shaking [degrees], usual p
 and its radius. clear_Y: distance [m] that a pair is to keep. Pairs stand group by group
 (`mrhubo.fast.plain.broad_phase`). reach_Z: how far [m] a group's capsule and ball must be apart so that no pair is
 nearer than that. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
-network, the prior's coders last; layer_G5: numbers in and out, where weights and biases begin in `number`, and 1 where
-the weights are among `shorts`, whose scales stand after the biases then; turned: the same for many frames at a time,
-as `_turned` lays a layer out, which begins where turned_G says, -1: not there; column: all columns; count_6: networks
+network, the prior's coders last; layer_G5: numbers in and out, where weights begin in `turned`, as `_turned` lays a
+layer out, 0, and 0; or where weights begin in `shorts`, where biases and then scales begin in `number`, and SHORT; and
+LINEAR where no activation stands before the layer; column: all columns; count_6: networks
 of the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
 distance. pool_CUX: the pool's directions, block after block. block_H: the block whose joints move a point of a sole,
 -1: none does. What is of legs is empty for robots without feet.
@@ -65,7 +66,7 @@ distance. pool_CUX: the pool's directions, block after block. block_H: the block
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
     BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S, CLEAR_Y,
     FIRST_Z, CAPSULE_Z, BALL_Z, REACH_Z, BODY_G, CENTRE_G3,
-    NET_H6, LAYER_G5, COLUMN, COUNT_6, NUMBER, TURNED_G, TURNED,
+    NET_H6, LAYER_G5, COLUMN, COUNT_6, NUMBER, TURNED,
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
     JOINT_L, PARENT_L, OFFSET_L3, START_R, SOLE_H, SOLE_H3, CARRIER_1, AXES_33, ROOT_3, BODY_H, POINT_H3, BALL_BODY_J,
     BALL_J3, RADIUS_J, NEAR_HJ, SCALE_1, HIP_R3, LIMB_R2, LENGTH_R2, FOOT_R2, BUILT_R23, BLOCK_H,
@@ -81,8 +82,10 @@ FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL, APART = np.arange(6)
 
 COLUMNS = 16
 """Of a tile (`mrhubo.fast.compiled.tile`)."""
-_LARGE, _STEPS = 2**16, 32_767
-"""Weights of a layer that is large, and the largest number of 16 bits."""
+SHORT, LINEAR = np.arange(1, 3)
+"""What is added up in layer_G5."""
+_STEPS = 32_767
+"""The largest number of 16 bits."""
 _ROUNDED = 1e-5
 """Distance [m] by which no robot moves where its joint angles are rounded to float32."""
 
@@ -165,30 +168,34 @@ def _derived(d: Description, clear_Y: np.ndarray) -> dict[str, np.ndarray]:
 
 def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np.ndarray]:
     nets, layers, columns, numbers = [], [], [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
-    places, turned = [], [np.zeros(0, np.float32)]
+    turned = [np.zeros(0, np.float32)]
 
-    def add(part: Part, coarse: bool) -> None:
+    def add(part: Part) -> None:
         nets.append([len(layers), len(part.layers), *_append(columns, part.input), *_append(columns, part.output)])
         for weight, bias in part.layers:
-            short = coarse and weight.size >= _LARGE
-            if short:
-                scale_O = np.abs(weight).max(axis=1).clip(1e-30) / _STEPS
-                place, _ = _append(shorts, np.round(weight / scale_O[:, None]).astype(np.int16).reshape(-1))
-                bias = np.concatenate((bias, scale_O.astype(np.float32)))
-            else:
-                place, _ = _append(numbers, weight.reshape(-1))
-            places.append(-1 if short else _append(turned, _turned(weight, bias))[0])
-            layers.append([weight.shape[1], weight.shape[0], place, _append(numbers, bias)[0], int(short)])
+            add_layer(weight, bias, False, False)
+
+    def add_layer(weight: np.ndarray, bias: np.ndarray, short: bool, linear: bool) -> None:
+        kind = SHORT * short + LINEAR * linear
+        if short:
+            scale_O = np.abs(weight).max(axis=1).clip(1e-30) / _STEPS
+            place, _ = _append(shorts, np.round(weight / scale_O[:, None]).astype(np.int16).reshape(-1))
+            scaled, _ = _append(numbers, np.concatenate((bias, scale_O.astype(np.float32))))
+        else:
+            (place, _), scaled = _append(turned, _turned(weight, bias)), 0
+        layers.append([weight.shape[1], weight.shape[0], place, scaled, kind])
 
     for part in (*d.pre, *d.post):
-        add(part, coarse=False)
-    for coder in (d.prior.encoder, d.prior.decoder):
-        add(_alone(coder), coarse=True)
+        add(part)
+    for coder in (narrowed(d), [(*layer, False) for layer in d.prior.decoder]):
+        nets.append([len(layers), len(coder), 0, 0, 0, 0])
+        for weight, bias, linear in coder:
+            add_layer(weight, bias, weight.size >= LARGE, linear)
     kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
         "net_H6": np.array(nets, np.int64), "layer_G5": np.array(layers, np.int64), "column": np.concatenate(columns),
         "count_6": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
-        "number": np.concatenate(numbers), "turned_G": np.array(places, np.int64), "turned": np.concatenate(turned),
+        "number": np.concatenate(numbers), "turned": np.concatenate(turned),
     }  # fmt: skip
 
 
@@ -198,11 +205,6 @@ def _turned(weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """
     more = -len(bias) % COLUMNS
     return np.pad(np.vstack((weight.T, bias)), [(0, 0), (0, more)]).reshape(-1)
-
-
-def _alone(layers: Layers) -> Part:
-    nothing = np.zeros(0, np.int64)
-    return Part(nothing, nothing, layers)
 
 
 def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:

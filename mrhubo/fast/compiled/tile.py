@@ -67,6 +67,67 @@ def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
     return context.get_dummy_value()
 
 
+def _make_line(parts: int) -> Any:
+    """A function as `_tile`, for one row and so many times sixteen columns, which read memory in its own order."""
+
+    @intrinsic
+    def line(typing_context, x, w, w_at, w_step, begin, begin_at, out, out_at, inputs):
+        arrays = {0: x, 1: w, 4: begin, 6: out}
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            vector, lanes = ir.VectorType(ir.FloatType(), COLUMNS), ir.VectorType(ir.IntType(32), COLUMNS)
+            index, unset = values[2].type, ir.Constant(vector, ir.Undefined)
+            data = {k: context.make_array(signature.args[k])(context, builder, values[k]).data for k in arrays}
+
+            def columns(array: int, place: Any, part: int) -> Any:
+                address = builder.gep(data[array], [builder.add(place, ir.Constant(index, COLUMNS * part))])
+                return builder.bitcast(address, vector.as_pointer())
+
+            sums = [cgutils.alloca_once(builder, vector) for _ in range(parts)]
+            for part, found in enumerate(sums):
+                builder.store(builder.load(columns(4, values[5], part), align=4), found)
+            with cgutils.for_range(builder, values[8], intp=index) as loop:
+                number = builder.load(builder.gep(data[0], [loop.index]))
+                first = builder.insert_element(unset, number, ir.Constant(ir.IntType(32), 0))
+                each = builder.shuffle_vector(first, unset, ir.Constant(lanes, [0] * COLUMNS))
+                place = builder.add(values[2], builder.mul(loop.index, values[3]))
+                for part, found in enumerate(sums):
+                    weight = builder.load(columns(1, place, part), align=4)
+                    product = builder.fmul(each, weight, flags=_ROUNDED_ONCE)
+                    builder.store(builder.fadd(builder.load(found), product, flags=_ROUNDED_ONCE), found)
+            for part, found in enumerate(sums):
+                builder.store(builder.load(found), columns(6, values[7], part), align=4)
+            return context.get_dummy_value()
+
+        fits = all(isinstance(a, types.Array) and a.dtype == types.float32 and a.layout == "C" for a in arrays.values())
+        return (types.void(*(arrays.get(k, types.intp) for k in range(9))), generate) if fits else None
+
+    return line
+
+
+_ten, _four, _one = _make_line(10), _make_line(4), _make_line(1)
+
+
+@njit(**INNER)
+def multiply_row(x, w, begin, out, columns):
+    """out[0] = begin + x[0] w, for a matrix (inputs, columns) alone; `w` is as wide as whole tiles are. As many sums as
+    there are registers run side by side, so that weights, which are read once, are read from one end to the other.
+    """
+    inputs, wide = w.shape
+    o = 0
+    while o < columns:
+        left = columns - o
+        if left > 9 * COLUMNS:
+            _ten(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
+            o += 10 * COLUMNS
+        elif left > 3 * COLUMNS:
+            _four(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
+            o += 4 * COLUMNS
+        else:
+            _one(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
+            o += COLUMNS
+
+
 @njit(**INNER)
 def multiply(x, x_at, w, w_at, begin, begin_at, begin_step, out, out_at, rows, columns, inputs):
     """out = begin + x w: matrices (rows, inputs) and (inputs, columns) inside arrays of two axes, each from a place on,
