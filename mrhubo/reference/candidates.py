@@ -23,7 +23,7 @@ STEPS, TOLERANCE = 6, 1e-2
 """How nearly candidates converge, as for `DirectionProblem.minimise`."""
 KEY_S = 0.15
 """Time [s] from one key to the next."""
-DEARER_RAD = math.radians(1.0)
+DEARER_RAD = math.radians(2.0)
 """A block gets all starts in a frame that costs more than the dearer of the keys around it, by as much as all of its
 directions being so far off costs."""
 
