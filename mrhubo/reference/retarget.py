@@ -1,8 +1,8 @@
 """The reference retargeter: human motion -> robot motion by optimisation, the ground truth for the network.
 
-Every frame is solved from several starts; the best path through the solutions is chosen; then all frames are refined
-together, with a small cost on joint velocity that carries joints over frames which do not determine them (the twist of
-a straight arm). `collision_free` then makes a second motion of it in which the robot does not touch itself.
+Frames are solved from several starts (`candidates`); the best path through the solutions is chosen; then all frames are
+refined together, with a small cost on joint velocity that carries joints over frames which do not determine them (the
+twist of a straight arm). `collision_free` then makes a second motion of it in which the robot does not touch itself.
 
 Legend: T frames (or B independent ones), S starts, D directions, N joints, J = 21 human joints, C blocks (see `solve`).
 """
@@ -23,6 +23,7 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MotionLike, read_poses, to_tensor
 from mrhubo.motion.steady import steady_root
 from mrhubo.reference.avoidance import Avoidance
+from mrhubo.reference.candidates import along_motion, from_starts
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
 from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
 from mrhubo.reference.result import OptimizationResult
@@ -149,7 +150,7 @@ class OptimizationRetargeter(nn.Module):
         assert self._standing is not None, "who has no feet has no steps"
         target_TD3 = flatten(self._targets(local_TJ33), steps, self._legs)
         rate = steps.frame_rate
-        q_TN = self._motion(target_TD3, self._candidates(target_TD3), rate)
+        q_TN = self._motion(target_TD3, self._along(target_TD3, rate), rate)
         return self._standing(q_TN, target_TD3, steps, self._smoothness(rate), avoid_collisions)
 
     @property
@@ -170,13 +171,13 @@ class OptimizationRetargeter(nn.Module):
         check_frame_rate(frame_rate, needed=True)
         target_TD3 = self._targets(local_TJ33)
         avoidance = self.avoidance if avoid_collisions else None
-        q_TN = self._motion(target_TD3, self._candidates(target_TD3), frame_rate, avoidance)
+        q_TN = self._motion(target_TD3, self._along(target_TD3, frame_rate), frame_rate, avoidance)
         return self._result(q_TN, target_TD3, frame_rate)
 
     @torch.no_grad()
     def motion_and_optima(self, local_TJ33: MotionLike, frame_rate: float) -> tuple[Tensor, Tensor]:
-        """The joint angles (T, N) [rad] of `retarget` and those of `solve_frames`, in little more time than one of
-        them takes.
+        """The joint angles (T, N) [rad] of `retarget`, of all starts in each frame, and those of `solve_frames`, in
+        little more time than the latter take.
 
         Raises:
             UserError: as for `retarget`.
@@ -264,13 +265,14 @@ class OptimizationRetargeter(nn.Module):
 
     def _candidates(self, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
         """Nearly converged solutions (B, S, N) from the starts, and the cost of their blocks (B, S, C)."""
-        found = []
-        for part_BD3 in target_BD3.split(max(1, self.problem.chunk // self.starts)):
-            start_XN = self._pool.near(part_BD3).flatten(0, 1)
-            target_XD3 = part_BD3.repeat_interleave(self.starts, dim=0)
-            q_XN, cost_XC = self.problem.minimise(start_XN, target_XD3, steps=6, tolerance=1e-2)
-            found.append((q_XN.unflatten(0, (-1, self.starts)), cost_XC.unflatten(0, (-1, self.starts))))
-        return torch.cat([q for q, _ in found]), torch.cat([cost for _, cost in found])
+        return from_starts(self.problem, self._pool, target_BD3)
+
+    def _along(self, target_TD3: Tensor, frame_rate: float) -> tuple[Tensor, Tensor]:
+        """The same for one motion. Motions of arms are what networks are measured by: there, no start is spared."""
+        pull = self._smoothness(frame_rate).pull
+        if not (self._legs.has_feet and pull):
+            return self._candidates(target_TD3)
+        return along_motion(self.problem, self._pool, target_TD3, frame_rate, pull)
 
     def _polish(self, candidates_BSN: Tensor, cost_BSC: Tensor, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
         """Each block's best candidate, converged: angles (B, N) and costs (B, C)."""

@@ -38,12 +38,17 @@ from mrhubo.reference.terms.soles import SoleTerm
 PLANTED, SWINGING = 2500.0, 50.0
 """Weights [1/m^2] of a planted point's place and of a swinging one's: a millimetre costs as much as a limb that is 3
 degrees off, or 0.4."""
+CLEAR = 5000.0
+"""Weight [1/m^2] with which a swinging point is kept above the floor besides, by its height alone."""
 SWEEPS, TOLERANCE = 10, 3e-4
 """How long legs give way, as for `refine`."""
 ROUNDS = 2
 """How often the legs give way: once more where feet that stand were lifted, as others would be under the floor."""
-LIFTED_M, LIFT_S, FREE_S = 0.005, 0.1, 0.3
+LIFTED_M, LIFT_S, FREE_S = 0.003, 0.1, 0.3
 """From how far [m] on that is; and the times [s] around in which the root is lifted too, and legs are free to move."""
+_RISE = 0.25
+"""Of how much a point is planted, the power that counts for the root's height: as long as a sole is planted at all, it
+is to touch the floor, while a place on the floor may be left gradually."""
 _FLAT = [0, 2]
 """The horizontal axes of the world."""
 _UP = 1
@@ -156,7 +161,7 @@ class Standing(nn.Module):
         above_TP, weight_TP = path_T3[:, None, _UP] + low_TP, contacts.weight_TP
         level = float((weight_TP * above_TP).sum() / max(weight_TP.sum(), 1e-9))  # hips lie elsewhere on a robot
         floor_TP = np.zeros(low_TP.shape, dtype=int)
-        rise_T1, _ = carry(above_TP[..., None] - level, weight_TP, floor_TP, rate, np.zeros((1, 1)))
+        rise_T1, _ = carry(above_TP[..., None] - level, weight_TP**_RISE, floor_TP, rate, np.zeros((1, 1)))
         root_T3 = path_T3 + np.stack((off_T2[:, 0], rise_T1[:, 0] - level, off_T2[:, 1]), axis=1)
         return _Carried(root_T3, place_K2, point_TP3 + root_T3[:, None], low_TP + root_T3[:, [_UP]])
 
@@ -201,7 +206,13 @@ class Standing(nn.Module):
         seen_TP3 = torch.from_numpy(wanted_TP3 - carried.root_T3[:, None]).to(target_TD3)
         weight_TP3 = torch.zeros_like(seen_TP3)
         weight_TP3[..., 0] = SWINGING + (PLANTED - SWINGING) * torch.from_numpy(counts_TP).to(seen_TP3)
-        return torch.cat((target_TD3, seen_TP3 @ steps.turn_T33.to(seen_TP3), weight_TP3), dim=1)
+        planted_TP = steps.contacts.weight_TP
+        high_TP = np.where(
+            steps.contacts.phase_TP >= 0, PLANTED * (np.sqrt(planted_TP) - planted_TP), CLEAR * counts_TP
+        )
+        up_T3 = steps.turn_T33[:, _UP].to(seen_TP3)
+        high_TP3 = torch.from_numpy(high_TP).to(seen_TP3).sqrt()[..., None] * up_T3[:, None]
+        return torch.cat((target_TD3, seen_TP3 @ steps.turn_T33.to(seen_TP3), weight_TP3, high_TP3), dim=1)
 
     def _give_way(
         self,

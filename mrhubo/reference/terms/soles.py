@@ -1,7 +1,8 @@
-"""Points of soles are where they are to be:  sum_p w_p |x_p(q) - x*_p|^2
+"""Points of soles are where they are to be:  sum_p w_p |x_p(q) - x*_p|^2 + (h_p . (x_p(q) - x*_p))^2
 
 Places are seen from what carries the legs (`mrhubo.reference.standing.legs`). They and the weights come after the
-directions in a problem's targets: P rows of places [m], then P rows whose first number is the weight [1/m^2].
+directions in a problem's targets: P rows of places [m], then P rows whose first number is the weight [1/m^2], and then,
+where heights count besides, P rows h, which point up and are as long as the root of that weight [1/m].
 
 Legend: B problems, P points, A driven joints, N joints, C blocks, D directions.
 """
@@ -50,7 +51,9 @@ class SoleTerm(Term):
         return [{n for n, moved in enumerate(row) if moved} for row in moved_PN.tolist()]
 
     def residual(self, state: State) -> tuple[Tensor, Tensor, Tensor]:
-        """Differences of places (B, P, 3) [m], their Jacobian (B, P, 3, N) [m/rad], and weights (B, P)."""
+        """Differences of places (B, P, 3) [m], their Jacobian (B, P, 3, N) [m/rad], and weights (B, P); h is left
+        out.
+        """
         points, robot, poses = len(self.factor_PA), self.legs.body_map.robot, state.poses
         place_BP3, axes_B33, root_B3 = self.legs.seen(poses)
         axis_BA3 = (poses.rotation_BL33[:, self._children] @ self.axes_A3[..., None])[..., 0] @ axes_B33
@@ -60,7 +63,8 @@ class SoleTerm(Term):
         turned_BPA3 = torch.linalg.cross(axis_BPA3, lever_BPA3)
         rotary_A1 = self.rotary_A[:, None]
         moved_BPA3 = self.factor_PA[..., None] * (rotary_A1 * turned_BPA3 + (1 - rotary_A1) * axis_BPA3)
-        target_BX3 = state.target_BD3[:, -2 * points :]
+        first = len(self.legs.body_map.directions)
+        target_BX3 = state.target_BD3[:, first : first + 2 * points]
         return place_BP3 - target_BX3[:, :points], moved_BPA3.mT @ robot.drive_DN, target_BX3[:, points:, 0]
 
     def add_to(self, model: Quadratic | None, state: State, blocks: Blocks) -> Quadratic:
@@ -71,6 +75,12 @@ class SoleTerm(Term):
         rows_BRN = (jacobian_BP3N * root_BP[..., None, None]).flatten(1, 2)
         miss_BR1 = (miss_BP3 * root_BP[..., None]).flatten(1)[..., None]
         cost_BP = miss_BP3.square().sum(-1) * weight_BP
+        upwards_BP3 = state.target_BD3[:, len(self.legs.body_map.directions) + 2 * len(self.factor_PA) :]
+        if upwards_BP3.shape[1]:
+            high_BP = (upwards_BP3 * miss_BP3).sum(-1)
+            cost_BP = cost_BP + high_BP.square()
+            rows_BRN = torch.cat((rows_BRN, (upwards_BP3[:, :, None] @ jacobian_BP3N)[:, :, 0]), dim=1)
+            miss_BR1 = torch.cat((miss_BR1, high_BP[..., None]), dim=1)
         return model.plus(cost_BP @ self._points_PC(blocks), (rows_BRN.mT @ miss_BR1)[..., 0], rows_BRN.mT @ rows_BRN)
 
     def _points_PC(self, blocks: Blocks) -> Tensor:

@@ -12,11 +12,11 @@ from torch import Tensor
 from mrhubo import rotation
 from mrhubo.errors import UserError
 from mrhubo.evaluation.whole_body import lowest, score_whole_body
-from mrhubo.motion import Motion
+from mrhubo.motion import Motion, read_motion
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.standing import Legs
-from mrhubo.robot import Robot
+from mrhubo.robot import BodyMap, Robot
 from tests.reference.standing.steppers import bow, jump, lunge, moved, squat
 from tests.reference.walkers import ROOTS, walker
 
@@ -75,6 +75,16 @@ def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: Optimizat
     assert score.sunk_max_cm < 0.05 and score.floating_max_cm < 0.5
     _, low_TP = soles(retargeter, result)
     assert low_TP[:, [2, 3]].max() > 0.01  # it is not flat
+
+
+def test_soles_touch_the_floor_from_heel_strike_to_toe_off(root: Path, external_dir: Path) -> None:
+    """NAO's swinging toes would be under the floor, and what lifts them must not lift the foot that stands."""
+    nao = OptimizationRetargeter(BodyMap.of(Robot.from_config(root / "conf" / "nao-whole-body.yaml")))
+    motion = read_motion(external_dir / "cmu" / "whole_body" / "16_17.npz")
+    result = nao(motion)
+    score = score_whole_body(nao.body_map, motion, result.q, *base(result))
+    assert score.sunk_max_cm < 0.05 and score.floating_max_cm < 0.75
+    assert score.slide_cm_s < 2 and score.over_limit == 0
 
 
 def test_the_world_may_be_turned_and_its_floor_be_anywhere(retargeter: OptimizationRetargeter) -> None:

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.reference.jacobian import DirectionJacobian
+from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.standing import Legs
 from mrhubo.reference.terms.soles import SoleTerm
 from mrhubo.reference.terms.term import State
@@ -32,6 +33,24 @@ def test_the_jacobian_equals_differences(tmp_path: Path, root: str) -> None:
     for n, offset_N in enumerate(step * torch.eye(q_BN.shape[1]).double()):
         slope_BP3 = (places(q_BN + offset_N)[0] - places(q_BN - offset_N)[0]) / (2 * step)
         torch.testing.assert_close(found_BP3N[..., n], slope_BP3, atol=1e-6, rtol=0)
+
+
+def test_the_model_is_that_of_its_cost(tmp_path: Path) -> None:
+    """Gradients are slopes of the cost, with heights that count besides; without them it costs less."""
+    legs = Legs(walker(tmp_path))
+    problem = DirectionProblem(legs.body_map, [SoleTerm(legs)]).double()
+    legs.double()
+    draw = torch.Generator().manual_seed(2)
+    q_BN = legs.body_map.robot.double().sample(4, draw).double()
+    rows_BX3 = torch.rand(4, len(legs.body_map.directions) + 12, 3, generator=draw, dtype=torch.float64)
+    found, step = problem.quadratic(q_BN, rows_BX3), 1e-5
+    for n, offset_N in enumerate(step * torch.eye(q_BN.shape[1]).double()):
+        slope_B = (problem.cost(q_BN + offset_N, rows_BX3) - problem.cost(q_BN - offset_N, rows_BX3)).sum(1) / (
+            2 * step
+        )
+        torch.testing.assert_close(2 * found.gradient_BN[:, n], slope_B, atol=1e-6, rtol=1e-5)
+    lower_B = found.cost_BC.sum(1) - problem.cost(q_BN, rows_BX3[:, :-4]).sum(1)
+    assert bool((lower_B > 0).all())
 
 
 def test_it_couples_each_leg_alone(tmp_path: Path) -> None:
