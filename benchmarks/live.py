@@ -197,6 +197,8 @@ def main(argv: list[str]) -> None:
         print("A frame, from its datagram to that of the joint angles [ms]:\n")
         print_table(["time", "p50", "p90", "p99", "longest"], measure_frames(link, options.frames))
         link.close()
+        if options.minutes < 1:
+            return
         link = Link(robot, points)
         soak = Soak(link)
         rows = [soak.minute() for _ in range(options.minutes)]
