@@ -49,4 +49,4 @@ def test_extras_that_are_told_to_be_installed_exist(root: Path) -> None:
         for found in re.findall(r"mrhubo\[([\w,]+)\]'", path.read_text())
         for name in found.split(",")
     }
-    assert {"fast", "onnx", "mjcf", "ros", "video", "live", "view"} <= named <= set(extras)
+    assert {"fast", "onnx", "mjcf", "ros", "video", "live", "pico", "view"} <= named <= set(extras)

@@ -230,5 +230,5 @@ def test_pico_is_asked_as_its_documentation_says(monkeypatch: pytest.MonkeyPatch
     source.close()
     assert calls == ["init", "close"]
     monkeypatch.setitem(sys.modules, "xrobotoolkit_sdk", None)
-    with pytest.raises(UserError, match="pip install"):
+    with pytest.raises(UserError, match=r"pip install 'mrhubo\[pico\]'"):
         PicoSource()

@@ -1,8 +1,8 @@
 """Body tracking of a PICO headset by XRoboToolkit: 24 joints, of which the places are read.
 
 SDK: https://github.com/XR-Robotics, on PyPI `xrobotoolkit-sdk`; its joints are SMPL's and two hands, its axes are taken
-to be right-handed with y up. Not tried with a headset: what is tested is the conversion, and that the SDK is asked as
-its documentation says.
+to be right-handed with y up, as GMR takes them (https://github.com/YanjieZe/GMR, `XRobotStreamer`). Not tried with a
+headset: what is tested is the conversion, and that the SDK is asked as its documentation says.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class PicoSource:
     def __init__(self) -> None:
         """Raises a UserError where the SDK is not installed."""
         self._sdk = import_optional(
-            "xrobotoolkit_sdk", "--source pico: needs XRoboToolkit's SDK: pip install xrobotoolkit-sdk"
+            "xrobotoolkit_sdk", "--source pico: needs XRoboToolkit's SDK: pip install 'mrhubo[pico]'"
         )
         self._session, self._number, self._stamp = str(time.time_ns()), 0, None
         self._is_open = False
