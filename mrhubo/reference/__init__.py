@@ -5,6 +5,7 @@ from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.metrics import (
     angle_between,
     at_limit_share,
+    count_jumps,
     direction_error,
     direction_jerk,
     joint_error,
@@ -13,7 +14,7 @@ from mrhubo.reference.metrics import (
 )
 from mrhubo.reference.polish import Polish
 from mrhubo.reference.result import OptimizationResult
-from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult, count_jumps
+from mrhubo.reference.retarget import OptimizationRetargeter, ReferenceResult
 from mrhubo.reference.solve import DirectionProblem
 
 __all__ = [

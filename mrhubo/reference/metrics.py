@@ -1,6 +1,6 @@
 """How far two robot motions are apart, and how far a robot motion is from a human's.
 
-Legend: T frames (or any batch), N joints, D directions.
+Legend: T frames (or any batch), X steps from one to the next, N joints, D directions, C blocks (see `solve`).
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError, unknown_name
+from mrhubo.reference.solve import DirectionProblem
+from mrhubo.reference.terms import REFERENCE_RATE
 from mrhubo.robot import BodyMap, LinkPoses, Robot
 from mrhubo.rotation import wrap_angle
 
@@ -72,3 +74,16 @@ def direction_jerk(directions_TD3: Tensor, frame_rate: float) -> Tensor:
 def angle_between(a: Tensor, b: Tensor) -> Tensor:
     """Angle (...) [rad] in [0, pi] between vectors (..., 3); exact near 0 and pi, where arccos is not."""
     return torch.atan2(torch.linalg.cross(a, b).norm(dim=-1), (a * b).sum(-1))
+
+
+def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> int:
+    """Steps in which a joint turns by more than 0.5 rad, but the human directions of its block by less than 0.25 rad.
+
+    Both per 1/24 s, whatever the frame rate; a step is counted once per block.
+    """
+    scale = frame_rate / REFERENCE_RATE
+    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
+    columns = problem.body_map.measured
+    human_XD = angle_between(target_TD3[1:, columns], target_TD3[:-1, columns])
+    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC[columns]).amax(dim=1) * scale
+    return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())

@@ -25,13 +25,13 @@ from mrhubo.motion.steady import steady_root
 from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.candidates import along_motion, from_starts
 from mrhubo.reference.collision_free import CollisionFreeProblem, avoid_collisions
-from mrhubo.reference.metrics import angle_between, at_limit_share, direction_error
+from mrhubo.reference.metrics import angle_between, at_limit_share, count_jumps, direction_error
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import speed_bound
 from mrhubo.reference.standing import HumanSteps, Legs, Stand, Standing, flatten, read_steps, standing_fields
 from mrhubo.reference.starts import StartPool
-from mrhubo.reference.terms import REFERENCE_RATE, Smoothness, pull_at
+from mrhubo.reference.terms import Smoothness, pull_at
 from mrhubo.reference.trajectory import MotionTask, pick, smooth_motion
 from mrhubo.robot import BodyMap, Robot, robot_facts
 
@@ -291,16 +291,3 @@ class OptimizationRetargeter(nn.Module):
             count_jumps(problem, q_TN, target_TD3, frame_rate),
             torch.zeros(len(q_TN), dtype=torch.bool) if rests_T is None else rests_T.cpu(),
         )  # fmt: skip
-
-
-def count_jumps(problem: DirectionProblem, q_TN: Tensor, target_TD3: Tensor, frame_rate: float) -> int:
-    """Steps in which a joint turns by more than 0.5 rad, but the human directions of its block by less than 0.25 rad.
-
-    Both per 1/24 s, whatever the frame rate; a step is counted once per block.
-    """
-    scale = frame_rate / REFERENCE_RATE
-    turned_XC = (q_TN.diff(dim=0).abs()[..., None] * problem.blocks.joints_NC).amax(dim=1) * scale
-    columns = problem.body_map.measured
-    human_XD = angle_between(target_TD3[1:, columns], target_TD3[:-1, columns])
-    asked_XC = (human_XD[..., None] * problem.blocks.directions_DC[columns]).amax(dim=1) * scale
-    return int(((turned_XC > 0.5) & (asked_XC < 0.25)).sum())

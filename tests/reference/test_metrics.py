@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.reference import direction_error, joint_error, link_error
+from mrhubo.reference import DirectionProblem, count_jumps, direction_error, joint_error, link_error
 from mrhubo.reference.metrics import angle_between
 from mrhubo.robot import BodyMap
 
@@ -75,3 +75,19 @@ def test_direction_error_ignores_what_is_below_the_chest(
 def test_small_angles_are_exact(angle: float) -> None:
     a, b = torch.tensor([1.0, 0.0, 0.0]), torch.tensor([math.cos(angle), math.sin(angle), 0.0])
     assert float(angle_between(a, b)) == pytest.approx(angle, abs=3e-7)
+
+
+def test_jumps_are_steps_that_the_human_does_not_make(body_maps: dict[str, BodyMap]) -> None:
+    problem = DirectionProblem(body_maps["nao"])
+    q_TN = torch.zeros(4, 8)
+    q_TN[2:, 0] = 0.6
+    still_TD3 = torch.tensor([1.0, 0, 0]).expand(4, len(problem.body_map.directions), 3)
+    left, right = (problem.body_map.direction_names.index(f"{side}_wrist") for side in ("left", "right"))
+    assert count_jumps(problem, q_TN, still_TD3, 24.0) == 1
+    assert count_jumps(problem, q_TN, still_TD3, 12.0) == 0  # the same step, at half the speed
+    turning_TD3 = still_TD3.clone()
+    turning_TD3[2:, left] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])
+    assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 0
+    turning_TD3 = still_TD3.clone()
+    turning_TD3[2:, right] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])  # but that is the other arm
+    assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 1

@@ -13,7 +13,6 @@ from mrhubo import rotation
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter, direction_error
-from mrhubo.reference.retarget import count_jumps
 
 
 @pytest.fixture(scope="module")
@@ -112,22 +111,6 @@ def test_a_motion_and_the_frames_optima_in_one_go(
     assert torch.equal(motion_TN, retargeters["nao"].retarget(local_TJ33, 24.0).q_TN)
     assert torch.equal(optima_TN, retargeters["nao"].solve_frames(local_TJ33)[0])
     assert not torch.equal(motion_TN, optima_TN)
-
-
-def test_jumps_are_steps_that_the_human_does_not_make(retargeters: dict[str, OptimizationRetargeter]) -> None:
-    problem = retargeters["nao"].problem
-    q_TN = torch.zeros(4, 8)
-    q_TN[2:, 0] = 0.6
-    still_TD3 = torch.tensor([1.0, 0, 0]).expand(4, len(problem.body_map.directions), 3)
-    left, right = (problem.body_map.direction_names.index(f"{side}_wrist") for side in ("left", "right"))
-    assert count_jumps(problem, q_TN, still_TD3, 24.0) == 1
-    assert count_jumps(problem, q_TN, still_TD3, 12.0) == 0  # the same step, at half the speed
-    turning_TD3 = still_TD3.clone()
-    turning_TD3[2:, left] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])
-    assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 0
-    turning_TD3 = still_TD3.clone()
-    turning_TD3[2:, right] = torch.tensor([math.cos(0.3), math.sin(0.3), 0.0])  # but that is the other arm
-    assert count_jumps(problem, q_TN, turning_TD3, 24.0) == 1
 
 
 def test_bad_input_is_named(retargeters: dict[str, OptimizationRetargeter]) -> None:

@@ -17,8 +17,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, read_motion
-from mrhubo.reference import OptimizationRetargeter
-from mrhubo.reference.retarget import count_jumps
+from mrhubo.reference import OptimizationRetargeter, count_jumps
 from mrhubo.retargeter import Retargeter
 from mrhubo.streaming import Stream, StreamSettings
 
