@@ -45,12 +45,13 @@ def without_paths(config: Any) -> dict[str, Any]:
 
 def changed_settings(config: Any, usual: Any = None) -> dict[str, Any]:
     """Those of `without_paths` that differ from those of `usual`, by default from their field's default."""
-    defaults = {
-        field.name: field.default_factory() if callable(field.default_factory) else field.default
-        for field in dataclasses.fields(config)
-    }
     if usual is not None:
         defaults = vars(usual)
+    else:
+        defaults = {
+            field.name: field.default_factory() if callable(field.default_factory) else field.default
+            for field in dataclasses.fields(config)
+        }
     return {name: value for name, value in without_paths(config).items() if getattr(config, name) != defaults[name]}
 
 

@@ -30,7 +30,8 @@ directions being so far off costs."""
 
 def from_starts(problem: DirectionProblem, pool: StartPool, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
     """Nearly converged solutions (B, S, N) [rad] from all starts, and the cost of their blocks (B, S, C)."""
-    parts = [_minima(problem, pool.near(part_BD3), part_BD3) for part_BD3 in _parts(problem, target_BD3, pool.starts)]
+    several = target_BD3.split(max(1, problem.chunk // pool.starts))
+    parts = [_minima(problem, pool.near(part_BD3), part_BD3) for part_BD3 in several]
     return torch.cat([q for q, _ in parts]), torch.cat([cost for _, cost in parts])
 
 
@@ -56,18 +57,10 @@ def along_motion(
     keys_KSN, keys_KSC = from_starts(problem, pool, target_TD3[key_K])
     best_KN, best_KC = best_path(keys_KSN, keys_KSC, problem.blocks.joints_NC, pull / stride)
     around_X2 = (frame_X // stride)[:, None] + torch.arange(2, device=frame_X.device)
-    parts = [
-        _minima(problem, best_KN[part_X2], part_XD3)
-        for part_X2, part_XD3 in zip(
-            _parts(problem, around_X2, 2), _parts(problem, target_TD3[frame_X], 2), strict=True
-        )
-    ]
-    between_X2N, between_X2C = torch.cat([q for q, _ in parts]), torch.cat([cost for _, cost in parts])
+    between_X2N, between_X2C = _minima(problem, best_KN[around_X2], target_TD3[frame_X])
     turn_S = torch.arange(pool.starts, device=frame_X.device) % 2
-    candidates_TSN, cost_TSC = (
-        target_TD3.new_empty(frames, *keys_KSN.shape[1:]),
-        target_TD3.new_empty(frames, *keys_KSC.shape[1:]),
-    )
+    candidates_TSN = target_TD3.new_empty(frames, *keys_KSN.shape[1:])
+    cost_TSC = target_TD3.new_empty(frames, *keys_KSC.shape[1:])
     candidates_TSN[key_K], cost_TSC[key_K] = keys_KSN, keys_KSC
     candidates_TSN[frame_X], cost_TSC[frame_X] = between_X2N[:, turn_S], between_X2C[:, turn_S]
     most_XC = best_KC[around_X2].amax(dim=1) + problem.weights(target_TD3[frame_X]) * DEARER_RAD**2
@@ -75,11 +68,6 @@ def along_motion(
     if len(dear_Y):
         candidates_TSN[dear_Y], cost_TSC[dear_Y] = from_starts(problem, pool, target_TD3[dear_Y])
     return candidates_TSN, cost_TSC
-
-
-def _parts(problem: DirectionProblem, rows_BXX: Tensor, starts: int) -> tuple[Tensor, ...]:
-    """What is worked on at a time, of frames that have so many starts each."""
-    return rows_BXX.split(max(1, problem.chunk // starts))
 
 
 def _minima(problem: DirectionProblem, start_BSN: Tensor, target_BD3: Tensor) -> tuple[Tensor, Tensor]:
