@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import datetime
 import http.client
 import shutil
@@ -15,8 +16,8 @@ import pytest
 
 pytest.importorskip("websockets")
 pytest.importorskip("cryptography")
-from websockets.exceptions import InvalidMessage, InvalidStatus
-from websockets.sync.client import connect
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
 
 from mrhubo.errors import UserError
 from mrhubo.live import certificate as room
@@ -64,11 +65,14 @@ def test_a_client_that_was_told_of_it_checks_it_and_comes_in(server: Server, our
         page.request("GET", "/")
         assert page.getresponse().status == 200
     server.show("one")
-    with connect(
-        f"wss://127.0.0.1:{port}/live", ssl=who_trusts(ours.path), origin=f"https://127.0.0.1:{port}"
-    ) as client:  # pyright: ignore
-        server.show("two")
-        assert client.recv(timeout=30) in ("one", "two")
+
+    async def watch() -> str | bytes:
+        here, trust = f"127.0.0.1:{port}", who_trusts(ours.path)
+        async with connect(f"wss://{here}/live", ssl=trust, origin=f"https://{here}") as client:  # pyright: ignore
+            server.show("two")
+            return await asyncio.wait_for(client.recv(), 30)
+
+    assert asyncio.run(watch()) in ("one", "two")
     assert server.url == f"https://127.0.0.1:{port}/"
 
 
@@ -82,19 +86,20 @@ def test_who_was_not_told_refuses_it(server: Server) -> None:
         plain.getresponse()
 
 
-def refused(url: str, trust: ssl.SSLContext, origin: str) -> int:
-    """The status with which a server sends somebody away. It closes the connection at once, and what it said may be lost
-    on the way if the other side was still sending; then once more.
+def status(url: str, trust: ssl.SSLContext, origin: str) -> int:
+    """What a server answers who wants to begin a WebSocket; 101: it may. In one thread (asyncio): the client of
+    `websockets.sync` reads and writes its TLS connection in two, which CPython locks
+    since gh-134698; with 3.11 one request in a hundred was lost (https://github.com/python/cpython/issues/134698).
     """
-    for _ in range(5):
+
+    async def ask() -> int:
         try:
-            with connect(url, ssl=trust, origin=origin):  # pyright: ignore[reportArgumentType]
+            async with connect(url, ssl=trust, origin=origin):  # pyright: ignore[reportArgumentType]
                 return 101
         except InvalidStatus as error:
             return error.response.status_code
-        except InvalidMessage:
-            continue
-    raise AssertionError("no answer")
+
+    return asyncio.run(ask())
 
 
 def test_pages_and_tokens_as_without_it(ours: ServerCertificate, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,9 +110,8 @@ def test_pages_and_tokens_as_without_it(ours: ServerCertificate, monkeypatch: py
         here, trust = f"127.0.0.1:{server.endpoint.port}", who_trusts(ours.path)
         known = "?token=a-secret-of-some-length"
         for query, origin in (("", f"https://{here}"), (known, f"http://{here}"), (known, "https://evil.example")):
-            assert refused(f"wss://{here}/live{query}", trust, origin) == 403
-        with connect(f"wss://{here}/live{known}", ssl=trust, origin=f"https://{here}"):  # pyright: ignore
-            pass
+            assert status(f"wss://{here}/live{query}", trust, origin) == 403
+        assert status(f"wss://{here}/live{known}", trust, f"https://{here}") == 101
         assert server.url.startswith("https://") and server.url.endswith("/#token=a-secret-of-some-length")
     finally:
         server.close()
