@@ -51,6 +51,7 @@ def refine(
     tolerance: float = 3e-4,
     fixed_T: Tensor | None = None,
     bound: StepBound | None = None,
+    blocks_C: Tensor | None = None,
 ) -> tuple[Tensor, Tensor]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
 
@@ -60,12 +61,15 @@ def refine(
     the step counted. A block ends when a step turns none of its joints by `tolerance` [rad], or six steps in a row were
     of no use. Frames in `fixed_T` (T,) stay as they are.
 
-    With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad.
+    With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad. `blocks_C` (C,) are the blocks
+    that may move; None: all.
     """
     model = _motion_model(problem, q_TN, target_TD3, smoothness)
     cost_C = model.frames.cost_BC.double().sum(0)
     damping_TC = torch.full_like(model.frames.cost_BC, DAMPING)
     failures_C, joints_NC = torch.zeros_like(cost_C), problem.blocks.joints_NC.double()
+    if blocks_C is not None:
+        failures_C = failures_C.masked_fill(~blocks_C, PATIENCE)
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
         trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
@@ -100,6 +104,7 @@ def refine_around(
     sweeps: int,
     tolerance: float,
     step_N: Tensor | None = None,
+    blocks_C: Tensor | None = None,
 ) -> Tensor:
     """`refine` for the frames in `free_T` (T,); the others stay.
 
@@ -110,7 +115,9 @@ def refine_around(
     if not len(used_X):
         return q_TN
     near, bound = smoothness.at(used_X), None if step_N is None else StepBound(step_N, used_X.diff() == 1)
-    part_XN = refine(problem, q_TN[used_X], target_TD3[used_X], near, sweeps, tolerance, ~free_T[used_X], bound)[0]
+    part_XN, _ = refine(
+        problem, q_TN[used_X], target_TD3[used_X], near, sweeps, tolerance, ~free_T[used_X], bound, blocks_C
+    )
     return q_TN.index_copy(0, used_X, part_XN)
 
 

@@ -84,8 +84,8 @@ def keep_speed(
     if fixed_T is not None:
         free_T = free_T & ~fixed_T
     found_TN = nearest_TN
-    for terms in (smoothness,) if smoothness.directions is None else (smoothness.of_joints, smoothness):
-        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, sweeps, TOLERANCE, step_N)
-    found_TN = nearest_slow(found_TN, step_N, fixed_T)
     concerned_C = changed_TN.any(dim=0).to(q_TN) @ problem.blocks.joints_NC > 0
+    for terms in (smoothness,) if smoothness.directions is None else (smoothness.of_joints, smoothness):
+        found_TN = refine_around(problem, found_TN, target_TD3, terms, free_T, sweeps, TOLERANCE, step_N, concerned_C)
+    found_TN = nearest_slow(found_TN, step_N, fixed_T)
     return torch.where(concerned_C[problem.blocks.block_N], found_TN, q_TN)

@@ -61,6 +61,22 @@ def test_refined_motion_is_a_minimum(retargeters: dict[str, OptimizationRetarget
         assert cost(torch.clamp(moved_TN, problem.lower_N, problem.upper_N)) > cost(q_TN) - 1e-5
 
 
+def test_a_block_may_be_refined_alone(retargeters: dict[str, OptimizationRetargeter]) -> None:
+    """The others stay to the bit, and it ends where it ends when all are refined."""
+    problem, generator = retargeters["nao"].problem, torch.Generator().manual_seed(3)
+    q_TN, goal_TN = (problem.robot.sample(8, generator) for _ in range(2))
+    target_TD3 = problem.body_map.robot_directions(problem.robot.forward(goal_TN))
+    blocks_C = torch.tensor([True] + [False] * (problem.blocks.joints_NC.shape[1] - 1))
+    moves_N = blocks_C[problem.blocks.block_N]
+    all_TN, one_TN = (
+        refine(problem, q_TN, target_TD3, Smoothness(0.02), blocks_C=chosen)[0] for chosen in (None, blocks_C)
+    )
+    assert torch.equal(one_TN[:, ~moves_N], q_TN[:, ~moves_N]) and not torch.equal(
+        all_TN[:, ~moves_N], q_TN[:, ~moves_N]
+    )
+    torch.testing.assert_close(one_TN[:, moves_N], all_TN[:, moves_N], rtol=0, atol=1e-5)
+
+
 def test_windows_do_not_show(retargeters: dict[str, OptimizationRetargeter], monkeypatch: pytest.MonkeyPatch) -> None:
     """A motion that is worked on in windows of a few seconds is the same as in one piece, and as slow as it must be."""
     problem = retargeters["nao"].problem

@@ -49,9 +49,8 @@ LIFTED_M, LIFT_S, FREE_S = 0.003, 0.1, 0.3
 _RISE = 0.25
 """Of how much a point is planted, the power that counts for the root's height: as long as a sole is planted at all, it
 is to touch the floor, while a place on the floor may be left gradually."""
-_FLAT = [0, 2]
-"""The horizontal axes of the world."""
-_UP = 1
+_FLAT, _UP = [0, 2], 1
+"""The horizontal axes of the world, and the upright one."""
 
 
 @dataclass(frozen=True)
@@ -94,11 +93,12 @@ class Standing(nn.Module):
         self.legs, self.robot = legs, legs.body_map.robot
         self.problem = DirectionProblem(legs.body_map, [SoleTerm(legs)])
         moved = set().union(*SoleTerm(legs).couplings())
-        legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
         self._avoidance: Avoidance | None = None
         self.balance = Balance(legs) if self.robot.balance else None
         """What shifts the root of whole motions; None: nothing looks at the centre of mass."""
+        legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
         self._legs_N = legs_N.to(self.robot.lower_N.device)
+        self._legs_C = self._legs_N.float() @ self.problem.blocks.joints_NC > 0
 
     @property
     def avoidance(self) -> Avoidance:
@@ -172,8 +172,7 @@ class Standing(nn.Module):
     def _wanted(self, carried: _Carried, steps: HumanSteps) -> tuple[np.ndarray, np.ndarray]:
         """Where points of soles are to be (T, P, 3) in the world, and how much that counts (T, P), 0..1."""
         phase_TP, weight_TP = steps.contacts.phase_TP, steps.contacts.weight_TP
-        found_TP3, frame_T = carried.point_TP3.copy(), np.arange(len(phase_TP))
-        low_TP = carried.low_TP.copy()
+        found_TP3, low_TP, frame_T = carried.point_TP3.copy(), carried.low_TP.copy(), np.arange(len(phase_TP))
         for p in range(found_TP3.shape[1]):
             there_T = phase_TP[:, p] >= 0
             if there_T.any():
@@ -249,7 +248,9 @@ class Standing(nn.Module):
             found_XN = self.problem.minimise(q_XN, target_XD3)[0]
         else:
             q_XN = nearest_slow(q_XN, step_N, fixed_X)
-            found_XN = refine_around(self.problem, q_XN, target_XD3, smoothness, ~fixed_X, SWEEPS, TOLERANCE, step_N)
+            found_XN = refine_around(
+                self.problem, q_XN, target_XD3, smoothness, ~fixed_X, SWEEPS, TOLERANCE, step_N, self._legs_C
+            )
             found_XN = nearest_slow(found_XN, step_N, fixed_X)
         return torch.where(self._legs_N, found_XN, q_XN)
 
@@ -271,9 +272,7 @@ def _lifted(carried: _Carried, frame_rate: float) -> _Carried:
     """A root that is lifted so, smoothly and by no less."""
     width = 2 * round(LIFT_S * frame_rate) + 1
     lift_T = uniform_filter1d(maximum_filter1d(_lift(carried), width, mode="nearest"), width, mode="nearest")
-    shift_T3 = np.zeros_like(carried.root_T3)
-    shift_T3[:, _UP] = lift_T
-    return carried.shifted(shift_T3)
+    return carried.shifted(lift_T[:, None] * np.eye(3)[_UP])
 
 
 def standing_fields(position_T3: Tensor, rotation_T33: Tensor, planted_TS: np.ndarray, legs: Legs) -> dict[str, Any]:
