@@ -93,8 +93,9 @@ def main(argv: list[str]) -> None:
             rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
             follows = "" if root == "pelvis" else f", whose root follows {root}"
             print(f"## {name}{follows}, as a {way}: {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
-            heads = ["chest, in the world [deg]", "slide, own [cm/s]", "over 1 cm/s", "sunk", "floats (max [cm])",
-                     "path [cm/m]", "heading [deg]", "speed", "jumps", "touches", "ms a frame"]  # fmt: skip
+            heads = ["chest, in the world [deg]", "slide, own [cm/s]", "over 1 cm/s", "sunk",
+                     "floats (max [cm])", "height [cm]", "path [cm/m]", "heading [deg]", "speed", "jumps", "touches",
+                     "ms a frame"]  # fmt: skip
             columns = ["clip", *(f"{_PARTS[part]} [deg]" for part in parts), *heads]
             print_table(columns, [*rows, _row("mean", found, parts)])
             print()
@@ -248,6 +249,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: lis
         f"{mean('sliding'):.0%}",
         f"{mean('sunk'):.1%} ({most('sunk_max_cm'):.1f})",
         f"{mean('floating'):.1%} ({most('floating_max_cm'):.1f})",
+        f"{mean('height_cm'):.2f}",
         f"{mean('path_cm_m'):.1f}",
         f"{mean('heading_deg'):.1f}",
         f"{most('speed_max'):.2f}",

@@ -58,6 +58,8 @@ class WholeBodyScore:
     floating: float
     """Share of frames with a planted sole more than 2 cm above the floor."""
     floating_max_cm: float
+    height_cm: float
+    """Mean height of planted soles above the floor, each at its lowest point."""
     path_cm_m: float
     """Mean horizontal distance of the root to the person's path, scaled by the legs' length, for each metre of it."""
     heading_deg: float
@@ -116,6 +118,7 @@ def score_whole_body(
         sunk_max_cm=100 * max(0.0, float(-low_TS.min())),
         floating=_mean((up_TS > FLOATING_M).any(axis=1)),
         floating_max_cm=100 * max(0.0, float(up_TS.max())),
+        height_cm=100 * _mean(np.maximum(low_TS[planted_TS], 0.0)),
         path_cm_m=path_error(legs.root(poses, base_T3, base_T33), human_to_world(steps.path_T3)),
         heading_deg=heading_error(legs.heading(poses, base_T33), steps),
         speed_max=float(share_TN.max()) if len(share_TN) else 0.0,

@@ -38,6 +38,7 @@ _HEADS = {
     "sunk_max_cm": ("most [cm]", "{:.1f}"),
     "floating": ("floats", "{:.1%}"),
     "floating_max_cm": ("most [cm]", "{:.1f}"),
+    "height_cm": ("height [cm]", "{:.2f}"),
     "path_cm_m": ("path [cm/m]", "{:.1f}"),
     "heading_deg": ("heading [deg]", "{:.1f}"),
     "speed_max": ("speed/limit", "{:.2f}"),

@@ -57,6 +57,11 @@ def test_soles_off_the_floor(measured: _Measured, up: float, sunk: float, floati
     assert (score.sunk, score.floating) == (sunk, floating)
     assert score.sunk_max_cm == pytest.approx(max(0.0, -100 * up), abs=0.1)
     assert score.floating_max_cm == pytest.approx(max(0.0, 100 * up), abs=1.0) or up < 0
+    assert (
+        score.height_cm == pytest.approx(measured.score().height_cm + 100 * up, abs=0.3)
+        if up > 0
+        else score.height_cm < 0.3
+    )
 
 
 def test_a_robot_that_looks_aside(measured: _Measured) -> None:
