@@ -9,7 +9,7 @@ from llvmlite import ir  # pyright: ignore[reportMissingImports]
 from numba import njit, types  # pyright: ignore[reportMissingImports]
 from numba.extending import overload  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, Truths, choose, in_llvm, nearest
+from mrhubo.fast.compiled.lanes import BARE, LANES, NUMBERS, Lanes, Truths, choose, in_llvm, nearest
 from mrhubo.fast.compiled.tables import INNER
 
 # Minimax polynomials up to pi/4, of FreeBSD's msun (k_sin.c, k_cos.c).
@@ -80,7 +80,7 @@ def sine_cosine(x: Any) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@overload(sine_cosine)
+@overload(sine_cosine, BARE)
 def _sine_cosine(x):
     if x != Lanes:
         return lambda x: (math.sin(x), math.cos(x))

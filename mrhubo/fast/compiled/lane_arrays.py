@@ -20,7 +20,7 @@ from numba.extending import (  # pyright: ignore[reportMissingImports]
     register_model,
 )
 
-from mrhubo.fast.compiled.lanes import LANES, NUMBERS, Lanes, in_llvm, spread
+from mrhubo.fast.compiled.lanes import BARE, LANES, NUMBERS, Lanes, in_llvm, spread
 
 
 class _LaneArrayType(types.Type):
@@ -55,7 +55,7 @@ def zeros(kind: Any, shape: Any) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@overload(zeros)
+@overload(zeros, BARE)
 def _zeros(kind, shape):
     if kind == Lanes:
         return lambda kind, shape: side_by_side(np.zeros((*shape, LANES)))
@@ -80,7 +80,7 @@ def _shape_of(lanes):
     return lambda lanes: inside(lanes).shape
 
 
-@overload(len)
+@overload(len, BARE)
 def _length(lanes):
     return (lambda lanes: len(inside(lanes))) if isinstance(lanes, _LaneArrayType) else None
 
@@ -125,12 +125,12 @@ def _put(typing_context: Any, lanes: Any, place: Any, number: Any) -> Any:
     return types.void(lanes, place, number), generate
 
 
-@overload(operator.getitem)
+@overload(operator.getitem, BARE)
 def _getitem(lanes, place):
     return (lambda lanes, place: _get(lanes, place)) if _fits(lanes, place) else None
 
 
-@overload(operator.setitem)
+@overload(operator.setitem, BARE)
 def _setitem(lanes, place, number):
     return (lambda lanes, place, number: _put(lanes, place, number)) if _fits(lanes, place) else None
 

@@ -35,6 +35,10 @@ _FAST = ("reassoc", "contract", "nsz")
 """As `COMPILED` has it for single numbers."""
 
 
+BARE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of what compiled functions alone call: numba would make each callable from Python and from C too."""
+
+
 def in_llvm(define: Callable[..., Any]) -> Any:
     """`numba.extending.intrinsic`: a function of LLVM's own operations, without its definition's typing context."""
     return intrinsic(define)
@@ -116,7 +120,7 @@ def _elementwise(build: Callable[..., Any], result: Any) -> Any:
 def _overloaded(function: Any, build: Callable[..., Any], result: Any) -> None:
     apply = _elementwise(build, result)
 
-    @overload(function)
+    @overload(function, BARE)
     def of_two(a, b):
         if Lanes in (a, b) and all(kind == Lanes or _is_number(kind) for kind in (a, b)):
             return lambda a, b: apply(a, b)
@@ -160,17 +164,17 @@ nearest = _of_one("rint")
 _root, _size = _of_one("sqrt"), _of_one("fabs")
 
 
-@overload(math.sqrt)
+@overload(math.sqrt, BARE)
 def _sqrt(a):
     return (lambda a: _root(a)) if a == Lanes else None
 
 
-@overload(abs)
+@overload(abs, BARE)
 def _abs(a):
     return (lambda a: _size(a)) if a == Lanes else None
 
 
-@overload(operator.neg)
+@overload(operator.neg, BARE)
 def _neg(a):
     return (lambda a: 0.0 - a) if a == Lanes else None
 
@@ -193,12 +197,12 @@ def _of_truths(name: str) -> Any:
 _both, _either = _of_truths("and_"), _of_truths("or_")
 
 
-@overload(operator.and_)
+@overload(operator.and_, BARE)
 def _and(a, b):
     return (lambda a, b: _both(a, b)) if Truths in (a, b) else None
 
 
-@overload(operator.or_)
+@overload(operator.or_, BARE)
 def _or(a, b):
     return (lambda a, b: _either(a, b)) if Truths in (a, b) else None
 
@@ -226,7 +230,7 @@ def choose(condition: Any, a: Any, b: Any) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@overload(choose)
+@overload(choose, BARE)
 def _choose(condition, a, b):
     if condition == Truths:
         return lambda condition, a, b: _chosen(condition, a, b)
@@ -238,7 +242,7 @@ def some(condition: Any) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@overload(some)
+@overload(some, BARE)
 def _some(condition):
     return (lambda condition: _any(condition)) if condition == Truths else (lambda condition: condition)
 
@@ -248,7 +252,7 @@ def alike(other: Any, number: float) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@overload(alike)
+@overload(alike, BARE)
 def _alike(other, number):
     return (lambda other, number: filled(number)) if other == Lanes else (lambda other, number: float(number))
 
@@ -276,6 +280,6 @@ def _not(typing_context: Any, condition: Any) -> Any:
     return Truths(condition), generate
 
 
-@overload(no)
+@overload(no, BARE)
 def _no(condition):
     return (lambda condition: _not(condition)) if condition == Truths else (lambda condition: not condition)
