@@ -20,6 +20,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 from mrhubo.fast.compiled import avoidance, collision, judging, networks, polishing, steps, tables
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import robot as robots
+from mrhubo.fast.compiled.reading import read_quickly
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -174,4 +175,4 @@ def make_kernels() -> Kernels:
                 near_B[:] = True
 
     drop_others(look.stats.cache_path)
-    return Kernels(look, follow, avoid, retarget, polish)
+    return Kernels(*map(read_quickly, (look, follow, avoid, retarget, polish)))
