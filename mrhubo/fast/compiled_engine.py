@@ -272,7 +272,8 @@ class CompiledEngine:
             self.giving_way.problem.directions(nobody_0N)
             self.giving_way.close(nobody_0N)
             self.avoid(nobody_0N, nothing_0D3)
-            self._kernels.polish(self._tables, 0, nothing_0D3, nobody_0N.astype(np.float32))
+            nowhere_0 = np.zeros(0, np.bool_)
+            self._kernels.polish(self._tables, 0, False, nothing_0D3, nobody_0N.astype(np.float32), nowhere_0)
             kernels = [*self._kernels, *self._motion_kernels]
             kernels += [] if self._unroll is None else [self._universal_kernel]
             note_kept((kernel.stats.cache_path for kernel in kernels), self._unroll is not None)
@@ -283,15 +284,18 @@ class CompiledEngine:
     ) -> None:  # fmt: skip
         together = polish > 0 and len(q_BN) > FEW
         avoid = avoid and polish > 0
+        near_B = into.collision_B if judge else np.empty(len(q_BN), np.bool_)
+        near_B[:] = True
 
         def part(rows: slice) -> None:
             if together:
-                self._kernels.polish(self._tables, polish, target_BD3[rows], q_BN[rows])
-            self._kernels.retarget(
-                self._tables, self._activation, 0 if together else polish, avoid, judge, target_BD3[rows],
-                q_BN[rows], shake_BX[rows], into.error_BM[rows], into.phi_B[rows], into.collision_B[rows],
-                into.trust_BX[rows],
-            )  # fmt: skip
+                self._kernels.polish(self._tables, polish, avoid, target_BD3[rows], q_BN[rows], near_B[rows])
+            if judge or not together:
+                self._kernels.retarget(
+                    self._tables, self._activation, 0 if together else polish, avoid and not together, judge,
+                    target_BD3[rows], q_BN[rows], shake_BX[rows], into.error_BM[rows], into.phi_B[rows],
+                    near_B[rows], into.trust_BX[rows],
+                )  # fmt: skip
 
         self._shared(len(q_BN), part)
 

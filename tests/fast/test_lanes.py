@@ -73,7 +73,11 @@ def test_steps_of_many_frames_are_those_of_each(make: Callable[[str], Retargeter
     """Of untrained networks, so that most frames start again from other places."""
     fast = FastRetargeter(make("nao").describe(), "compiled")
     for avoid in (False, True):
-        together = fast.predict(array, 10, avoid)
-        alone = np.concatenate([fast.predict(pose, 10, avoid)[None] for pose in array])
-        off_B = np.abs(together - alone).max(axis=1)
+        together = fast(array, 10, avoid_collisions=avoid)
+        alone = [fast(pose, 10, avoid_collisions=avoid) for pose in array]
+        off_B = np.abs(together.q - np.stack([answer.q for answer in alone])).max(axis=1)
         assert np.quantile(off_B, 0.9) < 1e-6 and off_B.max() < 1e-4
+        collision_B = np.array([answer.collision for answer in alone])
+        np.testing.assert_array_equal(together.collision, collision_B)
+        assert avoid or 0 < collision_B.mean() < 1
+        np.testing.assert_array_equal(fast.predict(array, 10, avoid), together.q)

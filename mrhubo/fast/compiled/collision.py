@@ -1,4 +1,4 @@
-"""As `mrhubo.fast.plain.collision`, for one frame."""
+"""As `mrhubo.fast.plain.collision`, for one frame, or for several side by side (`mrhubo.fast.compiled.lanes`)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.human import add, cross, dot, put, row, turn
+from mrhubo.fast.compiled.lanes import alike, choose, no, some
 from mrhubo.fast.compiled.tables import (
     BALL_Z,
     BODY_G,
@@ -58,28 +59,27 @@ def place_capsules(t, work):
 def far(t, work, z):
     """Whether no pair of a group can be nearer than its clearance, nor overlap, where capsules are placed."""
     middle, g = 2 * size(t, BODY_S) + whole(t, CAPSULE_Z, z), whole(t, BALL_Z, z)
-    apart, reach = 0.0, 2 * real(t, REACH_Z, z)
-    for x in range(3):
-        between = work.ends_S3[middle, x] - 2 * work.centre_G3[g, x]
-        apart += between * between
-    return apart >= reach * reach
+    between, reach = add(row(work.ends_S3, middle), row(work.centre_G3, g), -2.0), 2 * real(t, REACH_Z, z)
+    return not some(dot(between, between) < reach * reach)
 
 
 @njit(**INNER)
-def apart(t, work, y, margin):
-    """Of a pair of placed capsules: signed distance [m], point on the first one's axis, and what leads there from the
-    second's. What is certainly further apart than the margin [m] is infinitely far.
-    """
-    ends_S3, count = work.ends_S3, size(t, BODY_S)
+def far_apart(t, work, y, margin):
+    """Whether a pair of placed capsules is certainly further apart than a margin [m]."""
+    first = 2 * size(t, BODY_S)
     i, j = whole(t, PAIR_Y2, 2 * y), whole(t, PAIR_Y2, 2 * y + 1)
-    centre = 0.0
-    for x in range(3):
-        between = ends_S3[2 * count + i, x] - ends_S3[2 * count + j, x]
-        centre += between * between
-    reach = real(t, REACH_S, i) + real(t, REACH_S, j) + max(margin, 0.0)
-    if centre >= 4 * reach * reach:
-        return math.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    point, between = _closest(ends_S3, 2 * i, 2 * j)
+    between = add(row(work.ends_S3, first + i), row(work.ends_S3, first + j), -1.0)
+    reach = 2 * (real(t, REACH_S, i) + real(t, REACH_S, j) + max(margin, 0.0))
+    return not some(dot(between, between) < reach * reach)
+
+
+@njit(**INNER)
+def apart(t, work, y):
+    """Of a pair of placed capsules: signed distance [m], point on the first one's axis, and what leads there from the
+    second's.
+    """
+    i, j = whole(t, PAIR_Y2, 2 * y), whole(t, PAIR_Y2, 2 * y + 1)
+    point, between = _closest(work.ends_S3, 2 * i, 2 * j)
     return math.sqrt(dot(between, between)) - real(t, RADIUS_S, i) - real(t, RADIUS_S, j), point, between
 
 
@@ -98,13 +98,11 @@ def _closest(ends_S3, i, j):
     )
     safe_a, safe_e = max(a, SHORT), max(e, SHORT)
     determinant = a * e - b * b
-    s = 0.0
-    if determinant > PARALLEL * a * e:
-        s = (b * f - c * e) / max(determinant, SHORT * SHORT)
+    s = choose(determinant > PARALLEL * a * e, (b * f - c * e) / max(determinant, SHORT * SHORT), 0.0)
     u = min(max((b * min(max(s, 0.0), 1.0) + f) / safe_e, 0.0), 1.0)
     s = min(max((b * u - c) / safe_a, 0.0), 1.0)
     u = min(max((b * s + f) / safe_e, 0.0), 1.0)
-    return add(start_a, along_a, s), add(add(r, along_a, s), along_b, -u)
+    return add(start_a, along_a, s), add(add(r, along_a, s), along_b, 0.0 - u)
 
 
 @njit(**INNER)
@@ -113,14 +111,18 @@ def touches(t, work, clear):
     placed.
     """
     place_capsules(t, work)
+    found = alike(work.lower_N[0], 0.0) > 0
     for z in range(size(t, BALL_Z)):
         if far(t, work, z):
             continue
         for y in range(whole(t, FIRST_Z, z), whole(t, FIRST_Z, z + 1)):
             margin = real(t, CLEAR_Y, y) if clear else 0.0
-            if apart(t, work, y, margin)[0] < margin:
-                return True
-    return False
+            if far_apart(t, work, y, margin):
+                continue
+            found = found | (apart(t, work, y)[0] < margin)
+            if not some(no(found)):
+                return found
+    return found
 
 
 @njit(**INNER)

@@ -14,6 +14,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import contacts, ground, steps, tables
 from mrhubo.fast.compiled import robot as robots
+from mrhubo.fast.compiled.reading import read_quickly
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -62,4 +63,4 @@ def make_ground_kernels() -> GroundKernels:
         ground.stand(t, work, f)
 
     drop_others(start.stats.cache_path)
-    return GroundKernels(start, look, stand)
+    return GroundKernels(*map(read_quickly, (start, look, stand)))

@@ -20,6 +20,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 from mrhubo.fast.compiled import avoidance, collision, judging, networks, polishing, steps, tables
 from mrhubo.fast.compiled import human as humans
 from mrhubo.fast.compiled import robot as robots
+from mrhubo.fast.compiled.reading import read_quickly
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -105,7 +106,7 @@ def make_kernels() -> Kernels:
         t, activation, polish, avoid, judge, target_BD3, q_BN, shake_BX, error_BM, phi_B, collision_B, trust_BX
     ):  # fmt: skip
         """Makes steps from `q_BN`, where the answers will stand, and if `avoid` away from self-collision; and says how
-        good they are, if `judge`.
+        good they are, if `judge`. Where no steps are made, `collision_B` tells before which frames may collide.
         """
         _ = version
         work = robots.make_work(t)
@@ -133,7 +134,9 @@ def make_kernels() -> Kernels:
                         free = avoidance.avoid(t, work, q_N)
                     for n in range(joints):
                         q_BN[b, n] = q_N[n]
-                free_B[k] = free and tables.whole(t, tables.COUNT_6, tables.APART)
+                    free_B[k] = free and tables.whole(t, tables.COUNT_6, tables.APART)
+                elif judge:
+                    free_B[k] = not collision_B[b]
                 if judge:
                     judging.read_pose(t, target_BD3, b, turn_T33, between_333, local_BT33[k])
                     judging.prior_input(local_BT33[k], one_BE, k)
@@ -160,10 +163,16 @@ def make_kernels() -> Kernels:
                     phi_B[b] = max(phi_B[b], phi)
 
     @njit(cache=True, **tables.COMPILED)
-    def polish(t, steps, target_BD3, q_BN):
-        """Makes steps from `q_BN` of many frames, where the answers will stand."""
+    def polish(t, steps, avoid, target_BD3, q_BN, near_B):
+        """As `retarget`, the steps of many frames alone, from `q_BN` and into it. If `avoid`, `near_B` tells then which
+        frames may collide.
+        """
         _ = version
         polishing.polish_all(t, target_BD3, q_BN, steps)
+        if avoid:
+            polishing.avoid_all(t, target_BD3, q_BN, near_B)
+            if not tables.whole(t, tables.COUNT_6, tables.APART):
+                near_B[:] = True
 
     drop_others(look.stats.cache_path)
-    return Kernels(look, follow, avoid, retarget, polish)
+    return Kernels(*map(read_quickly, (look, follow, avoid, retarget, polish)))

@@ -15,6 +15,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import avoidance, collision, cost, human, steps, tables
 from mrhubo.fast.compiled import robot as robots
+from mrhubo.fast.compiled.reading import read_quickly
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -142,4 +143,4 @@ def make_motion_kernels() -> MotionKernels:
                 before_X[k] -= row_W[width - len(before_X) + k] * found
 
     drop_others(quadratic.stats.cache_path)
-    return MotionKernels(quadratic, whole, turning, close, factor, solve)
+    return MotionKernels(*map(read_quickly, (quadratic, whole, turning, close, factor, solve)))

@@ -13,7 +13,6 @@ from mrhubo.fast.compiled.tables import (
     BEND_W,
     CENTER_F,
     COLUMN,
-    COLUMNS,
     COUNT_6,
     FIRST_O,
     FIRST_STAGE,
@@ -40,6 +39,7 @@ from mrhubo.fast.compiled.tables import (
     real,
     single,
     size,
+    spaced,
     whole,
 )
 from mrhubo.fast.compiled.tile import ROWS, multiply, multiply_row
@@ -102,7 +102,7 @@ def affine(t, layer, x_BI, out_BO, frames):
     weights = whole(t, LAYER_G5, 5 * layer + 2)
     # A view tells that places are not negative, without which numba is five times slower.
     if not whole(t, LAYER_G5, 5 * layer + 4) & SHORT:
-        at, wide = begin_turned + weights, outputs + -outputs % COLUMNS
+        at, wide = begin_turned + weights, spaced(outputs)
         weight_IO = number[at : at + inputs * wide].reshape(inputs, wide)
         bias_O = number[at + inputs * wide : at + (inputs + 1) * wide]
         if frames == 1:
@@ -251,7 +251,7 @@ def features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k):
 @njit(**INNER)
 def make_rooms(frames, width):
     """Three arrays for numbers between layers."""
-    shape = (frames + -frames % ROWS, width + -width % COLUMNS)
+    shape = (frames + -frames % ROWS, spaced(width))
     return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
 
 

@@ -1,4 +1,5 @@
-"""As `mrhubo.fast.compiled.steps.polish`, for many frames, as many side by side as there are lanes.
+"""As `mrhubo.fast.compiled.steps.polish` and `mrhubo.fast.compiled.avoidance.avoid`, for many frames, as many side by
+side as there are lanes.
 
 Legend: B frames, D directions, N joints, C blocks, L lanes, F lanes that have a frame of their own.
 """
@@ -8,9 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
+from mrhubo.fast.compiled.avoidance import avoid
+from mrhubo.fast.compiled.collision import touches
 from mrhubo.fast.compiled.lane_arrays import inside, zeros
-from mrhubo.fast.compiled.lanes import LANES, filled
-from mrhubo.fast.compiled.robot import make_lane_work, make_work
+from mrhubo.fast.compiled.lanes import LANES, choose, filled
+from mrhubo.fast.compiled.robot import make_lane_work, make_work, place
 from mrhubo.fast.compiled.steps import aim, minimise, near
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
@@ -117,3 +120,35 @@ def _start_again(t, work, alone, target_BD3, q_BN, enough_BC, frame_L, steps, co
                     for n in range(joints):
                         if whole(t, BLOCK_N, n) == c:
                             q_BN[b, n] = start_NL[n, lane]
+
+
+@njit(**INNER)
+def avoid_all(t, target_BD3, q_BN, near_B):
+    """Steps away from self-collision from `q_BN` [rad], where the answers will stand, of the frames that need them;
+    `near_B` tells which those are.
+    """
+    work, target_1D3 = make_lane_work(t), zeros(filled(0.0), (1, target_BD3.shape[1], 3))
+    frames, joints = len(q_BN), q_BN.shape[1]
+    near_F, near, frame_L = np.empty(frames, np.intp), 0, np.empty(LANES, np.intp)
+    start_NL, near_CL = inside(work.start_N), inside(work.own_cost_C)
+    for first in range(0, frames, LANES):
+        for lane in range(LANES):
+            frame_L[lane] = min(first + lane, frames - 1)
+        _begin(work, q_BN, frame_L)
+        place(t, work, work.start_N)
+        work.own_cost_C[0] = choose(touches(t, work, True), filled(1.0), 0.0)
+        for lane in range(min(LANES, frames - first)):
+            b = first + lane
+            near_B[b] = near_CL[0, lane] > 0
+            if near_B[b]:
+                near_F[near] = b
+                near += 1
+    for first in range(0, near, LANES):
+        for lane in range(LANES):
+            frame_L[lane] = near_F[min(first + lane, near - 1)]
+        aim_at(t, work, target_1D3, target_BD3, frame_L)
+        _begin(work, q_BN, frame_L)
+        avoid(t, work, work.start_N)
+        for lane in range(min(LANES, near - first)):
+            for n in range(joints):
+                q_BN[frame_L[lane], n] = start_NL[n, lane]

@@ -33,6 +33,7 @@ from mrhubo.fast.compiled.tables import (
     OFFSET_A,
     ORIGIN_A33,
     PARENT_A,
+    POOL_CU,
     POSITION_A3,
     RATIO_A,
     ROTARY_A,
@@ -94,8 +95,8 @@ class Work(NamedTuple):
     sole_N3: np.ndarray
     carrier_133: np.ndarray
     """Human axes of what carries the legs, base frame."""
-    wanted_X: np.ndarray
-    """A block's directions, weighted, one number after the other."""
+    score_U: np.ndarray
+    """What poses of the pool cost, float32."""
     right_N: np.ndarray
     """Right side and solution of a block's system, in its order;"""
     free_N: np.ndarray
@@ -159,7 +160,7 @@ def _make_work(t, kind):
         zeros(kind, (soles,)),
         zeros(kind, (joints, 3)),
         zeros(kind, (1, 3, 3)),
-        zeros(kind, (3 * directions,)),
+        np.empty(size(t, POOL_CU) // blocks, np.float32),
         zeros(kind, (joints,)),
         zeros(kind, (joints,)),
     )

@@ -14,9 +14,9 @@ from mrhubo.fast.compiled.lanes import alike, choose, no, some
 from mrhubo.fast.compiled.tables import (
     BLOCK_N,
     BODY_H,
-    CELL_CU,
     FAR,
     FIRST_C,
+    FIRST_CS,
     FIRST_D,
     FIRST_STEPS,
     GAIN,
@@ -26,7 +26,8 @@ from mrhubo.fast.compiled.tables import (
     ORDER_N,
     PARTIAL_D,
     POLISH_4,
-    POOL_CUX,
+    POOL_CU,
+    POOL_CXU,
     POOL_RIDGE_CU,
     POOL_UN,
     STARTS,
@@ -175,28 +176,30 @@ def follow(t, work, target_BD3, b, pull, q_N):
 @njit(**INNER)
 def near(t, work, target_BD3, b, c, start, into_N):
     """The pool's best pose of a cell, for the joints of a block."""
-    best, found, joints, wanted_X = np.inf, -1, size(t, BLOCK_N), work.wanted_X
-    poses, first, last = size(t, POOL_UN) // joints, whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)
+    starts, poses = int(real(t, POLISH_4, STARTS)), len(work.score_U)
+    cell, first, last = c * (starts + 1) + start, whole(t, FIRST_D, c), whole(t, FIRST_D, c + 1)
+    at, count = whole(t, FIRST_CS, cell), whole(t, FIRST_CS, cell + 1) - whole(t, FIRST_CS, cell)
+    # Loops over views, so that several poses are looked at at once.
+    singles, score_U, at = t[2], work.score_U[:count], c * poses + at
+    ridge = t[0][2 * POOL_RIDGE_CU] + at
+    score_U[:] = singles[ridge : ridge + count]
+    row = t[0][2 * POOL_CXU] + 3 * first * poses + at - c * poses
     for r in range(first, last):
         d = whole(t, ORDER_D, r)
         for i in range(3):
-            wanted_X[3 * (r - first) + i] = real(t, WEIGHT_D, d) * target_BD3[b, d, i]
-    # What is the same for thousands of poses is looked up once: a table's number takes three loads.
-    integers, singles, numbers = t[0], t[2], 3 * (last - first)
-    cell, pool = integers[2 * CELL_CU] + c * poses, integers[2 * POOL_CUX] + 3 * first * poses
-    for u in range(poses):
-        if integers[cell + u] != start:
-            continue
-        score, own = 0.0, pool + numbers * u
-        for x in range(numbers):
-            score += wanted_X[x] * singles[own + x]
-        score = single(t, POOL_RIDGE_CU, c * poses + u) - 2 * score
-        if score < best:
-            best, found = score, u
-    if found >= 0:
+            wanted, own_U = np.float32(-2 * real(t, WEIGHT_D, d) * target_BD3[b, d, i]), singles[row : row + count]
+            for u in range(count):
+                score_U[u] += wanted * own_U[u]
+            row += poses
+    if count:
+        found = 0
+        for u in range(1, count):
+            if score_U[u] < score_U[found]:
+                found = u
+        found = whole(t, POOL_CU, at + found)
         for x in range(whole(t, FIRST_C, c), whole(t, FIRST_C, c + 1)):
             n = whole(t, ORDER_N, x)
-            into_N[n] = single(t, POOL_UN, found * joints + n)
+            into_N[n] = single(t, POOL_UN, found * size(t, BLOCK_N) + n)
 
 
 @njit(**INNER)

@@ -26,8 +26,8 @@ _KEYS = (
     "parent_A", "rotary_A", "column_A", "limb_D", "start_body_D", "end_body_D", "view_body_V", "direction_Q",
     "joint_Q", "column_Q", "ratio_A", "offset_A", "axis_A3", "position_A3", "origin_A33", "across_A33", "twice_A33",
     "start_D3", "end_D3", "view_V33", "factor_Q4",
-    "block_N", "order_N", "first_C", "order_D", "first_D", "partial_D", "cell_CU", "lower_N", "upper_N", "middle_N",
-    "ridge_N", "weight_D", "polish_4", "pool_ridge_CU", "pool_CUX", "pool_UN",
+    "block_N", "order_N", "first_C", "order_D", "first_D", "partial_D", "first_CS", "lower_N", "upper_N", "middle_N",
+    "ridge_N", "weight_D", "polish_4", "pool_ridge_CU", "pool_CXU", "pool_CU", "pool_UN",
     "kind_K", "slot_K", "of_K", "seen_K", "last_K", "direction_K3", "parent_T", "mirror_T", "rest_K23", "share_K",
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
     "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S", "clear_Y",
@@ -52,16 +52,17 @@ network, the prior's coders last; layer_G5: numbers in and out, where weights be
 layer out, 0, and 0; or where weights begin in `shorts`, where biases and then scales begin in `number`, and SHORT; and
 LINEAR where no activation stands before the layer; column: all columns; count_6: networks
 of the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
-distance. pool_CUX: the pool's directions, block after block. block_H: the block whose joints move a point of a sole,
--1: none does. What is of legs is empty for robots without feet.
+distance. pool_CXU: the pool's directions, block after block, and in each cell after cell; first_CS: where each cell
+begins, and last where all end; pool_CU: which pose of the pool each is; pool_ridge_CU likewise. block_H: the block
+whose joints move a point of a sole, -1: none does. What is of legs is empty for robots without feet.
 """
 (
     JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
     PARENT_A, ROTARY_A, COLUMN_A, LIMB_D, START_BODY_D, END_BODY_D, VIEW_BODY_V, DIRECTION_Q,
     JOINT_Q, COLUMN_Q, RATIO_A, OFFSET_A, AXIS_A3, POSITION_A3, ORIGIN_A33, ACROSS_A33, TWICE_A33,
     START_D3, END_D3, VIEW_V33, FACTOR_Q4,
-    BLOCK_N, ORDER_N, FIRST_C, ORDER_D, FIRST_D, PARTIAL_D, CELL_CU, LOWER_N, UPPER_N, MIDDLE_N,
-    RIDGE_N, WEIGHT_D, POLISH_4, POOL_RIDGE_CU, POOL_CUX, POOL_UN,
+    BLOCK_N, ORDER_N, FIRST_C, ORDER_D, FIRST_D, PARTIAL_D, FIRST_CS, LOWER_N, UPPER_N, MIDDLE_N,
+    RIDGE_N, WEIGHT_D, POLISH_4, POOL_RIDGE_CU, POOL_CXU, POOL_CU, POOL_UN,
     KIND_K, SLOT_K, OF_K, SEEN_K, LAST_K, DIRECTION_K3, PARENT_T, MIRROR_T, REST_K23, SHARE_K,
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
     BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S, CLEAR_Y,
@@ -152,13 +153,18 @@ def _derived(d: Description, clear_Y: np.ndarray) -> dict[str, np.ndarray]:
         orders.append(np.concatenate([np.flatnonzero(column) for column in own_XC.T]))
         firsts.append(np.concatenate(([0], own_XC.sum(axis=0).cumsum())).astype(np.int64))
     ends = [constants[f"{name}_deg"] for name in ("plane_low", "plane_high", "needed_low", "needed_high")]
-    pools = [d.cost.pool_UD3[:, d.cost.block_D == c].reshape(-1) for c in range(len(d.cost.cell_CU))]
+    order_CU, first_CS = np.argsort(d.cost.cell_CU, axis=1, kind="stable"), []
+    for cell_U in np.sort(d.cost.cell_CU, axis=1):
+        first_CS.append(np.searchsorted(cell_U, np.arange(int(constants["starts"]) + 1)))
+    pools = [d.cost.pool_UD3[order_U][:, d.cost.block_D == c] for c, order_U in enumerate(order_CU)]
     polish = [constants["far_rad"] ** 2, constants["gain_rad"] ** 2, constants["starts"], constants["first_steps"]]
     scale = [constants[name] for name in ("good_deg", "excess_deg", "shake_deg", "usual_phi")]
     return {
         "position_A3": k.origin_A34[..., 3], "origin_A33": origin_A33, "across_A33": origin_A33 @ across_A33,
         "twice_A33": origin_A33 @ across_A33 @ across_A33, "order_N": orders[0], "first_C": firsts[0],
-        "pool_CUX": np.concatenate(pools),
+        "pool_CXU": np.concatenate([pool.reshape(len(pool), -1).T.reshape(-1) for pool in pools]),
+        "first_CS": np.array(first_CS), "pool_CU": order_CU,
+        "pool_ridge_CU": np.take_along_axis(d.cost.pool_ridge_CU, order_CU, axis=1),
         "order_D": orders[1], "first_D": firsts[1], "bend_4": np.radians(ends), "polish_4": np.array(polish),
         "scale_4": np.array(scale), "reach_S": reach_S, "clear_Y": clear_Y[groups.order_Y],
         "pair_Y2": capsules.pair_Y2[groups.order_Y], "first_Z": groups.first_Z, "capsule_Z": groups.capsule_Z,
@@ -200,10 +206,10 @@ def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np
 
 
 def _turned(weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """Weights with the numbers that come in along the first axis, and biases after them, with zeros behind up to whole
-    tiles.
+    """Weights with the numbers that come in along the first axis, and biases after them, with zeros behind, so that
+    there are as many columns as `spaced` says.
     """
-    more = -len(bias) % COLUMNS
+    more = spaced.py_func(len(bias)) - len(bias)
     return np.pad(np.vstack((weight.T, bias)), [(0, 0), (0, more)]).reshape(-1)
 
 
@@ -219,6 +225,15 @@ INNER: dict[str, Any] = {**COMPILED, "no_cpython_wrapper": True, "no_cfunc_wrapp
 """The same for those that compiled functions alone call,"""
 INNER_EXACT: dict[str, Any] = {**INNER, "fastmath": False}
 """and for those of them that must see NaN as it is."""
+
+
+@njit(**INNER)
+def spaced(columns):
+    """How long rows of so many columns are: whole tiles, and one more where the beginnings of rows would compete for
+    the same few places of the processor's nearest memory, as multiples of 1,024 bytes do.
+    """
+    whole = columns + -columns % COLUMNS
+    return whole if whole % 256 else whole + COLUMNS
 
 
 @njit(**INNER)

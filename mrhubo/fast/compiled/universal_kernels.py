@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled import lane_arrays, lanes, polishing, robot, tables, universal
+from mrhubo.fast.compiled.reading import read_quickly
 from mrhubo.fast.kept import checksum, drop_others
 
 
@@ -45,4 +46,4 @@ def make_universal_kernel() -> Callable[..., Any]:
             at += count
 
     drop_others(unroll.stats.cache_path)
-    return unroll
+    return read_quickly(unroll)
