@@ -26,20 +26,11 @@ from mrhubo.fast.together.refine import (
     MOST,
     PATIENCE,
     ROUNDING,
+    stretches,
 )
 from mrhubo.reference.banded import factor
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.terms import Quadratic, Smoothness
-
-
-@dataclass(frozen=True)
-class StepBound:
-    """How far joints may turn from one frame to the next."""
-
-    step_N: Tensor
-    """[rad]."""
-    counts_X: Tensor
-    """Between which frames and the next (T - 1,)."""
 
 
 def refine(
@@ -50,7 +41,7 @@ def refine(
     sweeps: int = 100,
     tolerance: float = 3e-4,
     fixed_T: Tensor | None = None,
-    bound: StepBound | None = None,
+    step_N: Tensor | None = None,
     blocks_C: Tensor | None = None,
 ) -> tuple[Tensor, Tensor]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
@@ -61,7 +52,8 @@ def refine(
     the step counted. A block ends when a step turns none of its joints by `tolerance` [rad], or six steps in a row were
     of no use. Frames in `fixed_T` (T,) stay as they are.
 
-    With a bound, which the given angles keep to, so do the found ones, but for 1e-5 rad. `blocks_C` (C,) are the blocks
+    With a bound `step_N` of how far joints turn from one frame to the next [rad], which the given angles keep to, so do
+    the found ones, but for 1e-5 rad. `blocks_C` (C,) are the blocks
     that may move; None: all.
     """
     model = _motion_model(problem, q_TN, target_TD3, smoothness)
@@ -72,7 +64,7 @@ def refine(
         failures_C = failures_C.masked_fill(~blocks_C, PATIENCE)
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
-        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
+        trial_TN = q_TN + _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, step_N)
         trial_TN = torch.clamp(trial_TN, problem.lower_N, problem.upper_N)
         trial_TN = torch.where(running_C[problem.blocks.block_N], trial_TN, q_TN)
         trial = _motion_model(problem, trial_TN, target_TD3, smoothness)
@@ -108,17 +100,16 @@ def refine_around(
 ) -> Tensor:
     """`refine` for the frames in `free_T` (T,); the others stay.
 
-    Of a stretch of frames that stay, only those next to the others matter to them, so the rest is left out; what is
-    then coupled that has nothing to do with each other stays as it is, and costs always the same.
+    Of a stretch of frames that stay, only those next to the others matter to them. So each stretch of free frames is
+    refined by itself, with those: what has nothing to do with each other converges at its own pace.
     """
-    used_X = torch.nonzero(widen(free_T, smoothness.reach))[:, 0]
-    if not len(used_X):
-        return q_TN
-    near, bound = smoothness.at(used_X), None if step_N is None else StepBound(step_N, used_X.diff() == 1)
-    part_XN, _ = refine(
-        problem, q_TN[used_X], target_TD3[used_X], near, sweeps, tolerance, ~free_T[used_X], bound, blocks_C
-    )
-    return q_TN.index_copy(0, used_X, part_XN)
+    used_T, found_TN = widen(free_T, smoothness.reach), q_TN.clone()
+    for used in stretches(used_T.cpu().numpy()):
+        near = smoothness.at(torch.arange(used.start, used.stop, device=q_TN.device))
+        found_TN[used], _ = refine(
+            problem, q_TN[used], target_TD3[used], near, sweeps, tolerance, ~free_T[used], step_N, blocks_C
+        )
+    return found_TN
 
 
 def widen(mask_T: Tensor, frames: int) -> Tensor:
@@ -171,7 +162,7 @@ def _motion_step(
     running_C: Tensor,
     smoothness: Smoothness,
     fixed_T: Tensor | None,
-    bound: StepBound | None,
+    step_N: Tensor | None,
 ) -> Tensor:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
     free_T = torch.ones_like(q_TN[:, 0], dtype=torch.bool) if fixed_T is None else ~fixed_T
@@ -190,7 +181,7 @@ def _motion_step(
                 for lag, entry in enumerate(entries)
             )
             system = Banded(within_TMM, _array(diagonal_TM), couplings_TMM)
-            bounds = _bounds(problem, q_TN, free_T, bound, joints_M)
+            bounds = _bounds(problem, q_TN, free_T, step_N, joints_M)
             step_TM = bounded_minimum(system, _array(right_TN[:, joints_M]), bounds, factor)
             step_TN[:, joints_M] = torch.from_numpy(step_TM).to(q_TN)
     return step_TN
@@ -217,15 +208,13 @@ def _coupled(
     return entries
 
 
-def _bounds(
-    problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, bound: StepBound | None, joints_M: Tensor
-) -> Bounds:
+def _bounds(problem: DirectionProblem, q_TN: Tensor, free_T: Tensor, step_N: Tensor | None, joints_M: Tensor) -> Bounds:
     moves_2TM = _array(torch.stack((problem.lower_N - q_TN, problem.upper_N - q_TN))[..., joints_M])
-    if bound is None:
+    if step_N is None:
         return Bounds.of(moves_2TM, _array(free_T))
-    moved_XM, most_M = q_TN.diff(dim=0)[:, joints_M], bound.step_N[joints_M]
+    moved_XM, most_M = q_TN.diff(dim=0)[:, joints_M], step_N[joints_M]
     steps_2XM = _array(torch.stack((-most_M - moved_XM, most_M - moved_XM)))
-    return Bounds.of(moves_2TM, _array(free_T), steps_2XM, _array(bound.counts_X & (free_T[1:] | free_T[:-1])))
+    return Bounds.of(moves_2TM, _array(free_T), steps_2XM, _array(free_T[1:] | free_T[:-1]))
 
 
 def _array(tensor: Tensor) -> np.ndarray:

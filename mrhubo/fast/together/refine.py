@@ -29,16 +29,6 @@ tells whether the step helped: at its end at most this share of what it was at i
 efficient line search", SIAM Journal on Optimization, 2005)."""
 
 
-@dataclass(frozen=True)
-class StepBound:
-    """How far joints may turn from one frame to the next."""
-
-    step_N: np.ndarray
-    """[rad]."""
-    counts_X: np.ndarray
-    """Between which frames and the next (T - 1,)."""
-
-
 def refine(
     problem: Problem,
     q_TN: np.ndarray,
@@ -47,11 +37,12 @@ def refine(
     sweeps: int,
     tolerance: float,
     fixed_T: np.ndarray,
-    bound: StepBound | None = None,
+    step_N: np.ndarray | None = None,
     blocks_C: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """A local minimum (T, N) [rad] of the motion's cost from angles inside the limits, and each block's cost (C,).
-    `blocks_C`: the blocks that may move; None: all.
+    `step_N` bounds how far joints turn from one frame to the next [rad], and `blocks_C` (C,) are the blocks that may
+    move; None: nothing bounds them, and all may.
     """
     cost = problem.cost
     model = _motion_model(problem, q_TN, target_TD3, smoothness)
@@ -59,7 +50,7 @@ def refine(
     failures_C = np.zeros(len(cost_C), int) if blocks_C is None else np.where(blocks_C, 0, PATIENCE)
     for _ in range(sweeps):
         running_C = failures_C < PATIENCE
-        step_TN = _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, bound)
+        step_TN = _motion_step(problem, q_TN, model, damping_TC, running_C, smoothness, fixed_T, step_N)
         trial_TN = np.clip(q_TN + step_TN, cost.lower_N, cost.upper_N)
         trial_TN = np.where(running_C[cost.block_N], trial_TN, q_TN)
         trial = _motion_model(problem, trial_TN, target_TD3, smoothness)
@@ -93,23 +84,19 @@ def refine_around(
     blocks_C: np.ndarray | None = None,
 ) -> np.ndarray:
     """`refine` of some blocks (C,), or all, for the frames in `free_T` (T,), with a bound or none; the others stay."""
-    used_X = np.flatnonzero(widen(free_T, smoothness.reach))
-    if not len(used_X):
-        return q_TN
-    bound = None if step_N is None else StepBound(step_N, np.diff(used_X) == 1)
-    found_TN = q_TN.copy()
-    found_TN[used_X] = refine(
-        problem,
-        q_TN[used_X],
-        target_TD3[used_X],
-        smoothness.at(used_X),
-        sweeps,
-        tolerance,
-        ~free_T[used_X],
-        bound,
-        blocks_C,
-    )[0]
+    used_T, found_TN = widen(free_T, smoothness.reach), q_TN.copy()
+    for used in stretches(used_T):
+        near = smoothness.at(np.arange(used.start, used.stop))
+        found_TN[used], _ = refine(
+            problem, q_TN[used], target_TD3[used], near, sweeps, tolerance, ~free_T[used], step_N, blocks_C
+        )
     return found_TN
+
+
+def stretches(mask_T: np.ndarray) -> list[slice]:
+    """The runs of frames in a mask (T,)."""
+    ends_X = np.flatnonzero(np.diff(mask_T.astype(np.int8), prepend=0, append=0))
+    return [slice(int(start), int(stop)) for start, stop in ends_X.reshape(-1, 2)]
 
 
 def widen(mask_T: np.ndarray, frames: int) -> np.ndarray:
@@ -155,7 +142,7 @@ def _motion_step(
     running_C: np.ndarray,
     smoothness: Smoothness,
     fixed_T: np.ndarray,
-    bound: StepBound | None,
+    step_N: np.ndarray | None,
 ) -> np.ndarray:
     """Damped Gauss-Newton step (T, N) [rad] of the motion's free joints, block by block."""
     cost, free_T = problem.cost, ~fixed_T
@@ -170,7 +157,7 @@ def _motion_step(
         extra_TM = damping_TC[:, block, None] * (own_TN[:, joints_M] + FLOOR)
         diagonal_TM = np.where(free_T[:, None], diagonal(entries[0]) + extra_TM, 1.0)
         system = Banded(within_TMM, diagonal_TM, couplings_TMM)
-        bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, free_T, bound, q_TN, joints_M)
+        bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, free_T, step_N, q_TN, joints_M)
         step_TN[:, joints_M] = bounded_minimum(system, right_TN[:, joints_M], bounds, problem.factor)
     return step_TN
 
@@ -195,13 +182,13 @@ def _bounds(
     down_TN: np.ndarray,
     up_TN: np.ndarray,
     free_T: np.ndarray,
-    bound: StepBound | None,
+    step_N: np.ndarray | None,
     q_TN: np.ndarray,
     joints_M: np.ndarray,
 ) -> Bounds:
     moves_2TM = np.stack((down_TN[:, joints_M], up_TN[:, joints_M]))
-    if bound is None:
+    if step_N is None:
         return Bounds.of(moves_2TM, free_T)
-    moved_XM, most_M = np.diff(q_TN[:, joints_M], axis=0), bound.step_N[joints_M]
+    moved_XM, most_M = np.diff(q_TN[:, joints_M], axis=0), step_N[joints_M]
     steps_2XM = np.stack((-most_M - moved_XM, most_M - moved_XM))
-    return Bounds.of(moves_2TM, free_T, steps_2XM, bound.counts_X & (free_T[1:] | free_T[:-1]))
+    return Bounds.of(moves_2TM, free_T, steps_2XM, free_T[1:] | free_T[:-1])
