@@ -26,11 +26,17 @@ def write_numpy(retargeter: Retargeter, path: Path) -> float:
         path: NAME.py.
 
     Raises:
-        UserError: the name has another ending, the answers are others than PyTorch's, or the disk refuses.
+        UserError: the name has another ending, the network is the one for every robot, the answers are others than
+            PyTorch's, or the disk refuses.
     """
     if path.suffix != ".py" or not path.stem.isidentifier():
         raise UserError(f"{path}: the name must be one of a Python module, such as nao.py")
     description = describe_networks(retargeter)
+    if description.universal is not None:
+        raise UserError(
+            "the network for every robot is an optimiser on the robot's geometry, and too long for a file of its own;"
+            " write an ONNX file, or let mrhubo.load_fast answer, which needs no PyTorch"
+        )
     arrays = {name: array for name, array in description.arrays().items() if name.startswith(_KEPT)}
     arrays["meaning"] = np.array(json.dumps(meaning(description, "poses")))
     arrays["settings"] = np.array(description.metadata()["settings"])

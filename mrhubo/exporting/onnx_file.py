@@ -7,7 +7,6 @@ Legend: B frames, J = 21 posed joints, P of them that are looked at, D direction
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,10 @@ import numpy as np
 from torch import Tensor
 
 from mrhubo.errors import UserError
+from mrhubo.exporting import onnx_universal
+from mrhubo.exporting.graph import Graph
 from mrhubo.exporting.meaning import compared, describe_networks, meaning
+from mrhubo.exporting.values import Value
 from mrhubo.fast.description import Description
 from mrhubo.fast.sections import Part
 from mrhubo.files.atomic import atomic_path
@@ -29,7 +31,7 @@ _TINY, _SHORT = 1e-12, 1e-12
 
 
 def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> float:
-    """Writes the file and returns how far its answers are from PyTorch's at most [rad], on poses of the body prior.
+    """Writes the file and returns how far its answers are from mrhubo's at most [rad], on poses of the body prior.
 
     Args:
         retargeter: whose networks.
@@ -37,8 +39,8 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
         inputs: "poses", or "directions" for networks that see these.
 
     Raises:
-        UserError: the package onnx is missing, the networks see no directions, the file's answers are others than
-            PyTorch's, or the disk refuses.
+        UserError: the package onnx is missing, the networks see no directions, a branch of the robot is none that the
+            network for every robot knows, the file's answers are others than mrhubo's, or the disk refuses.
     """
     missing = "an ONNX file needs the package onnx: pip install 'mrhubo[onnx]'"
     onnx = import_optional("onnx", missing)
@@ -56,10 +58,17 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
 
 
 def _model(onnx: Any, description: Description, inputs: str) -> Any:
-    graph = _Graph(onnx)
-    single = onnx.TensorProto.FLOAT
-    directions, joints = len(description.cost.weight_D), len(description.cost.lower_N)
+    universal = description.universal
+    graph = Graph(onnx, np.float32 if universal is None else np.float64)
+    directions = len(description.cost.weight_D)
     name, shape = ("local_rotations", [21, 3, 3]) if inputs == "poses" else ("directions", [directions, 3])
+    if universal is not None:
+        given = Value(graph, name, np.float32).cast(np.float64)
+        target = Value(graph, _directions(graph, description, given.name)) if inputs == "poses" else given
+        angles = onnx_universal.joint_angles(description, universal, target).cast(np.float32)
+        limits = (limit.astype(np.float32) for limit in (description.cost.lower_N, description.cost.upper_N))
+        graph.node("Identity", angles.clip(*limits).name, output="joint_angles")
+        return _finished(onnx, graph, description, inputs, name, shape)
     if description.settings.features == "local":
         rows = graph.gather(name, description.features.input_I, 1)
         columns = graph.node("Transpose", graph.gather(rows, [0, 1], 3), perm=[0, 1, 3, 2])
@@ -70,7 +79,11 @@ def _model(onnx: Any, description: Description, inputs: str) -> Any:
     for stage in (description.pre, description.post):
         raw = _branched(graph, stage, raw, description.settings.residual) if stage else raw
     _limited(graph, description, raw, "joint_angles")
-    helper = onnx.helper
+    return _finished(onnx, graph, description, inputs, name, shape)
+
+
+def _finished(onnx: Any, graph: Graph, description: Description, inputs: str, name: str, shape: list[int]) -> Any:
+    helper, single, joints = onnx.helper, onnx.TensorProto.FLOAT, len(description.cost.lower_N)
     made = helper.make_graph(
         graph.nodes, "mrhubo",
         [helper.make_tensor_value_info(name, single, ["batch", *shape])],
@@ -84,66 +97,7 @@ def _model(onnx: Any, description: Description, inputs: str) -> Any:
     return model
 
 
-class _Graph:
-    """Nodes and constants, which get names of their own; a value is known by its name."""
-
-    def __init__(self, onnx: Any) -> None:
-        self._onnx, self.nodes, self.constants = onnx, [], []
-        self._known: dict[bytes, str] = {}
-
-    def node(self, kind: str, *inputs: str, output: str | None = None, **attributes: Any) -> str:
-        """The output of a new node."""
-        output = output or f"{kind.lower()}_{len(self.nodes)}"
-        self.nodes.append(self._onnx.helper.make_node(kind, list(inputs), [output], **attributes))
-        return output
-
-    def constant(self, values: Any, kind: type = np.float32) -> str:
-        """A constant; the same one for the same numbers."""
-        array = np.array(values, kind, order="C")
-        key = repr((array.shape, array.dtype.str)).encode() + array.tobytes()
-        if key not in self._known:
-            self._known[key] = f"constant_{len(self.constants)}"
-            self.constants.append(self._onnx.numpy_helper.from_array(array, self._known[key]))
-        return self._known[key]
-
-    def numbers(self, values: Sequence[int] | np.ndarray) -> str:
-        """A constant of whole numbers."""
-        return self.constant(values, np.int64)
-
-    def gather(self, value: str, places: Sequence[int] | np.ndarray, axis: int) -> str:
-        """Some places along an axis."""
-        return self.node("Gather", value, self.numbers(places), axis=axis)
-
-    def at(self, value: str, place: int, axis: int) -> str:
-        """One place along an axis, which is gone then."""
-        return self.node("Gather", value, self.constant(place, np.int64), axis=axis)
-
-    def dot(self, a: str, b: str) -> str:
-        """Sums of products over the last axis, which stays, of length 1."""
-        return self.node("ReduceSum", self.node("Mul", a, b), self.numbers([-1]), keepdims=1)
-
-    def cross(self, a: str, b: str) -> str:
-        """Cross products along the last axis."""
-        a1, b2 = self.gather(a, [1, 2, 0], -1), self.gather(b, [2, 0, 1], -1)
-        a2, b1 = self.gather(a, [2, 0, 1], -1), self.gather(b, [1, 2, 0], -1)
-        return self.node("Sub", self.node("Mul", a1, b2), self.node("Mul", a2, b1))
-
-    def flat(self, value: str, count: int) -> str:
-        """One axis after the batch's."""
-        return self.node("Reshape", value, self.numbers([-1, count]))
-
-    def stack(self, values: Sequence[str], axis: int) -> str:
-        """Along a new axis."""
-        longer = [self.node("Unsqueeze", value, self.numbers([axis])) for value in values]
-        return self.node("Concat", *longer, axis=axis)
-
-    def unit(self, a: str) -> str:
-        """Unit vectors; 0 stays 0."""
-        length = self.node("Sqrt", self.dot(a, a))
-        return self.node("Div", a, self.node("Max", length, self.constant(_SHORT)))
-
-
-def _directions(graph: _Graph, description: Description, poses: str) -> str:
+def _directions(graph: Graph, description: Description, poses: str) -> str:
     """Directions (B, D, 3) of poses, as `mrhubo.fast.plain.human` works them out."""
     human = description.human
     rows = graph.gather(poses, human.joint_P, 1)
@@ -175,7 +129,7 @@ def _directions(graph: _Graph, description: Description, poses: str) -> str:
     return graph.node("Squeeze", rows, graph.numbers([2]))
 
 
-def _with_bends(graph: _Graph, description: Description, found: str) -> str:
+def _with_bends(graph: Graph, description: Description, found: str) -> str:
     """The directions with those of bend axes worked out of the limbs'."""
     human, constants = description.human, description.settings.constants
     upper, lower, own = (graph.gather(found, places, 1) for places in (human.upper_Z, human.lower_Z, human.bend_Z))
@@ -184,7 +138,7 @@ def _with_bends(graph: _Graph, description: Description, found: str) -> str:
     # ONNX has no atan2: of a sine that is not negative it is twice the arc tangent of sine / (length + cosine).
     length = graph.node("Sqrt", graph.node("Add", graph.node("Mul", sine, sine), graph.node("Mul", cosine, cosine)))
     below = graph.node("Max", graph.node("Add", length, cosine), graph.constant(_SHORT))
-    bend = graph.node("Mul", graph.node("Atan", graph.node("Div", sine, below)), graph.constant(2.0))
+    bend = graph.node("Mul", graph.atan(graph.node("Div", sine, below)), graph.constant(2.0))
 
     def rising(name: str) -> str:
         low, high = (math.radians(constants[f"{name}_{end}_deg"]) for end in ("low", "high"))
@@ -203,7 +157,7 @@ def _with_bends(graph: _Graph, description: Description, found: str) -> str:
     return graph.gather(graph.node("Concat", found, axis, axis=1), order, 1)
 
 
-def _features(graph: _Graph, description: Description, directions: str) -> str:
+def _features(graph: Graph, description: Description, directions: str) -> str:
     """What the networks see of directions, as `mrhubo.fast.plain.networks.features_of`."""
     f = description.features
     vectors, count = graph.gather(directions, f.input_I, 1), len(f.input_I)
@@ -229,7 +183,7 @@ def _features(graph: _Graph, description: Description, directions: str) -> str:
     return graph.node("Mul", shifted, graph.constant(f.scale_F))
 
 
-def _branched(graph: _Graph, stage: tuple[Part, ...], x: str, residual: bool) -> str:
+def _branched(graph: Graph, stage: tuple[Part, ...], x: str, residual: bool) -> str:
     found, given = [], np.concatenate([part.output for part in stage])
     for part in stage:
         y = graph.gather(x, part.input, 1)
@@ -241,13 +195,13 @@ def _branched(graph: _Graph, stage: tuple[Part, ...], x: str, residual: bool) ->
     return graph.gather(graph.node("Concat", *found, axis=1), given.argsort(), 1)
 
 
-def _gelu(graph: _Graph, x: str) -> str:
+def _gelu(graph: Graph, x: str) -> str:
     erf = graph.node("Erf", graph.node("Mul", x, graph.constant(math.sqrt(0.5))))
     twice = graph.node("Add", erf, graph.constant(1.0))
     return graph.node("Mul", graph.node("Mul", x, twice), graph.constant(0.5))
 
 
-def _limited(graph: _Graph, description: Description, raw: str, output: str) -> None:
+def _limited(graph: Graph, description: Description, raw: str, output: str) -> None:
     lower_N, upper_N = (limit.astype(np.float32) for limit in (description.cost.lower_N, description.cost.upper_N))
     share = graph.node("Tanh", raw) if description.settings.bound == "tanh" else raw
     angle = graph.node("Mul", share, graph.constant((upper_N - lower_N) / 2))

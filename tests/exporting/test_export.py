@@ -111,6 +111,6 @@ def test_the_command(retargeter: Retargeter, tmp_path: Path, capsys: pytest.Capt
 
 def test_a_wrong_file_is_not_written(retargeter: Retargeter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(standalone, "_gelu", lambda x: x)
-    with pytest.raises(UserError, match="from PyTorch's"):
+    with pytest.raises(UserError, match="from mrhubo's"):
         write_numpy(retargeter, tmp_path / "robot.py")
     assert not list(tmp_path.iterdir())

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from mrhubo.reference import OptimizationRetargeter, trajectory
-from mrhubo.reference.refine import refine
+from mrhubo.reference.refine import refine, refine_around
 from mrhubo.reference.speed import speed_bound
 from mrhubo.reference.terms import Smoothness
 from mrhubo.reference.trajectory import MotionTask, best_path, pick, smooth_motion
@@ -75,6 +75,23 @@ def test_a_block_may_be_refined_alone(retargeters: dict[str, OptimizationRetarge
         all_TN[:, ~moves_N], q_TN[:, ~moves_N]
     )
     torch.testing.assert_close(one_TN[:, moves_N], all_TN[:, moves_N], rtol=0, atol=1e-5)
+
+
+def test_stretches_are_refined_as_if_they_were_alone(retargeters: dict[str, OptimizationRetargeter]) -> None:
+    """Far from each other, so that nothing of one is seen in the other; frames between them stay to the bit."""
+    problem, generator = retargeters["nao"].problem, torch.Generator().manual_seed(4)
+    q_TN, goal_TN = (problem.robot.sample(40, generator) for _ in range(2))
+    target_TD3 = problem.body_map.robot_directions(problem.robot.forward(goal_TN))
+    number_T = torch.arange(40)
+    first_T, last_T = (number_T >= 5) & (number_T < 12), number_T >= 30
+
+    def refined(free_T: torch.Tensor) -> torch.Tensor:
+        return refine_around(problem, q_TN, target_TD3, Smoothness(0.02), free_T, sweeps=30, tolerance=1e-4)
+
+    both_TN = refined(first_T | last_T)
+    assert torch.equal(both_TN[~(first_T | last_T)], q_TN[~(first_T | last_T)])
+    for free_T in (first_T, last_T):
+        assert torch.equal(both_TN[free_T], refined(free_T)[free_T]) and not torch.equal(both_TN[free_T], q_TN[free_T])
 
 
 def test_windows_do_not_show(retargeters: dict[str, OptimizationRetargeter], monkeypatch: pytest.MonkeyPatch) -> None:
