@@ -44,8 +44,8 @@ def describe_networks(retargeter: Retargeter, inputs: str = "poses") -> Descript
     description = retargeter.describe()
     if description.root is not None and inputs == "poses" and description.settings.features == "directions":
         raise UserError(
-            "robot.root_follows: legs are seen from a base that is not turned as the person's pelvis, and files of "
-            "layers do not work that out; export an ONNX file with --input directions, or use mrhubo.load_fast"
+            "robot.root_follows: legs are seen from a base that is not turned as the person's pelvis, and "
+            "exported files do not work that out; export an ONNX file with --input directions, or use mrhubo.load_fast"
         )
     return description
 

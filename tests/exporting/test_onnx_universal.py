@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 import torch
 
+import mrhubo
 from mrhubo import export, rotation
 from mrhubo.body import BodyPrior
+from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.exporting import onnx_universal, write_onnx
 from mrhubo.fast import FastRetargeter
-from mrhubo.retargeter import Retargeter, UniversalJoints
-from mrhubo.robot import BodyMap, Robot
+from mrhubo.retargeter import Retargeter, UniversalJoints, build_network
+from mrhubo.robot import BodyMap, Robot, build_body_map
 from mrhubo.universal.network import UniversalNetwork
 
 pytest.importorskip("onnx")
@@ -65,6 +67,21 @@ def test_it_answers_as_the_plain_form(retargeter: Retargeter, poses: np.ndarray,
     told = session.get_modelmeta().custom_metadata_map
     assert json.loads(told["joint_names"]) == list(retargeter.joint_names)
     assert told["network"] == "the one for every robot, in five iterations"
+
+
+def test_a_tuned_package(root: Path, tmp_path: Path, poses: np.ndarray) -> None:
+    config = load_config(root / "conf" / "nao.yaml", ["model.start=universal"])
+    body_map = build_body_map(config.robot)
+    network, prior = build_network(config, body_map), BodyPrior(hidden=8).eval()
+    assert isinstance(network, UniversalJoints)
+    with torch.no_grad():
+        network.optimiser.network.later.bias += 0.01  # what a fit leaves is not what is shipped
+    package = Retargeter(network, body_map, prior, config, phi_threshold=0.01).save(tmp_path / "package", {})
+    path = tmp_path / "nao.onnx"
+    export.main(["--retargeter", str(package), "--to", "onnx", "--out", str(path)])
+    (found_BN,) = onnxruntime.InferenceSession(path).run(None, {"local_rotations": poses})
+    wanted_BN = mrhubo.load_fast(package, "numpy").predict(poses)
+    assert np.quantile(np.abs(found_BN - wanted_BN), 0.98) < SAME_RAD
 
 
 def test_a_robot_without_a_package(tmp_path: Path, capsys: pytest.CaptureFixture[str], poses: np.ndarray) -> None:

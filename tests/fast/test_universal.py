@@ -14,7 +14,6 @@ from torch import Tensor
 import mrhubo
 from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError
-from mrhubo.exporting import write_numpy
 from mrhubo.fast import FastRetargeter
 from mrhubo.fast.description import FILE, Description
 from mrhubo.fast.engines import FORMS
@@ -143,8 +142,3 @@ def test_a_damaged_file_is_refused(made: Callable[[str], Retargeter], tmp_path: 
             with pytest.raises(UserError, match="no description"):
                 Description.read(tmp_path / "changed.safetensors")
     assert len(own) > 30
-
-
-def test_it_is_not_exported(made: Callable[[str], Retargeter], tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"mrhubo\.load_fast runs it"):
-        write_numpy(made("nao"), tmp_path / "nao.py")

@@ -35,7 +35,7 @@ _FAST = ("reassoc", "contract", "nsz")
 """As `COMPILED` has it for single numbers."""
 
 
-BARE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+BARE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of what compiled functions alone call: numba would make each callable from Python and from C too."""
 
 
