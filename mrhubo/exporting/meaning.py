@@ -95,8 +95,9 @@ def compared(answer: Callable[[Tensor], np.ndarray], retargeter: Retargeter) -> 
     same, at_most, most = (_SAME, _WORST, _MOST) if described.universal is None else (_EQUAL, np.inf, _RARE)
     usual, worst = float(np.quantile(off_BN, most)), float(off_BN.max())
     if not (usual <= same and worst <= at_most):
+        let = f"{same:g} for nearly all" + (f" and {at_most:g} for the rest" if at_most < np.inf else "")
         raise UserError(
             f"the exported file's answers are up to {worst:.1e} rad from mrhubo's, nearly all within {usual:.1e};"
-            f" at most {at_most:g} and {same:g} are let through"
+            f" at most {let} is let through"
         )
     return worst

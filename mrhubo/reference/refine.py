@@ -53,8 +53,7 @@ def refine(
     of no use. Frames in `fixed_T` (T,) stay as they are.
 
     With a bound `step_N` of how far joints turn from one frame to the next [rad], which the given angles keep to, so do
-    the found ones, but for 1e-5 rad. `blocks_C` (C,) are the blocks
-    that may move; None: all.
+    the found ones, but for 1e-5 rad. `blocks_C` (C,) are the blocks that may move; None: all.
     """
     model = _motion_model(problem, q_TN, target_TD3, smoothness)
     cost_C = model.frames.cost_BC.double().sum(0)
