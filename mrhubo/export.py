@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from mrhubo.config import CommandParser, run_command
-from mrhubo.errors import UserError
+from mrhubo.config.answering import add_who_flags, add_whole_body_flag, check_whole_body
 
 DESCRIPTION = (
     "Writes the networks of a package as one ONNX file, or as a Python file that needs NumPy alone with its weights"
@@ -17,13 +17,8 @@ DESCRIPTION = (
 def build_parser() -> CommandParser[None]:
     """The command's arguments."""
     parser = CommandParser[None]("mrhubo export", DESCRIPTION, None)
-    package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
-    who = parser.add_mutually_exclusive_group(required=True)
-    who.add_argument("--retargeter", metavar="FOLDER", help=package)
-    robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
-    who.add_argument("--robot", metavar="ROBOT", help=robot)
-    whole = "with the URDF of --robot: its legs, feet and waist too, and not its arms and head alone"
-    parser.add_argument("--whole-body", action="store_true", help=whole)
+    add_who_flags(parser)
+    add_whole_body_flag(parser)
     parser.add_argument("--to", choices=("onnx", "numpy"), required=True, help="what to write")
     out = "file to write: NAME.onnx, or NAME.py, beside which NAME.npz will lie"
     parser.add_argument("--out", metavar="FILE", required=True, help=out)
@@ -38,15 +33,12 @@ def main(argv: list[str]) -> None:
     import mrhubo
     from mrhubo.exporting import write_numpy, write_onnx
 
-    if options.whole_body and options.robot is None:
-        raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
+    check_whole_body(options)
     out = Path(options.out)
-    if options.robot is None:
+    if options.retargeter is not None:
         retargeter = mrhubo.load(options.retargeter)
     else:
-        from mrhubo.describing.run import open_robot
-
-        retargeter = mrhubo.for_robot(open_robot(options.robot, options.whole_body))
+        retargeter = mrhubo.for_robot(options.robot, options.whole_body)
     off = write_onnx(retargeter, out, options.input) if options.to == "onnx" else write_numpy(retargeter, out)
     beside = f" and {out.with_suffix('.npz')}" if options.to == "numpy" else ""
     print(f"{out}{beside}: {len(retargeter.joint_names)} joints of '{retargeter.body_map.robot.name}'")

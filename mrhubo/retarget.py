@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrhubo.config import CommandParser, number, print_error, run_command
+from mrhubo.config.answering import add_who_flags, add_whole_body_flag, check_whole_body
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot_motion import FORMATS, read_joint_order
 from mrhubo.runtime.progress import Reporter
@@ -33,11 +34,7 @@ METHOD_MEANING = (
 def build_parser() -> CommandParser[None]:
     """The command's arguments."""
     parser = CommandParser[None]("mrhubo retarget", DESCRIPTION, None)
-    who = parser.add_mutually_exclusive_group(required=True)
-    package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
-    who.add_argument("--retargeter", metavar="FOLDER", help=package)
-    robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
-    who.add_argument("--robot", metavar="ROBOT", help=robot)
+    add_who_flags(parser)
     parser.add_argument("--method", metavar="METHOD", help=f"with --robot: {METHOD_MEANING}")
     what = parser.add_mutually_exclusive_group(required=True)
     motion = "motion files and videos, and folders of motion files"
@@ -67,8 +64,7 @@ def add_motion_flags(parser: CommandParser[None]) -> None:
     parser.add_argument("--bvh-map", metavar="FILE", help="YAML file that says which joint of a BVH file is which")
     model = "which model finds the body in a video: lite, full (default) or heavy"
     parser.add_argument("--pose-model", metavar="MODEL", default="full", help=model)
-    whole = "with the URDF of --robot: its legs, feet and waist move too, and not its arms and head alone"
-    parser.add_argument("--whole-body", action="store_true", help=whole)
+    add_whole_body_flag(parser)
     avoid = "whether frames in which the robot would touch itself give way, by its URDF's collision shapes"
     parser.add_argument("--avoid-collisions", action=BooleanOptionalAction, default=True, help=avoid)
 
@@ -80,8 +76,7 @@ def main(argv: list[str]) -> int:
 
     if options.method is not None:
         check_method(options.method, METHODS, options.retargeter is not None)
-    if options.whole_body and options.retargeter is not None:
-        raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
+    check_whole_body(options)
     files = find_files([Path(name) for name in options.motion or options.video])
     places = plan_places(options.out, options.format, files)
     request = read_request(options, options.joint_order)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-_SHORT = 1e-12
+SHORT = 1e-12
+"""Vectors below this length have no direction."""
 
 
 class Graph:
@@ -36,10 +37,12 @@ class Graph:
         """ONNX's number for a kind of numbers."""
         return self._onnx.helper.np_dtype_to_tensor_dtype(np.dtype(kind))
 
-    def top(self, value: str, count: int, outputs: Sequence[str]) -> None:
-        """The least along axis 1, in order, and their places; of equal ones the first."""
+    def least(self, value: str, count: int) -> tuple[str, str]:
+        """So many of the least along axis 1, in order, and their places; of equal ones the first."""
+        found, order = (f"{what}_{len(self.nodes)}" for what in ("least", "order"))
         inputs = [value, self.numbers([count])]
-        self.nodes.append(self._onnx.helper.make_node("TopK", inputs, list(outputs), axis=1, largest=0))
+        self.nodes.append(self._onnx.helper.make_node("TopK", inputs, [found, order], axis=1, largest=0))
+        return found, order
 
     def numbers(self, values: Sequence[int] | np.ndarray) -> str:
         """A constant of whole numbers."""
@@ -82,4 +85,4 @@ class Graph:
     def unit(self, a: str) -> str:
         """Unit vectors; 0 stays 0."""
         length = self.node("Sqrt", self.dot(a, a))
-        return self.node("Div", a, self.node("Max", length, self.constant(_SHORT)))
+        return self.node("Div", a, self.node("Max", length, self.constant(SHORT)))

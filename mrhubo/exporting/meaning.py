@@ -70,29 +70,29 @@ def meaning(description: Description, inputs: str) -> dict[str, str]:
     }
 
 
-def compared(answer: Callable[[Tensor], np.ndarray], retargeter: Retargeter) -> float:
+def compared(answer: Callable[[Tensor], np.ndarray], retargeter: Retargeter, description: Description) -> float:
     """How far a file's answers are from mrhubo's at most [rad], on poses of the body prior: from PyTorch's, or, of the
     network for every robot, from those of its iterations in float64, as PyTorch's float32 ends up to 1e-3 away.
 
     Args:
         answer: gives joint angles (B, N) [rad] of poses (B, 21, 3, 3) by the file.
         retargeter: whose file it is.
+        description: the retargeter's arrays.
 
     Raises:
         UserError: more than they may be.
     """
     import torch
 
-    described = retargeter.describe()
     latent_BZ = torch.randn(_CHECKED, retargeter.prior.latent, generator=torch.Generator().manual_seed(0))
     with torch.no_grad():
         local_BJ33 = retargeter.prior.decode_matrices(latent_BZ.to(retargeter.device)).cpu()
-    if described.universal is None:
+    if description.universal is None:
         wanted_BN = retargeter.predict(local_BJ33).cpu().numpy()
     else:
-        wanted_BN = FastRetargeter(described, "numpy").predict(local_BJ33.numpy())
+        wanted_BN = FastRetargeter(description, "numpy").predict(local_BJ33.numpy())
     off_BN = np.abs(answer(local_BJ33) - wanted_BN)
-    same, at_most, most = (_SAME, _WORST, _MOST) if described.universal is None else (_EQUAL, np.inf, _RARE)
+    same, at_most, most = (_SAME, _WORST, _MOST) if description.universal is None else (_EQUAL, np.inf, _RARE)
     usual, worst = float(np.quantile(off_BN, most)), float(off_BN.max())
     if not (usual <= same and worst <= at_most):
         let = f"{same:g} for nearly all" + (f" and {at_most:g} for the rest" if at_most < np.inf else "")

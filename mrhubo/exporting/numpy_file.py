@@ -41,7 +41,7 @@ def write_numpy(retargeter: Retargeter, path: Path) -> float:
     arrays["meaning"] = np.array(json.dumps(meaning(description, "poses")))
     arrays["settings"] = np.array(description.metadata()["settings"])
     exported = standalone.Retargeter(arrays)
-    off = compared(lambda local_BJ33: exported(local_BJ33.numpy()), retargeter)
+    off = compared(lambda local_BJ33: exported(local_BJ33.numpy()), retargeter, description)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # pyright: ignore[reportArgumentType]
     for file, content in (

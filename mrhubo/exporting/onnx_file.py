@@ -15,7 +15,7 @@ from torch import Tensor
 
 from mrhubo.errors import UserError
 from mrhubo.exporting import onnx_universal
-from mrhubo.exporting.graph import Graph
+from mrhubo.exporting.graph import SHORT, Graph
 from mrhubo.exporting.meaning import compared, describe_networks, meaning
 from mrhubo.exporting.values import Value
 from mrhubo.fast.description import Description
@@ -27,7 +27,7 @@ from mrhubo.retargeter import Retargeter
 INPUTS = ("poses", "directions")
 _OPSET, _IR = 18, 9
 """Of 2022 and 2023, which every runtime of today reads."""
-_TINY, _SHORT = 1e-12, 1e-12
+_TINY = 1e-12
 
 
 def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> float:
@@ -51,7 +51,7 @@ def write_onnx(retargeter: Retargeter, path: Path, inputs: str = "poses") -> flo
     if inputs == "directions" and description.settings.features != "directions":
         raise UserError("these networks see rotations, not directions (model.input_frame: local); export --input poses")
     model = _model(onnx, description, inputs)
-    off = compared(lambda local_BJ33: _answers(onnx, model, retargeter, inputs, local_BJ33), retargeter)
+    off = compared(lambda local_BJ33: _answers(onnx, model, retargeter, inputs, local_BJ33), retargeter, description)
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
     return off
@@ -137,7 +137,7 @@ def _with_bends(graph: Graph, description: Description, found: str) -> str:
     sine = graph.node("Sqrt", graph.dot(across, across))
     # ONNX has no atan2: of a sine that is not negative it is twice the arc tangent of sine / (length + cosine).
     length = graph.node("Sqrt", graph.node("Add", graph.node("Mul", sine, sine), graph.node("Mul", cosine, cosine)))
-    below = graph.node("Max", graph.node("Add", length, cosine), graph.constant(_SHORT))
+    below = graph.node("Max", graph.node("Add", length, cosine), graph.constant(SHORT))
     bend = graph.node("Mul", graph.atan(graph.node("Div", sine, below)), graph.constant(2.0))
 
     def rising(name: str) -> str:

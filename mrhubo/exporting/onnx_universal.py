@@ -75,11 +75,9 @@ def joint_angles(description: Description, universal: Universal, target_BD3: Val
     cost_BKC = nodes.cost(tried_BKN, goal, keep)
     for turn, most in enumerate((*KEPT, 1)):
         keep = min(keep, most)
-        graph, names = q_BN.graph, [f"least_{turn}", f"order_{turn}"]
-        graph.top(cost_BKC.name, keep, names)
-        order_BKN = Value(graph, names[1], np.int64).take(block_N, 2)
-        kept_BKN = Value(graph, graph.node("GatherElements", tried_BKN.name, order_BKN.name, axis=1))
-        least_BC = Value(graph, names[0]).take(0, 1)
+        least_BKC, order_BKC = cost_BKC.least(keep)
+        kept_BKN = tried_BKN.node("GatherElements", order_BKC.take(block_N, 2), axis=1)
+        least_BC = least_BKC.take(0, 1)
         better_BC = least_BC.less(best_BC)
         best_BN = better_BC.take(block_N, 1).where(kept_BKN.take(0, 1), best_BN)
         best_BC = better_BC.where(least_BC, best_BC)

@@ -75,6 +75,11 @@ class Value:
         """Where it is less than another, booleans."""
         return self.node("Less", other, kind=np.bool_)
 
+    def least(self, count: int) -> tuple[Value, Value]:
+        """So many of the least along axis 1, in order, and their places."""
+        found, order = self.graph.least(self.name, count)
+        return Value(self.graph, found, self.kind), Value(self.graph, order, np.int64)
+
     def where(self, yes: Value, no: Any) -> Value:
         """One where this holds, else the other."""
         name = no.name if isinstance(no, Value) else self.graph.constant(no, yes.kind)

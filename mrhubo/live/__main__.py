@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mrhubo.config import CommandParser, parse_arguments, run_command
+from mrhubo.config.answering import add_who_flags, add_whole_body_flag, check_whole_body
 from mrhubo.config.arguments import number
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
@@ -45,13 +46,8 @@ def build_parser() -> CommandParser[LiveConfig]:
     from mrhubo.live.kinds import SINKS, SOURCES
 
     parser = _LiveParser("mrhubo live", DESCRIPTION, LiveConfig, takes_config=False)
-    who = parser.add_mutually_exclusive_group(required=True)
-    package = "the package that a fit ended with, or a version in the registry: models:/mrhubo-nao/1"
-    who.add_argument("--retargeter", metavar="FOLDER", help=package)
-    robot = "a robot without a package: its YAML file, the name of one that ships with mrhubo, or its URDF alone"
-    who.add_argument("--robot", metavar="ROBOT", help=robot)
-    whole = "with the URDF of --robot: its legs, feet and waist move too, and not its arms and head alone"
-    parser.add_argument("--whole-body", action="store_true", help=whole)
+    add_who_flags(parser)
+    add_whole_body_flag(parser)
     source = f"where frames come from, may be given several times; {'; '.join(SOURCES.values())}"
     parser.add_argument("--source", metavar="SOURCE", action="append", required=True, help=source)
     sink = f"where joint angles go, may be given several times; {'; '.join(SINKS.values())}"
@@ -91,8 +87,7 @@ def main(argv: list[str]) -> int:
     certificate = None
     if options.certificate is not None and not options.https:
         raise UserError("--certificate goes with --https")
-    if options.whole_body and options.retargeter is not None:
-        raise UserError("command line: --whole-body goes with --robot alone; a package answers what it was trained for")
+    check_whole_body(options)
     if options.https:
         from mrhubo.live.certificate import open_certificate
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.fast.masks import stretches
 from mrhubo.fast.plain.contacts import (
     BAND_M,
     GATHERED,
@@ -132,8 +133,7 @@ def _runs(planted_TP: np.ndarray) -> list[tuple[int, tuple[int, int]]]:
     """Each point and contact, first and after the last frame, in order."""
     found = []
     for point in range(planted_TP.shape[1]):
-        change = np.flatnonzero(np.diff(np.concatenate(([False], planted_TP[:, point], [False])).astype(int)))
-        found += [(point, (int(first), int(last))) for first, last in change.reshape(-1, 2)]
+        found += [(point, (run.start, run.stop)) for run in stretches(planted_TP[:, point])]
     return found
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from mrhubo.fast.masks import stretches
 from mrhubo.fast.together.banded import Banded
 from mrhubo.fast.together.bounded import bounded_minimum
 from mrhubo.fast.together.bounds import Bounds
@@ -26,7 +27,6 @@ from mrhubo.fast.together.refine import (
     MOST,
     PATIENCE,
     ROUNDING,
-    stretches,
 )
 from mrhubo.reference.banded import factor
 from mrhubo.reference.solve import DirectionProblem

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mrhubo.fast.masks import stretches
+
 WIDTH = 300
 """Of all panels, in the units of their drawing."""
 _STRIP, _CURVE, _ROW = 16, 110, 15
@@ -59,9 +61,8 @@ def contact_strips(contact_TF: np.ndarray, names: Sequence[str], now: float = 0.
     for row, name in enumerate(names):
         top = row * (_STRIP + 2)
         parts.append(f'<rect x="0" y="{top}" width="{WIDTH}" height="{_STRIP}" fill="{_GRID}"/>')
-        edges = np.diff(contact_TF[:, row].astype(np.int8), prepend=0, append=0)
-        for start, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
-            place = f'x="{start * width:.2f}" y="{top}" width="{(end - start) * width:.2f}"'
+        for run in stretches(contact_TF[:, row]):
+            place = f'x="{run.start * width:.2f}" y="{top}" width="{(run.stop - run.start) * width:.2f}"'
             parts.append(f'<rect {place} height="{_STRIP}" fill="{AT_END}"/>')
         parts.append(f'<text x="4" y="{top + _STRIP - 4.5}" fill="{_DARK}">{html.escape(_short(name))}</text>')
     height = len(names) * (_STRIP + 2) - 2

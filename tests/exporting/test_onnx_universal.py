@@ -18,24 +18,17 @@ from mrhubo.exporting import onnx_universal, write_onnx
 from mrhubo.fast import FastRetargeter
 from mrhubo.retargeter import Retargeter, UniversalJoints, build_network
 from mrhubo.robot import BodyMap, Robot, build_body_map
-from mrhubo.universal.network import UniversalNetwork
+from tests.fast.untrained import SIZES, random_network
 
 pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
-SIZES = {"nao": (32, 2, 8), "coman": (10, 5, 3), "reachy": (12, 1, 5)}
-"""Width, heads and hypotheses."""
 SAME_RAD = 1e-5
 
 
 @pytest.fixture(scope="module", params=SIZES)
 def retargeter(request: pytest.FixtureRequest) -> Retargeter:
-    """With random weights, which correct more than trained ones do."""
-    torch.manual_seed(0)
-    network = UniversalNetwork(*SIZES[request.param])
-    with torch.no_grad():
-        for layer in (network.first, network.later):
-            layer.weight *= 5
+    network = random_network(request.param)
     body_map, prior = BodyMap.of(Robot.from_config(request.param)), BodyPrior(hidden=8).eval()
     return Retargeter(UniversalJoints(body_map, network), body_map, prior, None, phi_threshold=0.01)
 

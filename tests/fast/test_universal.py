@@ -21,23 +21,17 @@ from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, Robot
-from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.robots import RobotBranch, UnfitBranch
+from tests.fast.untrained import SIZES, random_network
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 USUAL_RAD, LAYERS_RAD = 1e-6, 2e-4
 """How far apart the forms may be: nearly all frames, and those whose steps enlarge the rounding of float32 layers."""
-SIZES = {"nao": (32, 2, 8), "coman": (10, 5, 3), "reachy": (12, 1, 5)}
-"""Width, heads and hypotheses."""
 
 
 def make_untrained(name: str) -> Retargeter:
-    """A robot's retargeter with random weights, which correct more than trained ones do."""
-    torch.manual_seed(0)
-    network = UniversalNetwork(*SIZES[name])
-    with torch.no_grad():
-        for layer in (network.first, network.later):
-            layer.weight *= 5
+    """A robot's retargeter with random weights."""
+    network = random_network(name)
     torch.manual_seed(1)
     body_map, prior = BodyMap.of(Robot.from_config(name)), BodyPrior(hidden=20).eval()
     return Retargeter(UniversalJoints(body_map, network), body_map, prior, None, phi_threshold=0.01)

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.fast.masks import widen
 from mrhubo.fast.plain.avoidance import Avoidance
 from mrhubo.fast.together.banded import Factor
 from mrhubo.fast.together.problem import Directions, Problem, make_problem
-from mrhubo.fast.together.refine import refine_around, widen
+from mrhubo.fast.together.refine import refine_around
 from mrhubo.fast.together.smoothness import Smoothness
 from mrhubo.fast.together.speed import keep_speed
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.fast.masks import stretches, widen
 from mrhubo.fast.plain.steps import Model, diagonal
 from mrhubo.fast.together.banded import Banded
 from mrhubo.fast.together.bounded import bounded_minimum
@@ -91,19 +92,6 @@ def refine_around(
             problem, q_TN[used], target_TD3[used], near, sweeps, tolerance, ~free_T[used], step_N, blocks_C
         )
     return found_TN
-
-
-def stretches(mask_T: np.ndarray) -> list[slice]:
-    """The runs of frames in a mask (T,)."""
-    ends_X = np.flatnonzero(np.diff(mask_T.astype(np.int8), prepend=0, append=0))
-    return [slice(int(start), int(stop)) for start, stop in ends_X.reshape(-1, 2)]
-
-
-def widen(mask_T: np.ndarray, frames: int) -> np.ndarray:
-    """Frames (T,) that are so many or fewer away from one in the mask."""
-    total_X = np.concatenate(([0], mask_T.cumsum()))
-    place_T = np.arange(len(mask_T))
-    return total_X[np.minimum(place_T + frames + 1, len(mask_T))] > total_X[np.maximum(place_T - frames, 0)]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
+from mrhubo.fast.masks import widen
 from mrhubo.fast.together.problem import Problem
-from mrhubo.fast.together.refine import refine_around, widen
+from mrhubo.fast.together.refine import refine_around
 from mrhubo.fast.together.smoothness import Smoothness
 
 SWEEPS, TOLERANCE = 5, 2e-3
