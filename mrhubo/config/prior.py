@@ -32,7 +32,7 @@ class PriorConfig:
     """Width of the decoder's two hidden layers."""
     encoder_hidden: int = bounded(1_024, 8, 8_192)
     """Width of the encoder's two hidden layers."""
-    latent: int = bounded(32, 1, 1_024)
+    latent: int = bounded(48, 1, 1_024)
     """Size of the latent."""
     activation: str = choice("silu", "silu", "leaky_relu", "tanh")
     """Activation of the hidden layers; second-order solvers need a smooth one."""
@@ -51,12 +51,15 @@ class PriorConfig:
     """Share of the poses that the encoder sees with noise, and the decoder has to give clean."""
     max_excess_deg: float = bounded(20.0, 0.0)
     """Frames with a joint further outside its anatomical range than this are dropped."""
-    missing_share: float = bounded(0.5, 0.0, 1.0)
-    """Share of the poses whose wrists (and of those whose collars, toes) get random angles, which the data lacks."""
+    missing_share: float = bounded(0.8, 0.0, 1.0)
+    """Share of the poses whose wrists (and of those whose ankles, collars, toes) get random angles, which the data
+    lacks."""
     rest_share: float = bounded(0.2, 0.0, 1.0)
     """Share of the poses whose legs, trunk and collars are put at rest, as a robot without them reads a pose."""
     held_out: float = bounded(0.05, 0.001, 0.5)
-    """Share of the clips held out for validation."""
+    """Share of the clips held out for validation, drawn at random."""
+    held_out_clips: list[str] = field(default_factory=list)
+    """Clips held out in any case, by their names in `clip_ids`."""
     seed: int = bounded(0, 0, 2**32 - 1)
     """Seed of weights, split and draws."""
     tracking_dir: Path = field(default_factory=lambda: Path("mlruns"))

@@ -14,17 +14,20 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 
 _Triple = tuple[float, float, float]
 _MISSING: dict[str, tuple[_Triple, _Triple]] = {
-    "wrist": ((0.0, 12.0, 30.0), (0.0, 28.0, 75.0)),
+    "wrist": ((0.0, 16.0, 34.0), (0.0, 35.0, 75.0)),
     "collar": ((3.0, 7.0, 8.0), (8.0, 18.0, 18.0)),
     "foot": ((12.0, 0.0, 0.0), (35.0, 0.0, 0.0)),
+    "ankle": ((6.0, 6.0, 6.0), (15.0, 15.0, 15.0)),
 }
-"""Joints that never move in the data: standard deviation and limit of added angles about x, y, z [deg]."""
+"""Joints that never move in the data, or do so in one performer's way: standard deviation and limit of added angles
+about x, y, z [deg]."""
 
 _READ = ("shoulder", "elbow", "wrist", "neck", "head")
 
 
 def add_missing_motion(pose_BJ6: Tensor, share: float) -> Tensor:
-    """Gives wrists, collars and toes plausible angles that the data lacks; each pair in a random share of the poses.
+    """Gives wrists, ankles, collars and toes plausible angles that the data lacks; each pair in a random share of the
+    poses.
 
     What a collar is turned by, the shoulder is turned back, so that the arm keeps its direction, as when a person
     shrugs. Angles are normal, cut off inside the anatomical ranges.

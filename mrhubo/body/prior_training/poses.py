@@ -17,13 +17,16 @@ from torch.utils.data import Dataset, Sampler
 from mrhubo import rotation
 from mrhubo.body import anatomy
 from mrhubo.body.arm_axes import CMU_TILT, untilt_arms
+from mrhubo.body.level_feet import own_up, standing_up, turn_feet, usual_up
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.npz import open_npz
 
 
 def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
-    """Poses (F, 21, 6) float32, arms turned as SMPL's are, the frames of each clip, and the clips' names.
+    """Poses (F, 21, 6) float32, arms turned as SMPL's are and standing feet level, the frames of each clip, and the
+    clips' names. What stands in a name before its last underscore is the performer's; feet are alike in all its clips.
 
     Raises:
         UserError: the file is missing, damaged, or holds other arrays than expected.
@@ -36,12 +39,28 @@ def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
         raise UserError(f"data: {path}: expected poses (F, 66) and clip_starts up to F, found poses {poses.shape}")
     if not np.isfinite(poses).all():
         raise UserError(f"data: {path}: poses holds NaN or infinite numbers")
+    clips = [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+    performers: dict[str, list[slice]] = {}
+    for clip, name in zip(clips, names.tolist(), strict=True):
+        performers.setdefault(name.rpartition("_")[0] or name, []).append(clip)
+    feet = {
+        performer: [standing_up(turned[:, 0], turned[:, 1:]) for turned in (_rotations(poses[clip]) for clip in own)]
+        for performer, own in performers.items()
+    }
+    usual_3 = usual_up([each for own in feet.values() for each in own])
     sixd = torch.empty(len(poses), len(POSED_JOINT_NAMES), 6)
-    for start in range(0, len(poses), 50_000):
-        block = torch.from_numpy(poses[start : start + 50_000, 3:].astype(np.float32)).unflatten(-1, (-1, 3))
-        local = torch.from_numpy(untilt_arms(rotation.axis_angle_to_matrix(block).numpy(), CMU_TILT))
-        sixd[start : start + 50_000] = rotation.matrix_to_sixd(local)
-    return sixd, [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)], [str(n) for n in names]
+    for performer, own in performers.items():
+        left, right = (np.concatenate(side) for side in zip(*feet[performer], strict=True))
+        up = own_up((left, right), usual_3)
+        for clip in own:
+            local_FJ33 = untilt_arms(turn_feet(_rotations(poses[clip])[:, 1:], up), CMU_TILT)
+            sixd[clip] = rotation.matrix_to_sixd(torch.from_numpy(local_FJ33))
+    return sixd, clips, names.tolist()
+
+
+def _rotations(poses: np.ndarray) -> np.ndarray:
+    """Of root and joints (F, 22, 3, 3), of axis-angle numbers (F, 66)."""
+    return axis_angle_to_matrix(poses.astype(np.float32).reshape(len(poses), -1, 3))
 
 
 def plausible_frames(pose_FJ6: Tensor, max_excess_deg: float) -> Tensor:

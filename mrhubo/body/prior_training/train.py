@@ -134,7 +134,10 @@ class Split:
         poses, clips, names = load_training_poses(config.data)
         if held_out_clips is None:
             order = torch.randperm(len(clips), generator=torch.Generator().manual_seed(config.seed)).tolist()
+            if unknown := sorted(set(config.held_out_clips) - set(names)):
+                raise UserError(f"held_out_clips: {config.data} has no clip '{unknown[0]}'")
             held = set(order[: max(1, round(config.held_out * len(clips)))])
+            held |= {i for i, name in enumerate(names) if name in config.held_out_clips}
         else:
             held = {i for i, name in enumerate(names) if name in held_out_clips}
         parts = [[poses[clips[i]] for i in range(len(clips)) if (i in held) == wanted] for wanted in (False, True)]

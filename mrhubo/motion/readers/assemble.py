@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
+from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.world import find_up
@@ -30,7 +31,7 @@ def to_our_rest(motion: Motion) -> Motion:
     """The motion, whose rotations refer to its family's rest pose, with those that refer to ours.
 
     Elbows of a body that was fitted are no hinges; those of a converted skeleton are, about whatever axis it has. A
-    motion without a family may be of such a one.
+    motion without a family may be of such a one, whose feet may be rolled where they stand.
     """
     if motion.family:
         local_TJ33 = motion.arrays.local_TJ33
@@ -41,8 +42,16 @@ def to_our_rest(motion: Motion) -> Motion:
     tilt = elbow_tilt(motion.arrays.local_TJ33)
     if tilt is None or abs(tilt) <= _LEVEL:
         return motion
-    note = f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"
-    return motion.changed(local_TJ33=untilt_arms(motion.arrays.local_TJ33, tilt), notes=(*motion.notes, note))
+    local_TJ33 = untilt_arms(motion.arrays.local_TJ33, tilt)
+    notes = [f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"]
+    root_T33 = motion.arrays.root_rotation_T33
+    if root_T33 is not None and (up := rolled_up(standing_up(root_T33, local_TJ33))) is not None:
+        left, right = (math.degrees(math.acos(up_3[1])) for up_3 in up)
+        notes.append(
+            f"the feet stand rolled, the left one by {left:.0f} and the right one by {right:.0f} degrees: taken out"
+        )
+        local_TJ33 = turn_feet(local_TJ33, up)
+    return motion.changed(local_TJ33=local_TJ33, notes=(*motion.notes, *notes))
 
 
 def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:

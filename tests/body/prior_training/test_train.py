@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from mrhubo.body import BodyPrior
+from mrhubo import rotation
+from mrhubo.body import POSED_JOINT_NAMES, BodyPrior
 from mrhubo.body.prior_training import train as training
 from mrhubo.body.prior_training.poses import load_training_poses, plausible_frames
 from mrhubo.body.prior_training.train import PriorTraining, train
@@ -119,3 +120,24 @@ def test_defects_of_the_recording_are_dropped(data: Path) -> None:
     )
     with pytest.raises(UserError, match="max_excess_deg: 0 leaves no frame"):
         training.Split.of(PriorConfig(data=data, max_excess_deg=0.0, held_out=0.001))
+
+
+def test_named_clips_are_held_out_besides_those_drawn(data: Path) -> None:
+    named = ["03_01", "17_01"]
+    drawn = training.Split.of(PriorConfig(data=data)).held_out_clips
+    assert training.Split.of(PriorConfig(data=data, held_out_clips=named)).held_out_clips == sorted({*drawn, *named})
+    with pytest.raises(UserError, match=r"held_out_clips: .*poses.npz has no clip '3_01'"):
+        training.Split.of(PriorConfig(data=data, held_out_clips=["17_01", "3_01"]))
+
+
+def test_feet_are_level_by_what_all_clips_of_a_performer_show(tmp_path: Path) -> None:
+    ankles = [3 * (1 + POSED_JOINT_NAMES.index(f"{side}_ankle")) + 2 for side in ("left", "right")]
+    poses = np.zeros((800, 66), np.float32)
+    poses[:, ankles] = np.where(np.arange(800)[:, None] < 500, [-0.3, 0.3], [-0.2, 0.2])  # of two performers
+    poses[150:350, 3:6] = np.random.default_rng(0).normal(0, 0.5, (200, 3))  # one clip of kicks
+    ids = np.array(["a_1", "a_2", "a_3", "b_1"])
+    np.savez(path := tmp_path / "poses.npz", poses=poses, clip_starts=np.array([0, 150, 350, 500, 800]), clip_ids=ids)
+    local_FJ33 = rotation.sixd_to_matrix(load_training_poses(path)[0])
+    for side in ("left", "right"):
+        ankle_F33 = local_FJ33[:, POSED_JOINT_NAMES.index(f"{side}_ankle")]
+        torch.testing.assert_close(ankle_F33, torch.eye(3).expand(800, 3, 3), atol=1e-3, rtol=0)
