@@ -27,13 +27,14 @@ from torch import Tensor
 from mrhubo.body.latent import LatentProblem
 from mrhubo.body.quasi_newton import nearest_samples, solve_quasi_newton
 from mrhubo.config import load_config
+from mrhubo.fast.side_by_side import available_cores
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fitting.preparation import prepare_pairs
 from mrhubo.pairing import PairGenerator, PairSetup, PairStore, generate_pairs, make_filter, solve_lbfgs
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import align_pose
 from mrhubo.runtime.progress import Progress, Reporter
-from mrhubo.runtime.threads import available_cores, use_threads
+from mrhubo.runtime.threads import use_threads
 
 
 def main(argv: list[str]) -> None:

@@ -96,24 +96,26 @@ def by_joint(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
 
 
 @torch.no_grad()
-def by_direction(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
-    """Mean angle [deg] between each direction of a whole body before and after, and what 95% stay below; left and right
-    together, for each set of poses.
-    """
+def direction_angles(prior: BodyPrior, pose_BJ6: Tensor) -> dict[str, Tensor]:
+    """Angles [deg] between each direction of a whole body before and after, by part; left and right in one."""
     body_map = build_body_map(load_config(DIRECTIONS).robot, Skeleton())
-    parts = [name.removeprefix(f"{SIDES[0]}_").removeprefix(f"{SIDES[1]}_") for name in body_map.measured_names]
-    found = []
-    for pose_BJ6 in columns:
-        before, after = (sixd_to_matrix(pose) for pose in (pose_BJ6, prior.denoise(pose_BJ6)))
-        angle_BD = angle_between(body_map.human_directions(before), body_map.human_directions(after))
-        found.append(torch.rad2deg(angle_BD[:, body_map.measured]))
+    before, after = (sixd_to_matrix(pose) for pose in (pose_BJ6, prior.denoise(pose_BJ6)))
+    angle_BD = torch.rad2deg(angle_between(body_map.human_directions(before), body_map.human_directions(after)))
+    found: dict[str, list[Tensor]] = {}
+    for name, column in zip(body_map.measured_names, body_map.measured, strict=True):
+        part = name.removeprefix(f"{SIDES[0]}_").removeprefix(f"{SIDES[1]}_")
+        found.setdefault(NAMES.get(part, part.replace("_", " ")), []).append(angle_BD[:, column])
+    return {part: torch.cat(angles) for part, angles in found.items()}
+
+
+def by_direction(prior: BodyPrior, columns: list[Tensor]) -> list[list[str]]:
+    """Mean of each direction's angle [deg], and what 95% stay below, for each set of poses."""
+    found = [direction_angles(prior, pose_BJ6) for pose_BJ6 in columns]
     rows = []
-    for part in dict.fromkeys(parts):
-        chosen = [i for i, other in enumerate(parts) if other == part]
-        cells = [angle_BD[:, chosen].flatten() for angle_BD in found]
+    for part in found[0]:
+        cells = [angles[part] for angles in found]
         most = [float(cell[:: max(1, len(cell) // 1_000_000)].quantile(0.95)) for cell in cells]
-        figures = [f"{float(cell.mean()):.1f}, {percent:.1f}" for cell, percent in zip(cells, most, strict=True)]
-        rows.append([NAMES.get(part, part.replace("_", " ")), *figures])
+        rows.append([part, *(f"{float(cell.mean()):.1f}, {end:.1f}" for cell, end in zip(cells, most, strict=True))])
     return rows
 
 

@@ -12,21 +12,24 @@ import json
 import sys
 from pathlib import Path
 
+import torch
 from common import print_header, print_table, read_options
-from prior import by_clip
+from prior import by_clip, direction_angles
 
 from mrhubo.body import BodyPrior
 from mrhubo.body.prior_training.train import train
 from mrhubo.config import PriorConfig, fingerprint, load_config, without_paths
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, find_motions, read_folder
+from mrhubo.rotation import matrix_to_sixd
 from mrhubo.runtime.locations import default_motions
 
 VARIANTS = {
     "chosen": [],
     "LeakyReLU in place of SiLU": ["activation=leaky_relu"],
-    "latent 24": ["latent=24"],
-    "latent 48": ["latent=48"],
+    "latent 32": ["latent=32"],
+    "latent 64": ["latent=64"],
+    "half of the missing motion": ["missing_share=0.4"],
     "encoder 512 wide": ["encoder_hidden=512"],
     "KL weight / 4": ["w_kl=0.0005"],
     "KL weight x 4": ["w_kl=0.008"],
@@ -38,7 +41,7 @@ VARIANTS = {
 }
 COLUMNS = {
     "joint_mm": "held-out [mm]",
-    "evaluation_mm": "evaluation [mm]",
+    "evaluation_mm": "clips [mm]",
     "ik_keypoint_mm": "IK [mm]",
     "ik_zero_keypoint_mm": "IK from z = 0 [mm]",
     "samples_inside": "samples inside",
@@ -46,11 +49,15 @@ COLUMNS = {
     "roc_bent": "ROC bent",
     "roc_grafted": "ROC grafted",
     "noise30_after_deg": "30° noise [deg]",
+    "hand fingers": "fingers [deg]",
+    "foot up": "soles [deg]",
 }
 
 
 def measures(config: PriorConfig, clips: list[Motion]) -> dict[str, float]:
-    """A variant's measures: those in its card, and the reconstruction of the evaluation clips (mean over clips)."""
+    """A variant's measures: those in its card, and the reconstruction of some clips: of joints, mean over clips, and of
+    where fingers and soles point, mean over frames.
+    """
     config.output = config.tracking_dir / "prior_experiments" / f"{fingerprint(without_paths(config))}.safetensors"
     try:
         prior = BodyPrior.open(config.output)
@@ -58,7 +65,9 @@ def measures(config: PriorConfig, clips: list[Motion]) -> dict[str, float]:
         train(config)
         prior = BodyPrior.open(config.output)
     found = dict(json.loads(prior.metadata["card"])["measures_on_held_out_clips"])
-    return {**found, "evaluation_mm": by_clip(prior, clips)[1]}
+    angles = direction_angles(prior, torch.cat([matrix_to_sixd(clip.local_TJ33) for clip in clips]))
+    means = {part: float(angle.mean()) for part, angle in angles.items()}
+    return {**found, **means, "evaluation_mm": by_clip(prior, clips)[1]}
 
 
 def main(argv: list[str]) -> None:

@@ -22,9 +22,9 @@ from pathlib import Path
 from common import print_header, print_table, read_options
 
 from mrhubo.config import load_config
+from mrhubo.fast.side_by_side import available_cores
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.fitting.preparation import prepare_pairs
-from mrhubo.runtime.threads import available_cores
 
 TORCHRUN = ["-m", "torch.distributed.run", "--nproc-per-node"]
 

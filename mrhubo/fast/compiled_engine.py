@@ -5,9 +5,7 @@ Legend: B frames, J = 21 posed joints, D directions, M measured ones, N joints, 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeVar
 
@@ -23,6 +21,7 @@ from mrhubo.fast.plain.root_turn import turned_back
 from mrhubo.fast.plain.steps import Model
 from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import SKEW
+from mrhubo.fast.side_by_side import available_cores, side_by_side
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.banded import Banded, Solve
 from mrhubo.fast.together.problem import Problem, make_problem
@@ -55,8 +54,7 @@ class CompiledEngine:
         self._kernels = kernels.make_kernels()
         self._check, self._direct, self._answer = kernels.CHECK, kernels.DIRECT, kernels.ANSWER
         self._activation = ACTIVATIONS[description.settings.activation]
-        self._threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        self._pool: ThreadPoolExecutor | None = None
+        self._threads = available_cores()
         self._unnoted = True
         self._no_shake = np.zeros((0, len(description.trust.column_XD)))
         self._unroll: Callable[[np.ndarray, np.ndarray], object] | None = None
@@ -305,7 +303,5 @@ class CompiledEngine:
         """
         if frames <= FEW or self._threads == 1:
             return [work(slice(0, frames))]
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(self._threads, "mrhubo")
         length = max(FEW, -(-frames // (_PARTS * self._threads)))
-        return list(self._pool.map(work, [slice(first, first + length) for first in range(0, frames, length)]))
+        return side_by_side(work, [slice(first, first + length) for first in range(0, frames, length)])

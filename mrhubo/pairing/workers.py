@@ -23,13 +23,13 @@ from pathlib import Path
 import mrhubo
 from mrhubo.config import Config, to_yaml
 from mrhubo.errors import UserError
+from mrhubo.fast.side_by_side import available_cores
 from mrhubo.files.storage import remove_leftovers
 from mrhubo.pairing.generate import PairGenerator
 from mrhubo.pairing.store import PairStore
 from mrhubo.pairing.worker import make_shard
 from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.ranks import Ranks
-from mrhubo.runtime.threads import available_cores
 
 _MIN_PAIRS_PER_WORKER = 10_000
 """Fewer are made before a new interpreter has started."""

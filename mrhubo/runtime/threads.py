@@ -12,10 +12,7 @@ from contextlib import contextmanager
 
 import torch
 
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+from mrhubo.fast.side_by_side import available_cores
 
 
 def wanted_threads() -> int:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mrhubo.fast.masks import stretches, widen
 from mrhubo.fast.plain.steps import Model, diagonal
+from mrhubo.fast.side_by_side import side_by_side
 from mrhubo.fast.together.banded import Banded
 from mrhubo.fast.together.bounded import bounded_minimum
 from mrhubo.fast.together.bounds import Bounds
@@ -85,12 +86,16 @@ def refine_around(
     blocks_C: np.ndarray | None = None,
 ) -> np.ndarray:
     """`refine` of some blocks (C,), or all, for the frames in `free_T` (T,), with a bound or none; the others stay."""
-    used_T, found_TN = widen(free_T, smoothness.reach), q_TN.copy()
-    for used in stretches(used_T):
+    found_TN = q_TN.copy()
+
+    def work(used: slice) -> None:
         near = smoothness.at(np.arange(used.start, used.stop))
         found_TN[used], _ = refine(
             problem, q_TN[used], target_TD3[used], near, sweeps, tolerance, ~free_T[used], step_N, blocks_C
         )
+
+    # The longest first, so that none is left to one thread at the end.
+    side_by_side(work, sorted(stretches(widen(free_T, smoothness.reach)), key=lambda used: used.start - used.stop))
     return found_TN
 
 
@@ -136,7 +141,8 @@ def _motion_step(
     cost, free_T = problem.cost, ~fixed_T
     right_TN = -model.frames.gradient_BN * free_T[:, None]
     own_TN, bands, step_TN = diagonal(model.frames.hessian_BNN), smoothness.hessian(q_TN), np.zeros_like(q_TN)
-    for block in np.flatnonzero(running_C):
+
+    def work(block: int) -> None:
         joints_M = np.flatnonzero(cost.block_N == block)
         entries = _coupled(model, smoothness, np.flatnonzero(cost.block_D == block), joints_M, bands)
         within_TMM, *couplings_TMM = (
@@ -147,6 +153,8 @@ def _motion_step(
         system = Banded(within_TMM, diagonal_TM, couplings_TMM)
         bounds = _bounds(cost.lower_N - q_TN, cost.upper_N - q_TN, free_T, step_N, q_TN, joints_M)
         step_TN[:, joints_M] = bounded_minimum(system, right_TN[:, joints_M], bounds, problem.factor)
+
+    side_by_side(work, np.flatnonzero(running_C).tolist())
     return step_TN
 
 
