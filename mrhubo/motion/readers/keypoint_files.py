@@ -78,7 +78,9 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     names = confidence = rate = None
     where = "the list"
     if isinstance(value, dict) and isinstance(value.get("instance_info"), list):
-        return _from_mmpose(path, value, options)
+        return _from_mmpose(path, "'instance_info'", value["instance_info"], value.get("meta_info"), options)
+    if isinstance(value, list) and value and all(isinstance(one, dict) and "instances" in one for one in value):
+        return _from_mmpose(path, where, value, None, options)
     if isinstance(value, dict):
         names, confidence, rate = (
             next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS, RATE_KEYS)
@@ -180,10 +182,10 @@ def _placed(path: Path, where: str, rows: list[_Row], names: list[str] | None = 
     return Keypoints(point_TKX[..., :3], names or None, point_TKX[..., 3] if has_fourth else None, where=where)
 
 
-def _from_mmpose(path: Path, value: dict[str, Any], options: ReadOptions) -> Keypoints:
-    """MMPose's: people in frames, told apart by `track_id`, or else followed."""
-    where = "'instance_info'"
-    info: list[Any] = value["instance_info"]
+def _from_mmpose(path: Path, where: str, info: list[Any], meta: Any, options: ReadOptions) -> Keypoints:
+    """MMPose's: people in frames, told apart by `track_id`, or else followed, in the picture too where there are boxes:
+    points that were lifted from it may be around one origin.
+    """
     rows: list[_Row] = []
     scores: list[np.ndarray | None] = []
     seen: list[Sighting] = []
@@ -198,9 +200,11 @@ def _from_mmpose(path: Path, value: dict[str, Any], options: ReadOptions) -> Key
                 point_K3 = np.array([point[:3] for point in row.points]).reshape(-1, 3)
                 rows.append(row)
                 scores.append(sure_K)
-                seen.append(Sighting(number, person_called(one.get("track_id")), point_K3, sure_K))
+                seen.append(
+                    Sighting(number, person_called(one.get("track_id")), point_K3, sure_K, _picture(one.get("bbox")))
+                )
     if not seen:
-        raise UserError(f"{path}: 'instance_info' has nobody with 'keypoints'")
+        raise UserError(f"{path}: {where} has nobody with 'keypoints'")
     notes: list[str] = []
     person, places = frames_of_one(path, seen, options, notes)
     found = _placed(path, where, [_NOTHING if place is None else rows[place] for place in places])
@@ -210,12 +214,21 @@ def _from_mmpose(path: Path, value: dict[str, Any], options: ReadOptions) -> Key
     if all(sure_K is not None and len(sure_K) == points for sure_K in told.values()):
         found.confidence_TK = np.zeros((frames, points))
         found.confidence_TK[list(told)] = np.stack([sure_K for sure_K in told.values() if sure_K is not None])
-    names = value.get("meta_info", {}).get("keypoint_id2name") if isinstance(value.get("meta_info"), dict) else None
+    names = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
     if isinstance(names, dict) and len(names) == points:
-        order = sorted(names, key=lambda key: int(key) if str(key).isdigit() else 0)
+        order = sorted(names, key=lambda key: int(key) if str(key).isdecimal() else 0)
         found.names = [str(names[key]) for key in order]
-    found.where = f"'instance_info', person '{person}'"
+    found.where = f"{where}, person '{person}'"
     return found
+
+
+def _picture(box: Any) -> np.ndarray | None:
+    """Where the middle of a box [x1, y1, x2, y2] is (2,), in its heights; None of anything else."""
+    box = box[0] if isinstance(box, list) and len(box) == 1 else box
+    if not isinstance(box, list) or len(box) != 4 or not all(type(x) in (int, float) and abs(x) < 1e6 for x in box):
+        return None
+    height = box[3] - box[1]
+    return np.array([box[0] + box[2], box[1] + box[3]]) / (2 * height) if height > 0 else None
 
 
 def _frame_ids(path: Path, info: list[Any]) -> list[int]:

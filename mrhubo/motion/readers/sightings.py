@@ -42,6 +42,8 @@ class Sighting:
     point_K3: np.ndarray
     sure_K: np.ndarray | None = None
     """How sure the file is of each point, 0 to 1."""
+    picture_2: np.ndarray | None = None
+    """Where they are in a picture, in heights of the box around them."""
 
 
 def person_called(value: object) -> str | None:
@@ -130,9 +132,15 @@ def _told_apart(path: Path, sightings: Sequence[Sighting], notes: list[str]) -> 
         return names
     given = set(names)
     free = (str(number) for number in count() if str(number) not in given)
-    frames, points = sorted(nameless), _alike(known)
+    frames, points, height = sorted(nameless), _alike(known), _height(known)
+    pictures = {place: picture for place in known if (picture := sightings[place].picture_2) is not None}
+    if len(pictures) == len(known):  # points may all be around one origin, whoever's they are
+        points = {
+            place: np.hstack([point_K3, np.tile(height * pictures[place], (len(point_K3), 1))])
+            for place, point_K3 in points.items()
+        }
     places = [np.stack([points[place] for place in nameless[frame]]) for frame in frames]
-    reach = _REACH * _height(known)
+    reach = _REACH * height
     if given == {None}:
         numbers = link_in(path, places, reach, frames)
     else:  # those who have a name in other frames may be any of these

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -296,7 +297,7 @@ def test_points_with_names_go_by_their_names(
     """Each frame has another order, and some lack a joint, even the first."""
     names = [name for name in SETS["MediaPipe"] if name != "-"]
     array, random = array_of(points, tuple(names)), np.random.default_rng(0)
-    frames = []
+    frames: list[Any] = []
     for frame in range(FRAMES):
         missing = "left_wrist" if frame in (0, 7) else None
         shown = [place for place in random.permutation(len(names)).tolist() if names[place] != missing]
@@ -368,7 +369,19 @@ def mmpose(folder: Path, people: list[list[np.ndarray]], numbers: list[int]) -> 
     (folder / "a.json").write_text(json.dumps({"meta_info": {}, "instance_info": frames}))
 
 
-@pytest.mark.parametrize("write", [openpose, mmpose])
+def inferencer(folder: Path, people: list[list[np.ndarray]], numbers: list[int]) -> None:
+    """MMPose's as its inferencer writes it: a list, with boxes in the picture, of points around a hip."""
+    mmpose(folder, people, numbers)
+    frames = json.loads((folder / "a.json").read_text())["instance_info"]
+    for frame in frames:
+        for one in frame["instances"]:
+            x, y = 100 * one["keypoints"][9][0], 500
+            one["bbox"] = [[x, y, x + 100, y + 200]]
+            one["keypoints"] = (np.array(one["keypoints"]) - one["keypoints"][9]).tolist()
+    (folder / "a.json").write_text(json.dumps(frames))
+
+
+@pytest.mark.parametrize("write", [openpose, mmpose, inferencer])
 def test_people_without_numbers_are_followed(
     write, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
 ) -> None:
