@@ -99,8 +99,8 @@ def read_romp(tree: Tree) -> Layout | None:
     rows = [_rows(frame, "smpl_thetas") for frame in frames]
     places = [_places(frame, "cam_trans", count) for frame, count in zip(frames, rows, strict=True)]
     seen: dict[int, list[tuple[int, Tree, int]]] = {}
-    for time, frame, people in zip(times, frames, link_in(tree.path, places, _METRES, times), strict=True):
-        for row, person in enumerate(people):
+    for time, frame, here in zip(times, frames, link_in(tree.path, places, _METRES, times), strict=True):
+        for row, person in enumerate(here):
             seen.setdefault(person, []).append((time, frame, row))
     tracks = [Track(str(person), len(found), _romp_reader(found)) for person, found in seen.items()]
     return Layout(kind, tracks, (LINKED,) if max(rows) > 1 else ())

@@ -216,7 +216,7 @@ def _from_mmpose(path: Path, where: str, info: list[Any], meta: Any, options: Re
         found.confidence_TK[list(told)] = np.stack([sure_K for sure_K in told.values() if sure_K is not None])
     names = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
     if isinstance(names, dict) and len(names) == points:
-        order = sorted(names, key=lambda key: int(key) if str(key).isdecimal() else 0)
+        order = sorted(names, key=lambda key: int(key[:9]) if key.isdecimal() else 0)
         found.names = [str(names[key]) for key in order]
     found.where = f"{where}, person '{person}'"
     return found
