@@ -18,7 +18,7 @@ from mrhubo.live.body import Root, SeenPose
 from mrhubo.live.point_sets import POINT_SETS, PointSet
 from mrhubo.live.vectors import Vector
 from mrhubo.motion.orientations import HEAD_POINTS
-from mrhubo.motion.readers.keypoints import UNSURE
+from mrhubo.motion.readers.sightings import UNSURE
 
 VERSION = 1
 MAX_BYTES = 65_536

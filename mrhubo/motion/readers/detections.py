@@ -64,9 +64,11 @@ def _rows(tree: Tree) -> SmplArrays | None:
 
 def _followed(tree: Tree, whole: SmplArrays, frame_N: np.ndarray, place_N2: np.ndarray, kind: Kind) -> Layout:
     """The people of all rows, by the number of each row's frame, and by where it is."""
-    frames = [np.flatnonzero(frame_N == frame) for frame in np.unique(frame_N)]
+    frame_T, frame_of_N, count_T = np.unique(frame_N, return_inverse=True, return_counts=True)
+    frames = np.split(np.argsort(frame_of_N, kind="stable"), np.cumsum(count_T)[:-1])
     rows: dict[int, list[int]] = {}
-    for here, numbers in zip(frames, link_in(tree.path, [place_N2[here] for here in frames], _REACH), strict=True):
+    followed = link_in(tree.path, [place_N2[here] for here in frames], _REACH, frame_T.tolist())
+    for here, numbers in zip(frames, followed, strict=True):
         for row, number in zip(here, numbers, strict=True):
             rows.setdefault(number, []).append(int(row))
 

@@ -16,18 +16,18 @@ _MAX_FRAMES = 100_000
 _BEGINNING = re.compile(
     rb'\s*+(?:\{.{0,300}?"(?:people|bodies)"\s*:\s*\[|\[\s*(?:\]\s*$|\{(?=.{0,300}?"keypoints3d"))).*', re.DOTALL
 )
-_NUMBER = re.compile(r"\d+")
+_NUMBER = re.compile(r"[0-9]")
 
 
 def frame_files(folder: Path) -> list[Path]:
-    """The files of a folder with one a frame, in order; none where it is no such folder."""
+    """The files of a folder with one a frame, by name; none where it is no such folder."""
     try:
         files = [file for file in folder.iterdir() if file.suffix.lower() == ".json" and not file.name.startswith(".")]
     except OSError:
         return []
     if len(files) < 2 or len(files) > _MAX_FRAMES or not all(_NUMBER.search(file.stem) for file in files):
         return []
-    files = sorted(files, key=lambda file: (int(_NUMBER.findall(file.stem)[-1][:15]), file.name))
+    files = sorted(files, key=lambda file: file.name)
     return files if is_frame(files[0]) and is_frame(files[-1]) else []
 
 

@@ -1,4 +1,4 @@
-"""Motions in folders with a JSON file a frame, by name in order.
+"""Motions in folders with a JSON file a frame, whose number is in its name.
 
 * EasyMocap: a list of people, each with `id` and `keypoints3d`, rows of x, y, z and a confidence
   (https://github.com/zju3dv/EasyMocap).
@@ -23,14 +23,15 @@ from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_files import MAX_BYTES
+from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.tracks import Person, choose
+from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
 
 _MOST_PEOPLE, _MOST_NUMBERS = 100, 4_000
 """In a frame, and of a person."""
-_LISTS = ("people", "bodies")
+_LISTS, _IDS = ("people", "bodies"), ("id", "person_id")
 _POINTS = ("keypoints3d", "joints19", "joints26", "pose_keypoints_3d")
 _FLAT = "pose_keypoints_2d"
 
@@ -40,42 +41,41 @@ def read_frames(folder: Path, files: list[Path], options: ReadOptions) -> Motion
 
     Args:
         folder: what the motion is called after.
-        files: of its frames, in order.
+        files: of its frames.
         options: person, rate.
 
     Raises:
         NoMotion: the points are in a picture, or nobody is there.
-        UserError: a file is damaged, or the frame rate is not known.
+        UserError: a file is damaged, the order of the frames or the frame rate is not known.
     """
-    people: dict[str, dict[int, np.ndarray]] = {}
+    seen: list[Sighting] = []
     flat = False
-    for number, file in enumerate(files):
-        for place, one in enumerate(_people(file)):
+    for number, file in zip(frame_numbers_in(folder, [file.stem for file in files]), files, strict=True):
+        for one in _people(file):
             key = next((key for key in _POINTS if one.get(key)), None)
             flat |= key is None and bool(one.get(_FLAT))
             if key is not None:
-                name = one.get("id", one.get("person_id", place))
-                name = place if isinstance(name, list) else name
-                people.setdefault(shortened(name, 40), {})[number] = _points(file, key, one[key])
-    if not people and flat:
+                row_K4 = _points(file, key, one[key])
+                person = next((person_called(one[name]) for name in _IDS if name in one), None)
+                seen.append(Sighting(number, person, row_K4[:, :3], row_K4[:, 3]))
+    if not seen and flat:
         raise NoMotion(f"{folder}: holds points in a picture, '{_FLAT}' of OpenPose, frame by frame; {LIFT}")
-    if not people:
+    if not seen:
         raise NoMotion(f"{folder}: nobody with {' or '.join(_POINTS)} is in its {len(files):,} frames")
     notes: list[str] = []
-    chosen = choose(folder, [Person(name, len(seen)) for name, seen in people.items()], options, notes)
-    seen = people[chosen.person]
-    counts = {len(points) for points in seen.values()}
+    person, places = frames_of_one(folder, seen, options, notes)
+    counts = {len(seen[place].point_K3) for place in places if place is not None}
     if len(counts) > 1:
-        raise UserError(f"{folder}: person '{chosen.person}' has now {min(counts)} and now {max(counts)} points")
-    first, last = min(seen), max(seen)
-    point_TK4 = np.full((last + 1 - first, counts.pop(), 4), np.nan)
-    for number, points in seen.items():
-        point_TK4[number - first] = points
-    sure_TK = np.nan_to_num(point_TK4[..., 3]).clip(0.0, 1.0)
-    where = f"in a folder with a file a frame, person {chosen.person}"
-    return motion_of_points(
-        folder, Keypoints(point_TK4[..., :3], confidence_TK=sure_TK, where=where, notes=notes), options
-    )
+        raise UserError(f"{folder}: person '{person}' has now {min(counts)} and now {max(counts)} points")
+    points = counts.pop()
+    check_size(folder, "the folder", len(places), points)
+    point_TK3, sure_TK = np.full((len(places), points, 3), np.nan), np.zeros((len(places), points))
+    for frame, place in enumerate(places):
+        if place is not None:
+            point_TK3[frame], sure_TK[frame] = seen[place].point_K3, seen[place].sure_K
+    where = f"in a folder with a file a frame, person {person}"
+    found = Keypoints(point_TK3, confidence_TK=np.nan_to_num(sure_TK).clip(0.0, 1.0), where=where, notes=notes)
+    return motion_of_points(folder, found, options)
 
 
 def _people(file: Path) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
+from mrhubo.motion.readers.frame_numbers import frame_numbers_in, in_order
 from mrhubo.motion.readers.linking import LINKED, link_in
 from mrhubo.motion.readers.rotations import Form, find_form
 from mrhubo.motion.readers.smpl_names import named_tracks, people_in
@@ -34,6 +35,7 @@ def read_phalp(tree: Tree) -> Layout | None:
     if not tree.is_mapping or not len(tree):
         return None
     seen: dict[str, list[tuple[int, Tree]]] = {}
+    times: list[int | None] = []
     for number, (_, frame) in enumerate(tree.items()):
         people, names = frame.get("smpl"), [frame.get(key) for key in ("tid", "tracked_ids")]
         if people is None or not people.is_list or not any(names):
@@ -50,11 +52,16 @@ def read_phalp(tree: Tree) -> Layout | None:
             else [False] * len(ids)
         )
         time = frame.get("time")
-        place = number if time is None or time.shape() != () else int(time.array())
+        times.append(None if time is None or time.shape() != () else int(time.array()))
         for person, body, is_old in zip(ids, people, old, strict=True):
             if not is_old and body.is_mapping:
-                seen.setdefault(f"{float(person.array()):g}", []).append((place, body))
-    tracks = [Track(person, len(found), _phalp_reader(found)) for person, found in seen.items()]
+                seen.setdefault(f"{float(person.array()):g}", []).append((number, body))
+    told = [time for time in times if time is not None]
+    frames = told if len(told) == len(times) else frame_numbers_in(tree.path, tree.keys)
+    tracks = [
+        Track(person, len(found), _phalp_reader([(frames[number], body) for number, body in found]))
+        for person, found in seen.items()
+    ]
     return Layout(Kind("4D-Humans or PHALP", "smpl", CAMERAS), tracks)
 
 
@@ -85,15 +92,16 @@ def read_romp(tree: Tree) -> Layout | None:
     people = None if tracked is None else people_in(tracked)
     if tracked is not None and people:
         return Layout(kind, named_tracks(people))
-    frames = [results] if "smpl_thetas" in results.keys else [frame for _, frame in results.items()]
-    if not frames or not any("smpl_thetas" in frame.keys for frame in frames):
+    named = [("", results)] if "smpl_thetas" in results.keys else list(results.items())
+    if not any("smpl_thetas" in frame.keys for _, frame in named):
         return None
+    times, frames = zip(*in_order(tree.path, named), strict=True)
     rows = [_rows(frame, "smpl_thetas") for frame in frames]
     places = [_places(frame, "cam_trans", count) for frame, count in zip(frames, rows, strict=True)]
     seen: dict[int, list[tuple[int, Tree, int]]] = {}
-    for number, people in enumerate(link_in(tree.path, places, _METRES)):
-        for row, person in enumerate(people):
-            seen.setdefault(person, []).append((number, frames[number], row))
+    for time, frame, here in zip(times, frames, link_in(tree.path, places, _METRES, times), strict=True):
+        for row, person in enumerate(here):
+            seen.setdefault(person, []).append((time, frame, row))
     tracks = [Track(str(person), len(found), _romp_reader(found)) for person, found in seen.items()]
     return Layout(kind, tracks, (LINKED,) if max(rows) > 1 else ())
 

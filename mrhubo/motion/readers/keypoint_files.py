@@ -1,8 +1,10 @@
 """Keypoints as files have them: arrays in .npy and .npz, and JSON.
 
 JSON is `{"fps": 30, "names": [...], "keypoints": [[[x, y, z], ...], ...], "confidence": [[...], ...]}`, or a list of
-frames, each a list of points [x, y, z], [x, y, z, confidence] or {"x": ..., "y": ..., "z": ..., "visibility": ...}; or
-what MMPose writes (`meta_info`, `instance_info`: https://github.com/open-mmlab/mmpose/blob/main/demo/docs/en/3d_human_pose_demo.md).
+frames, each a list of points [x, y, z], [x, y, z, confidence] or {"x": ..., "y": ..., "z": ..., "visibility": ...}, or
+points by name, as {"left_hip": [x, y, z], ...} or with a "name" each, in any order, some of them perhaps missing; or
+what MMPose writes (`meta_info`, `instance_info`:
+https://github.com/open-mmlab/mmpose/blob/main/demo/docs/en/3d_human_pose_demo.md).
 
 Legend: T frames, K keypoints.
 """
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +23,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.files.tree import read_tree
 from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import (
     CONFIDENCE_KEYS,
     NAME_KEYS,
@@ -30,6 +34,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
 )
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS
+from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
 
 _POSE_KEYS = {
     "poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa",
@@ -40,7 +45,6 @@ _JSON = re.compile(
     r"\s*(?:\[\s*[\[{]|\{.*\"(?:" + "|".join((*POINT_KEYS, "instance_info", "frames")) + r")\"\s*:)", re.DOTALL
 )
 _MAX_JSON = 2**27
-_MOST_POINTS = 1_000
 
 
 def holds_points(content: Content) -> bool:
@@ -74,7 +78,9 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     names = confidence = rate = None
     where = "the list"
     if isinstance(value, dict) and isinstance(value.get("instance_info"), list):
-        return _from_mmpose(path, value, options)
+        return _from_mmpose(path, "'instance_info'", value["instance_info"], value.get("meta_info"), options)
+    if isinstance(value, list) and value and all(isinstance(one, dict) and "instances" in one for one in value):
+        return _from_mmpose(path, where, value, None, options)
     if isinstance(value, dict):
         names, confidence, rate = (
             next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS, RATE_KEYS)
@@ -87,43 +93,47 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
         value, where = value[key], f"'{key}'"
     if not isinstance(value, list) or not value:
         raise UserError(f"{path}: {where} is no list of frames")
+    check_size(path, where, len(value), 1)
     rows = [_frame(path, where, number, frame) for number, frame in enumerate(value)]
-    given = next((list(row[1]) for row in rows if row[1]), None)
-    width = max(len(row[0]) for row in rows)
-    point_TKX = np.full((len(rows), width, 4), np.nan)
-    for number, (points, _) in enumerate(rows):
-        for place, point in enumerate(points):
-            point_TKX[number, place, : len(point)] = point
-    if width > _MOST_POINTS:
-        raise UserError(f"{path}: {where} has {width} points a frame; expected at most {_MOST_POINTS}")
-    has_fourth = bool(np.isfinite(point_TKX[..., 3]).any())
-    found = Keypoints(point_TKX[..., :3], where=where)
-    found.confidence_TK = point_TKX[..., 3] if has_fourth else None
-    found.names = [str(name) for name in (names if isinstance(names, list) else given or [])] or None
+    found = _placed(path, where, rows, [str(name) for name in names] if isinstance(names, list) else None)
     if confidence is not None:
         found.confidence_TK = _numbers(path, confidence, "'confidence'")
     if rate is not None:
-        found.rate = float(_numbers(path, rate, "the frame rate").reshape(-1)[0])
+        rates = _numbers(path, rate, "the frame rate")
+        if rates.size != 1:
+            raise UserError(f"{path}: the frame rate has shape {rates.shape}; expected one number")
+        found.rate = float(rates.reshape(()))
     return found
 
 
-def _frame(path: Path, where: str, number: int, frame: Any) -> tuple[list[list[float]], list[str]]:
-    """The points of a frame, and their names if they have some; none where nothing was seen."""
+@dataclass(frozen=True)
+class _Row:
+    """The points of a frame; none where nothing was seen."""
+
+    points: list[list[float]]
+    names: list[str] | None = None
+    """Where points have them."""
+
+
+_NOTHING = _Row([])
+
+
+def _frame(path: Path, where: str, number: int, frame: Any) -> _Row:
     if isinstance(frame, dict):
         inner = next((frame[key] for key in POINT_KEYS if key in frame), None)
         frame = inner if inner is not None else frame
     if frame is None:
-        return [], []
+        return _NOTHING
     names: list[str] = []
     if isinstance(frame, dict):
         names, frame = [str(name) for name in frame], list(frame.values())
+    elif isinstance(frame, list):
+        names = [str(point["name"]) for point in frame if isinstance(point, dict) and "name" in point]
     if not isinstance(frame, list):
         raise UserError(f"{path}: {where} has no list of points in frame {number}")
     points = []
     for point in frame:
         if isinstance(point, dict):
-            if "name" in point:
-                names.append(str(point["name"]))
             sure = next((point[key] for key in ("visibility", "confidence", "score", "presence") if key in point), None)
             point = [point.get("x"), point.get("y"), point.get("z"), *([] if sure is None else [sure])]
         if point is None:
@@ -132,40 +142,101 @@ def _frame(path: Path, where: str, number: int, frame: Any) -> tuple[list[list[f
             what = f"{len(point)} numbers" if isinstance(point, list) else shortened(point, 30)
             raise UserError(f"{path}: {where} has a point of {what} in frame {number}; expected x, y and z")
         points.append([_number(path, where, number, x) for x in point])
-    return points, names
+    if len(names) not in (0, len(points)):
+        raise UserError(f"{path}: {where} names {len(names)} of the {len(points)} points in frame {number}; name all")
+    if len(set(names)) < len(names):
+        twice = next(name for place, name in enumerate(names) if name in names[:place])
+        raise UserError(f"{path}: {where} has two points '{shortened(twice, 30)}' in frame {number}")
+    return _Row(points, names or None)
 
 
-def _from_mmpose(path: Path, value: dict[str, Any], options: ReadOptions) -> Keypoints:
-    """MMPose's: people in frames, told apart by `track_id`, or else by their place."""
-    people: dict[str, dict[int, tuple[Any, Any]]] = {}
-    info = value["instance_info"]
-    for number, frame in enumerate(info):
+def _placed(path: Path, where: str, rows: list[_Row], names: list[str] | None = None) -> Keypoints:
+    """The points of all frames, each in the column of its name, or of its place where points have none.
+
+    Args:
+        path: the file, for sentences.
+        where: in it they are.
+        rows: frame by frame.
+        names: of the columns, where the file lists them. Names that are numbers are places in this list.
+    """
+    seen = [row for row in rows if row.points]
+    if any(row.names is None for row in seen) and any(row.names for row in seen):
+        odd = next(frame for frame, row in enumerate(rows) if row.points and row.names is None)
+        raise UserError(f"{path}: {where} has points without names in frame {odd}, and with names in others")
+    own = list(dict.fromkeys(name for row in seen for name in row.names or ()))
+    if not own:
+        places, width = None, max((len(row.points) for row in rows), default=0)
+    elif all(name.isdecimal() and len(name) < 10 for name in own):
+        places = {name: int(name) for name in own}
+        width = max(len(names or ()), *(place + 1 for place in places.values()))
+    else:
+        names = names if names is not None and set(own) <= set(names) else own
+        places, width = {name: place for place, name in enumerate(names)}, len(names)
+    check_size(path, where, len(rows), width)
+    point_TKX = np.full((len(rows), width, 4), np.nan)
+    for frame, row in enumerate(rows):
+        for place, point in enumerate(row.points):
+            column = place if places is None or row.names is None else places[row.names[place]]
+            point_TKX[frame, column, : len(point)] = point
+    has_fourth = bool(np.isfinite(point_TKX[..., 3]).any())
+    return Keypoints(point_TKX[..., :3], names or None, point_TKX[..., 3] if has_fourth else None, where=where)
+
+
+def _from_mmpose(path: Path, where: str, info: list[Any], meta: Any, options: ReadOptions) -> Keypoints:
+    """MMPose's: people in frames, told apart by `track_id`, or else followed, in the picture too where there are boxes:
+    points that were lifted from it may be around one origin.
+    """
+    rows: list[_Row] = []
+    scores: list[np.ndarray | None] = []
+    seen: list[Sighting] = []
+    for number, frame in zip(_frame_ids(path, info), info, strict=True):
         instances = frame.get("instances") if isinstance(frame, dict) else None
-        for place, one in enumerate(instances if isinstance(instances, list) else []):
+        for one in instances if isinstance(instances, list) else []:
             if isinstance(one, dict) and "keypoints" in one:
-                person = str(one.get("track_id", place))
-                people.setdefault(person, {})[number] = (one["keypoints"], one.get("keypoint_scores"))
-    if not people:
-        raise UserError(f"{path}: 'instance_info' has nobody with 'keypoints'")
-    person = options.person or max(people, key=lambda name: len(people[name]))
-    if person not in people:
-        raise UserError(f"{path}: has no person '{shortened(person, 30)}'; there are {', '.join(list(people)[:20])}")
-    frames = [people[person].get(number, (None, None)) for number in range(len(info))]
-    found = _from_json(path, [points for points, _ in frames], options)
-    shape = found.point_TK3.shape[:2]
-    if any(scores is not None for _, scores in frames):
-        nothing = np.zeros(shape[1])
-        rows = [nothing if s is None else _numbers(path, s, "'keypoint_scores'").reshape(-1) for _, s in frames]
-        if all(len(row) == shape[1] for row in rows):
-            found.confidence_TK = np.stack(rows)
-    names = value.get("meta_info", {}).get("keypoint_id2name") if isinstance(value.get("meta_info"), dict) else None
-    if isinstance(names, dict) and len(names) == shape[1]:
-        order = sorted(names, key=lambda key: int(key) if str(key).isdigit() else 0)
+                row = _frame(path, where, number, one["keypoints"])
+                sure_K = one.get("keypoint_scores")
+                sure_K = None if sure_K is None else _numbers(path, sure_K, "'keypoint_scores'").reshape(-1)
+                sure_K = None if sure_K is None or len(sure_K) != len(row.points) else sure_K
+                point_K3 = np.array([point[:3] for point in row.points]).reshape(-1, 3)
+                rows.append(row)
+                scores.append(sure_K)
+                seen.append(
+                    Sighting(number, person_called(one.get("track_id")), point_K3, sure_K, _picture(one.get("bbox")))
+                )
+    if not seen:
+        raise UserError(f"{path}: {where} has nobody with 'keypoints'")
+    notes: list[str] = []
+    person, places = frames_of_one(path, seen, options, notes)
+    found = _placed(path, where, [_NOTHING if place is None else rows[place] for place in places])
+    found.notes = notes
+    frames, points = found.point_TK3.shape[:2]
+    told = {frame: scores[place] for frame, place in enumerate(places) if place is not None}
+    if all(sure_K is not None and len(sure_K) == points for sure_K in told.values()):
+        found.confidence_TK = np.zeros((frames, points))
+        found.confidence_TK[list(told)] = np.stack([sure_K for sure_K in told.values() if sure_K is not None])
+    names = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
+    if isinstance(names, dict) and len(names) == points:
+        order = sorted(names, key=lambda key: int(key[:9]) if key.isdecimal() else 0)
         found.names = [str(names[key]) for key in order]
-    found.where = f"'instance_info', person '{shortened(person, 30)}'"
-    if len(people) > 1:
-        found.notes.append(f"{len(people)} people are in the file; person '{shortened(person, 30)}' is read")
+    found.where = f"{where}, person '{person}'"
     return found
+
+
+def _picture(box: Any) -> np.ndarray | None:
+    """Where the middle of a box [x1, y1, x2, y2] is (2,), in its heights; None of anything else."""
+    box = box[0] if isinstance(box, list) and len(box) == 1 else box
+    if not isinstance(box, list) or len(box) != 4 or not all(type(x) in (int, float) and abs(x) < 1e6 for x in box):
+        return None
+    height = box[3] - box[1]
+    return np.array([box[0] + box[2], box[1] + box[3]]) / (2 * height) if height > 0 else None
+
+
+def _frame_ids(path: Path, info: list[Any]) -> list[int]:
+    """The number of each frame: by `frame_id`, or by its place where these are no numbers of their own."""
+    given = [frame.get("frame_id") if isinstance(frame, dict) else None for frame in info]
+    if all(type(number) is int and number >= 0 for number in given) and len(set(given)) == len(given):
+        return frame_numbers_in(path, [str(number) for number in given])
+    return list(range(len(info)))
 
 
 def checked(path: Path, found: Keypoints) -> Keypoints:

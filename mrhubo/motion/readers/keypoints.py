@@ -21,16 +21,14 @@ from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
+from mrhubo.motion.readers.sightings import MAX_FRAMES, known_points
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
 
-UNSURE = 0.3
-"""Points that their source is less sure of are taken as missing; detectors draw no point below it."""
 _SAMPLES = 256
 _NONSENSE = 0.6
 """From this misfit on points are no body in the order of a set."""
 _CLEARLY = 2.0
 """A set fits clearly better than another if its misfit is so many times smaller."""
-_MAX_FRAMES = 500_000
 _LARGEST = 1e7
 _PIXELS = 50.0
 """Over more than this go a picture's coordinates, beside which numbers between 0 and 1 are scores."""
@@ -77,8 +75,8 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
         NoMotion: they are no points of a body in the order of a set that is known, and have no names.
         UserError: as for `read_keypoints`.
     """
-    if len(found.point_TK3) > _MAX_FRAMES:
-        raise UserError(f"{path}: has {len(found.point_TK3):,} frames; at most {_MAX_FRAMES:,} are read")
+    if len(found.point_TK3) > MAX_FRAMES:
+        raise UserError(f"{path}: has {len(found.point_TK3):,} frames; at most {MAX_FRAMES:,} are read")
     if (np.abs(np.nan_to_num(found.point_TK3)) > _LARGEST).any():
         raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
     _refuse_flat(path, found)
@@ -87,7 +85,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
     if missing:
         raise UserError(f"{path}: has no point called {listed(missing)}; shoulders and hips are needed")
     rate, notes = _rate(path, found, options), found.notes
-    point_TK3 = _without_missing(found)
+    point_TK3 = known_points(found.point_TK3, found.confidence_TK)
     points = {name: point_TK3[:, place] for name, place in places.items()}
     _refuse_shares(path, found, points)
     points, world = _to_world(points, notes)
@@ -156,18 +154,6 @@ def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
     if found.rate is None:
         return asked_rate(path, options)
     return told_rate(path, "says", found.rate, options, found.notes)
-
-
-def _without_missing(found: Keypoints) -> np.ndarray:
-    """The points with NaN for those that are missing: of which the source is not sure, or which lie with others exactly
-    at the origin.
-    """
-    point_TK3 = np.where(np.isfinite(found.point_TK3).all(-1, keepdims=True), found.point_TK3, np.nan)
-    zero_TK = (point_TK3 == 0).all(-1)
-    missing_TK = zero_TK & (zero_TK.sum(1, keepdims=True) > 1)
-    if found.confidence_TK is not None:
-        missing_TK |= found.confidence_TK < UNSURE
-    return np.where(missing_TK[..., None], np.nan, point_TK3)
 
 
 @np.errstate(all="ignore")

@@ -21,16 +21,16 @@ import numpy as np
 from mrhubo.body.joints import SIDES
 from mrhubo.errors import UserError
 from mrhubo.fast.plain.human import cross, normalize
-from mrhubo.files.regular import naming
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES
-from mrhubo.motion.readers.linking import LINKED, link
+from mrhubo.motion.readers.frame_numbers import in_order
+from mrhubo.motion.readers.linking import LINKED, link_in
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.smpl_names import search
-from mrhubo.motion.readers.tracks import Person, choose
+from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.motion.readers.world import ANY_WORLD, find_up
 
 _KEY, _CAMERA = "pred_keypoints_3d", "pred_cam_t"
@@ -107,20 +107,23 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
     stacked = search(tree, _stacked)
     if stacked is not None:
         return {"": (len(stacked.points), lambda: stacked)}
-    frames = list(tree) if tree.is_list else [child for _, child in tree.items()]
-    people = [[person for person in (frame if frame.is_list else (frame,)) if _KEY in person.keys] for frame in frames]
-    if not any(people):
+    people: list[tuple[str, list[Tree]]] = []
+    for name, frame in tree.items() if tree.is_mapping else (("", frame) for frame in tree):
+        people.append((name, [person for person in (frame if frame.is_list else (frame,)) if _KEY in person.keys]))
+    if not any(here for _, here in people):
         return {}
-    places = [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for here in people]
-    with naming(tree.path):
-        numbers = link(places, _REACH)
-    if max(map(len, people)) > 1:
+    frames = in_order(tree.path, people)
+    count = frames[-1][0] + 1
+    check_span(tree.path, len(frames), count)
+    places = [np.stack([_place(person) for person in here]) if here else np.zeros((0, 3)) for _, here in frames]
+    numbers = link_in(tree.path, places, _REACH, [time for time, _ in frames])
+    if max(map(len, places)) > 1:
         notes.append(LINKED)
     seen: dict[int, dict[int, Tree]] = {}
-    for frame, (here, found) in enumerate(zip(people, numbers, strict=True)):
+    for (time, here), found in zip(frames, numbers, strict=True):
         for person, number in zip(here, found, strict=True):
-            seen.setdefault(number, {})[frame] = person
-    return {str(name): (len(found), lambda found=found: _gathered(found, len(frames))) for name, found in seen.items()}
+            seen.setdefault(number, {})[time] = person
+    return {str(name): (len(found), lambda found=found: _gathered(found, count)) for name, found in seen.items()}
 
 
 def _place(person: Tree) -> np.ndarray:

@@ -171,6 +171,16 @@ def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, not
     return to_our_rest(upright(motion, kind.worlds, rest_in_words(kind.family)))
 
 
+def check_span(path: Path, seen: int, frames: int) -> None:
+    """Refuses somebody who is seen in too few of the frames from their first to their last, before arrays are made.
+
+    Raises:
+        UserError: they are, or there are too many frames.
+    """
+    if frames * _SCARCEST > seen or frames > MAX_FRAMES:
+        raise UserError(f"{path}: somebody who is seen in {seen:,} of {frames:,} frames makes no motion")
+
+
 def _root(arrays: SmplArrays, notes: list[str]) -> np.ndarray | None:
     """Rotations (S, 3, 3) of the root; None, and a note, where they cannot be used."""
     seen, form = len(arrays.pose), arrays.form
@@ -240,8 +250,7 @@ def _filled(
     if len(order) < len(numbers):
         notes.append(f"{len(numbers) - len(order):,} poses of frames that are told before are left out")
     frames = int(order[-1] - order[0]) + 1
-    if frames * _SCARCEST > len(order) or frames > MAX_FRAMES:
-        raise UserError(f"{path}: somebody who is seen in {len(order):,} of {frames:,} frames makes no motion")
+    check_span(path, len(order), frames)
     index_S, known_T = order - order[0], np.zeros(frames, bool)
     known_T[index_S] = True
 

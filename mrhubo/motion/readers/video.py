@@ -11,10 +11,10 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.keypoint_sets import SETS
-from mrhubo.motion.readers.keypoints import UNSURE
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import told_rate
+from mrhubo.motion.readers.sightings import UNSURE
 from mrhubo.video.frames import video_kind
 from mrhubo.video.track import Track, track_body
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -287,3 +288,133 @@ def test_a_folder_of_openpose_holds_points_in_a_picture(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "v_0_keypoints.json"):
         with pytest.raises(mrhubo.motion.NoMotion, match="in a picture"):
             mrhubo.read_motion(path, RATE)
+
+
+@pytest.mark.parametrize("form", ["dictionaries", "lists"])
+def test_points_with_names_go_by_their_names(
+    form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """Each frame has another order, and some lack a joint, even the first."""
+    names = [name for name in SETS["MediaPipe"] if name != "-"]
+    array, random = array_of(points, tuple(names)), np.random.default_rng(0)
+    frames: list[Any] = []
+    for frame in range(FRAMES):
+        missing = "left_wrist" if frame in (0, 7) else None
+        shown = [place for place in random.permutation(len(names)).tolist() if names[place] != missing]
+        frames.append({names[place]: array[frame, place].tolist() for place in shown})
+    if form == "lists":
+        frames = [[dict(zip("xyz", xyz, strict=True)) | {"name": name} for name, xyz in f.items()] for f in frames]
+    path = tmp_path / "points.json"
+    frames[3] = None  # nobody is seen
+    path.write_text(json.dumps({"fps": 30, "frames": frames}))
+    found = mrhubo.read_motion(path)
+    seen = [frame for frame in range(FRAMES) if frame not in (0, 3, 7)]
+    assert found.confidence_TJ is not None
+    elbow_T = found.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")]
+    assert elbow_T.nonzero().flatten().tolist() == seen
+    kept = found.changed(local_TJ33=found.local_TJ33[seen], confidence_TJ=None)
+    assert bone_error(kept, pose[seen]) < 0.2
+    # the list of names has the order of the confidence's columns
+    sure = np.ones((FRAMES, len(names)))
+    sure[:, names.index("left_elbow")] = 0
+    path.write_text(json.dumps({"fps": 30, "frames": frames, "names": names, "confidence": sure.tolist()}))
+    found = mrhubo.read_motion(path)
+    assert found.confidence_TJ is not None
+    arms = [not found.confidence_TJ[:, POSED_JOINT_NAMES.index(f"{side}_shoulder")].any() for side in SIDES]
+    assert arms == [True, False]
+
+
+def test_names_that_are_numbers_are_places(points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    array = array_of(points, SETS["COCO"])
+    frames = [{str(place): array[frame, place].tolist() for place in range(16, -1, -1)} for frame in range(FRAMES)]
+    path = tmp_path / "points.json"
+    for more in ({}, {"names": list(SETS["COCO"])}):
+        path.write_text(json.dumps({"fps": 30, "frames": frames} | more))
+        assert bone_error(mrhubo.read_motion(path), pose) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"frames": [[{"name": "nose", "x": 1, "y": 2, "z": 3}, [1, 2, 3]]]}, "names 1 of the 2 points in frame 0"),
+        ({"frames": [{"nose": [1, 2, 3]}, [[1, 2, 3]]]}, "without names in frame 1"),
+        ({"frames": [[], [{"name": "nose"}, {"name": "nose"}]]}, "two points 'nose' in frame 1"),
+        ({"fps": [], "keypoints": [[[1, 2, 3]]]}, "frame rate has shape"),
+        ({"fps": [30, 25], "keypoints": [[[1, 2, 3]]]}, "frame rate has shape"),
+        ({"keypoints": [*[[]] * 60_000, [[0, 0, 0]] * 20_000]}, "20,000 points a frame"),
+        ({"keypoints": [*[[]] * 500_000, [[0, 0, 0]]]}, "500,001 frames"),
+        ({"keypoints": [*[[]] * 60_000, [[0, 0, 0]] * 900]}, "60,001 frames of 900 points"),
+        ({"frames": [{"999999999": [1, 2, 3]}]}, "1,000,000,000 points a frame"),
+    ],
+)
+def test_json_that_is_refused(content: dict, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "points.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(UserError, match=rf"points\.json: .*{words}"):
+        mrhubo.read_motion(path, RATE)
+
+
+def openpose(folder: Path, people: list[list[np.ndarray]], numbers: list[int]) -> None:
+    """Nobody has a number."""
+    for number, here in zip(numbers, people, strict=True):
+        content = [{"person_id": [-1], "pose_keypoints_3d": row_K4.ravel().tolist()} for row_K4 in here]
+        (folder / f"v_{number:012d}_keypoints.json").write_text(json.dumps({"version": 1.3, "people": content}))
+
+
+def mmpose(folder: Path, people: list[list[np.ndarray]], numbers: list[int]) -> None:
+    frames = [
+        {"frame_id": number, "instances": [{"keypoints": x[:, :3].tolist(), "keypoint_scores": [1.0] * 25} for x in here]}
+        for number, here in zip(numbers, people, strict=True)
+    ]  # fmt: skip
+    (folder / "a.json").write_text(json.dumps({"meta_info": {}, "instance_info": frames}))
+
+
+def inferencer(folder: Path, people: list[list[np.ndarray]], numbers: list[int]) -> None:
+    """MMPose's as its inferencer writes it: a list, with boxes in the picture, of points around a hip."""
+    mmpose(folder, people, numbers)
+    frames = json.loads((folder / "a.json").read_text())["instance_info"]
+    for frame in frames:
+        for one in frame["instances"]:
+            x, y = 100 * one["keypoints"][9][0], 500
+            one["bbox"] = [[x, y, x + 100, y + 200]]
+            one["keypoints"] = (np.array(one["keypoints"]) - one["keypoints"][9]).tolist()
+    (folder / "a.json").write_text(json.dumps(frames))
+
+
+@pytest.mark.parametrize("write", [openpose, mmpose, inferencer])
+def test_people_without_numbers_are_followed(
+    write, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """Two people three metres apart, of whom now one and now the other comes first; one stands still."""
+    row_TK4 = np.pad(array_of(points, SETS["OpenPose's BODY_25"]), ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
+    still_TK4 = row_TK4[[0] * FRAMES] + [3, 0, 0, 0]
+    people = [[a, b][:: 1 if t % 2 else -1] for t, (a, b) in enumerate(zip(row_TK4, still_TK4, strict=True))]
+    write(tmp_path, people, list(range(FRAMES)))
+    path = tmp_path if write is openpose else tmp_path / "a.json"
+    for person, truth in (("1", pose), ("0", pose[[0] * FRAMES])):
+        found = mrhubo.read_motion(path, ReadOptions(rate=30.0, person=person))
+        assert bone_error(found, truth) < 0.01 and "does not say who is who" in found.notes[0]
+    assert f"'0' ({FRAMES} frames), '1' ({FRAMES} frames)" in mrhubo.read_motion(path, RATE).notes[1]
+
+
+@pytest.mark.parametrize("write", [openpose, mmpose])
+def test_gaps_between_numbers_of_frames_stay(write, points: dict[str, np.ndarray], tmp_path: Path) -> None:
+    row_TK4 = np.pad(array_of(points, SETS["OpenPose's BODY_25"]), ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
+    write(tmp_path, [[row] for row in row_TK4], [*range(10), *range(60, 70)])
+    found = mrhubo.read_motion(tmp_path if write is openpose else tmp_path / "a.json", RATE)
+    assert len(found) == 70 and found.confidence_TJ is not None
+    elbow_T = found.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")]
+    assert (elbow_T == 0).nonzero().flatten().tolist() == list(range(10, 60))
+
+
+def test_files_of_frames_are_in_the_order_of_their_numbers(
+    points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    for frame, row in enumerate(array_of(points, SETS["OpenPose's BODY_25"])):
+        name = f"frame{5 * frame}_keypoints3d.json"
+        (tmp_path / name).write_text(json.dumps([{"id": 0, "keypoints3d": row.tolist()}]))
+    found = mrhubo.read_motion(tmp_path, RATE)
+    assert len(found) == FRAMES and bone_error(found, pose) < 0.01
+    (tmp_path / "copy5_keypoints3d.json").write_bytes((tmp_path / "frame5_keypoints3d.json").read_bytes())
+    with pytest.raises(UserError, match=f"{tmp_path.name}: .*same number"):
+        mrhubo.read_motion(tmp_path, RATE)
