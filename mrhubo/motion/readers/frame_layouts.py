@@ -11,6 +11,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
+from mrhubo.files.values import name_of
 from mrhubo.motion.readers.linking import LINKED, link_in
 from mrhubo.motion.readers.rotations import Form, find_form
 from mrhubo.motion.readers.smpl_names import named_tracks, people_in
@@ -44,18 +45,20 @@ def read_phalp(tree: Tree) -> Layout | None:
             raise UserError(
                 f"{frame.named}: has {len(people)} bodies, and numbers of tracks for another number of people"
             )
-        old = (
-            [float(age.array()) > 0 for age in ages]
-            if ages is not None and len(ages) == len(ids)
-            else [False] * len(ids)
-        )
+        old = [age.number() > 0 for age in ages] if ages is not None and len(ages) == len(ids) else [False] * len(ids)
         time = frame.get("time")
-        place = number if time is None or time.shape() != () else int(time.array())
+        place = number if time is None or time.shape() is None else int(time.number())
         for person, body, is_old in zip(ids, people, old, strict=True):
             if not is_old and body.is_mapping:
-                seen.setdefault(f"{float(person.array()):g}", []).append((place, body))
+                seen.setdefault(_name(person), []).append((place, body))
     tracks = [Track(person, len(found), _phalp_reader(found)) for person, found in seen.items()]
     return Layout(Kind("4D-Humans or PHALP", "smpl", CAMERAS), tracks)
+
+
+def _name(person: Tree) -> str:
+    """What a person is called, by a text or a number."""
+    text = person.text()
+    return text if text is not None else str(name_of(person.number()))
 
 
 def _phalp_reader(found: list[tuple[int, Tree]]) -> Callable[[], SmplArrays]:
