@@ -103,6 +103,11 @@ class Tree:
         return isinstance(self._value, list | tuple)
 
     @property
+    def is_none(self) -> bool:
+        """Whether it is Python's `None`, JSON's `null`."""
+        return self._value is None
+
+    @property
     def keys(self) -> tuple[str, ...]:
         """Of a dictionary, as texts; none of anything else."""
         return tuple(name for name, _ in self._entries())
@@ -195,7 +200,7 @@ class Tree:
         if isinstance(self._value, RecordedObject):
             shape = self.shape()
             return f"an array of shape {shape}" if shape is not None else f"an object '{shortened(self._value.kind)}'"
-        return f"a {type(self._value).__name__}"
+        return "None" if self.is_none else f"a {type(self._value).__name__}"
 
     def _child(self, name: str, value: Any) -> Tree:
         return Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else shortened(name, 40))
@@ -214,7 +219,9 @@ class Tree:
         return made[id(value)]
 
     def _make(self, value: Any, deepest: int) -> np.ndarray:
-        if isinstance(value, bool | int | float):
+        if isinstance(value, bool):
+            return np.array(value)
+        if isinstance(value, int | float):
             return np.array(to_float(value, self.named))
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
             return value

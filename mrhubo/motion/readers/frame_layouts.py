@@ -13,8 +13,8 @@ from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.files.values import name_of
 from mrhubo.motion.readers.linking import LINKED, link_in
+from mrhubo.motion.readers.people import people_in
 from mrhubo.motion.readers.rotations import Form, find_form
-from mrhubo.motion.readers.smpl_names import named_tracks, people_in
 from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import CAMERAS
 
@@ -86,8 +86,8 @@ def read_romp(tree: Tree) -> Layout | None:
     kind = Kind("ROMP or BEV", "smpl", CAMERAS)
     tracked = tree.get("sequence_results")
     people = None if tracked is None else people_in(tracked)
-    if tracked is not None and people:
-        return Layout(kind, named_tracks(people))
+    if people is not None:
+        return Layout(kind, people.tracks, people.notes)
     frames = [results] if "smpl_thetas" in results.keys else [frame for _, frame in results.items()]
     if not frames or not any("smpl_thetas" in frame.keys for frame in frames):
         return None

@@ -18,7 +18,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
-from mrhubo.files.tree import read_tree
+from mrhubo.files.tree import read_tree, tree_of
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import (
     CONFIDENCE_KEYS,
@@ -29,7 +29,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
     in_npz,
 )
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import RATE_KEYS
+from mrhubo.motion.readers.rate import rate_in
 
 _POSE_KEYS = {
     "poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa",
@@ -71,13 +71,13 @@ def read_keypoints_file(path: Path, options: ReadOptions) -> Keypoints:
 
 
 def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
-    names = confidence = rate = None
+    names, confidence, whole = None, None, value
     where = "the list"
     if isinstance(value, dict) and isinstance(value.get("instance_info"), list):
         return _from_mmpose(path, value, options)
     if isinstance(value, dict):
-        names, confidence, rate = (
-            next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS, RATE_KEYS)
+        names, confidence = (
+            next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS)
         )
         key = next((key for key in (*POINT_KEYS, "frames", "data") if key in value), None)
         if key is None:
@@ -102,8 +102,8 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     found.names = [str(name) for name in (names if isinstance(names, list) else given or [])] or None
     if confidence is not None:
         found.confidence_TK = _numbers(path, confidence, "'confidence'")
-    if rate is not None:
-        found.rate = float(_numbers(path, rate, "the frame rate").reshape(-1)[0])
+    told = rate_in(tree_of(whole, path, ""), found.notes)
+    found.rate = None if told is None else told[1]
     return found
 
 
@@ -160,7 +160,7 @@ def _from_mmpose(path: Path, value: dict[str, Any], options: ReadOptions) -> Key
             found.confidence_TK = np.stack(rows)
     names = value.get("meta_info", {}).get("keypoint_id2name") if isinstance(value.get("meta_info"), dict) else None
     if isinstance(names, dict) and len(names) == shape[1]:
-        order = sorted(names, key=lambda key: int(key) if str(key).isdigit() else 0)
+        order = sorted(names, key=lambda key: int(key[:9]) if key.isdecimal() else 0)
         found.names = [str(names[key]) for key in order]
     found.where = f"'instance_info', person '{shortened(person, 30)}'"
     if len(people) > 1:

@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from mrhubo.errors import UserError, nearest, shortened
+from mrhubo.files.tree import Tree
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import (
@@ -71,6 +72,8 @@ class Track(Person):
 
     read: Callable[[], SmplArrays]
     """Reads what the file has of them."""
+    homes: tuple[Tree, ...] = ()
+    """Dictionaries that are theirs, which may tell the frame rate."""
 
 
 @dataclass(frozen=True)
