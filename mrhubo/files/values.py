@@ -38,10 +38,7 @@ def name_of(key: Any) -> str | None:
             return None
     if isinstance(key, float) and math.isfinite(key) and key == int(key):
         key = int(key)
-    try:
-        return str(key) if isinstance(key, str | int | float) else None
-    except ValueError:  # Python writes no number of thousands of digits
-        return None
+    return str(key) if isinstance(key, str | int | float) else None
 
 
 def to_float(number: float, named: str) -> float:

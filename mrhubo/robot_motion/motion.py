@@ -213,7 +213,8 @@ def _array(name: str, given: Any, shape: tuple[int, ...], kind: type) -> np.ndar
 
 
 def _rate(given: Any) -> float:
-    rate = _float(given) if isinstance(given, int | float | np.number) and not isinstance(given, bool) else math.nan
+    is_real = isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool)
+    rate = _float(given) if is_real else math.nan
     if not 0 < rate < math.inf:
         raise UserError(f"frame_rate must be a positive number of frames per second, found {shortened(given)}")
     return rate

@@ -47,7 +47,7 @@ def read_phalp(tree: Tree) -> Layout | None:
             )
         old = [age.number() > 0 for age in ages] if ages is not None and len(ages) == len(ids) else [False] * len(ids)
         time = frame.get("time")
-        place = number if time is None or time.shape() is None else int(time.number())
+        place = number if time is None or time.is_none or time.text() is not None else int(time.number())
         for person, body, is_old in zip(ids, people, old, strict=True):
             if not is_old and body.is_mapping:
                 seen.setdefault(_name(person), []).append((place, body))
