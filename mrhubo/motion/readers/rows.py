@@ -83,7 +83,7 @@ def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:
     row_TX = rows_TX[:, :69].astype(np.float64)
     more = (_turn(row_TX[:, 6:]) + _NEARLY_STILL) / (_turn(row_TX[:, :63]) + _NEARLY_STILL)
     stands = _stands(row_TX[:, :3], row_TX[:, 3:6])
-    if more < (_CLEARLY if stands else 1.0):
+    if not np.isfinite(more) or more < (_CLEARLY if stands else 1.0):  # who reads them says what is not finite
         return True
     if more > _CLEARLY and not stands:
         return False

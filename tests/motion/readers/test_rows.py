@@ -83,6 +83,13 @@ def test_who_lies_on_the_floor_is_still_phumas(tmp_path: Path) -> None:
     assert read(tmp_path / "a.npy", phuma(Rotation.identity(), height=0.1)).source.startswith("PHUMA")
 
 
+def test_numbers_that_are_not_finite_are_named(tmp_path: Path) -> None:
+    rows = phuma(Z_UP)
+    rows[3, 40] = np.nan
+    with pytest.raises(UserError, match="'rows' is not finite in frame 3"):
+        read(tmp_path / "a.npy", rows)
+
+
 def test_rows_that_may_be_either_are_refused(tmp_path: Path) -> None:
     """Somebody in a T-pose; and one whose thigh is turned outward so far that its numbers could be a pelvis' place."""
     turned_out = np.column_stack((walk().reshape(FRAMES, 63), np.zeros((FRAMES, 6))))
