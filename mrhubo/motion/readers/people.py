@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 
 from mrhubo.errors import listed, shortened
 from mrhubo.files.tree import Tree
-from mrhubo.motion.readers.smpl_names import Found, find_here, first_entries, search, without_world
+from mrhubo.motion.readers.smpl_names import Found, find_here, first_entries, search, without_world, words_of
 from mrhubo.motion.readers.tracks import Track
 
-_BESIDE = re.compile(
-    r"camera|cam(_|\b)|intrinsic|extrinsic|meta|info|config|setting|args|scene|video|output", re.IGNORECASE
-)
-"""In names of what lies beside people, and is nobody."""
+_BESIDE = {
+    "camera",
+    "cameras",
+    "cam",
+    "intrinsics",
+    "extrinsics",
+    "meta",
+    "metadata",
+    "info",
+    "config",
+    "settings",
+    "args",
+}
+"""Words in names of what lies beside people, and is nobody."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,8 @@ def people_in(node: Tree) -> People | None:
     entries = list(node.items())
     people = tuple(_holders(entries))
     names = {name for name, _ in people}
-    others = [name for name, child in entries if child.is_mapping and name not in names and not _BESIDE.search(name)]
+    rest = [name for name, child in entries if child.is_mapping and name not in names]
+    others = [name for name in rest if not _BESIDE & set(words_of(name))]
     note = f"left out, as there are no SMPL parameters of frames in them: {shortened(listed(others), 200)}"
     return People(people, (note,) if others else ())
 

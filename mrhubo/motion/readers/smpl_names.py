@@ -165,15 +165,16 @@ def first_entries(node: Tree) -> Iterator[tuple[str, Tree]]:
 
 def without_world(name: str) -> str:
     """A name without the words that tell whether its parameters are in the world or as a camera sees them."""
-    return "_".join(word for word in _words(name) if word not in (*_WORLD, *_CAMERA))
+    return "_".join(word for word in words_of(name) if word not in (*_WORLD, *_CAMERA))
 
 
 def _rank(name: str) -> int:
-    words = _words(name)
+    words = words_of(name)
     if any(word in words for word in _WORLD):
         return 0
     return 2 if any(word in words for word in _CAMERA) else 1
 
 
-def _words(name: str) -> list[str]:
-    return re.findall(r"[^\W_]+", name.lower())
+def words_of(name: str) -> list[str]:
+    """The words of a name in small letters: of `smpl_params-incam` and `smplParamsIncam` the same."""
+    return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower())

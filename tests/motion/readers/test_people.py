@@ -36,6 +36,7 @@ def read(path: Path, content: Any, person: str | None = None) -> Motion:
         {"camera": {"fx": np.array(500.0)}},
         {"meta": {"fps": None, "bodies": [1, 2]}},
         {"someone": {"pose": np.zeros(72)}},
+        {"someone's webcam": {"pose": np.zeros(72)}},
         {"nobody": {"pose": np.zeros((0, 72))}},
         {"empty": {}, "none": None, "text": "x", "fps": 30},
         {"deeper": {"gt": body(9)}},
@@ -46,7 +47,7 @@ def test_an_odd_entry_hides_nobody(tmp_path: Path, odd: dict[str, Any]) -> None:
         motion = read(tmp_path / "a", content)
         said = " ".join(motion.notes)
         assert len(motion) == 6 and "'run' (6 frames)" in said and "'walk' (4 frames)" in said
-        assert ("left out, as" in said) == bool({"someone", "deeper", "empty"} & set(odd))
+        assert ("left out, as" in said) == bool({"someone", "someone's webcam", "deeper", "empty"} & set(odd))
         assert len(read(tmp_path / "a", content, "walk")) == 4
         with pytest.raises(UserError, match="no person 'Bob'; there are 'run'"):
             read(tmp_path / "a", content, "Bob")
@@ -65,7 +66,12 @@ def test_one_person_in_the_world_and_as_a_camera_sees_them_is_one(tmp_path: Path
     parts = {"smpl_params_incam": body(4), "smpl_params_global": body(5)}
     motion = read(tmp_path / "a", {"net_outputs": {"decode": body(6), **parts}, **parts})
     assert len(motion) == 5 and motion.source.startswith("GVHMR, 'smpl_params_global")
-    for names in (("cam", "world"), ("smplx_cam", "smplx_world"), ("smplx-camera", "smplx")):
+    for names in (
+        ("cam", "world"),
+        ("smplx_cam", "smplx_world"),
+        ("smplx-camera", "smplx"),
+        ("paramsIncam", "paramsGlobal"),
+    ):
         content = {name: body(n + 4) for n, name in enumerate(names)}
         assert len(read(tmp_path / "a", {1: {"frames": np.arange(5), **content}, 2: {"smplx_world": body(2)}})) == 5
         assert len(read(tmp_path / "a", content)) == 5
