@@ -17,14 +17,15 @@ import numpy as np
 
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.array_pickle import MODULES, load_pickle, steps_of
-from mrhubo.files.checkpoint import SAVE_ANEW, is_old_torch, read_torch, to_tensor
+from mrhubo.files.checkpoint import SAVE_ANEW, is_old_torch, read_torch
 from mrhubo.files.joblib_stream import Later
 from mrhubo.files.npz import open_npz, read_member
 from mrhubo.files.packed import is_packed, open_unpacked
 from mrhubo.files.records import RecordedObject, UnreadablePickle
 from mrhubo.files.regular import MAX_BYTES as MAX_FILE
 from mrhubo.files.regular import check_regular, naming, open_regular
-from mrhubo.files.safe_pickle import MAX_BYTES, to_array, to_number
+from mrhubo.files.safe_pickle import MAX_BYTES
+from mrhubo.files.values import from_record, name_of, to_float, unwrapped
 
 _MAX_MADE = 2**26
 """Numbers that lists of arrays are put together to, in one file."""
@@ -79,7 +80,7 @@ class Tree:
     @cached_property
     def _value(self) -> Any:
         given = self._given
-        return _unwrapped(self._source.member(given.key) if isinstance(given, _Member) else given)
+        return unwrapped(self._source.member(given.key) if isinstance(given, _Member) else given)
 
     @property
     def path(self) -> Path:
@@ -100,6 +101,11 @@ class Tree:
     def is_list(self) -> bool:
         """Whether it is a list or a tuple, or an array of objects."""
         return isinstance(self._value, list | tuple)
+
+    @property
+    def is_none(self) -> bool:
+        """Whether it is Python's `None`, JSON's `null`."""
+        return self._value is None
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -149,6 +155,20 @@ class Tree:
         except UserError:
             return None
 
+    def number(self) -> float:
+        """The number that it is, or that an array of one number holds.
+
+        Raises:
+            UserError: it is none, or NaN or infinite.
+        """
+        array = self.array()
+        if array.size != 1:
+            raise UserError(f"{self.named} has shape {array.shape}; expected one number")
+        number = float(array.reshape(()))
+        if not math.isfinite(number):
+            raise UserError(f"{self.named} is {number:g}; expected a number")
+        return number
+
     def find_array(self, *names: str) -> np.ndarray | None:
         """The array under the first of some keys that there is; None where there is none, or it is no array."""
         found = self.get(*names)
@@ -180,7 +200,7 @@ class Tree:
         if isinstance(self._value, RecordedObject):
             shape = self.shape()
             return f"an array of shape {shape}" if shape is not None else f"an object '{shortened(self._value.kind)}'"
-        return f"a {type(self._value).__name__}"
+        return "None" if self.is_none else f"a {type(self._value).__name__}"
 
     def _child(self, name: str, value: Any) -> Tree:
         return Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else shortened(name, 40))
@@ -188,7 +208,7 @@ class Tree:
     def _entries(self) -> Iterator[tuple[str, Any]]:
         if isinstance(self._value, dict):
             for key, value in self._value.items():
-                name = _name(key)
+                name = name_of(key)
                 if name is not None:
                     yield name, value
 
@@ -199,19 +219,21 @@ class Tree:
         return made[id(value)]
 
     def _make(self, value: Any, deepest: int) -> np.ndarray:
-        if isinstance(value, bool | int | float):
-            return np.array(float(value))
+        if isinstance(value, bool):
+            return np.array(value)
+        if isinstance(value, int | float):
+            return np.array(to_float(value, self.named))
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
             return value
         if isinstance(value, Later):
             return value.read(self.path)
         if isinstance(value, RecordedObject):
-            return _from_record(value, self._source.storages, self.named)
+            return from_record(value, self._source.storages, self.named)
         if not self.is_list or not len(self):
             raise UserError(f"{self.named} is {self.described}; expected an array")
         self._source.count(len(value))
         if all(isinstance(number, int | float) for number in value):
-            return np.array([float(number) for number in value])
+            return np.array([to_float(number, self.named) for number in value])
         if deepest == 0:
             raise UserError(f"{self.named} is a list of lists, more than {_DEEPEST} deep")
         arrays = [child._array(deepest - 1) for child in self]
@@ -221,6 +243,11 @@ class Tree:
             raise UserError(f"{self.named} is a list of arrays of different shapes: {found}")
         self._source.count(len(arrays) * arrays[0].size)
         return np.stack(arrays)
+
+
+def tree_of(value: Any, path: Path, where: str) -> Tree:
+    """The node of something that was read of a file already, and where in that it is."""
+    return Tree(value, _Source(path), where)
 
 
 def read_tree(path: Path) -> Tree:
@@ -255,39 +282,3 @@ def _read_zip(path: Path) -> Tree:
         return Tree({key: _Member(key) for key in keys}, _Source(path))
     content, storages = read_torch(path, MODULES, steps_of(check_regular(path)))
     return Tree(content, _Source(path, storages))
-
-
-def _unwrapped(value: Any) -> Any:
-    """An array of objects as the list of them, and one that holds a single object without axes as that object."""
-    for _ in range(_DEEPEST):
-        is_array = isinstance(value, RecordedObject) and type(value).__name__ == "_reconstruct"
-        state = value.state if is_array else None
-        if not (isinstance(state, tuple) and len(state) == 5 and isinstance(state[4], list)):
-            return value
-        value = state[4][0] if state[1] == () and len(state[4]) == 1 else state[4]
-    return value
-
-
-def _name(key: Any) -> str | None:
-    """A dictionary's key as a text; None where it is neither text nor a number."""
-    if isinstance(key, bytes):
-        key = key.decode("latin1")
-    if isinstance(key, RecordedObject):
-        try:
-            key = to_number(key)
-        except UserError:
-            return None
-    if isinstance(key, float) and math.isfinite(key) and key == int(key):
-        key = int(key)
-    return str(key) if isinstance(key, str | int | float) else None
-
-
-def _from_record(value: RecordedObject, storages: dict[str, bytes], named: str) -> np.ndarray:
-    try:
-        if value.module.startswith("torch"):
-            return to_tensor(value, storages).numpy()
-        if type(value).__name__ == "scalar":
-            return np.array(to_number(value))
-        return to_array(value)
-    except UserError as error:
-        raise UserError(f"{named}: {error}") from error

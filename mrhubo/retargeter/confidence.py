@@ -179,7 +179,7 @@ class ConfidenceModel:
         try:
             content = json.loads(text)
             model = cls(float(content["usual_phi"]), _weights(content["moving"]), _weights(content["still"]))
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except (ValueError, OverflowError, TypeError, KeyError, AttributeError) as error:
             raise UserError("the confidence's weights are none that this version reads") from error
         numbers = [model.usual_phi, *asdict(model.moving).values(), *asdict(model.still).values()]
         lowest = [value for w in (model.moving, model.still) for name, value in asdict(w).items() if name in SIGNALS]

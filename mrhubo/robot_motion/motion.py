@@ -50,6 +50,14 @@ class FollowingJoint:
     multiplier: float = 0.0
     offset: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Raises a UserError where multiplier or offset is no finite number."""
+        for name in ("multiplier", "offset"):
+            number = _float(getattr(self, name))
+            if not math.isfinite(number):
+                raise UserError(f"joint '{shortened(self.name)}' has a {name} that is no finite number")
+            object.__setattr__(self, name, number)
+
 
 @dataclass(frozen=True, eq=False)
 class RobotFacts:
@@ -205,6 +213,16 @@ def _array(name: str, given: Any, shape: tuple[int, ...], kind: type) -> np.ndar
 
 
 def _rate(given: Any) -> float:
-    if isinstance(given, bool) or not isinstance(given, int | float | np.number) or not 0 < given < math.inf:
+    is_real = isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool)
+    rate = _float(given) if is_real else math.nan
+    if not 0 < rate < math.inf:
         raise UserError(f"frame_rate must be a positive number of frames per second, found {shortened(given)}")
-    return float(given)
+    return rate
+
+
+def _float(given: Any) -> float:
+    """A number as a float; NaN where it is none, or a whole number that is longer than any float."""
+    try:
+        return float(given)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan

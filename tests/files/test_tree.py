@@ -90,6 +90,34 @@ def test_what_torch_and_numpy_save(tmp_path: Path) -> None:
     check(found["all"])
 
 
+@pytest.mark.parametrize("value", [10**400, [10**400], [[0.5], [-(10**400)]]])
+def test_whole_numbers_that_no_float_is_as_large_as(tmp_path: Path, value: Any) -> None:
+    (tmp_path / "a.pkl").write_bytes(pickle.dumps({"pose": value}))
+    found = read_tree(tmp_path / "a.pkl")
+    assert found["pose"].shape() is None
+    with pytest.raises(UserError, match=r"a\.pkl: 'pose.*' holds a whole number of more than 300 digits"):
+        found["pose"].array()
+
+
+def test_one_finite_number(tmp_path: Path) -> None:
+    given = {"a": 3, "b": [[4.5]], "c": np.float32(2), "d": np.array([1])}
+    bad = {
+        "nan": np.nan,
+        "inf": -np.inf,
+        "two": [1, 2],
+        "none": None,
+        "text": "1",
+        "empty": np.zeros(0),
+        "huge": 10**400,
+    }
+    (tmp_path / "a.pkl").write_bytes(pickle.dumps({**given, **bad}))
+    found = read_tree(tmp_path / "a.pkl")
+    assert [found[name].number() for name in given] == [3, 4.5, 2, 1]
+    for name in bad:
+        with pytest.raises(UserError, match=rf"a\.pkl: '{name}' (is|has|holds) "):
+            found[name].number()
+
+
 def test_bytes_beyond_the_end_are_told(tmp_path: Path) -> None:
     path = tmp_path / "a.pkl"
     joblib.dump({"pose": np.zeros((100, 72))}, path)

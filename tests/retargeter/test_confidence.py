@@ -68,7 +68,7 @@ def test_it_is_told_in_a_header() -> None:
 @pytest.mark.parametrize(
     ("path", "value"),
     [(("usual_phi",), 0.0), (("usual_phi",), "much"), (("moving", "miss"), -1.0), (("still", "shake"), math.nan),
-     (("moving", "certain"), math.inf), (("moving", "other"), 1.0), (("still",), 3)],
+     (("usual_phi",), 10**400), (("moving", "certain"), math.inf), (("moving", "other"), 1.0), (("still",), 3)],
 )  # fmt: skip
 def test_wrong_headers_are_refused(path: tuple[str, ...], value: object) -> None:
     content = json.loads(STANDARD.to_json())

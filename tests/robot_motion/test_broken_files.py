@@ -92,6 +92,7 @@ class Hostile:
         (json_with(q="x"), "'q' holds no array of numbers"),
         (json_with(joint_names="a"), "'joint_names' holds a, which is not what belongs there"),
         (json_with(frame_rate="30"), "'frame_rate' holds 30"),
+        (json_with(frame_rate=10**400), "frame_rate must be a positive number"),
         (b'{"q": ' + b"[" * 100_000, "is no JSON: RecursionError"),
         (b'{"joint_names": ["a"]}', "'q' is missing"),
         (b"time [s],a\n0,1\n", "no column is named 'JOINT \\[rad\\]'"),

@@ -29,6 +29,8 @@ Q = [[0.0, 1.0], [2.0, 3.0]]
         ({"frame_rate": 0.0}, "frame_rate must be a positive number"),
         ({"frame_rate": np.inf}, "frame_rate must be a positive number"),
         ({"frame_rate": True}, "frame_rate must be a positive number"),
+        ({"frame_rate": 10**400}, "frame_rate must be a positive number .* found 1000"),
+        ({"frame_rate": np.complex64(1)}, "frame_rate must be a positive number"),
         ({"confidence": [1.0]}, r"confidence has shape \(1,\); expected \(2,\)"),
         ({"branch_confidence": [[1.0], [1.0]]}, r"branch_confidence has shape \(2, 1\); expected \(2, 0\)"),
         ({"root_position": np.zeros((2, 3))}, "go together"),
@@ -41,6 +43,13 @@ Q = [[0.0, 1.0], [2.0, 3.0]]
 def test_what_does_not_fit_together_is_refused(fields: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         RobotMotion(**({"q": Q, "joint_names": ("a", "b")} | fields))
+
+
+@pytest.mark.parametrize("number", [np.nan, -np.inf, 10**400, "x"])
+@pytest.mark.parametrize("name", ["multiplier", "offset"])
+def test_what_follows_does_so_by_a_finite_number(name: str, number: Any) -> None:
+    with pytest.raises(UserError, match=f"joint 'c' has a {name} that is no finite number"):
+        FollowingJoint("c", "a", **{name: number})
 
 
 def test_a_pose_becomes_a_motion_of_one_frame_and_several_motions_none() -> None:

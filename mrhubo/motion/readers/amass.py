@@ -12,13 +12,14 @@ Legend: T frames, X numbers of a row.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
+from mrhubo.files.tree import Tree, tree_of
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.readers.assemble import (
     BLOCK,
@@ -33,7 +34,7 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.family import find_family
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import find_rate
+from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.world import WORLDS
 from mrhubo.motion.writers.amass import CONTACT_KEY
@@ -85,7 +86,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
     notes: list[str] = []
     with open_npz(path) as file:
         key, form, local_TJ33 = _read_pose(file)
-        frame_rate = find_rate(path, file.keys, partial(file.read, max_bytes=_MAX_SMALL), options, notes)
+        frame_rate = find_rate(path, [_rates(file)], options, notes)
         description = _read_description(file, notes)
         root_rotation_T33, root_position_T3 = _read_root(file, key, form, len(local_TJ33), notes)
         betas = _read_betas(file, notes)
@@ -122,6 +123,18 @@ def _read_pose(file: NpzFile) -> tuple[str, Form, np.ndarray]:
         raise UserError(f"{path}: '{key}' has shape {shape}; expected {expected}, or matrices (frames, joints, 3, 3)")
     first = 0 if key == "pose_body" else 1
     return key, form, read_local(path, key, shape[0], _blocks(file, key), form, first)
+
+
+def _rates(file: NpzFile) -> Tree:
+    """What may tell the frame rate; `None` in place of what cannot be read, or is pickled."""
+    told: dict[str, Any] = {}
+    for key in RATE_KEYS:
+        if key in file.keys:
+            try:
+                told[key] = file.read_any(key, lambda _: None, _MAX_SMALL)
+            except UserError:
+                told[key] = None
+    return tree_of(told, file.path, "")
 
 
 def _blocks(file: NpzFile, key: str) -> Iterator[tuple[int, np.ndarray]]:

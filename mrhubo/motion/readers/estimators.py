@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,11 @@ from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import RATE_KEYS, asked_rate, find_rate
+from mrhubo.motion.readers.people import holds_parameters
+from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rows import read_rows
 from mrhubo.motion.readers.sam3d import read_sam3d
+from mrhubo.motion.readers.smpl_names import first_entries
 from mrhubo.motion.readers.soma import read_soma
 from mrhubo.motion.readers.tracks import choose, motion_of
 
@@ -55,7 +57,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
     tree = read_tree(path)
 
     def rate(notes: list[str]) -> float:
-        return _rate(path, tree, options, notes)
+        return find_rate(path, (tree, *(child for _, child in first_entries(tree))), options, notes)
 
     found = (
         read_rows(tree, options)
@@ -63,10 +65,10 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         or read_soma(tree, rate)
         or read_sam3d(tree, options, rate)
     )
-    return found or _read_smpl(path, tree, options, rate)
+    return found or _read_smpl(path, tree, options)
 
 
-def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[list[str]], float]) -> Motion:
+def _read_smpl(path: Path, tree: Tree, options: ReadOptions) -> Motion:
     layout = find_layout(tree)
     points = points_in(tree, options) if layout is None else None
     if points is not None:
@@ -84,12 +86,13 @@ def _read_smpl(path: Path, tree: Tree, options: ReadOptions, rate: Callable[[lis
     arrays = track.read()
     if layout.camera_beside:
         arrays = in_world(path, arrays, notes)
-    return motion_of(path, arrays, layout.kind, rate(notes), notes)
+    rate = find_rate(path, (*track.homes, *_whole(tree)), options, notes)
+    return motion_of(path, arrays, layout.kind, rate, notes)
 
 
-def _rate(path: Path, tree: Tree, options: ReadOptions, notes: list[str]) -> float:
-    """Frames per second, as the file says on its first or second level."""
-    for node in (tree, *(child for _, child in list(tree.items())[:1] if child.is_mapping)):
-        if set(RATE_KEYS) & set(node.keys):
-            return find_rate(path, node.keys, lambda key, node=node: node[key].array(), options, notes)
-    return asked_rate(path, options)
+def _whole(tree: Tree) -> Iterator[Tree]:
+    """Dictionaries that may tell what goes for all: the file's own, and those in it, but none of a person."""
+    yield tree
+    for _, child in first_entries(tree):
+        if child.is_mapping and not holds_parameters(child):
+            yield child

@@ -11,10 +11,11 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
+from mrhubo.files.values import name_of
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in, in_order
 from mrhubo.motion.readers.linking import LINKED, link_in
+from mrhubo.motion.readers.people import people_in
 from mrhubo.motion.readers.rotations import Form, find_form
-from mrhubo.motion.readers.smpl_names import named_tracks, people_in
 from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import CAMERAS
 
@@ -46,16 +47,12 @@ def read_phalp(tree: Tree) -> Layout | None:
             raise UserError(
                 f"{frame.named}: has {len(people)} bodies, and numbers of tracks for another number of people"
             )
-        old = (
-            [float(age.array()) > 0 for age in ages]
-            if ages is not None and len(ages) == len(ids)
-            else [False] * len(ids)
-        )
+        old = [age.number() > 0 for age in ages] if ages is not None and len(ages) == len(ids) else [False] * len(ids)
         time = frame.get("time")
-        times.append(None if time is None or time.shape() != () else int(time.array()))
+        times.append(None if time is None or time.is_none or time.text() is not None else int(time.number()))
         for person, body, is_old in zip(ids, people, old, strict=True):
             if not is_old and body.is_mapping:
-                seen.setdefault(f"{float(person.array()):g}", []).append((number, body))
+                seen.setdefault(_name(person), []).append((number, body))
     told = [time for time in times if time is not None]
     frames = told if len(told) == len(times) else frame_numbers_in(tree.path, tree.keys)
     tracks = [
@@ -63,6 +60,12 @@ def read_phalp(tree: Tree) -> Layout | None:
         for person, found in seen.items()
     ]
     return Layout(Kind("4D-Humans or PHALP", "smpl", CAMERAS), tracks)
+
+
+def _name(person: Tree) -> str:
+    """What a person is called, by a text or a number."""
+    text = person.text()
+    return text if text is not None else str(name_of(person.number()))
 
 
 def _phalp_reader(found: list[tuple[int, Tree]]) -> Callable[[], SmplArrays]:
@@ -90,8 +93,8 @@ def read_romp(tree: Tree) -> Layout | None:
     kind = Kind("ROMP or BEV", "smpl", CAMERAS)
     tracked = tree.get("sequence_results")
     people = None if tracked is None else people_in(tracked)
-    if tracked is not None and people:
-        return Layout(kind, named_tracks(people))
+    if people is not None:
+        return Layout(kind, people.tracks, people.notes)
     named = [("", results)] if "smpl_thetas" in results.keys else list(results.items())
     if not any("smpl_thetas" in frame.keys for _, frame in named):
         return None

@@ -14,11 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mrhubo.errors import listed, shortened
 from mrhubo.files.npz import open_npz
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import RATE_KEYS
+from mrhubo.motion.readers.rate import rate_in
 from mrhubo.motion.readers.tracks import Person, choose
 
 POINT_KEYS = (
@@ -88,9 +89,17 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
     people = {name: child for name, child in tree.items() if set(POINT_KEYS) & set(child.keys)}
     if not people:
         return None
-    tracks = [Person(name, len(child[_key(child)].array())) for name, child in people.items()]
+    shapes = {name: child[_key(child)].shape() for name, child in people.items()}
+    tracks = [Person(name, shape[0]) for name, shape in shapes.items() if shape is not None and len(shape) > 2]
+    if not tracks:  # says what the first is
+        return _named_in(next(iter(people.values())))
     notes: list[str] = []
+    if len(tracks) < len(people):
+        others = set(people) - {track.person for track in tracks}
+        notes.append(f"left out, as there are no points of frames in them: {shortened(listed(others), 200)}")
     found = _named_in(people[choose(path, tracks, options, notes).person])
+    if found.rate is None and (told := rate_in(tree, found.notes)) is not None:
+        found.rate = told[1]
     found.notes += notes
     return found
 
@@ -111,11 +120,12 @@ def _in_node(path: Path, node: Tree) -> Keypoints:
     key = _key(node)
     point_TK3, confidence_TK = _split(path, node[key].array(), f"'{key}'")
     found = Keypoints(point_TK3, confidence_TK=confidence_TK, where=f"'{key}'")
-    confidence, rate = (node.get(*keys) for keys in (CONFIDENCE_KEYS, RATE_KEYS))
+    given = (node.find_array(key) for key in CONFIDENCE_KEYS)
+    confidence = next((array for array in given if array is not None and array.ndim), None)
     if confidence is not None:
-        found.confidence_TK = np.asarray(confidence.array(), dtype=np.float64)
-    if rate is not None and rate.array().size == 1:
-        found.rate = float(rate.array().reshape(()))
+        found.confidence_TK = np.asarray(confidence, dtype=np.float64)
+    told = rate_in(node, found.notes)
+    found.rate = None if told is None else told[1]
     return found
 
 

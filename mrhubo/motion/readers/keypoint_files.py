@@ -21,7 +21,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
-from mrhubo.files.tree import read_tree
+from mrhubo.files.tree import read_tree, tree_of
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import (
@@ -33,7 +33,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
     in_npz,
 )
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import RATE_KEYS
+from mrhubo.motion.readers.rate import rate_in
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
 
 _POSE_KEYS = {
@@ -75,15 +75,15 @@ def read_keypoints_file(path: Path, options: ReadOptions) -> Keypoints:
 
 
 def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
-    names = confidence = rate = None
+    names, confidence, whole = None, None, value
     where = "the list"
     if isinstance(value, dict) and isinstance(value.get("instance_info"), list):
         return _from_mmpose(path, "'instance_info'", value["instance_info"], value.get("meta_info"), options)
     if isinstance(value, list) and value and all(isinstance(one, dict) and "instances" in one for one in value):
         return _from_mmpose(path, where, value, None, options)
     if isinstance(value, dict):
-        names, confidence, rate = (
-            next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS, RATE_KEYS)
+        names, confidence = (
+            next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS)
         )
         key = next((key for key in (*POINT_KEYS, "frames", "data") if key in value), None)
         if key is None:
@@ -98,11 +98,8 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     found = _placed(path, where, rows, [str(name) for name in names] if isinstance(names, list) else None)
     if confidence is not None:
         found.confidence_TK = _numbers(path, confidence, "'confidence'")
-    if rate is not None:
-        rates = _numbers(path, rate, "the frame rate")
-        if rates.size != 1:
-            raise UserError(f"{path}: the frame rate has shape {rates.shape}; expected one number")
-        found.rate = float(rates.reshape(()))
+    told = rate_in(tree_of(whole, path, ""), found.notes)
+    found.rate = None if told is None else told[1]
     return found
 
 

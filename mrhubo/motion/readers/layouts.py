@@ -12,7 +12,8 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_frame_list, read_phalp, read_romp
-from mrhubo.motion.readers.smpl_names import Found, find_inside, named_tracks, people_in, search
+from mrhubo.motion.readers.people import has_twins, people_in
+from mrhubo.motion.readers.smpl_names import Found, find_inside, search
 from mrhubo.motion.readers.tracks import Kind, Layout
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
 
@@ -35,20 +36,14 @@ def _people(tree: Tree) -> Layout | None:
     `frames`, and `pose` (T, 165), `shape` and `trans` in `smplx_world` and `smplx_cam`
     (https://github.com/yufu-wang/PromptHMR).
     """
-    people = search(tree, people_in, deepest=1)
-    if not people:
+    people = None if has_twins(tree) else search(tree, people_in, deepest=1)
+    if people is None:
         return None
-    _, first = people[0]
-    keys, inside = set(first.node.keys), first.node is not first.outer
-    if "pose_world" in keys:
-        kind = Kind("WHAM", "smpl", ANY_WORLD)
-    elif "pred_cam" in keys or "orig_cam" in keys:
-        kind = Kind("VIBE or one of its kin", "smpl", CAMERAS)
-    else:
-        kind = _kind("SMPL parameters of people", first, first.node)
-    if inside and first.node.where.endswith(("_cam]", "_incam]")):
+    _, first = people.found[0]
+    kind = _kind("SMPL parameters of people", first, first.node)
+    if first.node is not first.outer and first.node.where.endswith(("_cam]", "_incam]")):
         kind = replace(kind, worlds=CAMERAS)
-    return Layout(kind, named_tracks(people))
+    return Layout(kind, people.tracks, people.notes)
 
 
 def _single(tree: Tree) -> Layout | None:
@@ -83,7 +78,11 @@ _FINDERS = (read_phalp, read_romp, read_frame_list, read_pymaf, read_cliff, _peo
 
 
 def _kind(source: str, found: Found, tree: Tree) -> Kind:
-    """What is known of parameters that nobody in particular wrote."""
+    """What is known of parameters: by their keys whose they are, or else by what the file says."""
+    if "pose_world" in found.node.keys:
+        return Kind("WHAM", "smpl", ANY_WORLD)
+    if {"pred_cam", "orig_cam"} & set(found.node.keys):
+        return Kind("VIBE or one of its kin", "smpl", CAMERAS)
     said = next((text for node in (found.node, tree) if (text := _said(node))), "")
     keys = {*found.node.keys, *tree.keys}
     return Kind(source, family_of(said, found.form.joints, keys), ANY_WORLD)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,5 +29,5 @@ class ReadOptions:
         """Raises a UserError where the rate is none."""
         if self.rate is not None:
             low, high = RATES
-            if not (isinstance(self.rate, int | float) and math.isfinite(self.rate) and low <= self.rate <= high):
+            if not (isinstance(self.rate, int | float) and low <= self.rate <= high):
                 raise UserError(f"the rate is {self.rate} frames per second; expected {low:g} to {high:g}")

@@ -2,44 +2,89 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import math
+from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
+from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.options import RATES, ReadOptions
 
 RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "fps")
 """What files call it; the first two are AMASS's."""
+_SAY = "say what it is, by --rate 30 on the command line or ReadOptions(rate=30) in Python"
 
 
-def find_rate(
-    path: Path, keys: Collection[str], read: Callable[[str], np.ndarray], options: ReadOptions, notes: list[str]
-) -> float:
+def find_rate(path: Path, nodes: Iterable[Tree], options: ReadOptions, notes: list[str]) -> float:
     """Frames per second.
 
     Args:
         path: the file, for sentences.
-        keys: what it holds.
-        read: gives the array of a key.
+        nodes: dictionaries that may tell it, the likeliest first.
         options: may tell the rate of a file that does not.
-        notes: is told if the file and the options disagree.
+        notes: is told if the file and the options disagree, or the file leaves it open.
 
     Raises:
-        UserError: neither says, or what the file says is no rate.
+        UserError: neither says.
     """
-    key = next((key for key in RATE_KEYS if key in keys), None)
-    if key is None:
-        return asked_rate(path, options)
-    array = read(key)
-    if array.size != 1:
-        raise UserError(f"{path}: '{key}' has shape {array.shape}; expected one number")
-    return told_rate(path, f"'{key}' is", float(array.reshape(())), options, notes)
+    open_ones: list[str] = []
+    for node in nodes:
+        told = rate_in(node, open_ones)
+        if told is not None:
+            return told_rate(path, f"'{told[0]}' is", told[1], options, notes)
+    rate = asked_rate(path, options, next(iter(open_ones), ""))
+    notes += open_ones[:1]
+    return rate
+
+
+def rate_in(node: Tree, notes: list[str]) -> tuple[str, float] | None:
+    """The key of a dictionary that tells a rate, and what it tells; None where none does, and a note of each that
+    leaves it open.
+    """
+    keys, open_ones = set(node.keys), []
+    for key in RATE_KEYS:
+        if key in keys:
+            number = number_told(node[key])
+            if number is not None:
+                return key, number
+            open_ones.append(f"'{key}' tells no frame rate{_in_words(node[key])}")
+    notes += open_ones
+    return None
+
+
+def number_told(node: Tree) -> float | None:
+    """The number above 0 that a node tells, also as a text or as many that are equal; None where it leaves that open,
+    as `None`, 0, NaN, an empty text, or whatever else is none.
+    """
+    try:
+        text = node.text()
+        if text is not None:
+            number = float(text)
+        else:
+            array = node.array()
+            if not array.size or array.dtype.kind == "b" or not (array == array.flat[0]).all():
+                return None
+            number = float(array.flat[0])
+    except (UserError, ValueError):  # no array; no number
+        return None
+    return number if 0 < number < math.inf else None
+
+
+def _in_words(node: Tree) -> str:
+    """What a node that tells no rate is, for the end of a sentence; nothing where that says nothing."""
+    try:
+        text, shape = node.text(), node.shape()
+    except UserError:  # it cannot be read
+        return ""
+    if text is not None:
+        return f": it is '{shortened(text, 20)}'"
+    if shape is not None and math.prod(shape) == 1:
+        return f": it is {node.array().item()!s:.20}"
+    return "" if node.is_none else f": it is {node.described}"
 
 
 def told_rate(path: Path, said: str, rate: float, options: ReadOptions, notes: list[str]) -> float:
-    """The rate that a file tells, which goes before that of the options.
+    """The rate that a file tells, which goes before that of the options; one that is not believed does not.
 
     Args:
         path: the file, for sentences.
@@ -49,30 +94,31 @@ def told_rate(path: Path, said: str, rate: float, options: ReadOptions, notes: l
         notes: is told if they do.
 
     Raises:
-        UserError: it is no rate.
+        UserError: it is not believed, and the options tell none.
     """
-    check_rate(path, said, rate)
+    low, high = RATES
+    if not low <= rate <= high:
+        said = f"{said} {rate:g} frames per second; expected {low:g} to {high:g}"
+        if options.rate is None:
+            raise UserError(f"{path}: {said}; {_SAY}")
+        notes.append(f"{said}; {options.rate:g} are taken, as given")
+        return float(options.rate)
     if options.rate is not None and options.rate != rate:
         notes.append(f"the rate of {options.rate:g} that was given is left out: the file says {rate:g}")
     return rate
 
 
-def check_rate(path: Path, said: str, rate: float) -> None:
-    """Refuses what is no rate; arguments as for `told_rate`."""
-    low, high = RATES
-    if not low <= rate <= high:
-        raise UserError(f"{path}: {said} {rate:g} frames per second; expected {low:g} to {high:g}")
-
-
-def asked_rate(path: Path, options: ReadOptions) -> float:
+def asked_rate(path: Path, options: ReadOptions, why: str = "") -> float:
     """The rate that the options tell.
+
+    Args:
+        path: the file, for sentences.
+        options: may tell it.
+        why: the file does not, as a note says it, if that is known.
 
     Raises:
         UserError: they do not.
     """
     if options.rate is None:
-        raise UserError(
-            f"{path}: holds no frame rate; say what it is, by --rate 30 on the command line or ReadOptions(rate=30)"
-            " in Python"
-        )
+        raise UserError(f"{path}: {why or 'holds no frame rate'}; {_SAY}")
     return float(options.rate)

@@ -59,6 +59,11 @@ def find_form(shape: tuple[int, ...], counts: Collection[int]) -> Form | None:
     return None
 
 
+def rows_of(array: np.ndarray) -> np.ndarray:
+    """An array (T, ...) as rows (T, X), also where T is 0; a single number as one row."""
+    return array.reshape(len(array), math.prod(array.shape[1:])) if array.ndim else array.reshape(1, 1)
+
+
 def read_local(
     path: Path, key: str, frames: int, blocks: Iterable[tuple[int, np.ndarray]], form: Form, first: int
 ) -> np.ndarray:

@@ -1,32 +1,52 @@
-"""Motions in a single array whose rows are known by their length: those of Motion-X and of PHUMA."""
+"""Motions in a single array whose rows are known by their length: those of Motion-X, of PHUMA, and SMPL's `body_pose`.
+
+Legend: T frames, X numbers of a row.
+"""
 
 from __future__ import annotations
 
+import numpy as np
+
+from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.assemble import MAX_ROOT_TURN
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate
-from mrhubo.motion.readers.rotations import Form
+from mrhubo.motion.readers.rotations import Form, to_matrices
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, motion_of
-from mrhubo.motion.readers.world import ANY_WORLD
+from mrhubo.motion.readers.world import ANY_WORLD, find_up
 
 _MOTION_X = 322
 _MOTION_X_RATE = 30.0
 _PHUMA = (69, 73, 79)
 """Without more, with how much each foot touches the ground, with the body's shape."""
-_BODY = Form(21, False)
+_CONTACTS = 73
+_BODY, _WITH_HANDS = Form(21, False), Form(23, False)
+_STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
+"""Joints of spine, neck, collars and head, which turn less than those of limbs."""
+_CLEARLY = 1.8
+"""How much more the stiff joints turn as PHUMA's than as those of `body_pose`, at most in PHUMA's rows. Of 464 clips of
+CMU's written as PHUMA's, 99 in 100 have up to 1.2; of the same as `body_pose`, 99 in 100 have 2.1 or more."""
+_NEARLY_STILL = 0.02
+"""Turns [rad] that say nothing."""
+_PELVIS_M = (0.2, 2.2)
+"""How high a pelvis is above the floor, with room for SMPL-X's origin above it."""
+_UPRIGHT = 0.5
+"""Cosine between the body's own up axis, on the mean, and the world's."""
 
 
 def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
-    """Reads SMPL-X's parameters from an array (T, 322) or (T, 69); None of anything else.
+    """Reads SMPL's or SMPL-X's parameters from an array (T, 322), (T, 69), (T, 73) or (T, 79); None of anything else.
 
     Motion-X's rows are the root's rotation (3), the body's (63), hands, jaw, face, then at 309 the place of the root
     (3) and the body's shape (10); it says of all its motions that they have 30 frames a second
     (https://github.com/IDEA-Research/Motion-X). PHUMA's are the place of the root (3), its rotation (3) and the body's
-    (63), then perhaps more (https://github.com/DAVIAN-Robotics/PHUMA).
+    (63), then perhaps more (https://github.com/DAVIAN-Robotics/PHUMA). SMPL's `body_pose`, 23 joints without the root,
+    is as wide, and with the shape as wide as PHUMA's with it; which it is, is told by what is in it.
 
     Raises:
-        UserError: the numbers are no motion, or the frame rate is not known.
+        UserError: the numbers are no motion, or may be of either kind; or the frame rate is not known.
     """
     shape = tree.shape()
     if shape is None or len(shape) != 2 or not shape[0]:
@@ -38,9 +58,55 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
         if options.rate is None:
             notes.append(f"{rate:g} frames a second, as Motion-X says of all its motions; --rate says otherwise")
         return motion_of(tree.path, arrays, Kind("Motion-X rows (T, 322)", "smplx", ANY_WORLD), rate, notes)
-    if shape[1] in _PHUMA:
-        betas = rows_TX[:, 69:] if shape[1] == max(_PHUMA) else None
+    if shape[1] not in _PHUMA:
+        return None
+    betas = rows_TX[:, 69:] if shape[1] == max(_PHUMA) else None
+    if shape[1] == _CONTACTS or _is_phuma(tree, rows_TX):
         arrays = SmplArrays("rows", rows_TX[:, 6:69], _BODY, 0, rows_TX[:, 3:6], rows_TX[:, :3], betas)
         kind = Kind(f"PHUMA rows (T, {shape[1]})", "smplx", ANY_WORLD)
-        return motion_of(tree.path, arrays, kind, asked_rate(tree.path, options), notes)
-    return None
+    else:
+        arrays = SmplArrays("rows", rows_TX[:, :69], _WITH_HANDS, 0, betas=betas)
+        kind = Kind(f"rows (T, {shape[1]}) of SMPL's body_pose", "smpl", ANY_WORLD)
+        notes.append(
+            "taken for SMPL's body_pose, without a root: as PHUMA's rows, which are as wide, the first numbers were no"
+            " place of a pelvis, and spine and neck turned as arms and legs do"
+        )
+    return motion_of(tree.path, arrays, kind, asked_rate(tree.path, options), notes)
+
+
+def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:
+    """Whether rows (T, 69 or more) are PHUMA's, and no `body_pose`.
+
+    Raises:
+        UserError: they may be either.
+    """
+    row_TX = rows_TX[:, :69].astype(np.float64)
+    more = (_turn(row_TX[:, 6:]) + _NEARLY_STILL) / (_turn(row_TX[:, :63]) + _NEARLY_STILL)
+    stands = _stands(row_TX[:, :3], row_TX[:, 3:6])
+    if not np.isfinite(more) or more < (_CLEARLY if stands else 1.0):  # who reads them says what is not finite
+        return True
+    if more > _CLEARLY and not stands:
+        return False
+    raise UserError(
+        f"{tree.path}: has rows of {rows_TX.shape[1]} numbers, which may be PHUMA's (place, root, 21 joints) or SMPL's"
+        " body_pose (23 joints, no root), and its numbers fit neither clearly; save an .npz with 'transl',"
+        " 'global_orient' and 'body_pose' (frames, 63), or with 'body_pose' (frames, 69) alone"
+    )
+
+
+def _turn(body_TX: np.ndarray) -> float:
+    """How much the joints that are stiff turn [rad], on the mean, in rows (T, 63) of the body's 21 joints."""
+    joint_TJ3 = body_TX.reshape(len(body_TX), -1, 3)
+    return float(np.linalg.norm(joint_TJ3[:, _STIFF], axis=-1).mean())
+
+
+def _stands(place_T3: np.ndarray, root_T3: np.ndarray) -> bool:
+    """Whether a pelvis is as high above the floor as that of somebody who is upright, in any world."""
+    rotation_T133 = to_matrices(root_T3, Form(1, False), MAX_ROOT_TURN)
+    if rotation_T133 is None or not np.isfinite(place_T3).all():
+        return False
+    up_T3 = rotation_T133[:, 0, :, 1]
+    _, turn_33 = find_up(up_T3, ANY_WORLD)
+    low, high = _PELVIS_M
+    height = float(np.median(place_T3 @ turn_33[1]))
+    return low <= height <= high and float((up_T3 @ turn_33[1]).mean()) > _UPRIGHT

@@ -10,6 +10,7 @@ and `pose` everybody.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -26,11 +27,10 @@ _WITH_ROOT, _WITHOUT = (22, 24, 52, 55), (21, 23)
 _PLACES = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
 _ENTRIES = 50
-"""Of a dictionary that are looked at, to tell what the others are."""
 _DEEPEST = 3
 """Dictionaries in dictionaries."""
-_WORLD, _CAMERA = ("global", "world"), ("incam", "cam")
-"""Parts of the names of parameters in the world, which are preferred, and of those that a camera sees."""
+_WORLD, _CAMERA = ("global", "world"), ("incam", "cam", "camera")
+"""Words in the names of parameters in the world, which are preferred, and of those that a camera sees."""
 
 
 @dataclass(frozen=True)
@@ -94,18 +94,19 @@ class Found:
         frames = self._array(_FRAMES, person)
         if frames is None and self.outer is not None:
             frames = replace(self, node=self.outer)._array(_FRAMES, person)
-        scaling = self._array(("smpl_scaling",), None) if names.pose == "smpl_poses" else None
-        if position is not None and scaling is not None and scaling.size == 1 and float(scaling.reshape(-1)[0]) > 0:
-            position = position / float(scaling.reshape(-1)[0])  # AIST++ has places in units of a scaled body
+        scaling = node.get("smpl_scaling") if names.pose == "smpl_poses" else None
+        if position is not None and scaling is not None and scaling.number() > 0:
+            position = position / scaling.number()  # AIST++ has places in units of a scaled body
         frames = frames if frames is not None and frames.size == len(array) else None
         first = 1 if self.form.joints in _WITH_ROOT else 0
         return SmplArrays(pose.where, array, self.form, first, root, position, betas, frames)
 
     def tracks(self, person: str = "") -> list[Track]:
         """One for each of the people; the name is for a single one."""
+        homes = (self.node,) if self.outer is None else (self.node, self.outer)
         if self.people is None:
-            return [Track(person, self.frames, self.read)]
-        return [Track(str(n), self.frames, lambda n=n: self.read(n)) for n in range(self.people)]
+            return [Track(person, self.frames, self.read, homes)]
+        return [Track(str(n), self.frames, lambda n=n: self.read(n), homes) for n in range(self.people)]
 
     def _array(self, keys: tuple[str, ...], person: int | None) -> np.ndarray | None:
         array = self.node.find_array(*keys)
@@ -146,7 +147,7 @@ def search(node: Tree, find: Callable[[Tree], T | None], deepest: int = _DEEPEST
     found = find(node)
     if found is not None or deepest == 0:
         return found
-    entries = [(name, child) for name, child in _some(node) if child.is_mapping]
+    entries = [(name, child) for name, child in first_entries(node) if child.is_mapping]
     for _, child in sorted(entries, key=lambda entry: _rank(entry[0])):
         found = search(child, find, deepest - 1)
         if found is not None:
@@ -154,40 +155,26 @@ def search(node: Tree, find: Callable[[Tree], T | None], deepest: int = _DEEPEST
     return None
 
 
-def people_in(node: Tree) -> list[tuple[str, Found]] | None:
-    """SMPL parameters of each entry of a dictionary of people, with their names; None where it is none.
-
-    An entry has them itself, or in dictionaries one deeper, the numbers of frames beside those.
-    """
-    entries = list(_some(node))
-    inner = [(name, child) for name, child in entries if child.is_mapping]
-    # beside two people or more there may be what goes for all, as the frame rate
-    if not inner or (len(inner) == 1 < len(entries)):
-        return None
-    if not all(_rank(name) == 1 and _of_person(child) for name, child in inner):
-        return None
-    found = [(name, _of_person(child)) for name, child in node.items() if child.is_mapping]
-    return [(name, place) for name, place in found if place is not None]
-
-
-def named_tracks(people: list[tuple[str, Found]]) -> list[Track]:
-    """The tracks of people with names."""
-    return [track for name, found in people for track in found.tracks(name)]
-
-
-def _of_person(node: Tree) -> Found | None:
-    found = search(node, find_here, deepest=1)
-    return None if found is None else replace(found, outer=node)
-
-
-def _some(node: Tree) -> Iterator[tuple[str, Tree]]:
+def first_entries(node: Tree) -> Iterator[tuple[str, Tree]]:
+    """The first fifty entries of a dictionary, which tell what the others are."""
     for number, entry in enumerate(node.items()):
         if number == _ENTRIES:
             return
         yield entry
 
 
+def without_world(name: str) -> str:
+    """A name without the words that tell whether its parameters are in the world or as a camera sees them."""
+    return "_".join(word for word in words_of(name) if word not in (*_WORLD, *_CAMERA))
+
+
 def _rank(name: str) -> int:
-    if any(part in name.lower() for part in _WORLD):
+    words = words_of(name)
+    if any(word in words for word in _WORLD):
         return 0
-    return 2 if any(part in name.lower() for part in _CAMERA) else 1
+    return 2 if any(word in words for word in _CAMERA) else 1
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name in small letters: of `smpl_params-incam` and `smplParamsIncam` the same."""
+    return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower())

@@ -22,7 +22,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES, MAX_ROOT_TURN, upright
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.rotations import find_form, to_matrices
+from mrhubo.motion.readers.rotations import find_form, rows_of, to_matrices
 from mrhubo.motion.readers.smpl_names import search
 from mrhubo.motion.readers.world import WORLDS
 
@@ -154,7 +154,8 @@ def _find(node: Tree) -> _Arrays | None:
             return _Arrays("Kimodo", "local_rot_mats", local, names, joints, root)
     if {"body_pose", "global_orient"} <= keys:
         body, root = node.find_array("body_pose"), node.find_array("global_orient")
-        if body is not None and root is not None and body.size == 76 * 3 * len(body) and root.size == 3 * len(body):
+        frames = len(body) if body is not None and body.ndim else 0
+        if body is not None and root is not None and frames and (body.size, root.size) == (76 * 3 * frames, 3 * frames):
             local = np.concatenate((root.reshape(-1, 1, 3), body.reshape(-1, 76, 3)), axis=1)
             return _Arrays("GEM-X", f"{node.where}[body_pose]", local, _ALL, None, node.find_array("transl"))
     if {"poses", "joint_names"} <= keys:
@@ -217,7 +218,7 @@ def _root(arrays: _Arrays, frames: int, notes: list[str]) -> np.ndarray | None:
     root = arrays.root
     if root is None:
         return None
-    rows_TX = root.reshape(len(root), -1) if root.ndim else root.reshape(1, 1)
+    rows_TX = rows_of(root)
     if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < FARTHEST_M).all():
         notes.append(f"where the root goes is left out: its shape is {root.shape}, or it holds no finite numbers")
         return None

@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from mrhubo.errors import UserError, nearest, shortened
+from mrhubo.files.tree import Tree
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import (
@@ -27,7 +28,7 @@ from mrhubo.motion.readers.assemble import (
 from mrhubo.motion.readers.family import rest_in_words
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rotations import JOINTS, Form, read_local, to_matrices
+from mrhubo.motion.readers.rotations import JOINTS, Form, read_local, rows_of, to_matrices
 
 _SCARCEST = 0.02
 """Who is seen in a smaller share of the frames from their first to their last makes no motion."""
@@ -71,6 +72,8 @@ class Track(Person):
 
     read: Callable[[], SmplArrays]
     """Reads what the file has of them."""
+    homes: tuple[Tree, ...] = ()
+    """Dictionaries that are theirs, which may tell the frame rate."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ def _root(arrays: SmplArrays, notes: list[str]) -> np.ndarray | None:
     """Rotations (S, 3, 3) of the root; None, and a note, where they cannot be used."""
     seen, form = len(arrays.pose), arrays.form
     if arrays.root is not None:
-        rows_SX = arrays.root.reshape(len(arrays.root), -1)
+        rows_SX = rows_of(arrays.root)
         matrices = rows_SX.shape[1] == 9
         if len(rows_SX) != seen or rows_SX.shape[1] not in (3, 9):
             notes.append(f"the root's rotation is left out: its shape is {arrays.root.shape}")
@@ -207,7 +210,7 @@ def _position(arrays: SmplArrays, notes: list[str]) -> np.ndarray | None:
     """Places (S, 3) of the root; None, and a note, where they cannot be used."""
     if arrays.position is None:
         return None
-    rows_SX = arrays.position.reshape(len(arrays.position), -1) if arrays.position.ndim else arrays.position[None, None]
+    rows_SX = rows_of(arrays.position)
     if len(rows_SX) != len(arrays.pose) or rows_SX.shape[1] != 3:
         notes.append(f"where the root goes is left out: its shape is {arrays.position.shape}")
         return None
@@ -223,7 +226,7 @@ def _betas(arrays: SmplArrays, notes: list[str]) -> tuple[float, ...] | None:
     if betas is None:
         return None
     if betas.ndim >= 2:
-        betas = betas.reshape(len(betas), -1).astype(np.float64).mean(axis=0) if len(betas) else betas.reshape(0)
+        betas = rows_of(betas).astype(np.float64).mean(axis=0) if len(betas) else betas.reshape(0)
     if betas.ndim != 1 or len(betas) > 400 or not (np.abs(betas) < LARGEST_BETA).all():
         notes.append(f"the body's shape is left out: expected up to 400 finite numbers, found {betas.shape}")
         return None

@@ -233,6 +233,9 @@ def test_map_names_joints(motion: Motion, tmp_path: Path) -> None:
     given_map.write_text(f"left_shouldr: {names['left_shoulder']}")
     with pytest.raises(UserError, match="nearest: 'left_shoulder'"):
         read(motion, style, tmp_path, ReadOptions(bvh_map=given_map))
+    given_map.write_text(f"unit: 1{'0' * 400}")
+    with pytest.raises(UserError, match="unit: expected metres"):
+        read(motion, style, tmp_path, ReadOptions(bvh_map=given_map))
     given_map.write_text("left_shoulder: no_such_bone")
     with pytest.raises(UserError, match="no_such_bone"):
         read(motion, style, tmp_path, ReadOptions(bvh_map=given_map))

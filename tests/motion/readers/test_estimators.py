@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import pickle
 from pathlib import Path
+from typing import Any
 
 import joblib
 import numpy as np
@@ -189,6 +191,31 @@ def test_old_bodies_of_phalps_tracks_are_passed_over(tmp_path: Path) -> None:
     assert motion.confidence_TJ is not None and motion.confidence_TJ[:, 0].tolist() == [1, 1, 0, 0, 1, 1]
 
 
+@pytest.mark.parametrize(
+    ("key", "odd"),
+    [
+        *(("time", number) for number in (np.nan, np.inf, 10**400, [1, 2])),
+        *((key, [number]) for key in ("tid", "tracked_time") for number in (np.nan, np.array([0, 0]), None, 10**400)),
+    ],
+)
+def test_numbers_of_phalps_that_are_none(tmp_path: Path, key: str, odd: object) -> None:
+    phalp(tmp_path / "a.pkl", {1: made_up(FRAMES, camera=True)})
+    content = joblib.load(tmp_path / "a.pkl")
+    next(iter(content.values()))[key] = odd
+    (tmp_path / "a.pkl").write_bytes(pickle.dumps(content))
+    with pytest.raises(UserError, match=rf"a\.pkl: '.*\[{key}\].*' (is|has|holds) "):
+        read_motion(tmp_path / "a.pkl", RATE)
+
+
+def test_phalps_tracks_are_called_by_whole_numbers(tmp_path: Path) -> None:
+    people = {1234567: made_up(FRAMES, camera=True), 1234568: made_up(4, seed=1, camera=True)}
+    phalp(tmp_path / "a.pkl", people)
+    motion = read_motion(tmp_path / "a.pkl", RATE)
+    assert "there are '1234567' (6 frames), '1234568' (4 frames)" in motion.notes[0]
+    other = read_motion(tmp_path / "a.pkl", ReadOptions(rate=30, person="1234568"))
+    assert close(other, people[1234568], "smpl")
+
+
 @pytest.mark.parametrize("write", [pymaf, cliff, lambda path, people: romp(path, people, tracked=False)])
 def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
     """They come in turns: in the first frame the second person first."""
@@ -294,3 +321,28 @@ def test_damaged_files_are_read_or_refused_by_name(
     seed = data.draw(st.integers(0, 2**32))
     path.write_bytes(damaged_by(seed, good_file(name, folder), good_file("wham", folder)))
     read_or_refused(path)
+
+
+ODD = [None, np.nan, -1, "x", 10**400, True, [], {}, [1, [2, 3]], [None], np.zeros(0), np.zeros((0, 72)), np.array(3.0),
+       np.zeros((2, 2, 2)), np.zeros(4, complex), np.full((4, 72), np.nan)]  # fmt: skip
+"""What may stand where something else is expected."""
+
+
+def entries_of(value: Any) -> list[tuple[Any, Any]]:
+    """All places in dictionaries and lists, each as what it is in and its key."""
+    pairs = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [place for key, child in pairs for place in ((value, key), *entries_of(child))]
+
+
+@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.ending in (".pkl", ".pk", ".npy")])
+def test_odd_values_anywhere_are_read_or_refused_by_name(tmp_path: Path, name: str) -> None:
+    WRITERS[name].write(tmp_path / "good", {1: made_up(3, camera=WRITERS[name].camera)})
+    good = np.load(tmp_path / "good", allow_pickle=True).item() if name == "tram" else joblib.load(tmp_path / "good")
+    generator = np.random.default_rng(0)
+    for _ in range(25):
+        content = copy.deepcopy(good)
+        places = entries_of(content)
+        inside, key = places[generator.integers(len(places))]
+        inside[key] = ODD[generator.integers(len(ODD))]
+        (tmp_path / "odd").write_bytes(pickle.dumps(content))
+        read_or_refused(tmp_path / "odd")

@@ -339,8 +339,6 @@ def test_names_that_are_numbers_are_places(points: dict[str, np.ndarray], pose: 
         ({"frames": [[{"name": "nose", "x": 1, "y": 2, "z": 3}, [1, 2, 3]]]}, "names 1 of the 2 points in frame 0"),
         ({"frames": [{"nose": [1, 2, 3]}, [[1, 2, 3]]]}, "without names in frame 1"),
         ({"frames": [[], [{"name": "nose"}, {"name": "nose"}]]}, "two points 'nose' in frame 1"),
-        ({"fps": [], "keypoints": [[[1, 2, 3]]]}, "frame rate has shape"),
-        ({"fps": [30, 25], "keypoints": [[[1, 2, 3]]]}, "frame rate has shape"),
         ({"keypoints": [*[[]] * 60_000, [[0, 0, 0]] * 20_000]}, "20,000 points a frame"),
         ({"keypoints": [*[[]] * 500_000, [[0, 0, 0]]]}, "500,001 frames"),
         ({"keypoints": [*[[]] * 60_000, [[0, 0, 0]] * 900]}, "60,001 frames of 900 points"),

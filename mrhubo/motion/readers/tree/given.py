@@ -9,7 +9,6 @@ Whatever is not said is found out.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import yaml
@@ -62,6 +61,6 @@ def read_map(path: Path, tree: JointTree, motion: Path) -> Given:
     if up is not None and up not in _UP:
         raise UserError(f"{path}: up: expected one of {', '.join(_UP)}, found {shortened(up, 30)}")
     unit = content.get("unit")
-    if unit is not None and not (type(unit) in (int, float) and math.isfinite(unit) and 1e-6 <= unit <= 1e3):
+    if unit is not None and not (type(unit) in (int, float) and 1e-6 <= unit <= 1e3):
         raise UserError(f"{path}: unit: expected metres, for instance 0.01, found {shortened(unit, 30)}")
     return Given(place, up, None if unit is None else float(unit))
