@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.robot_motion.clock import rate_of_times, seconds
 from mrhubo.video.estimator import PoseEstimator
 from mrhubo.video.frames import MAX_FRAMES, frames
 
@@ -57,7 +58,7 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
         raise UserError(f"{path}: nobody is found in any of its {len(times):,} frames")
     notes = [] if seen == len(times) else [f"nobody is found in {len(times) - seen:,} of {len(times):,} frames"]
     time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
-    rate = (len(time_T) - 1) / time_T[-1]
+    rate = rate_of_times(time_T, seconds)
     if np.abs(time_T * rate - np.arange(len(time_T))).max() > _STEADY:
         step_T = np.diff(time_T)
         rate = 1 / float(np.median(step_T))

@@ -32,18 +32,18 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is missing, damaged or too large, or no human is found in it.
     """
-    tree, seconds, notes = read_bvh_file(path)
+    tree, told, notes = read_bvh_file(path)
     rate = options.rate
     low, high = RATES
-    if seconds is not None and not low <= 1 / seconds <= high:
-        said = f"'Frame Time' is {seconds:g} s, which makes {1 / seconds:.3g} frames per second"
+    if told is not None and not low <= told <= high:
+        said = f"'Frame Time' makes {told:.3g} frames per second"
         if rate is None:
             raise UserError(f"{path}: {said}; expected {low:g} to {high:g}; say what it is with --rate")
         notes.append(f"{said}; {rate:g} are taken, as given")
-    elif seconds is not None:
-        if rate is not None and abs(rate * seconds - 1) > 1e-3:
-            notes.append(f"the file says {1 / seconds:.6g} frames per second, which is believed, and not {rate:g}")
-        rate = 1 / seconds
+    elif told is not None:
+        if rate is not None and abs(rate / told - 1) > 1e-3:
+            notes.append(f"the file says {told:.6g} frames per second, which is believed, and not {rate:g}")
+        rate = told
     if rate is None:
         raise UserError(f"{path}: does not say how many frames a second it has; say so with --rate")
     tree = _of_person(path, tree, options, notes)
