@@ -30,7 +30,8 @@ def is_amc(content: Content) -> bool:
 
 
 def read_acclaim(path: Path, options: ReadOptions) -> Motion:
-    """Reads an .amc file and the .asf file beside it: that of the subject (`02.asf` for `02_01.amc`) or the only one.
+    """Reads an .amc file and the .asf file beside it: that whose name is the longest beginning of the motion's, up to a
+    `_` (`02.asf` for `02_01.amc`, `HDM_bd.asf` for `HDM_bd_01-01_01_120.amc`), or the only one.
 
     The files cannot say their frame rate: it is asked for.
 
@@ -54,14 +55,12 @@ def _find_skeleton(path: Path) -> Path:
         found = sorted(file for file in path.parent.iterdir() if file.suffix.lower() == ".asf")
     except OSError as error:
         raise UserError(f"{path.parent}: cannot be read: {error.strerror or error}") from error
-    for stem in (path.stem, path.stem.rpartition("_")[0], path.stem.partition("_")[0]):
-        named = [file for file in found if file.stem == stem]
-        if named:
-            return named[0]
+    if named := [file for file in found if f"{path.stem}_".startswith(f"{file.stem}_")]:
+        return max(named, key=lambda file: len(file.stem))
     if len(found) == 1:
         return found[0]
     beside = f"beside it are {listed(file.name for file in found)}" if found else "there is none beside it"
     raise UserError(
-        f"{path}: needs the .asf file with its skeleton, {path.stem.partition('_')[0]}.asf; {beside}; put it into the "
-        "same folder"
+        f"{path}: needs the .asf file with its skeleton, whose name begins as the motion's, up to a '_' (02.asf for"
+        f" 02_01.amc); {beside}; put it into the same folder"
     )
