@@ -13,7 +13,7 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.asf_file import read_amc, read_asf
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.options import NoRate, ReadOptions
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
 
@@ -40,10 +40,7 @@ def read_acclaim(path: Path, options: ReadOptions) -> Motion:
     """
     skeleton = read_asf(_find_skeleton(path))
     if options.rate is None:
-        raise UserError(
-            f"{path}: an .amc file does not say how many frames a second it has; say so with --rate (most of "
-            "CMU's have 120)"
-        )
+        raise NoRate(path, "an .amc file does not tell its frame rate (most of CMU's and HDM05's have 120)")
     tree, notes = read_amc(path, skeleton)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     kind = f"ASF/AMC files, skeleton {skeleton.path.name}:"

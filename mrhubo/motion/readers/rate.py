@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
 
 RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "fps")
 """What files call it; the first two are AMASS's."""
@@ -68,11 +68,8 @@ def asked_rate(path: Path, options: ReadOptions) -> float:
     """The rate that the options tell.
 
     Raises:
-        UserError: they do not.
+        NoRate: they do not.
     """
     if options.rate is None:
-        raise UserError(
-            f"{path}: holds no frame rate; say what it is, by --rate 30 on the command line or ReadOptions(rate=30)"
-            " in Python"
-        )
+        raise NoRate(path, "holds no frame rate")
     return float(options.rate)
