@@ -56,6 +56,12 @@ def test_an_unsteady_film_is_interpolated_between_its_true_times(film) -> None:
     assert track.point_TK3[:, 0, 0] == pytest.approx(np.arange(10, 90, 10))
 
 
+def test_an_unsteady_film_whose_times_are_rounded_has_a_round_rate(film) -> None:
+    times = np.delete(np.round(np.arange(40) / 30, 3), [5, 6, 7, 20])
+    film(times.tolist(), list(range(100, 136)))
+    assert track_body(Path("a.mkv"), Known()).rate == 30
+
+
 def test_nobody_stays_nobody(film) -> None:
     film([0.0, 0.1, 0.2, 0.3, 0.45], [10, 0, 30, 40, 55])
     track = track_body(Path("a.mkv"), Known())
