@@ -19,6 +19,7 @@ from mrhubo.errors import UserError, unknown_name
 from mrhubo.files.arrays import DamagedFile
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion, find_motions, read_folder, reshare
+from mrhubo.motion.readers.options import NoRate
 from mrhubo.pairing import pose_settings
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap
@@ -72,7 +73,12 @@ def load_motions(config: Config, skeleton: Skeleton | None = None) -> Motions:
     except UserError as error:
         raise UserError(f"evaluation.motions: {error}") from error
     skeleton = skeleton or Skeleton()
-    motions = [motion.for_skeleton(skeleton) for motion in read_folder(folder)]
+    try:
+        motions = [motion.for_skeleton(skeleton) for motion in read_folder(folder)]
+    except NoRate as error:
+        raise error.instead(
+            "clips tell it themselves, as AMASS's .npz by 'mocap_frame_rate'; write such a file"
+        ) from error
     names = set(config.evaluation.validation)
     missing = sorted(names.difference(m.name for m in motions))
     if missing and config.evaluation.validation != EvaluationConfig().validation:  # which names clips of two folders

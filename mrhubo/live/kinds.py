@@ -7,7 +7,8 @@ SOURCES = {
     "udp": "udp[:PORT]: JSON messages in UDP datagrams (port 8766)",
     "vmc": "vmc[:PORT]: an avatar's bones by the VMC protocol, from this machine (port 39539)",
     "pico": "pico: body tracking of a PICO headset by XRoboToolkit",
-    "replay": "replay:FILE: a motion file at its rate; replay-loop:FILE: again and again",
+    "replay": "replay:FILE[@RATE]: a motion file at its rate, or at RATE where it tells none;"
+    " replay-loop:FILE[@RATE]: again and again",
 }
 """By name, what comes from where."""
 SINKS = {

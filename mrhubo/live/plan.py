@@ -42,6 +42,7 @@ class Plan:
             if isinstance(endpoint, Endpoint):
                 token = getattr(source, "token", None)
                 said.append(f"listening: udp {endpoint.shown}" + ("" if token is None else f", token {token}"))
+            said += [f"note: {note}" for note in getattr(source, "notes", ())]
         return said
 
     def add_source(self, text: str) -> None:
@@ -109,9 +110,21 @@ def _pico(where: str) -> Source:
 def _replay(where: str, loop: bool) -> Source:
     from mrhubo.live.sources.replay import ReplaySource
 
-    if not where:
+    path, rate = _at_rate(where)
+    if not path:
         raise UserError("--source replay: names no file; write replay:dance.bvh")
-    return ReplaySource.of_file(Path(where), loop)
+    return ReplaySource.of_file(Path(path), loop, rate)
+
+
+def _at_rate(where: str) -> tuple[str, float | None]:
+    """A file, and the frame rate after an `@`; there is none where a file has such a name."""
+    path, _, rate = where.rpartition("@")
+    if Path(where).exists():
+        return where, None
+    try:
+        return path, float(rate)
+    except ValueError:
+        return where, None
 
 
 def _udp_sink(where: str) -> Sink:

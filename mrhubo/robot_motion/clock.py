@@ -1,8 +1,16 @@
-"""The frame rate of files that tell the time of every frame in place of it."""
+"""The frame rate of files that tell times in place of it: that of every frame, or the step from one to the next.
+
+What is written is rounded: 0.033333 s is the step of 30 frames per second and not of 30.0003. Of the rates whose times
+a file's digits are, the roundest is meant.
+
+Legend: T frames.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from decimal import Decimal
 
 import numpy as np
 
@@ -10,6 +18,22 @@ from mrhubo.errors import UserError
 
 _DIGITS = 17
 """Of a float64 that tell it apart from every other."""
+_FEW = 7
+"""Digits of a rate whose times agree with a file's to the last bit by no accident."""
+_NTSC = tuple(rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240))
+"""Rates of video that are no whole numbers (SMPTE ST 12-1)."""
+_SINGLE, _DOUBLE = 2.0**-22, 2.0**-51
+"""How far apart numbers lie, as a share of them, that are the same but for float32 and its texts, or for float64."""
+_SURE, _FINEST = 6, 9
+"""Decimals that times may have been rounded to: so few for sure, more if they are not those of float32; and at most."""
+_SOME = 1_000
+"""Times that are looked at."""
+_COARSE, _FINE = 10, 1_000
+"""A step tells a rounder rate than its reciprocal if it has so many units of its last digit; one that is the same
+between all times of a file, and so most likely is exact, if it has so many.
+"""
+_CLOCKS = (1_000_000, 1_000)
+"""Units of clocks that whole nanoseconds may come from: ms, us."""
 _UNEVEN = 0.1
 """How far a step may be from the mean one, as a share of it: whole milliseconds at 120 frames a second are off by 8%, a
 frame that was dropped by 100%."""
@@ -18,10 +42,8 @@ frame that was dropped by 100%."""
 def find_rate(time_T: np.ndarray, clock: Callable[[np.ndarray, float], np.ndarray]) -> float | None:
     """Frames per second of evenly spaced times; None for fewer than two frames, which tell none.
 
-    Of the rates whose times these are, the one with the fewest digits: what was written comes back.
-
     Args:
-        time_T: times (T,), in the file's unit, from the first frame's on.
+        time_T: times (T,), in the file's unit.
         clock: the times that frames (T,) have at a rate, in the same unit.
 
     Raises:
@@ -29,18 +51,114 @@ def find_rate(time_T: np.ndarray, clock: Callable[[np.ndarray, float], np.ndarra
     """
     if len(time_T) < 2:
         return None
-    second = float(clock(np.array([1.0]), 1.0)[0])
-    step_T = np.diff(time_T.astype(np.float64)) / second
+    step_T = np.diff(time_T.astype(np.float64)) / _second(clock)
     mean = float(step_T.mean())
     if not np.isfinite(step_T).all() or mean <= 0 or np.abs(step_T - mean).max() > _UNEVEN * mean:
         raise UserError("the times of its frames do not rise evenly; a robot motion has one frame rate")
-    passed_T, frame_T = time_T - time_T[0], np.arange(len(time_T), dtype=np.float64)
-    exact = (len(time_T) - 1) / (float(passed_T[-1]) / second)
-    for digits in range(1, _DIGITS + 1):
-        rate = float(f"{exact:.{digits}g}")
-        if np.array_equal(clock(frame_T, rate), passed_T):
-            return rate
-    return exact
+    return rate_of_times(time_T, clock)
+
+
+def rate_of_times(time_T: np.ndarray, clock: Callable[[np.ndarray, float], np.ndarray]) -> float:
+    """As `find_rate`, of two times or more that rise, however evenly.
+
+    A rate with few digits that has these times to the last bit comes back as it was written. Else it is the roundest
+    one that has them when they are rounded, or cut off, to the digits that the file has.
+    """
+    second, frame_T = _second(clock), np.arange(len(time_T), dtype=np.float64)
+    passed_T, unit, is_written = _passed(time_T)
+    step = float(passed_T[-1]) / (len(time_T) - 1)
+    step_T = np.diff(np.rint(passed_T / unit))
+    is_repeated = is_written and bool((step_T == step_T[0]).all())
+
+    def agrees(rate: float) -> bool:
+        return np.array_equal(clock(frame_T, rate), passed_T)
+
+    def rounds(rate: float) -> bool:
+        if is_repeated:  # a step that was rounded and then repeated; or one that is as it is written
+            return step >= _FINE * unit and _is_usual(rate) and _has_step(rate, step / second, unit / second)
+        return float(np.ptp(frame_T * (second / rate) - passed_T)) < unit * (1 + 1e-6)
+
+    exact = second / step
+    return (
+        _first(exact, lambda rate: _is_usual(rate) and rounds(rate))
+        or _first(exact, agrees, _FEW)
+        or _first(exact, rounds)
+        or _first(exact, agrees)
+        or exact
+    )
+
+
+def rate_of_step(text: str) -> float | None:
+    """Frames per second of the seconds between frames, as a file writes them; None where they are none, or no time.
+
+    The roundest rate whose step is rounded to these digits, or a usual one whose step is cut off to them.
+    """
+    step = float(text)
+    if not (math.isfinite(step) and step > 0 and math.isfinite(1 / step)):
+        return None
+    unit = max(10.0 ** int(Decimal(text).as_tuple().exponent), step * _SINGLE)
+    found = _first(1 / step, lambda rate: 1 / rate == step, _FEW)
+    if found is None and step >= _COARSE * unit:
+        found = _first(1 / step, lambda rate: _has_step(rate, step, unit))
+    return found or 1 / step
+
+
+def in_full(rate: float) -> str:
+    """A rate with all its digits, for sentences: one that is not whole does not look so."""
+    return repr(float(rate)).removesuffix(".0")
+
+
+def _first(exact: float, fits: Callable[[float], bool], digits: int = _DIGITS) -> float | None:
+    """The roundest rate near one that fits."""
+    return next((rate for rate in _rates(exact, digits) if fits(rate)), None)
+
+
+def _rates(exact: float, digits: int) -> Iterator[float]:
+    """Rates near one, the roundest first: whole numbers, those of video, and decimals with more and more digits."""
+    decimals = [float(f"{exact:.{count}g}") for count in range(1, digits + 1)]
+    yield from (rate for rate in decimals if rate.is_integer())
+    yield from _NTSC
+    yield from (rate for rate in decimals if not rate.is_integer())
+
+
+def _is_usual(rate: float) -> bool:
+    return rate.is_integer() or rate in _NTSC
+
+
+def _has_step(rate: float, step: float, unit: float) -> bool:
+    """Whether a rate's step [s] is rounded to one that is written in units of its last digit; a usual rate's may be cut
+    off.
+    """
+    return -unit / 2 < 1 / rate - step < (unit if _is_usual(rate) else unit / 2)
+
+
+def _second(clock: Callable[[np.ndarray, float], np.ndarray]) -> float:
+    return float(clock(np.array([1.0]), 1.0)[0])
+
+
+def _passed(time_T: np.ndarray) -> tuple[np.ndarray, float, bool]:
+    """Times (T,) from the first one on; how finely they are told, in their unit; and whether by decimals, to which they
+    are rounded then.
+    """
+    if time_T.dtype.kind in "iu":
+        passed_T = time_T - time_T[0]
+        return passed_T, next((float(unit) for unit in _CLOCKS if not (passed_T % unit).any()), 1.0), True
+    passed_T, most = time_T.astype(np.float64) - float(time_T[0]), float(np.abs(time_T).max())
+    single = most * _SINGLE if _are_single(time_T) else 0.0
+    precision = single if time_T.dtype == np.float32 else most * _DOUBLE
+    for places in range(_FINEST + 1):
+        written_T, unit = np.round(passed_T, places), 10.0**-places
+        if np.abs(written_T - passed_T).max() <= 2 * precision < unit / 10:
+            is_sure = places <= _SURE or not single
+            return (written_T, unit, True) if is_sure else (passed_T, max(unit, single), False)
+    return passed_T, max(precision, single), False
+
+
+def _are_single(time_T: np.ndarray) -> bool:
+    """Whether times are float32 numbers, or the shortest decimals that tell these apart."""
+    some_T = time_T[:_SOME].astype(np.float64)
+    texts_T = some_T.astype(np.float32).astype(np.str_).astype(np.float64)
+    return np.array_equal(texts_T, some_T) or np.array_equal(some_T.astype(np.float32), some_T)
 
 
 def seconds(frame_T: np.ndarray, rate: float) -> np.ndarray:

@@ -6,6 +6,7 @@ JSON: https://www.rfc-editor.org/rfc/rfc8259
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +15,28 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
 from mrhubo.robot_motion.motion import PER_FRAME, RobotMotion
-from mrhubo.robot_motion.plain import build, facts_of, frames_of, short
+from mrhubo.robot_motion.plain import blocks, build, facts_of, frames_of, short
 from mrhubo.robot_motion.tables import read_text
 
 
 def write_json(motion: RobotMotion, path: Path) -> None:
     """Writes one object with a key a field, atomically."""
-    frames = {name: a.tolist() if a.dtype == np.bool_ else short(a) for name, a in frames_of(motion).items()}
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps({**facts_of(motion), **frames}, ensure_ascii=False) + "\n", encoding="utf-8")
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
+        file.write(json.dumps(facts_of(motion), ensure_ascii=False).removesuffix("}"))
+        for name, array in frames_of(motion).items():
+            file.write(f', "{name}": ')
+            file.writelines(_text(array))
+        file.write("}\n")
+
+
+def _text(array: np.ndarray) -> Iterator[str]:
+    """An array as JSON, part by part."""
+    if not array.size or not array.ndim:
+        yield json.dumps(short(array))
+        return
+    for block in blocks(len(array), array.size // len(array)):
+        yield (", " if block.start else "[") + json.dumps(short(array[block]))[1:-1]
+    yield "]"
 
 
 def read_json(path: Path) -> RobotMotion:

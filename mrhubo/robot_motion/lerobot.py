@@ -21,6 +21,7 @@ import numpy as np
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import read_regular
+from mrhubo.robot_motion.clock import in_full
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.plain import build
 from mrhubo.robot_motion.tables import import_pyarrow, read_table
@@ -76,10 +77,11 @@ def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
 def check_lerobot_rate(frame_rate: float | None, others: float | None = None) -> None:
     """Refuses a frame rate that a dataset cannot have, or that is not that of its other motions."""
     if frame_rate is None or frame_rate != int(frame_rate):
-        told = "is not known" if frame_rate is None else f"is {frame_rate:g}"
+        told = "is not known" if frame_rate is None else f"is {in_full(frame_rate)}"
         raise UserError(f"a LeRobot dataset has a whole number of frames a second, the motion's {told}; {_REMEDY}")
     if others is not None and frame_rate != others:
-        raise UserError(f"a LeRobot dataset has one frame rate, found {others:g} and {frame_rate:g}; {_REMEDY}")
+        told = f"{in_full(others)} and {in_full(frame_rate)}"
+        raise UserError(f"a LeRobot dataset has one frame rate, found {told}; {_REMEDY}")
 
 
 def check_lerobot_folder(folder: Path) -> None:

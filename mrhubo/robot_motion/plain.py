@@ -4,7 +4,7 @@ value a frame. One layout for .npz, .json and the header of .parquet.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ from mrhubo.robot_motion.motion import PER_FRAME, FollowingJoint, RobotFacts, Ro
 
 FORMAT = "mrhubo.robot_motion/1"
 UNIT = "rad"
+_BLOCK = 2**16
+"""Numbers."""
 TEXTS = ("format", "unit", "name", "source", "robot", "made_by", "checksum")
 NAME_LISTS = ("joint_names", "branch_names", "direction_names", "contact_names", "other_names", "other_follows")
 NUMBERS = ("frame_rate",)
@@ -98,8 +100,19 @@ def build(facts: Mapping[str, Any], frames: Mapping[str, np.ndarray], path: Path
 
 
 def short(array: np.ndarray) -> Any:
-    """Float32 numbers as lists of the shortest decimals that tell them apart."""
-    return array.astype(np.str_).astype(np.float64).tolist() if array.size else array.tolist()
+    """Float32 numbers as lists of the shortest decimals that tell them apart; flags as they are."""
+    if not array.size or array.dtype == np.bool_:
+        return array.tolist()
+    if not array.ndim:
+        return array.astype(np.str_).astype(np.float64).tolist()
+    rows = blocks(len(array), array.size // len(array))
+    return [row for block in rows for row in array[block].astype(np.str_).astype(np.float64).tolist()]
+
+
+def blocks(rows: int, width: int) -> Iterator[slice]:
+    """Slices of a table's rows, to be made text one after the other: a number takes 130 bytes as text in an array."""
+    step = max(1, _BLOCK // max(1, width))
+    return (slice(first, first + step) for first in range(0, rows, step))
 
 
 def _checked(key: str, value: Any) -> Any:

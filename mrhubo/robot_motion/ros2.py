@@ -18,7 +18,7 @@ from mrhubo.errors import UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.robot_motion.clock import find_rate, nanoseconds
 from mrhubo.robot_motion.motion import RobotMotion
-from mrhubo.robot_motion.plain import build, short
+from mrhubo.robot_motion.plain import blocks, build, short
 from mrhubo.robot_motion.tables import read_text
 
 SECOND = 1_000_000_000
@@ -40,12 +40,12 @@ def _yaml(motion: RobotMotion, path: Path) -> Iterator[str]:
     points = points_of(motion, path)
     yield "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}\n"
     yield f"joint_names: {json.dumps(motion.joint_names, ensure_ascii=False)}\n"  # JSON's strings are YAML's
-    yield "points:\n" if points else "points: []\n"
+    yield "points:\n" if motion.frames else "points: []\n"
     for sec, nanosec, positions in points:
         yield f"- positions: {positions}\n  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}\n"
 
 
-def points_of(motion: RobotMotion, path: Path) -> list[tuple[int, int, list[float]]]:
+def points_of(motion: RobotMotion, path: Path) -> Iterator[tuple[int, int, list[float]]]:
     """Seconds, nanoseconds and angles of every frame."""
     motion = motion.single()
     if motion.frame_rate is None:
@@ -53,7 +53,8 @@ def points_of(motion: RobotMotion, path: Path) -> list[tuple[int, int, list[floa
             f"{path}: a trajectory tells the time of every point, and the motion has no frame rate; give one"
         )
     passed_T = nanoseconds(np.arange(motion.frames), motion.frame_rate)
-    return [(int(t) // SECOND, int(t) % SECOND, row) for t, row in zip(passed_T, short(motion.q), strict=True)]
+    rows = (row for block in blocks(*motion.q.shape) for row in short(motion.q[block]))
+    return ((int(t) // SECOND, int(t) % SECOND, row) for t, row in zip(passed_T, rows, strict=True))
 
 
 def read_yaml(path: Path) -> RobotMotion:

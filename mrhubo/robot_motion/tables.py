@@ -20,7 +20,7 @@ from mrhubo.files.regular import check_regular, read_regular
 from mrhubo.lazy import import_optional
 from mrhubo.robot_motion.columns import from_columns, to_columns
 from mrhubo.robot_motion.motion import FLAGS, RobotMotion, find_repeated
-from mrhubo.robot_motion.plain import build, facts_of
+from mrhubo.robot_motion.plain import blocks, build, facts_of
 
 MAX_TEXT = 2**29
 """Bytes of the largest text file that is read."""
@@ -40,10 +40,12 @@ def write_csv(motion: RobotMotion, path: Path) -> None:
 
 def write_rows(path: Path, columns: list[np.ndarray], header: str = "") -> None:
     """Writes columns (T,) as lines of numbers with commas, each as short as tells it apart, atomically."""
-    texts = [(column.astype(np.int64) if column.dtype.kind in "biu" else column).astype(np.str_) for column in columns]
     with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         file.write(header)
-        file.writelines(",".join(row) + "\n" for row in zip(*texts, strict=True))
+        for block in blocks(len(columns[0]), len(columns)):
+            parts = (column[block] for column in columns)
+            texts = [(part.astype(np.int64) if part.dtype.kind in "biu" else part).astype(np.str_) for part in parts]
+            file.writelines(",".join(row) + "\n" for row in zip(*texts, strict=True))
 
 
 def read_csv(path: Path) -> RobotMotion:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.robot_motion.clock import in_full
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.order import JointOrder, base_of
 from mrhubo.robot_motion.plain import build
@@ -29,7 +30,7 @@ def write_unitree(motion: RobotMotion, path: Path, order: JointOrder | None) -> 
     place, turn, notes = base_of(motion, order)
     rows = np.concatenate([place, turn[:, _XYZW], motion.q], axis=1)
     write_rows(path, list(rows.T))
-    rate = "unknown" if motion.frame_rate is None else f"{motion.frame_rate:g}"
+    rate = "unknown" if motion.frame_rate is None else in_full(motion.frame_rate)
     return *notes, f"such a file names neither joints nor its frame rate, which is {rate}: tell who reads it"
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.robot_motion.clock import rate_of_step, rate_of_times, seconds
 from mrhubo.video.estimator import PoseEstimator
 from mrhubo.video.frames import MAX_FRAMES, frames
 
@@ -57,10 +58,10 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
         raise UserError(f"{path}: nobody is found in any of its {len(times):,} frames")
     notes = [] if seen == len(times) else [f"nobody is found in {len(times) - seen:,} of {len(times):,} frames"]
     time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
-    rate = (len(time_T) - 1) / time_T[-1]
+    rate = rate_of_times(time_T, seconds)
     if np.abs(time_T * rate - np.arange(len(time_T))).max() > _STEADY:
         step_T = np.diff(time_T)
-        rate = 1 / float(np.median(step_T))
+        rate = rate_of_step(f"{np.median(step_T):.3g}") or rate  # files round times to 1 ms
         notes.append(
             f"its {len(time_T):,} frames follow each other after {1000 * step_T.min():.0f} to"
             f" {1000 * step_T.max():.0f} ms: points are interpolated to {rate:.4g} frames per second"

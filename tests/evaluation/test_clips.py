@@ -6,6 +6,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mrhubo.config import load_config
@@ -46,3 +47,10 @@ def test_a_file_in_place_of_a_folder_is_named_with_the_key_and_its_place(root: P
     )
     with pytest.raises(UserError, match=re.escape(sentence)):
         prepare(config)
+
+
+def test_a_clip_without_a_frame_rate_is_told_what_to_do_here(root: Path, folder: Path) -> None:
+    np.savez(folder / "boxing.npz", poses=np.zeros((9, 66)), trans=np.zeros((9, 3)))
+    with pytest.raises(UserError, match=r"boxing\.npz: holds no frame rate; clips tell it themselves") as refused:
+        load(root, f"evaluation.motions=[{folder}]", "evaluation.validation=[drinking]")
+    assert "--rate" not in str(refused.value)

@@ -125,6 +125,28 @@ def test_a_slow_file_is_resampled(tmp_path: Path) -> None:
     assert ReplaySource.of_file(tmp_path / "slow.npz")._rate == 30
 
 
+def test_a_file_without_a_rate_is_replayed_at_the_one_that_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "poses@2.npz"
+    np.savez(path, poses=np.zeros((50, 66)), trans=np.zeros((50, 3)))
+    for kind in ("replay", "replay-loop"):
+        with pytest.raises(
+            UserError, match=f"holds no frame rate; say what it is, by --source {kind}:.*poses@2.npz@30$"
+        ):
+            Plan().add_source(f"{kind}:{path}")
+    plan = Plan()
+    plan.add_source(f"replay:{path}@60")
+    assert plan.sources[0]._rate == 60  # pyright: ignore
+    told = path.rename(tmp_path / "a@60")
+    with pytest.raises(UserError, match="--source replay:.*a@60@30$"):
+        plan.add_source(f"replay:{told}")
+    for wrong in ("0", "nan", "1e9"):
+        with pytest.raises(UserError, match="expected 1 to 1000"):
+            plan.add_source(f"replay:{told}@{wrong}")
+    np.savez(tmp_path / "b.npz", poses=np.zeros((50, 66)), trans=np.zeros((50, 3)), mocap_frame_rate=60.0)
+    plan.add_source(f"replay:{tmp_path / 'b.npz'}@50")
+    assert plan.sources[1]._rate == 60 and any("50" in said and "60" in said for said in plan.told())  # pyright: ignore
+
+
 def test_a_bug_in_a_source_stops_the_robot(clock: Clock, replay: ReplaySource, monkeypatch: pytest.MonkeyPatch) -> None:
     read, sink = replay.read, Kept()
 
@@ -273,6 +295,8 @@ def test_a_replay_gives_the_newest_frame_that_is_due(replay: ReplaySource) -> No
 WRONG: list[tuple[Callable[[Plan], object], str]] = [
     (lambda plan: plan.add_source("udb:1"), "nearest: 'udp'"),
     (lambda plan: plan.add_source("replay"), "names no file"),
+    (lambda plan: plan.add_source("replay:@30"), "names no file"),
+    (lambda plan: plan.add_source("replay:dance@me.bvh"), "dance@me.bvh: there is no such file"),
     (lambda plan: plan.add_source("replay:/no/such/file.bvh"), "no such file"),
     (lambda plan: plan.add_source("udp:x"), "HOST:PORT"),
     (lambda plan: plan.add_sink("udp"), "HOST:PORT"),

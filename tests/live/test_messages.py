@@ -32,6 +32,18 @@ def test_the_kinds() -> None:
     assert isinstance(same, SeenPose) and np.allclose(same.local_J33, pose.local_J33, atol=1e-6)
 
 
+def test_what_newer_senders_tell_besides_is_not_read() -> None:
+    root = {"rotation": [0.0, 0.7, 0.0], "place": [0.2, 0.9, 1.4]}
+    old = read_message(message(1, root=root)).content
+    new = read_message(message(1, root={**root, "speed": 3}, hands=[[1]], version="1.2")).content
+    assert isinstance(old, SeenPose) and isinstance(new, SeenPose) and old.root is not None and new.root is not None
+    assert np.array_equal(new.local_J33, old.local_J33) and np.array_equal(new.root.turn_33, old.root.turn_33)
+    assert read_message(message(1, "heartbeat", held=True, grip=0.5)).content == Heartbeat(True)
+    told = {"set": "webxr", "names": ["left-arm-upper", "left-third-arm"], "points": [[1, 2, 3], [4, 5, 6]]}
+    found = read_message(message(1, "landmarks", **told, radii=[0.1, 0.1])).content
+    assert isinstance(found, Landmarks) and found.points == {"left_shoulder": (1, 2, 3)}
+
+
 def test_mediapipe_has_y_down_and_z_away() -> None:
     points: list[Any] = [[0.1 * i, 0.2, 0.3] for i in range(33)]
     points[12] = None

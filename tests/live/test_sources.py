@@ -36,11 +36,16 @@ UNITY_OFFSETS = {
 """Our skeleton in Unity's axes: x to the right, y up, z forward, where the avatar looks."""
 
 
-def osc(bone: str, xyzw: Any, address: str = ADDRESS, place: Any = (0.0, 1.0, 0.0)) -> Any:
+def osc(bone: str, xyzw: Any, address: str = ADDRESS, place: Any = (0.0, 1.0, 0.0), more: Any = ()) -> Any:
     builder = OscMessageBuilder(address)
-    for value in (bone, *map(float, place), *map(float, xyzw)):
+    for value in (bone, *map(float, place), *map(float, xyzw), *more):
         builder.add_arg(value)
     return builder.build()
+
+
+def bundled(*elements: bytes) -> bytes:
+    """A bundle of OSC to be taken at once."""
+    return b"#bundle\0" + (1).to_bytes(8) + b"".join(len(element).to_bytes(4) + element for element in elements)
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -116,10 +121,52 @@ def test_hips_and_the_avatars_place_are_the_root() -> None:
 def test_places_that_are_none_are_refused(place: list[float], bone: str, address: str) -> None:
     bones = Bones()
     bones.take(osc("Hips", [0, 0, 0, 1], place=[0, 1, 0]).dgram)
-    with pytest.raises(Refused, match="malformed"):
-        bones.take(osc(bone, [0, 0, 0, 1], address, place).dgram)
+    assert not bones.take(osc(bone, [0, 0, 0, 1], address, place).dgram) and bones.dropped == 1
     root = bones.pose.root
     assert root is not None and root.place_3 is not None and root.place_3.tolist() == [0, 1, 0]
+
+
+@pytest.mark.parametrize("more", [(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), ("later",)])
+def test_what_newer_versions_tell_after_the_arguments_is_not_read(more: Any) -> None:
+    """Version 2.1 tells the avatar's scale and offset after its place, in one bundle with the bones."""
+    unit, turned = [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.5, np.sqrt(0.75)]
+    messages: list[Any] = [
+        ("root", unit, vmc.ROOT, (1, 0, 2)),
+        ("Hips", turned),
+        ("LeftUpperArm", turned),
+        ("LeftFoot", unit),
+    ]
+    old, new = Bones(), Bones()
+    assert old.take(bundled(*(osc(*message).dgram for message in messages)))
+    assert new.take(bundled(*(osc(*message, **{"more": more}).dgram for message in messages))) and new.dropped == 0
+    assert np.array_equal(new.pose.local_J33, old.pose.local_J33) and np.array_equal(new.pose.sure_J, old.pose.sure_J)
+    root, expected = new.pose.root, old.pose.root
+    assert root is not None and expected is not None and root.place_3 is not None and expected.place_3 is not None
+    assert np.array_equal(root.turn_33, expected.turn_33) and np.array_equal(root.place_3, expected.place_3)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        osc("root", [0, 0, 0], vmc.ROOT).dgram,
+        osc("root", [0, 0, 0, 0], vmc.ROOT).dgram,
+        osc("Hips", [0, 0, 0, 1], place=[0, np.nan, 0]).dgram,
+        osc("LeftFoot", [0, 0, 0, 1], place=[0, 1e9, 0]).dgram,
+        osc("LeftFoot", [0, 0, 0, 1]).dgram[:-8],  # arguments are missing
+        osc("x", [0, 0, 0, 1], "/VMC/Ext/Other").dgram[:-8],
+        b"none",
+        b"",
+    ],
+)
+def test_a_bad_message_is_dropped_alone(bad: bytes) -> None:
+    bones = Bones()
+    other = osc("x", [0, 0, 0, 1], "/VMC/Ext/Other").dgram
+    arm, hips = osc("LeftUpperArm", [0, 0, 0.5, np.sqrt(0.75)]).dgram, osc("Hips", [0, 0, 0, 1]).dgram
+    assert bones.take(bundled(bad, arm, other, bundled(bundled(hips), bad)))
+    assert bones.dropped == 2 and bones.pose.root is not None
+    assert bones.pose.sure_J[POSED_JOINT_NAMES.index("left_shoulder")] == 1
+    with pytest.raises(Refused, match="malformed"):
+        bones.take(bundled(arm)[:-4])
 
 
 @pytest.fixture
@@ -199,7 +246,15 @@ def test_pico_joints_become_the_pose_that_they_are_of() -> None:
             assert np.allclose(*ways, atol=2e-3), (side, end)
 
 
-@pytest.mark.parametrize("poses", [None, [], "x", np.zeros((23, 7)), np.full((24, 7), np.nan), [[1, 2]] * 24])
+def test_pico_numbers_that_a_newer_sdk_adds_are_not_read() -> None:
+    old = rows(torch.eye(3).expand(21, 3, 3))
+    assert to_landmarks(np.concatenate([old, np.full((24, 2), np.nan)], axis=1)) == to_landmarks(old)
+
+
+@pytest.mark.parametrize(
+    "poses",
+    [None, [], "x", np.zeros((23, 7)), np.zeros((24, 6)), np.zeros(24), np.full((24, 7), np.nan), [[1, 2]] * 24],
+)
 def test_pico_what_is_no_pose(poses: Any) -> None:
     with pytest.raises(Refused):
         to_landmarks(poses)

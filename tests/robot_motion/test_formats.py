@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from mrhubo.robot_motion import (
     read_robot_motion,
     write_robot_motion,
 )
+from mrhubo.robot_motion import plain as plain_module
 from mrhubo.robot_motion.motion import PER_FRAME
 from tests.robot_motion.motions import assert_same, motions, plain, standing
 
@@ -86,6 +89,58 @@ def test_bytes_depend_on_the_motion_alone(tmp_path: Path, name: str) -> None:
     for path in (first, second):
         write_robot_motion(plain(), path, name)
     assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("name", ["csv", "unitree", "json", "yaml", "mcap"])
+def test_what_is_written_block_by_block_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    need(name)
+    motion, written = standing(100), []
+    for block in (10**9, 64, 1):
+        monkeypatch.setattr(plain_module, "_BLOCK", block)
+        write_robot_motion(motion, path := tmp_path / f"{block}{FORMATS[name].ending}", name)
+        written.append(path.read_bytes())
+    assert written[0] == written[1] == written[2]
+
+
+def test_blocks_are_all_rows_once() -> None:
+    for rows, width in ((0, 3), (1, 1), (100_000, 40), (7, 10**6)):
+        found = [row for block in plain_module.blocks(rows, width) for row in range(rows)[block]]
+        assert found == list(range(rows))
+        assert all(
+            len(range(rows)[block]) * width <= 2**16 or width > 2**16 for block in plain_module.blocks(rows, width)
+        )
+
+
+def test_json_is_what_json_makes_of_it(tmp_path: Path) -> None:
+    """To the byte: facts, then every array as lists of the shortest decimals."""
+    for motion in (
+        standing(9),
+        RobotMotion([0.5, 0.1], ("a", "b"), collision=True),
+        RobotMotion(np.zeros((2, 0, 1)), ("ä",)),
+    ):
+        write_robot_motion(motion, tmp_path / "a.json")
+        arrays = {name: array for name in PER_FRAME if (array := getattr(motion, name)) is not None}
+        lists = {
+            name: array.tolist() if array.dtype == bool or not array.size else array.astype(str).astype(float).tolist()
+            for name, array in arrays.items()
+        }
+        text = json.dumps({**plain_module.facts_of(motion), **lists}, ensure_ascii=False) + "\n"
+        assert (tmp_path / "a.json").read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize("name", ["csv", "json", "yaml"])
+def test_writing_takes_little_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """As text at once these numbers would take 130 bytes each."""
+    monkeypatch.setattr(plain_module, "_BLOCK", 2_000)
+    motion = RobotMotion(np.random.default_rng(0).normal(size=(2_000, 10)), tuple("abcdefghij"), 120.0)
+    write_robot_motion(motion, tmp_path / "first.json")  # what is imported on demand
+    tracemalloc.start()
+    try:
+        write_robot_motion(motion, tmp_path / f"a{FORMATS[name].ending}", name)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 60 * motion.q.size
 
 
 def test_several_motions_fit_into_an_npz_alone(tmp_path: Path) -> None:

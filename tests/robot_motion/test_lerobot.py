@@ -79,6 +79,8 @@ def test_what_no_dataset_holds_is_refused(tmp_path: Path, folder: Path) -> None:
         write_lerobot(MOTIONS, folder)
     with pytest.raises(UserError, match="a whole number of frames a second, the motion's is 29.97"):
         write_lerobot([plain(rate=29.97)], tmp_path / "a")
+    with pytest.raises(UserError, match=r"the motion's is 30\.00003; resample"):  # and not "is 30"
+        write_lerobot([plain(rate=30.00003)], tmp_path / "a")
     with pytest.raises(UserError, match="one frame rate, found 30 and 60; resample them"):
         write_lerobot([MOTIONS[0], plain(rate=60.0)], tmp_path / "a")
     other = dataclasses.replace(MOTIONS[1], joint_names=("a", "b", "c"), robot=RobotFacts())

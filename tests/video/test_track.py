@@ -45,7 +45,7 @@ def test_a_steady_film_is_taken_as_it_is(film) -> None:
     film(times, list(range(100, 110)))
     estimator = Known()
     track = track_body(Path("a.mkv"), estimator)
-    assert estimator.resets == 1 and track.rate == pytest.approx(30, rel=1e-3) and track.notes == ()
+    assert estimator.resets == 1 and track.rate == 30 and track.notes == ()
     assert track.point_TK3[:, 0, 0] == pytest.approx(np.arange(100, 110)) and track.seen_T.all()
 
 
@@ -54,6 +54,12 @@ def test_an_unsteady_film_is_interpolated_between_its_true_times(film) -> None:
     track = track_body(Path("a.mkv"), Known())
     assert track.rate == pytest.approx(10) and "100 to 300 ms" in track.notes[0]
     assert track.point_TK3[:, 0, 0] == pytest.approx(np.arange(10, 90, 10))
+
+
+def test_an_unsteady_film_whose_times_are_rounded_has_a_round_rate(film) -> None:
+    times = np.delete(np.round(np.arange(40) / 30, 3), [5, 6, 7, 20])
+    film(times.tolist(), list(range(100, 136)))
+    assert track_body(Path("a.mkv"), Known()).rate == 30
 
 
 def test_nobody_stays_nobody(film) -> None:

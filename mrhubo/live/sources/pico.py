@@ -18,13 +18,15 @@ from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Message, Nobody, Refused
 from mrhubo.live.point_sets import POINT_SETS
 
-_JOINTS = 24
+_JOINTS, _NUMBERS = 24, 7
+"""How many there are, and numbers of each that are known."""
 _FARTHEST = 1e3
 _NAME = "pico"
 
 
 def to_landmarks(poses: Any) -> Landmarks:
-    """Points of `get_body_joints_pose()`: (24, 7), each x, y, z [m] and a quaternion, which is not read.
+    """Points of `get_body_joints_pose()`: (24, 7), each x, y, z [m] and a quaternion, which is not read, nor what a
+    newer SDK tells after it.
 
     Raises:
         Refused: it has another shape or holds no numbers.
@@ -33,7 +35,9 @@ def to_landmarks(poses: Any) -> Landmarks:
         pose_K7 = np.asarray(poses, np.float64)
     except (TypeError, ValueError) as error:
         raise Refused("malformed") from error
-    if pose_K7.shape != (_JOINTS, 7) or not (np.abs(pose_K7[:, :3]) <= _FARTHEST).all():
+    if pose_K7.ndim != 2 or len(pose_K7) != _JOINTS or pose_K7.shape[1] < _NUMBERS:
+        raise Refused("malformed")
+    if not (np.abs(pose_K7[:, :3]) <= _FARTHEST).all():
         raise Refused("malformed")
     names = POINT_SETS["pico"].names or ()
     points = {name: (x, y, z) for name, (x, y, z) in zip(names, pose_K7[:, :3].tolist(), strict=True)}

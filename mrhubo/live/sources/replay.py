@@ -10,8 +10,9 @@ from mrhubo.live.body import Root, SeenPose
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Message
 from mrhubo.motion import Motion, ReadOptions, read_motion, resample
+from mrhubo.motion.readers.options import NoRate
 
-_NAME = "replay"
+_NAME, _LOOP = "replay", "replay-loop"
 _SLOWEST = 30.0
 """Frames per second: slower ones would look like a stream that breaks off again and again."""
 
@@ -24,6 +25,8 @@ class ReplaySource:
     def __init__(self, motion: Motion, loop: bool = False) -> None:
         """A motion from its first frame on; `loop`: again and again."""
         arrays = motion.arrays
+        self.notes = motion.notes
+        """What is to be known about it, a sentence each."""
         self._local_TJ33, self._rate, self._loop = arrays.local_TJ33, motion.frame_rate, loop
         sure_TJ = arrays.confidence_TJ
         self._root_T33, self._place_T3 = arrays.root_rotation_T33, arrays.root_position_T3
@@ -32,13 +35,21 @@ class ReplaySource:
         self._last = -1
 
     @classmethod
-    def of_file(cls, path: Path, loop: bool = False) -> ReplaySource:
+    def of_file(cls, path: Path, loop: bool = False, rate: float | None = None) -> ReplaySource:
         """A motion file, of any kind that `read_motion` reads.
 
+        Args:
+            path: the file.
+            loop: again and again.
+            rate: frames per second of a file that does not tell them.
+
         Raises:
-            UserError: it is missing, damaged, or tells no frame rate.
+            UserError: it is missing, damaged, or its frame rate is not known.
         """
-        motion = read_motion(path, ReadOptions())
+        try:
+            motion = read_motion(path, ReadOptions(rate=rate))
+        except NoRate as error:
+            raise error.instead(f"say what it is, by --source {_LOOP if loop else _NAME}:{path}@30") from error
         return cls(motion if motion.frame_rate >= _SLOWEST else resample(motion, _SLOWEST), loop)
 
     def open(self) -> None:

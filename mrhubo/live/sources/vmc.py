@@ -1,16 +1,16 @@
 """The Virtual Motion Capture protocol: rotations of an avatar's bones, as OSC messages over UDP.
 
 Protocol: https://protocol.vmc.info/english (`/VMC/Ext/Bone/Pos` with the name of a Unity humanoid bone, its position
-and its rotation, both relative to the bone above it; `/VMC/Ext/Root/Pos` with the place of the whole avatar). Unity's
-axes are left-handed: x to the right, y up, z forward, which is where an avatar looks. Mirrored in x they are ours. A
-bone's rotation refers to the avatar's T-pose, in which VRM has all rotations 0, as our rest pose has.
+and its rotation, both relative to the bone above it; `/VMC/Ext/Root/Pos` with the place of the whole avatar, and from
+version 2.1 on its scale and offset for mixed reality, which are not read). Unity's axes are left-handed: x to the
+right, y up, z forward, which is where an avatar looks. Mirrored in x they are ours. A bone's rotation refers to the
+avatar's T-pose, in which VRM has all rotations 0, as our rest pose has.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,9 @@ PORT = 39_539
 """On which programs that receive VMC listen by default."""
 ADDRESS, ROOT = "/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"
 _ARGUMENTS = 8
+"""Name, position and rotation. What newer versions of the protocol tell after them is not read."""
+_BUNDLE, _BUNDLE_HEADER, _SIZE = b"#bundle\0", 16, 4
+"""How a bundle of OSC begins, and bytes: before its first element, and of an element's size."""
 _CENTRAL = {"Spine": "spine1", "Chest": "spine2", "UpperChest": "spine3", "Neck": "neck", "Head": "head"}
 _SIDED = {
     "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
@@ -56,37 +59,46 @@ class Bones:
         """Hips, and the avatar's own place in the world, mirrored in x."""
         self._lengths: dict[str, float] = {}
         """Of the bones above `_LEG` [m]."""
+        self.dropped = 0
+        """Messages that told no bone as the protocol does."""
 
     def take(self, datagram: bytes) -> bool:
-        """Takes the bones of one datagram, all or none; whether there were any.
+        """Takes the bones of one datagram; whether there were any. A message in it that tells no bone as the protocol
+        does is dropped alone.
 
         Raises:
-            Refused: it is no OSC, or a bone in it has no rotation.
+            Refused: the datagram is too long, or cut off.
         """
         if len(datagram) > MAX_BYTES:
             raise Refused("too_long")
-        found: dict[int, tuple[float, ...]] = {}
-        poses: dict[str, Root] = {}
-        lengths: dict[str, float] = {}
-        for address, arguments in _osc(datagram):
-            if address not in (ADDRESS, ROOT):
-                continue
-            if len(arguments) != _ARGUMENTS or not isinstance(arguments[0], str):
-                raise Refused("malformed")
-            name = ROOT if address == ROOT else arguments[0]
-            if name in (ROOT, _HIPS):
-                poses[name] = _pose(arguments)
-            if name in _LEG:
-                lengths[name] = float(np.linalg.norm(_position(arguments)))
-            place = None if address == ROOT else _PLACE.get(name)
-            if place is not None:
-                found[place] = _quaternion(arguments[4:])
-        for place, (x, y, z, w) in found.items():
+        is_any = False
+        for message in _messages(datagram):
+            try:
+                is_any |= self._take(*_osc(message))
+            except Refused:
+                self.dropped += 1
+        return is_any
+
+    def _take(self, address: str, arguments: list[Any]) -> bool:
+        if address not in (ADDRESS, ROOT):
+            return False
+        if len(arguments) < _ARGUMENTS or not isinstance(arguments[0], str):
+            raise Refused("malformed")
+        position, rotation = arguments[1:4], arguments[4:_ARGUMENTS]
+        name = ROOT if address == ROOT else arguments[0]
+        place = None if address == ROOT else _PLACE.get(name)
+        # all of it is read before any of it is kept
+        pose = _pose(position, rotation) if name in (ROOT, _HIPS) else None
+        length = float(np.linalg.norm(_position(position))) if name in _LEG else None
+        if place is not None:
+            x, y, z, w = _quaternion(rotation)
             self._xyzw_J4[place] = x, -y, -z, w  # mirrored in x
             self._seen_J[place] = True
-        self._poses |= poses
-        self._lengths |= lengths
-        return bool(found or poses)
+        if pose is not None:
+            self._poses[name] = pose
+        if length is not None:
+            self._lengths[name] = length
+        return place is not None or pose is not None
 
     @property
     def pose(self) -> SeenPose:
@@ -109,32 +121,63 @@ class Bones:
         return Root(turn_33, place_3 * (LEG_LENGTH / length if length > _SHORTEST_LEG else 1.0))
 
 
-def _position(arguments: list[Any]) -> np.ndarray:
-    numbers = [float(value) for value in arguments[1:4] if isinstance(value, int | float) and abs(value) <= _FARTHEST]
+def _position(values: list[Any]) -> np.ndarray:
+    numbers = [float(value) for value in values if isinstance(value, int | float) and abs(value) <= _FARTHEST]
     if len(numbers) != 3:  # nor NaN
         raise Refused("malformed")
     return np.array(numbers) * [-1.0, 1.0, 1.0]
 
 
-def _pose(arguments: list[Any]) -> Root:
-    x, y, z, w = _quaternion(arguments[4:])
-    return Root(of_quaternions(np.array([[x, -y, -z, w]]))[0], _position(arguments))
+def _pose(position: list[Any], rotation: list[Any]) -> Root:
+    x, y, z, w = _quaternion(rotation)
+    return Root(of_quaternions(np.array([[x, -y, -z, w]]))[0], _position(position))
 
 
-def _quaternion(values: Any) -> tuple[float, ...]:
+def _quaternion(values: list[Any]) -> tuple[float, ...]:
     numbers = tuple(float(value) for value in values if isinstance(value, int | float) and abs(value) <= 2.0)
     if len(numbers) != 4 or not 0.5 < math.sqrt(sum(n * n for n in numbers)) < 2.0:
         raise Refused("malformed")
     return numbers
 
 
-def _osc(datagram: bytes) -> Iterator[tuple[str, list[Any]]]:
-    """Address and arguments of every message in a datagram."""
-    from pythonosc.osc_packet import OscPacket
+def _messages(datagram: bytes) -> list[bytes]:
+    """The OSC messages of a datagram: itself, or those of a bundle and of bundles in it
+    (https://opensoundcontrol.stanford.edu/spec-1_0.html). python-osc gives up a bundle for one bad message in it.
+
+    Raises:
+        Refused: a bundle is cut off.
+    """
+    found: list[bytes] = []
+    waiting = [(0, len(datagram))]
+    while waiting:
+        start, end = waiting.pop()
+        if not datagram.startswith(_BUNDLE, start, end):
+            found.append(datagram[start:end])
+            continue
+        inner, start = [], start + _BUNDLE_HEADER
+        while start < end:
+            size, start = int.from_bytes(datagram[start : start + _SIZE]), start + _SIZE
+            if size > end - start:
+                raise Refused("malformed")
+            inner.append((start, start + size))
+            start += size
+        waiting += inner[::-1]  # so that they come out in order
+    return found
+
+
+def _osc(message: bytes) -> tuple[str, list[Any]]:
+    """Address and arguments of a message.
+
+    Raises:
+        Refused: it is none.
+    """
+    from pythonosc.osc_message import OscMessage
 
     try:
-        for timed in OscPacket(datagram).messages:
-            yield timed.message.address, list(timed.message.params)
+        if not OscMessage.dgram_is_message(message):
+            raise Refused("malformed")
+        read = OscMessage(message)
+        return read.address, list(read.params)
     except Refused:
         raise
     except Exception as error:  # whatever python-osc makes of a stranger's bytes
@@ -152,7 +195,7 @@ class VmcSource(DatagramSource):
         Raises:
             UserError: python-osc is not installed, or the host is reached by others.
         """
-        import_optional("pythonosc.osc_packet", "VMC needs python-osc: pip install 'mrhubo[live]'")
+        import_optional("pythonosc.osc_message", "VMC needs python-osc: pip install 'mrhubo[live]'")
         if not endpoint.is_loopback:
             raise UserError(
                 f"--source vmc:{endpoint.shown}: VMC has no token, so it is taken on loopback alone; let a program on"
@@ -174,6 +217,8 @@ class VmcSource(DatagramSource):
                 inbox.counts[str(fault)] += 1
 
         self._datagrams.read(take)
+        inbox.counts["malformed"] += self._bones.dropped
+        self._bones.dropped = 0
         if moved:
             self._number += 1
             inbox.offer(Message(self._session, self._number, now, self._bones.pose), "vmc", now)

@@ -13,7 +13,7 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.asf_file import read_amc, read_asf
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.options import NoRate, ReadOptions
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
 
@@ -30,7 +30,8 @@ def is_amc(content: Content) -> bool:
 
 
 def read_acclaim(path: Path, options: ReadOptions) -> Motion:
-    """Reads an .amc file and the .asf file beside it: that of the subject (`02.asf` for `02_01.amc`) or the only one.
+    """Reads an .amc file and the .asf file beside it: that whose name is the longest beginning of the motion's, up to a
+    `_` (`02.asf` for `02_01.amc`, `HDM_bd.asf` for `HDM_bd_01-01_01_120.amc`), or the only one.
 
     The files cannot say their frame rate: it is asked for.
 
@@ -39,10 +40,7 @@ def read_acclaim(path: Path, options: ReadOptions) -> Motion:
     """
     skeleton = read_asf(_find_skeleton(path))
     if options.rate is None:
-        raise UserError(
-            f"{path}: an .amc file does not say how many frames a second it has; say so with --rate (most of "
-            "CMU's have 120)"
-        )
+        raise NoRate(path, "an .amc file does not tell its frame rate (most of CMU's and HDM05's have 120)")
     tree, notes = read_amc(path, skeleton)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     kind = f"ASF/AMC files, skeleton {skeleton.path.name}:"
@@ -54,14 +52,12 @@ def _find_skeleton(path: Path) -> Path:
         found = sorted(file for file in path.parent.iterdir() if file.suffix.lower() == ".asf")
     except OSError as error:
         raise UserError(f"{path.parent}: cannot be read: {error.strerror or error}") from error
-    for stem in (path.stem, path.stem.rpartition("_")[0], path.stem.partition("_")[0]):
-        named = [file for file in found if file.stem == stem]
-        if named:
-            return named[0]
+    if named := [file for file in found if f"{path.stem}_".startswith(f"{file.stem}_")]:
+        return max(named, key=lambda file: len(file.stem))
     if len(found) == 1:
         return found[0]
     beside = f"beside it are {listed(file.name for file in found)}" if found else "there is none beside it"
     raise UserError(
-        f"{path}: needs the .asf file with its skeleton, {path.stem.partition('_')[0]}.asf; {beside}; put it into the "
-        "same folder"
+        f"{path}: needs the .asf file with its skeleton, whose name begins as the motion's, up to a '_' (02.asf for"
+        f" 02_01.amc); {beside}; put it into the same folder"
     )

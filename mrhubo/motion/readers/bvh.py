@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.bvh_file import read_bvh_file
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
 from mrhubo.motion.readers.tracks import Person, choose
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
@@ -32,20 +31,20 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is missing, damaged or too large, or no human is found in it.
     """
-    tree, seconds, notes = read_bvh_file(path)
+    tree, told, notes = read_bvh_file(path)
     rate = options.rate
     low, high = RATES
-    if seconds is not None and not low <= 1 / seconds <= high:
-        said = f"'Frame Time' is {seconds:g} s, which makes {1 / seconds:.3g} frames per second"
+    if told is not None and not low <= told <= high:
+        said = f"'Frame Time' makes {told:.3g} frames per second"
         if rate is None:
-            raise UserError(f"{path}: {said}; expected {low:g} to {high:g}; say what it is with --rate")
+            raise NoRate(path, f"{said}; expected {low:g} to {high:g}")
         notes.append(f"{said}; {rate:g} are taken, as given")
-    elif seconds is not None:
-        if rate is not None and abs(rate * seconds - 1) > 1e-3:
-            notes.append(f"the file says {1 / seconds:.6g} frames per second, which is believed, and not {rate:g}")
-        rate = 1 / seconds
+    elif told is not None:
+        if rate is not None and abs(rate / told - 1) > 1e-3:
+            notes.append(f"the file says {told:.6g} frames per second, which is believed, and not {rate:g}")
+        rate = told
     if rate is None:
-        raise UserError(f"{path}: does not say how many frames a second it has; say so with --rate")
+        raise NoRate(path, "holds no frame rate")
     tree = _of_person(path, tree, options, notes)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     return tree_motion(tree, motion_name(path), str(path), rate, "BVH file:", given, tuple(notes))

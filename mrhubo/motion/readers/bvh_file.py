@@ -9,7 +9,6 @@ Legend: T frames, C channels. Angles in degrees; unit and axes are whatever the 
 
 from __future__ import annotations
 
-import math
 import re
 import warnings
 from dataclasses import replace
@@ -21,6 +20,7 @@ import numpy as np
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import open_regular
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
+from mrhubo.robot_motion.clock import rate_of_step
 
 MAX_BYTES = 2**30
 """Largest file."""
@@ -43,7 +43,7 @@ _TOKEN = re.compile(r"[{}]|[^\s{}]+")
 
 
 def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
-    """Reads a BVH file: the tree, the seconds between frames (None where the file does not say), and notes.
+    """Reads a BVH file: the tree, the frames per second (None where the file does not say), and notes.
 
     Raises:
         UserError: it is missing, damaged, too large, or no BVH file; says where.
@@ -57,10 +57,10 @@ def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
             )
         joints, columns = _read_hierarchy(path, _decoded(start[: found.start()]))
         after = start[found.end() :]
-        frames, seconds, rest = _read_counts(path, after)
+        frames, rate, rest = _read_counts(path, after)
         handle.seek(found.end() + rest)
         value_TC, notes = _read_numbers(path, handle, columns, frames)
-    return JointTree(tuple(joints), value_TC), seconds, notes
+    return JointTree(tuple(joints), value_TC), rate, notes
 
 
 def _decoded(content: bytes) -> str:
@@ -149,8 +149,8 @@ def _read_channels(path: Path, line: str, words: list[str], joint: Joint, first:
 
 
 def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, int]:
-    """How many frames are promised, the seconds between them, and where the numbers begin."""
-    frames, seconds, place = None, None, 0
+    """How many frames are promised, how many a second there are, and where the numbers begin."""
+    frames, rate, place = None, None, 0
     for pattern in (_FRAMES, _TIME):
         found = pattern.match(after, place)
         if found is None:
@@ -159,12 +159,12 @@ def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, in
         if pattern is _FRAMES:
             frames = int(found[1][:12])
         else:
+            text = found[1].decode("latin1")
             try:
-                seconds = float(found[1].replace(b",", b"."))
+                rate = rate_of_step(text.replace(",", "."))
             except ValueError as error:
-                raise UserError(f"{path}: 'Frame Time' is '{shortened(found[1].decode('latin1'))}'") from error
-            seconds = seconds if math.isfinite(seconds) and seconds > 0 else None
-    return frames, seconds, place
+                raise UserError(f"{path}: 'Frame Time' is '{shortened(text)}'") from error
+    return frames, rate, place
 
 
 def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | None) -> tuple[np.ndarray, list[str]]:

@@ -81,12 +81,17 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
         return read_frames(path, frames, options)
     content = Content.open(path)
     row = find_format(content)
-    if row is None and (what_to_do := advice(content)) is not None:
-        raise NoMotion(f"{path}: {what_to_do}")
     if row is None:
         expected = ", ".join(row.name for row in FORMATS)
-        raise NoMotion(
+        refusal = NoMotion(
             f"{path}: is {content.described}, and no human motion that is read here; expected one of: {expected}"
             " (docs/formats.md says how each is laid out)"
         )
-    return row.read(path, options)
+    else:
+        try:
+            return row.read(path, options)
+        except NoMotion as error:  # a reader may take a file for its own that is none: JSON of anything with joints
+            refusal = error
+    if (what_to_do := advice(content)) is not None:
+        raise NoMotion(f"{path}: {what_to_do}") from refusal
+    raise refusal

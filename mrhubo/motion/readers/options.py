@@ -11,6 +11,21 @@ RATES = (1.0, 1000.0)
 """Frames per second that are believed."""
 
 
+class NoRate(UserError):
+    """A motion file does not tell its frame rate, and nobody else does."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        """`why`: what the file tells in place of it, for a sentence about the file."""
+        super().__init__(
+            f"{path}: {why}; say what it is, by --rate 30 on the command line or ReadOptions(rate=30) in Python"
+        )
+        self.path, self.why = path, why
+
+    def instead(self, remedy: str) -> UserError:
+        """The same where neither is there to be used: what to do then."""
+        return UserError(f"{self.path}: {self.why}; {remedy}")
+
+
 @dataclass(frozen=True)
 class ReadOptions:
     """How a motion file is to be read, as far as the file itself does not say."""

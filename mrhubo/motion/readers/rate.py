@@ -8,11 +8,10 @@ from pathlib import Path
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.tree import Tree
-from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
 
 RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "fps")
 """What files call it; the first two are AMASS's."""
-_SAY = "say what it is, by --rate 30 on the command line or ReadOptions(rate=30) in Python"
 
 
 def find_rate(path: Path, nodes: Iterable[Tree], options: ReadOptions, notes: list[str]) -> float:
@@ -100,7 +99,7 @@ def told_rate(path: Path, said: str, rate: float, options: ReadOptions, notes: l
     if not low <= rate <= high:
         said = f"{said} {rate:g} frames per second; expected {low:g} to {high:g}"
         if options.rate is None:
-            raise UserError(f"{path}: {said}; {_SAY}")
+            raise NoRate(path, said)
         notes.append(f"{said}; {options.rate:g} are taken, as given")
         return float(options.rate)
     if options.rate is not None and options.rate != rate:
@@ -117,8 +116,8 @@ def asked_rate(path: Path, options: ReadOptions, why: str = "") -> float:
         why: the file does not, as a note says it, if that is known.
 
     Raises:
-        UserError: they do not.
+        NoRate: they do not.
     """
     if options.rate is None:
-        raise UserError(f"{path}: {why or 'holds no frame rate'}; {_SAY}")
+        raise NoRate(path, why or "holds no frame rate")
     return float(options.rate)

@@ -14,6 +14,11 @@ _FILES = {
     "FBX": (b"Kaydara FBX Binary  \x00\x1a\x00", "Blender"),
     "an FBX": (b"; FBX 7.4.0 project file\n", "Blender"),
     "glTF": (b'{"asset": {"version": "2.0"}, "nodes": []}', "Blender"),
+    "a glTF": (  # whose skin has joints
+        b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"name": "Armature"}],'
+        b' "skins": [{"joints": [0, 1, 2], "skeleton": 0}], "animations": []}',
+        "Blender",
+    ),
     "C3D": (b"\x02P\0\0\0", "markers"),
     "TRC": (b"PathFileType\t4\t(X/Y/Z)\n", "markers"),
     "COLLADA": (b'<?xml version="1.0"?>\n<COLLADA xmlns="x">', "Blender"),

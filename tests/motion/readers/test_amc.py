@@ -94,6 +94,23 @@ def test_the_frame_rate_and_the_skeleton_are_asked_for(files: Path, tmp_path: Pa
         mrhubo.read_motion(files, ReadOptions(rate=120.0))
 
 
+@pytest.mark.parametrize(
+    ("name", "skeleton"),
+    [
+        ("HDM_bd_01-01_01_120", "HDM_bd"),
+        ("HDM_bdx_01", "HDM"),
+        ("HDM_dg", "HDM_dg"),
+        ("HDM_dg_late_2", "HDM_dg_late"),
+    ],
+)
+def test_the_skeleton_of_several_is_that_of_the_longest_beginning(files: Path, name: str, skeleton: str) -> None:
+    folder = files.parent
+    for other in ("HDM", "HDM_bd", "HDM_dg", "HDM_dg_late", "HD"):
+        shutil.copy(folder / "07.asf", folder / f"{other}.asf")
+    found = mrhubo.read_motion(files.rename(folder / f"{name}.amc"), ReadOptions(rate=120.0))
+    assert f"skeleton {skeleton}.asf" in found.source
+
+
 def test_a_cut_off_last_frame_is_left_out(files: Path) -> None:
     files.write_text(files.read_text().rpartition("\n40\n")[0] + "\n40\nroot 0 15 0 0 0 0\n")
     found = mrhubo.read_motion(files, ReadOptions(rate=120.0))

@@ -201,6 +201,15 @@ def test_first_frame_that_jumps_is_left_out(motion: Motion, tmp_path: Path) -> N
     assert not read(motion, Style(), tmp_path).notes
 
 
+@pytest.mark.parametrize(
+    ("step", "rate"), [("0.033333", 30), ("0.0083333", 120), ("0,016667", 60), ("0.033367", 30_000 / 1001)]
+)
+def test_a_rounded_frame_time_means_the_round_rate(step: str, rate: float, motion: Motion, tmp_path: Path) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(re.sub("Frame Time: .*", f"Frame Time: {step}", write_bvh(motion, Style())))
+    assert mrhubo.read_motion(path).frame_rate == rate
+
+
 def test_frame_rate(motion: Motion, tmp_path: Path) -> None:
     odd = dataclasses.replace(motion, frame_rate=239.01)
     assert read(odd, Style(), tmp_path).frame_rate == pytest.approx(239.01, rel=1e-6)
