@@ -95,14 +95,13 @@ def _smooth_window(problem: Problem, q_TN: np.ndarray, task: Task, before_LN: np
     def polish(path_TN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return refine(problem, path_TN, target_TD3, smoothness, SWEEPS, TOLERANCE, fixed_T)
 
-    def polish_other(path_TN: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def polish_other(path_TN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         other_TN = _without_jumps(problem, path_TN, target_TD3, smoothness.pull, len(before_LN))
-        return None if other_TN is None else polish(other_TN)
+        return (path_TN, np.full(problem.cost.joints_NC.shape[1], np.inf)) if other_TN is None else polish(other_TN)
 
-    (motion_TN, cost_C), other = side_by_side(lambda work: work(path_TN), (polish, polish_other))
-    if other is not None:
-        other_TN, other_cost_C = other
-        motion_TN = np.where((other_cost_C < cost_C)[problem.cost.block_N], other_TN, motion_TN)
+    ways = side_by_side(lambda work: work(path_TN), (polish, polish_other))
+    (motion_TN, cost_C), (other_TN, other_cost_C) = ways
+    motion_TN = np.where((other_cost_C < cost_C)[problem.cost.block_N], other_TN, motion_TN)
     motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
     if task.giving_way is None:
         return motion_TN
