@@ -41,7 +41,11 @@ _RATE = 60.0
 _FRAMES = 7
 """Moments of each pose: as many as its noise is averaged over, and one before and after."""
 _USUAL = 0.95
-"""Share of whole poses that have the usual phi or less."""
+"""Share of whole poses that have the usual phi or less,"""
+_LEAST_PHI = 2 / 9 * math.radians(3.0) ** 2
+"""which is that of joints pulled by three degrees at least: files of different skeletons differ by more, and an arm
+that is no human's pulls the other one by a degree or two. A turn by a small angle a about any axis changes the six numbers
+by 4/3 a^2 in the sum of squares."""
 _RIDGE = 1e-4
 """Weight of the squared weights beside the mean loss: keeps those finite that nothing speaks against."""
 _EXACT = {"maxiter": 1_000, "ftol": 1e-13, "gtol": 1e-8}
@@ -78,7 +82,7 @@ def calibrate(retargeter: Retargeter, poses: int = POSES, seed: int = 0) -> Conf
     error_BD = torch.rad2deg(angle_between(answer_BD3, body_map.human_directions(true_BJ33.to(device))))
     error_BC = torch.stack([error_BD[:, list(b.columns)].mean(dim=1) for b in retargeter.branches], dim=1)
     good_X = (error_BC < GOOD_DEG).flatten().cpu()
-    usual_phi = float(signals.phi[whole].flatten().quantile(_USUAL))
+    usual_phi = max(float(signals.phi[whole].flatten().quantile(_USUAL)), _LEAST_PHI)
     still = dataclasses.replace(signals, shake_deg=None)
     moving_XS, still_XS = (scaled(s, usual_phi).flatten(0, 1).cpu() for s in (signals, still))
     return ConfidenceModel(usual_phi, fit_weights(moving_XS, good_X), fit_weights(still_XS, good_X))

@@ -5,7 +5,7 @@ Four signals tell, each of which only lowers it:
 
 miss        the answer's limbs point elsewhere than the input's: what the robot cannot do, or what went wrong
 implausible the directions are no human's: phi of what the robot reads (`mrhubo.robot.plausibility`), beyond that of the
-            prior's own poses
+            prior's own poses, and beyond three degrees
 excess      joints of the pose that the robot reads leave their anatomical range
 shake       limbs change their course faster than a person's can: noise; only where a frame rate is known
 
@@ -154,7 +154,8 @@ class ConfidenceModel:
     """Confidence of signals."""
 
     usual_phi: float
-    """phi that one in twenty of the prior's own poses exceeds; up to it a pose is as plausible as can be."""
+    """phi that one in twenty of the prior's own poses exceeds, three degrees at least; up to it a pose is as plausible as
+    can be."""
     moving: Weights
     """Where a frame rate is known, and so how much a motion shakes."""
     still: Weights
@@ -207,8 +208,8 @@ def scaled(signals: Signals, usual_phi: float) -> Tensor:
 
 
 STANDARD = ConfidenceModel(
-    usual_phi=0.07,
-    moving=Weights(certain=3.2, miss=3.2, implausible=4.2, excess=3.9, shake=1.1),
-    still=Weights(certain=2.4, miss=2.9, implausible=3.8, excess=3.4, shake=0.0),
+    usual_phi=0.0006,
+    moving=Weights(certain=3.3, miss=3.1, implausible=2.0, excess=0.0, shake=1.3),
+    still=Weights(certain=2.5, miss=2.8, implausible=1.8, excess=0.0, shake=0.0),
 )
 """Of a retargeter that was never calibrated: what NAO's is, rounded."""

@@ -13,11 +13,11 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.reference import DirectionJacobian, OptimizationRetargeter
 from mrhubo.robot import BodyMap, Limb, align_pose, read_keypoints
+from tests.poses import prior_poses
 from tests.reference.walkers import ROOTS, entries, walker
 
 FORWARD = (0.0, 0.0, 1.0)
@@ -34,7 +34,7 @@ def robot_directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:
 
 
 def human_poses(count: int) -> Tensor:
-    return BodyPrior.open().decode_matrices(torch.randn(count, 32, generator=torch.Generator().manual_seed(0)))
+    return prior_poses(count, 0)
 
 
 def columns(body_map: BodyMap, *regions: str) -> list[int]:

@@ -22,6 +22,7 @@ from mrhubo.reference import OptimizationRetargeter, direction_error
 from mrhubo.retargeter import Retargeter, architecture, build_network
 from mrhubo.retargeter import parts as pose_parts
 from mrhubo.robot import build_body_map
+from tests.poses import prior_poses
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def folder(made: Retargeter, tmp_path: Path) -> Path:
 
 def human(count: int) -> torch.Tensor:
     """Local rotations (count, 21, 3, 3) of plausible poses."""
-    return BodyPrior.open().decode_matrices(torch.randn(count, 32, generator=torch.Generator().manual_seed(1)))
+    return prior_poses(count, 1)
 
 
 def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from mrhubo.reference import OptimizationRetargeter, angle_between
 from mrhubo.retargeter import Retargeter, build_network, without_training
 from mrhubo.retargeter.calibration import calibrate
 from mrhubo.robot import build_body_map
+from tests.poses import prior_poses
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -96,7 +97,7 @@ def test_a_package_gives_back_a_tuned_network(root: Path, tmp_path: Path) -> Non
         for weights in made.network.parameters():
             weights += 0.01 * torch.randn(weights.shape, generator=torch.Generator().manual_seed(0))
     opened = Retargeter.load(made.save(tmp_path / "package", {"run_id": "abc"}))
-    pose = BodyPrior.open().decode_matrices(torch.randn(20, 32, generator=torch.Generator().manual_seed(1)))
+    pose = prior_poses(20, 1)
     torch.testing.assert_close(opened.predict(pose), made.predict(pose))
     for name, weights in made.network.state_dict().items():
         assert torch.equal(opened.network.state_dict()[name], weights), name

@@ -7,17 +7,17 @@ import math
 import pytest
 import torch
 
-from mrhubo.body import BodyPrior
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.retargeter import Retargeter
 from mrhubo.streaming import StreamSettings
 from mrhubo.streaming.branches import Branches, BranchState
+from tests.poses import prior_poses
 
 
 @pytest.mark.parametrize("wait", [0.2, 0.05])
 def test_a_worse_branch_is_left_after_the_time_that_is_set_and_not_before(retargeter: Retargeter, wait: float) -> None:
     problem = retargeter.directions
-    pose = BodyPrior.open().decode_matrices(torch.randn(60, 32, generator=torch.Generator().manual_seed(2)))
+    pose = prior_poses(60, 2)
     target = problem.body_map.human_directions(pose)
     best, _ = OptimizationRetargeter(retargeter.body_map).solve_frames(pose)
     start = problem.robot.sample(60, torch.Generator().manual_seed(0))

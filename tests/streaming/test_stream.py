@@ -14,12 +14,12 @@ from torch import Tensor
 
 import mrhubo
 from mrhubo import rotation
-from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError
 from mrhubo.motion import Motion, read_motion
 from mrhubo.reference import OptimizationRetargeter, count_jumps
 from mrhubo.retargeter import Retargeter
 from mrhubo.streaming import Stream, StreamSettings
+from tests.poses import prior_poses
 
 Hanging = Callable[..., Motion]
 
@@ -61,7 +61,7 @@ def test_no_limit_is_exceeded_whatever_comes_in(retargeter: Retargeter, wave: Te
 
 
 def test_who_stands_still_gets_the_frames_own_optimum_and_the_robot_stays_there(retargeter: Retargeter) -> None:
-    pose = BodyPrior.open().decode_matrices(torch.randn(8, 32, generator=torch.Generator().manual_seed(1)))
+    pose = prior_poses(8, 1)
     best, _ = OptimizationRetargeter(retargeter.body_map).solve_frames(pose)
     optimum = retargeter.judge(best, pose).direction_error_deg.mean(dim=1)
     stream = Stream(retargeter, people=8, settings=StreamSettings(avoid_collisions=False))

@@ -36,7 +36,7 @@ def test_key_poses_show_what_differs(root: Path, tmp_path: Path, shapes: bool) -
     config = load_config(root / "conf" / "nao.yaml").robot
     robot = Robot(config.urdf if shapes else bare(config.urdf, tmp_path), config.joints)
     artist, prior = Artist(robot), BodyPrior.open()
-    pose = prior.decode_matrices(torch.randn(3, 32, generator=torch.Generator().manual_seed(0)))
+    pose = prior.decode_matrices(torch.randn(3, prior.latent, generator=torch.Generator().manual_seed(0)))
     q = robot.sample(3, torch.Generator().manual_seed(1))
     clip = Clip(Motion("clip", pose, 24.0, "a motion"), q)
     same, again = (np.asarray(artist.key_poses(clip, {"mrhubo": q}, count=2), float) for _ in range(2))
@@ -51,7 +51,7 @@ def test_key_poses_show_what_differs(root: Path, tmp_path: Path, shapes: bool) -
 def test_the_sheet_of_pairs(root: Path, name: str) -> None:
     body_map, prior = build_body_map(load_config(root / "conf" / f"{name}.yaml").robot), BodyPrior.open()
     generator = torch.Generator().manual_seed(0)
-    pose = prior.decode(1.5 * torch.randn(30, 32, generator=generator))
+    pose = prior.decode(1.5 * torch.randn(30, prior.latent, generator=generator))
     pairs = {"q": body_map.robot.sample(30, generator), "H": pose, "phi": prior.reconstruction_error(pose)}
     sheet = Artist(body_map.robot).pairs(pairs, make_filter(pairs["phi"], "linear", 1.0), prior, count=1)
     assert sheet.width > 600 and sheet.height > 500 and np.asarray(sheet).std() > 10

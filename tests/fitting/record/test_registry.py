@@ -22,11 +22,12 @@ from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.runtime.database import database_uri
 from mrhubo.runtime.runs import start_run
 from mrhubo.runtime.tracking import open_client
+from tests.poses import prior_poses
 
 
 @pytest.fixture(scope="module")
 def pose() -> torch.Tensor:
-    return BodyPrior.open().decode_matrices(torch.randn(20, 32, generator=torch.Generator().manual_seed(1)))
+    return prior_poses(20, 1)
 
 
 @pytest.fixture(scope="module")
