@@ -154,8 +154,8 @@ class ConfidenceModel:
     """Confidence of signals."""
 
     usual_phi: float
-    """phi that one in twenty of the prior's own poses exceeds, three degrees at least; up to it a pose is as plausible as
-    can be."""
+    """phi that one in twenty of the prior's own poses exceeds, and of three degrees at least; up to it a pose is as
+    plausible as can be."""
     moving: Weights
     """Where a frame rate is known, and so how much a motion shakes."""
     still: Weights
