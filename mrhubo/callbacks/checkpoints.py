@@ -50,11 +50,13 @@ class Checkpoints(Checkpoint):
     The trainer needs the plugin `CheckedFiles`.
     """
 
-    def __init__(self, folder: Path, monitor: str) -> None:
-        """`monitor` is the name of the metric."""
-        self.folder, self.monitor = folder, monitor
+    def __init__(self, folder: Path, monitor: str, beside: str | None = None) -> None:
+        """`monitor` is the name of the metric, `beside` that of another to be told of the best checkpoint."""
+        self.folder, self.monitor, self.beside = folder, monitor, beside or monitor
         self.best_score: float | None = None
         """The least value of the metric, NaN counting as infinite."""
+        self.best_beside: float | None = None
+        """The other metric's value there."""
 
     def on_train_epoch_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Writes them; the best first, so that the last one knows no best that is not there."""
@@ -62,17 +64,17 @@ class Checkpoints(Checkpoint):
         score = float(trainer.strategy.broadcast(float(trainer.callback_metrics[self.monitor])))
         score = math.inf if math.isnan(score) else score
         if self.best_score is None or score < self.best_score:
-            self.best_score = score
+            self.best_score, self.best_beside = score, float(trainer.callback_metrics[self.beside])
             trainer.save_checkpoint(self.folder / BEST)
         trainer.save_checkpoint(self.folder / LAST)
 
     def state_dict(self) -> dict[str, Any]:
         """What a checkpoint keeps of it."""
-        return {"best_score": self.best_score}
+        return {"best_score": self.best_score, "best_beside": self.best_beside}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Goes on from that."""
-        self.best_score = state_dict["best_score"]
+        self.best_score, self.best_beside = state_dict["best_score"], state_dict["best_beside"]
 
 
 def resumable(folder: Path, module: lightning.LightningModule) -> tuple[Path | None, list[str]]:

@@ -192,7 +192,7 @@ class ModelConfig:
 class TrainerConfig:
     """The training."""
 
-    max_steps: int = bounded(7_500, 1, 1_000_000_000)
+    max_steps: int = bounded(9_000, 1, 1_000_000_000)
     """Optimiser steps; with `model.start: universal` 200."""
     batch_size: int = bounded(512, 1, 10_000_000)
     """Pairs per step; with `model.start: universal` 64."""

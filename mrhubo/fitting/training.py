@@ -48,6 +48,7 @@ class Training:
     """How the pairs came about."""
     best_checkpoint: Path
     best_link_cm: float
+    """Validation link error of that checkpoint."""
 
     @property
     def retargeter(self) -> Retargeter:
@@ -65,7 +66,8 @@ def train(
     ranks: Ranks | None = None,
     callbacks: Sequence[lightning.Callback] = (),
 ) -> Training:
-    """Makes the pairs that are missing, trains on them, and returns the network of the best validation link error.
+    """Makes the pairs that are missing, trains on them, and returns the network that is nearest to the person on the
+    validation clips.
 
     Args:
         prepared: the checked config; with `robot.scale: search` a `ScaleFactorSearch` must be among the callbacks.
@@ -89,8 +91,8 @@ def train(
         network = build_network(prepared.config, prepared.body_map)
     data = PairData(prepared, network.features, report, ranks)
     module = build_module(network, prepared.config)
-    saver = Checkpoints(checkpoints, "val/link_cm")
-    metrics = ClipMetrics(validation, prepared.body_map.robot, prepared.config.robot.key_links)
+    saver = Checkpoints(checkpoints, "val/angle_deg", beside="val/link_cm")
+    metrics = ClipMetrics(validation, prepared.body_map, prepared.config.robot.key_links)
     progress = TrainingProgress(settings.max_steps, _SHOWN, report)
     device = device_of(prepared.config).type
     # In bf16, autocast would have to be told to each thread; several ranks add up gradients as they come about.
@@ -110,7 +112,7 @@ def train(
         data.filter,
         data.pairing,
         checkpoints / BEST,
-        float("nan") if saver.best_score is None else saver.best_score,
+        float("nan") if saver.best_beside is None else saver.best_beside,
     )
 
 

@@ -100,10 +100,10 @@ def test_a_training_that_came_to_nan_ends(root: Path, bound: str) -> None:
     config, body_map = setting(root, "model.hidden=8", f"model.bound_output={bound}")
     network = build_network(config, body_map)
     clip = Clip(Motion("a", torch.eye(3).expand(9, 21, 3, 3), 24.0), torch.zeros(9, 8))
-    metrics, logged = ClipMetrics([clip], body_map.robot, config.robot.key_links), []
+    metrics, logged = ClipMetrics([clip], body_map, config.robot.key_links), []
     module = SimpleNamespace(network=network, log_dict=logged.append)
     metrics.on_train_epoch_end(SimpleNamespace(global_step=500), module)  # pyright: ignore[reportArgumentType]
-    assert set(logged[0]) == {"val/joint_rad", "val/link_cm"}
+    assert set(logged[0]) == {"val/joint_rad", "val/link_cm", "val/angle_deg"} and 0 < logged[0]["val/angle_deg"] < 180
     for weights in network.parameters():
         weights.data.fill_(torch.nan)
     with pytest.raises(UserError, match="came to NaN by step 1,000; a lower trainer.lr helps"):
