@@ -131,7 +131,8 @@ def _misfit(content: dict[str, Any], module: lightning.LightningModule) -> str |
             raise ValueError("an optimiser's state of another shape")
     scheduler.load_state_dict(content["lr_schedulers"][0])
     counts = content["epoch"], content["global_step"], content["loops"]["fit_loop"]["epoch_progress"]["total"]["ready"]
-    score = content["callbacks"][Checkpoints.__qualname__]["best_score"]
-    if not all(isinstance(count, int) and count >= 0 for count in counts) or not isinstance(score, float):
+    saver = content["callbacks"][Checkpoints.__qualname__]
+    scored = isinstance(saver["best_score"], float) and isinstance(saver["best_beside"], float)
+    if not all(isinstance(count, int) and count >= 0 for count in counts) or not scored:
         raise ValueError("no counts of steps")
     return None

@@ -29,7 +29,7 @@ class Line(lightning.LightningModule):
         return self.line(batch).square().mean()
 
     def on_train_epoch_end(self) -> None:
-        self.log("val/error", 1.0 + self.current_epoch)
+        self.log_dict({"val/error": 1.0 + self.current_epoch, "val/other": 7.0 - self.current_epoch})
 
     def configure_optimizers(self) -> Any:
         optimizer = torch.optim.AdamW(self.parameters())
@@ -39,7 +39,7 @@ class Line(lightning.LightningModule):
 def trained(folder: Path, epochs: int, start: Path | None = None) -> tuple[lightning.Trainer, Checkpoints, Line]:
     """Three steps an epoch."""
     torch.manual_seed(0)
-    module, saver = Line(), Checkpoints(folder, "val/error")
+    module, saver = Line(), Checkpoints(folder, "val/error", beside="val/other")
     with quiet_lightning():
         trainer = lightning.Trainer(
             max_epochs=epochs, accelerator="cpu", logger=False, enable_progress_bar=False, enable_model_summary=False,
@@ -73,7 +73,7 @@ def test_past_its_best_it_goes_on_from_its_last(folder: Path, tmp_path_factory: 
     found, said = resumable(folder, Line())
     assert found == folder / LAST and said == []
     trainer, saver, module = trained(folder, 4, found)
-    assert trainer.global_step == 12 and saver.best_score == 1.0
+    assert trainer.global_step == 12 and (saver.best_score, saver.best_beside) == (1.0, 7.0)
     assert (step(folder / BEST), step(folder / LAST)) == (3, 12)
     _, _, whole = trained(tmp_path_factory.mktemp("whole"), 4)
     assert torch.equal(module.line.weight, whole.line.weight)
@@ -103,6 +103,7 @@ def rewrite(path: Path, change: Any) -> None:
         (lambda c: c.pop("loops"), "of another version"),
         (lambda c: c.update(callbacks={"ModelCheckpoint": {}}), "of another version"),
         (lambda c: c.update(global_step="many"), "of another version"),
+        (lambda c: c["callbacks"]["Checkpoints"].pop("best_beside"), "of another version"),
         (lambda c: c.update({"pytorch-lightning_version": "1.9.5"}), "was written by Lightning 1.9, and 2"),
     ],
 )
