@@ -158,7 +158,7 @@ def test_it_goes_on_where_it_stopped(
         stopped.search()  # without MLflow
     assert sum(measured) == 24 and measured[0] < 24, "stopped on the way"
     assert stopped.search(*runs).values == whole.values
-    assert whole.distance_rad < 0.01  # it starts from the numbers that made the poses
+    assert whole.distance_rad < 0.02  # it starts from the numbers that made the poses
 
 
 class Searched(lightning.LightningDataModule):
@@ -234,7 +234,8 @@ def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
     found = client.search_runs([experiment.experiment_id])
     (run,) = [run for run in found if "mlflow.parentRunId" not in run.data.tags]
     assert len(found) == 1 + 8 and run.info.status == "FINISHED"
-    assert 0 < run.data.metrics["scale/distance_rad"] <= run.data.metrics["scale/start_distance_rad"] < math.pi
+    found, start = (run.data.metrics[f"scale/{name}"] for name in ("distance_rad", "start_distance_rad"))
+    assert 0 < found < start + 1e-6 < math.pi  # where nothing better is found, both are the same but for rounding
     artifacts = tmp_path / "runs" / "artifacts" / run.info.run_id / "artifacts"
     assert {path.name for path in (artifacts / "scale").iterdir()} >= {"history.png", "poses.png"}
     written = load_config(artifacts / "config.yaml")
