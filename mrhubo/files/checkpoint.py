@@ -9,11 +9,9 @@ from __future__ import annotations
 import io
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.archive import check_member, open_archive
@@ -21,6 +19,9 @@ from mrhubo.files.records import RecordedObject
 from mrhubo.files.regular import naming, open_regular
 from mrhubo.files.safe_pickle import MAX_BYTES, bytes_of, shape_of
 from mrhubo.files.unpickler import unpickle
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 _TORCH_TYPES = {
     "DoubleStorage": "<f8",
@@ -113,7 +114,15 @@ def read_torch(
 
 
 def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
-    """The tensor that a pickled one stands for, float32.
+    """The tensor that a pickled one stands for, float32; raises what `numbers_of` does."""
+    import torch
+
+    return torch.from_numpy(numbers_of(value, storages))
+
+
+def numbers_of(value: Any, storages: dict[str, bytes]) -> np.ndarray:
+    """The numbers of the tensor that a pickled one stands for, float32. PyTorch, which takes a second to import, is not
+    needed for that.
 
     Raises:
         UserError: it stands for something else, or reaches beyond its storage.
@@ -142,7 +151,9 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
         if last >= len(numbers) or math.prod(shape) > len(numbers):
             raise UserError(f"a tensor of shape {shape} reaches beyond its {len(numbers)} numbers")
         with np.errstate(over="ignore"):
-            return torch.from_numpy(numbers.astype(np.float32)).as_strided(shape, stride, offset).clone()
+            numbers = numbers[offset:].astype(np.float32)
+        strides = [step * numbers.itemsize for step in stride]
+        return np.lib.stride_tricks.as_strided(numbers, shape, strides).copy()
     except UserError:
         raise
     except Exception as error:  # records that do not fit together

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.files.checkpoint import to_tensor
+from mrhubo.files.checkpoint import numbers_of
 from mrhubo.files.records import RecordedObject
 from mrhubo.files.safe_pickle import to_array, to_number
 
@@ -70,7 +70,7 @@ def from_record(value: RecordedObject, storages: dict[str, bytes], named: str) -
     """
     try:
         if value.module.startswith("torch"):
-            return to_tensor(value, storages).numpy()
+            return numbers_of(value, storages)
         if type(value).__name__ == "scalar":
             return np.array(to_number(value))
         return to_array(value)

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, SIDES
+from mrhubo.body.joints import JOINT_NAMES, KEYPOINT_NAMES, SIDES
 
 _FACE = "nose left_eye right_eye left_ear right_ear"
 _LIMBS = " ".join(f"left_{n} right_{n}" for n in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"))

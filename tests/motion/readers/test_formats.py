@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from mrhubo.errors import UserError
 from mrhubo.motion import ReadOptions, find_motions, read_folder, read_motion, write_motion
@@ -73,3 +77,19 @@ def test_the_rate_is_asked_for_and_never_guessed(tmp_path: Path) -> None:
 def test_a_rate_that_is_none_is_refused(rate) -> None:
     with pytest.raises(UserError, match="frames per second"):
         ReadOptions(rate=rate)
+
+
+def test_reading_imports_no_pytorch(tmp_path: Path) -> None:
+    """Importing it takes longer than answering a minute of motion."""
+    write(tmp_path / "a.npz")
+    with (tmp_path / "b.pkl").open("wb") as file:
+        pickle.dump({"smpl_poses": np.zeros((3, 72), np.float32), "fps": 30}, file)
+    parameters = {"body_pose": torch.zeros(3, 63), "global_orient": torch.zeros(3, 3), "transl": torch.zeros(3, 3)}
+    torch.save({"smpl_params_global": parameters, "smpl_params_incam": parameters}, tmp_path / "c.pt")
+    code = (
+        "import sys; from pathlib import Path; import mrhubo; from mrhubo.motion import ReadOptions\n"
+        f"for path in sorted(Path({str(tmp_path)!r}).iterdir()):\n"
+        "    assert len(mrhubo.read_motion(path, ReadOptions(rate=30))) == 3\n"
+        "    assert 'torch' not in sys.modules, path\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
