@@ -22,7 +22,8 @@ Feet = tuple[np.ndarray, np.ndarray]
 """Of the left foot, and of the right one."""
 _UP, _MIRROR = np.array([0.0, 1.0, 0.0]), np.array([-1.0, 1.0, 1.0])
 _TURNING = math.radians(1.5)
-"""How far [rad] a foot that stands may turn from one frame to the next."""
+"""How far [rad] a foot that stands may turn from one frame to the next, at some 12 to 30 frames a second: at more, feet
+that swing would pass for standing."""
 _ABOVE = 0.02
 """How far [m] its ankle may be above the other one."""
 _NEAR = math.radians(5.0)
@@ -43,12 +44,13 @@ _ALIKE = math.radians(6.0)
 """How far each of them may be from the mirror image of the other, half-way."""
 
 
-def standing_up(root_T33: np.ndarray, local_TJ33: np.ndarray) -> Feet:
+def standing_up(root_T33: np.ndarray, local_TJ33: np.ndarray, below: float = 0.0) -> Feet:
     """The world's up in the frame of each foot, in those frames (X, 3) of a clip in which it stands.
 
     Args:
         root_T33: rotations (T, 3, 3) of the pelvis in the world, y up.
         local_TJ33: local rotations (T, 21, 3, 3).
+        below: how far [m] the foot's ankle must be under the pelvis.
     """
     height, turned = [], []
     for side in SIDES:
@@ -60,12 +62,12 @@ def standing_up(root_T33: np.ndarray, local_TJ33: np.ndarray) -> Feet:
         height.append(place_T3[:, 1])
         turned.append(foot_T33)
     found = []
-    for foot_T33, above_T in zip(turned, (height[0] - height[1], height[1] - height[0]), strict=True):
+    for foot_T33, height_T, other_T in zip(turned, height, height[::-1], strict=True):
         still_T = np.zeros(len(foot_T33), bool)
         if len(foot_T33) > 2:
             turn_T33 = np.swapaxes(foot_T33[:-2], -1, -2) @ foot_T33[2:]
             still_T[1:-1] = norm(matrix_to_axis_angle(turn_T33)) < 2 * _TURNING
-        found.append(foot_T33[still_T & (above_T < _ABOVE), 1])
+        found.append(foot_T33[still_T & (height_T - other_T < _ABOVE) & (height_T < -below), 1])
     return found[0], found[1]
 
 

@@ -55,7 +55,6 @@ _pools: dict[int, ThreadPoolExecutor] = {}
 
 def _pool() -> ThreadPoolExecutor:
     process = os.getpid()
-    if process not in _pools:
-        _pools.clear()
-        _pools[process] = ThreadPoolExecutor(max(1, available_cores() - 1), "mrhubo")
-    return _pools[process]
+    pool = _pools.get(process)
+    # Of two threads that come first, one's pool is taken; the other's has begun no thread.
+    return pool or _pools.setdefault(process, ThreadPoolExecutor(max(1, available_cores() - 1), "mrhubo"))

@@ -151,7 +151,7 @@ def numbers_of(value: Any, storages: dict[str, bytes]) -> np.ndarray:
         if last >= len(numbers) or math.prod(shape) > len(numbers):
             raise UserError(f"a tensor of shape {shape} reaches beyond its {len(numbers)} numbers")
         with np.errstate(over="ignore"):
-            numbers = numbers[offset:].astype(np.float32)
+            numbers = numbers[offset : last + 1].astype(np.float32)
         strides = [step * numbers.itemsize for step in stride]
         return np.lib.stride_tricks.as_strided(numbers, shape, strides).copy()
     except UserError:

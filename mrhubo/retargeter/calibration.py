@@ -44,8 +44,8 @@ _USUAL = 0.95
 """Share of whole poses that have the usual phi or less,"""
 _LEAST_PHI = 2 / 9 * math.radians(3.0) ** 2
 """which is that of joints pulled by three degrees at least: files of different skeletons differ by more, and an arm
-that is no human's pulls the other one by a degree or two. A turn by a small angle a about any axis changes the six
-numbers by 4/3 a^2 in the sum of squares."""
+that is no human's pulls the other one by a degree or two. A turn by a small angle a changes the six numbers by
+4/3 a^2 in the sum of squares, in the mean over its axes."""
 _RIDGE = 1e-4
 """Weight of the squared weights beside the mean loss: keeps those finite that nothing speaks against."""
 _EXACT = {"maxiter": 1_000, "ftol": 1e-13, "gtol": 1e-8}

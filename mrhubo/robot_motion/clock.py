@@ -142,7 +142,10 @@ def _passed(time_T: np.ndarray) -> tuple[np.ndarray, float, bool]:
     """
     if time_T.dtype.kind in "iu":
         passed_T = time_T - time_T[0]
-        return passed_T, next((float(unit) for unit in _CLOCKS if not (passed_T % unit).any()), 1.0), True
+        unit = next((float(unit) for unit in _CLOCKS if not (passed_T % unit).any()), None)
+        # Whole nanoseconds of today may have been floating-point seconds once.
+        coarse = max(1.0, float(np.abs(time_T).max()) * _DOUBLE)
+        return passed_T, coarse if unit is None else unit, unit is not None or coarse <= 1.0
     passed_T, most = time_T.astype(np.float64) - float(time_T[0]), float(np.abs(time_T).max())
     single = most * _SINGLE if _are_single(time_T) else 0.0
     precision = single if time_T.dtype == np.float32 else most * _DOUBLE

@@ -11,7 +11,7 @@ import pytest
 from mrhubo.body.joints import POSED_JOINT_NAMES
 from mrhubo.body.level_feet import Feet, middle, own_up, rolled_up, standing_up, turn_feet, usual_up
 from mrhubo.fast.rotations import axis_angle_to_matrix
-from mrhubo.motion import read_motion
+from mrhubo.motion import read_motion, write_motion
 
 UP = np.array([0.0, 1.0, 0.0])
 LEFT, RIGHT = (POSED_JOINT_NAMES.index(f"{side}_ankle") for side in ("left", "right"))
@@ -80,6 +80,34 @@ def test_a_performer_with_few_frames_or_strange_ones_has_what_is_usual() -> None
         np.testing.assert_allclose(own_up(feet, usual), expected, atol=1e-12)
     own = own_up(standing_up(*walk(-8.0, 8.0, 400)), usual)
     assert math.degrees(math.asin(-own[0][0])) == pytest.approx(8.0, abs=0.1)
+
+
+def test_who_sits_does_not_stand(tmp_path: Path) -> None:
+    root, local = walk(-16.0, 16.0)
+    for side in ("left", "right"):
+        hip, knee = (POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("hip", "knee"))
+        local[:, hip] = axis_angle_to_matrix(np.array([-1.5, 0.0, 0.0]))
+        local[:, knee] = axis_angle_to_matrix(np.array([1.5, 0.0, 0.0]))
+    assert min(map(len, standing_up(root, local))) > 0 and [len(x) for x in standing_up(root, local, 0.6)] == [0, 0]
+    assert min(map(len, standing_up(*walk(-16.0, 16.0), 0.6))) > 20
+
+
+@pytest.mark.parametrize("rate", [24.0, 120.0, 240.0])
+def test_legs_that_swing_are_not_levelled_whatever_the_rate(tmp_path: Path, rate: float) -> None:
+    """Hanging feet of a person whose arms are of a converted skeleton, and who hangs on a bar."""
+    time = np.arange(0, 6, 1 / rate)
+    poses = np.zeros((len(time), 22, 3))
+    bend = 1.0 + np.sin(time)
+    for side, sign in (("left", 1), ("right", -1)):
+        hip, ankle, elbow = (1 + POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("hip", "ankle", "elbow"))
+        poses[:, hip, 0] = 0.5 * np.sin(math.tau * time + (0 if sign > 0 else 1.5))
+        poses[:, ankle, 2] = -0.3 * sign
+        poses[:, elbow] = bend[:, None] * np.array([0.0, -0.871 * sign, 0.491 * sign])
+    write_motion(
+        path := tmp_path / "a.npz", poses[:, 1:].reshape(len(time), 63), poses[:, 0], poses[:, 0], rate, "swings"
+    )
+    motion = read_motion(path)
+    assert any("elbows" in note for note in motion.notes) and not any("feet" in note for note in motion.notes)
 
 
 def test_clips_of_the_paper_stand_level_and_those_that_did_are_left_alone(external_dir: Path) -> None:

@@ -34,7 +34,9 @@ def log_look(recording: Recording, look: FirstLook) -> None:
 
 
 def log_measures(recording: Recording, measured: Measured, best_link_cm: float) -> None:
-    """Metrics and a table of the test clips; `best_link_cm` is the best validation link error."""
+    """Metrics and a table of the test clips; `best_link_cm` is the validation link error of the
+    checkpoint that was taken.
+    """
     networks = measured.networks
     recording.logger.log_metrics({"val/best_link_cm": best_link_cm, **measured.metrics})
     log_rows(recording, [_row(score) for score in networks])

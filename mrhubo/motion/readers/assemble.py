@@ -23,6 +23,10 @@ FARTHEST_M = 1e5
 """No root is that far from the origin [m]."""
 LARGEST_BETA = 1e6
 """No number of a body's shape is that large."""
+_LOOKS = 30.0
+"""How often a second it is looked whether feet stand: more often, those that swing would seem to."""
+_UPRIGHT_M = 0.6
+"""How far an ankle is under the pelvis of who stands [m], and not sits or lies."""
 _LEVEL = math.radians(1.0)
 """Tilts of elbows' axes up to this stay: an angle that says nothing."""
 
@@ -45,7 +49,8 @@ def to_our_rest(motion: Motion) -> Motion:
     local_TJ33 = untilt_arms(motion.arrays.local_TJ33, tilt)
     notes = [f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"]
     root_T33 = motion.arrays.root_rotation_T33
-    if root_T33 is not None and (up := rolled_up(standing_up(root_T33, local_TJ33))) is not None:
+    few = slice(None, None, max(1, round(motion.frame_rate / _LOOKS)))
+    if root_T33 is not None and (up := rolled_up(standing_up(root_T33[few], local_TJ33[few], _UPRIGHT_M))) is not None:
         left, right = (math.degrees(math.acos(up_3[1])) for up_3 in up)
         notes.append(
             f"the feet stand rolled, the left one by {left:.0f} and the right one by {right:.0f} degrees: taken out"

@@ -39,7 +39,7 @@ def read_phalp(tree: Tree) -> Layout | None:
     times: list[int | None] = []
     for number, (_, frame) in enumerate(tree.items()):
         people, names = frame.get("smpl"), [frame.get(key) for key in ("tid", "tracked_ids")]
-        if people is None or not people.is_list or not any(names):
+        if people is None or not people.is_list or all(given is None for given in names):
             return None
         ages = frame.get("tracked_time")
         ids = next((list(given) for given in names if given is not None and len(given) == len(people)), None)

@@ -82,9 +82,9 @@ def _from_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     if isinstance(value, list) and value and all(isinstance(one, dict) and "instances" in one for one in value):
         return _from_mmpose(path, where, value, None, options)
     if isinstance(value, dict):
-        names, confidence = (
-            next((value[key] for key in keys if key in value), None) for keys in (NAME_KEYS, CONFIDENCE_KEYS)
-        )
+        names = next((value[key] for key in NAME_KEYS if key in value), None)
+        told = (value.get(key) for key in CONFIDENCE_KEYS)
+        confidence = next((each for each in told if isinstance(each, list) and each), None)
         key = next((key for key in (*POINT_KEYS, "frames", "data") if key in value), None)
         if key is None:
             raise NoMotion(

@@ -105,3 +105,14 @@ def test_rows_go_by_the_numbers_of_their_frames(tmp_path: Path) -> None:
         assert motion.notes[1].count(" frames)") == people
         turn_T = torch.rad2deg(mrhubo.rotation.matrix_to_axis_angle(motion.local_TJ33[:, 0]).norm(dim=-1))
         torch.testing.assert_close(turn_T.diff(), torch.full((len(motion) - 1,), 0.573), atol=1e-2, rtol=0)
+
+
+def test_phalp_may_see_nobody_in_the_first_frames(tmp_path: Path) -> None:
+    """Its tracks are confirmed after some frames."""
+    phalp(path := tmp_path / "a.pkl", made_up(6), np.zeros((6, 3)), [f"{number:06}.jpg" for number in range(6)])
+    frames = pickle.loads(path.read_bytes())
+    nobody = {"tid": [], "tracked_time": [], "smpl": []}
+    path.write_bytes(
+        pickle.dumps({"000000.jpg": nobody, **{f"{k + 1:06}.jpg": f for k, f in enumerate(frames.values())}})
+    )
+    assert len(read_motion(path, RATE)) in (6, 7)

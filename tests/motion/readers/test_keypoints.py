@@ -416,3 +416,15 @@ def test_files_of_frames_are_in_the_order_of_their_numbers(
     (tmp_path / "copy5_keypoints3d.json").write_bytes((tmp_path / "frame5_keypoints3d.json").read_bytes())
     with pytest.raises(UserError, match=f"{tmp_path.name}: .*same number"):
         mrhubo.read_motion(tmp_path, RATE)
+
+
+@pytest.mark.parametrize("open_one", [None, 0, float("nan"), [], "high"])
+def test_a_confidence_in_json_that_is_left_open_is_none(
+    tmp_path: Path, points: dict[str, np.ndarray], open_one: object
+) -> None:
+    names = tuple(points)
+    content = {"fps": 30, "names": names, "keypoints": array_of(points, names).tolist()}
+    for name, more in (("without", {}), ("with", {"confidence": open_one})):
+        (tmp_path / f"{name}.json").write_text(json.dumps(content | more))
+    found, expected = (mrhubo.read_motion(tmp_path / f"{name}.json") for name in ("with", "without"))
+    np.testing.assert_array_equal(found.arrays.local_TJ33, expected.arrays.local_TJ33)
