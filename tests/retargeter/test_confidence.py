@@ -20,7 +20,7 @@ from mrhubo.robot import build_body_map
 from mrhubo.robot.parts import LimbPart
 
 FIELDS = {"miss": "miss_deg", "implausible": "phi", "excess": "excess_deg", "shake": "shake_deg"}
-WELL = {"miss_deg": 1.0, "phi": 0.01, "excess_deg": 0.0, "shake_deg": 0.0}
+WELL = {"miss_deg": 1.0, "phi": 0.0003, "excess_deg": 0.0, "shake_deg": 0.0}
 
 
 def signals(**numbers: float) -> Signals:
