@@ -212,4 +212,4 @@ STANDARD = ConfidenceModel(
     moving=Weights(certain=3.3, miss=3.1, implausible=2.0, excess=1.0, shake=1.3),
     still=Weights(certain=2.5, miss=2.8, implausible=1.8, excess=1.0, shake=0.0),
 )
-"""Of a retargeter that was never calibrated: what NAO's is, rounded, and something for the excess, which NAO's phi tells."""
+"""Of a retargeter that was never calibrated: what NAO's is, rounded, and some weight for the excess."""
