@@ -20,7 +20,8 @@ from mrhubo.fast.rotations import matrix_to_axis_angle, shortest_turn
 
 Feet = tuple[np.ndarray, np.ndarray]
 """Of the left foot, and of the right one."""
-_UP, _MIRROR = np.array([0.0, 1.0, 0.0]), np.array([-1.0, 1.0, 1.0])
+_UP, _MIRROR = np.array([0, 1, 0], np.float32), np.array([-1, 1, 1], np.float32)
+"""In single precision, so that whatever they are put together with keeps its own."""
 _TURNING = math.radians(1.5)
 """How far [rad] a foot that stands may turn from one frame to the next, at some 12 to 30 frames a second: at more, feet
 that swing would pass for standing."""
@@ -33,7 +34,6 @@ _OWN = math.radians(15.0)
 """How far a performer's feet may be from what is usual: further off are handstands and rolls."""
 _ENOUGH = 200
 """Frames in which they must stand, to have an angle of their own."""
-
 _SOME = 20
 """Frames in which both feet of a single motion must stand, to be told rolled."""
 _ROLLED, _MOST = math.radians(6.0), math.radians(30.0)
@@ -57,7 +57,7 @@ def standing_up(root_T33: np.ndarray, local_TJ33: np.ndarray, below: float = 0.0
         foot_T33, place_T3 = root_T33, np.zeros(3)
         for name in ("hip", "knee", "ankle"):
             joint = POSED_JOINT_NAMES.index(f"{side}_{name}")
-            place_T3 = place_T3 + foot_T33 @ OFFSETS_J3[joint].astype(foot_T33.dtype)
+            place_T3 = place_T3 + foot_T33 @ OFFSETS_J3[joint]
             foot_T33 = foot_T33 @ local_TJ33[:, joint]
         height.append(place_T3[:, 1])
         turned.append(foot_T33)
@@ -73,8 +73,8 @@ def standing_up(root_T33: np.ndarray, local_TJ33: np.ndarray, below: float = 0.0
 
 def usual_up(feet: list[Feet]) -> np.ndarray:
     """What is up (3,) for most left feet, and, mirrored, for most right ones; the feet's own y where none stands."""
-    up_X3 = np.concatenate([up_X3 for left, right in feet for up_X3 in (left, right * _MIRROR.astype(right.dtype))])
-    return middle(up_X3) if len(up_X3) else _UP.astype(up_X3.dtype)
+    up_X3 = np.concatenate([up_X3 for left, right in feet for up_X3 in (left, right * _MIRROR)])
+    return middle(up_X3) if len(up_X3) else _UP
 
 
 def own_up(feet: Feet, usual_3: np.ndarray) -> Feet:
@@ -82,7 +82,7 @@ def own_up(feet: Feet, usual_3: np.ndarray) -> Feet:
     usual for a left foot; else what is usual.
     """
     found = []
-    for up_X3, usual in zip(feet, (usual_3, usual_3 * _MIRROR.astype(usual_3.dtype)), strict=True):
+    for up_X3, usual in zip(feet, (usual_3, usual_3 * _MIRROR), strict=True):
         up_3 = middle(up_X3) if len(up_X3) >= _ENOUGH else usual
         found.append(up_3 if up_3 @ usual > math.cos(_OWN) else usual)
     return found[0], found[1]
@@ -95,7 +95,7 @@ def rolled_up(feet: Feet) -> Feet | None:
     if min(map(len, feet)) < _SOME:
         return None
     left_3, right_3 = (middle(up_X3) for up_X3 in feet)
-    usual_3 = normalize(left_3 + right_3 * _MIRROR.astype(right_3.dtype))
+    usual_3 = normalize(left_3 + right_3 * _MIRROR)
     rolled = math.sin(_ROLLED) < -usual_3[0] < math.sin(_MOST) and abs(usual_3[2]) < math.sin(_LEANING)
     alike = left_3 @ usual_3 > math.cos(_ALIKE)
     return (left_3, right_3) if rolled and alike else None
@@ -106,7 +106,7 @@ def turn_feet(local_TJ33: np.ndarray, up: Feet) -> np.ndarray:
     found = local_TJ33.copy()
     for side, up_3 in zip(SIDES, up, strict=True):
         ankle = POSED_JOINT_NAMES.index(f"{side}_ankle")
-        found[:, ankle] = local_TJ33[:, ankle] @ shortest_turn(_UP.astype(up_3.dtype), up_3)
+        found[:, ankle] = local_TJ33[:, ankle] @ shortest_turn(_UP, up_3)
     return found
 
 

@@ -25,6 +25,7 @@ class ClipMetrics(lightning.Callback):
 
     def __init__(self, clips: Sequence[Clip], body_map: BodyMap, key_links: Sequence[str]) -> None:
         self.clips, self.body_map, self.key_links = list(clips), body_map, list(key_links)
+        self._human = [body_map.human_directions(clip.motion.local_TJ33) for clip in clips]
 
     def on_train_epoch_end(self, trainer: lightning.Trainer, pl_module: lightning.LightningModule) -> None:
         """Scores the network as it is now.
@@ -37,13 +38,15 @@ class ClipMetrics(lightning.Callback):
         if not all(bool(torch.isfinite(weights).all()) for weights in network.parameters()):
             raise UserError(f"the training came to NaN by step {trainer.global_step:,}; a lower trainer.lr helps")
         predictions = predict_clips(network, self.clips)
-        found = list(zip(self.clips, predictions, strict=True))
-        mean = mean_score([score_clip(clip, q_TN, self.body_map.robot, self.key_links) for clip, q_TN in found])
-        angle_deg = sum(self._angle_deg(clip, q_TN) for clip, q_TN in found) / len(found)
+        robot = self.body_map.robot
+        mean = mean_score(
+            [score_clip(clip, q_TN, robot, self.key_links) for clip, q_TN in zip(self.clips, predictions, strict=True)]
+        )
+        angles_deg = [self._angle_deg(*found) for found in zip(self._human, predictions, strict=True)]
+        angle_deg = sum(angles_deg) / len(angles_deg)
         pl_module.log_dict({"val/joint_rad": mean.joint_rad, "val/link_cm": mean.link_cm, "val/angle_deg": angle_deg})
 
-    def _angle_deg(self, clip: Clip, q_TN: Tensor) -> float:
-        body_map, columns = self.body_map, self.body_map.measured
-        robot_TD3 = body_map.robot_directions(body_map.robot.forward(q_TN))
-        human_TD3 = body_map.human_directions(clip.motion.local_TJ33)
+    def _angle_deg(self, human_TD3: Tensor, q_TN: Tensor) -> float:
+        columns = self.body_map.measured
+        robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
         return float(torch.rad2deg(angle_between(robot_TD3[:, columns], human_TD3[:, columns])).mean())

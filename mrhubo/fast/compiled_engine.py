@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from mrhubo.fast.plain.root_turn import turned_back
 from mrhubo.fast.plain.steps import Model
 from mrhubo.fast.poses import NOT_FINITE, refuse
 from mrhubo.fast.rotations import SKEW
-from mrhubo.fast.side_by_side import available_cores, side_by_side
+from mrhubo.fast.side_by_side import FEW, in_parts
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.banded import Banded, Solve
 from mrhubo.fast.together.problem import Problem, make_problem
@@ -29,12 +29,6 @@ from mrhubo.fast.together.problem import Problem, make_problem
 if TYPE_CHECKING:
     from mrhubo.fast.compiled.ground_kernels import GroundKernels
     from mrhubo.fast.compiled.motion_kernels import MotionKernels
-
-FEW = 32
-"""Up to so many frames are worked on by one thread: others would have to be woken first."""
-_PARTS = 8
-"""That each thread's share of many frames is divided into."""
-Result = TypeVar("Result")
 
 
 class CompiledEngine:
@@ -54,7 +48,6 @@ class CompiledEngine:
         self._kernels = kernels.make_kernels()
         self._check, self._direct, self._answer = kernels.CHECK, kernels.DIRECT, kernels.ANSWER
         self._activation = ACTIVATIONS[description.settings.activation]
-        self._threads = available_cores()
         self._unnoted = True
         self._no_shake = np.zeros((0, len(description.trust.column_XD)))
         self._unroll: Callable[[np.ndarray, np.ndarray], object] | None = None
@@ -92,7 +85,7 @@ class CompiledEngine:
         q_BN = self._room(local_BJ33)[1]
         if (unroll := self._unroll) is not None:
             target_BD3 = np.ascontiguousarray(target_BD3)
-            self._shared(len(q_BN), lambda rows: unroll(target_BD3[rows], q_BN[rows]))
+            in_parts(len(q_BN), lambda rows: unroll(target_BD3[rows], q_BN[rows]))
             return q_BN
         if not self.description.post:
             return self._nearest(np.ascontiguousarray(target_BD3))
@@ -119,7 +112,7 @@ class CompiledEngine:
         if len(local_BJ33) <= FEW:
             parts = [(0, look(self._tables, SKEW, what, local_BJ33, target_BD3, q_BN))]
         else:
-            parts = self._shared(len(local_BJ33), part)
+            parts = in_parts(len(local_BJ33), part)
         for start, found in parts:
             if found >= 0:
                 return start + found // 2, NO_ROTATION if found % 2 else NOT_FINITE
@@ -137,7 +130,7 @@ class CompiledEngine:
     def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """As `Engine.avoid`."""
         q_BN, own = q_BN.copy(), self._asked_by(target_BD3)
-        self._shared(len(q_BN), lambda rows: self._kernels.avoid(own, target_BD3[rows], q_BN[rows]))
+        in_parts(len(q_BN), lambda rows: self._kernels.avoid(own, target_BD3[rows], q_BN[rows]))
         return q_BN
 
     def follow(
@@ -170,7 +163,7 @@ class CompiledEngine:
         """As `mrhubo.fast.plain.steps.nearest`."""
         cost, found_BN = self.description.cost, np.empty((len(target_BD3), len(self.description.cost.lower_N)))
         start = self._ground_kernels.start
-        self._shared(len(found_BN), lambda rows: start(self._tables, target_BD3[rows], 0, found_BN[rows]))
+        in_parts(len(found_BN), lambda rows: start(self._tables, target_BD3[rows], 0, found_BN[rows]))
         return np.clip(found_BN.astype(np.float32), cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32))
 
     @cached_property
@@ -201,7 +194,7 @@ class CompiledEngine:
 
         def close(q_BN: np.ndarray) -> np.ndarray:
             close_B = np.empty(len(q_BN), np.bool_)
-            self._shared(len(q_BN), lambda rows: self._motion_kernels.close(self._tables, q_BN[rows], close_B[rows]))
+            in_parts(len(q_BN), lambda rows: self._motion_kernels.close(self._tables, q_BN[rows], close_B[rows]))
             return close_B
 
         return GivingWay(problem, close, self.avoid)
@@ -213,7 +206,7 @@ class CompiledEngine:
             frames, joints = q_BN.shape
             q_BN, target_BD3 = np.ascontiguousarray(q_BN), np.ascontiguousarray(target_BD3)
             found = np.empty((frames, blocks)), np.empty((frames, joints)), np.empty((frames, joints, joints))
-            self._shared(
+            in_parts(
                 frames,
                 lambda rows: kernel(self._tables, q_BN[rows], target_BD3[rows], *(part[rows] for part in found)),
             )
@@ -226,7 +219,7 @@ class CompiledEngine:
         (frames, joints), directions = q_BN.shape, len(self.description.human.seen_D)
         q_BN = np.ascontiguousarray(q_BN)
         found = np.empty((frames, directions, 3)), np.empty((frames, directions, 3, joints))
-        self._shared(
+        in_parts(
             frames, lambda rows: self._motion_kernels.turning(self._tables, q_BN[rows], *(part[rows] for part in found))
         )
         return found
@@ -295,13 +288,4 @@ class CompiledEngine:
                     near_B[rows], into.trust_BX[rows],
                 )  # fmt: skip
 
-        self._shared(len(q_BN), part)
-
-    def _shared(self, frames: int, work: Callable[[slice], Result]) -> list[Result]:
-        """Does the work on all frames, in threads where there are many; each takes one part after the other, as some
-        frames take ten times as long as others.
-        """
-        if frames <= FEW or self._threads == 1:
-            return [work(slice(0, frames))]
-        length = max(FEW, -(-frames // (_PARTS * self._threads)))
-        return side_by_side(work, [slice(first, first + length) for first in range(0, frames, length)])
+        in_parts(len(q_BN), part)

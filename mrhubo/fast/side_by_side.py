@@ -13,6 +13,10 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+FEW = 32
+"""Up to so many frames are worked on by one thread: others would have to be woken first."""
+_PARTS = 8
+"""That each thread's share of many frames is divided into."""
 
 
 def available_cores() -> int:
@@ -47,6 +51,17 @@ def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[
     for helper in begun:
         helper.result()
     return [found[number] for number in range(len(items))]
+
+
+def in_parts(frames: int, work: Callable[[slice], Result]) -> list[Result]:
+    """Work on all of some frames, side by side where they are many; each thread takes one part after the other, as some
+    frames take ten times as long as others.
+    """
+    cores = 1 if frames <= FEW else available_cores()
+    if cores == 1:
+        return [work(slice(0, frames))]
+    length = max(FEW, -(-frames // (_PARTS * cores)))
+    return side_by_side(work, [slice(first, first + length) for first in range(0, frames, length)])
 
 
 _pools: dict[int, ThreadPoolExecutor] = {}

@@ -100,13 +100,11 @@ def build(facts: Mapping[str, Any], frames: Mapping[str, np.ndarray], path: Path
 
 
 def short(array: np.ndarray) -> Any:
-    """Float32 numbers as lists of the shortest decimals that tell them apart; flags as they are."""
-    if not array.size or array.dtype == np.bool_:
-        return array.tolist()
-    if not array.ndim:
-        return array.astype(np.str_).astype(np.float64).tolist()
-    rows = blocks(len(array), array.size // len(array))
-    return [row for block in rows for row in array[block].astype(np.str_).astype(np.float64).tolist()]
+    """Float32 numbers as lists of the shortest decimals that tell them apart; flags as they are. Of many, block by
+    block (`blocks`).
+    """
+    is_text = array.size and array.dtype != np.bool_
+    return (array.astype(np.str_).astype(np.float64) if is_text else array).tolist()
 
 
 def blocks(rows: int, width: int) -> Iterator[slice]:

@@ -23,7 +23,8 @@ ELBOWS = ("left_elbow", "right_elbow")
 def humans() -> torch.Tensor:
     """Poses of the prior, with elbows that are pure hinges, bent by 0 to 115 degrees."""
     generator = torch.Generator().manual_seed(0)
-    poses = BodyPrior.open().decode_matrices(torch.randn(64, BodyPrior.open().latent, generator=generator))
+    prior = BodyPrior.open()
+    poses = prior.decode_matrices(torch.randn(64, prior.latent, generator=generator))
     for name in ELBOWS:
         angle_B1 = 2.0 * torch.rand(64, 1, generator=generator)
         hinge_3 = torch.tensor(hinge_axis(name))

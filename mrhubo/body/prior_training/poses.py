@@ -17,7 +17,7 @@ from torch.utils.data import Dataset, Sampler
 from mrhubo import rotation
 from mrhubo.body import anatomy
 from mrhubo.body.arm_axes import CMU_TILT, untilt_arms
-from mrhubo.body.level_feet import own_up, standing_up, turn_feet, usual_up
+from mrhubo.body.level_feet import Feet, own_up, standing_up, turn_feet, usual_up
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.fast.rotations import axis_angle_to_matrix
@@ -40,22 +40,26 @@ def load_training_poses(path: Path) -> tuple[Tensor, list[slice], list[str]]:
     if not np.isfinite(poses).all():
         raise UserError(f"data: {path}: poses holds NaN or infinite numbers")
     clips = [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)]
-    performers: dict[str, list[slice]] = {}
-    for clip, name in zip(clips, names.tolist(), strict=True):
-        performers.setdefault(name.rpartition("_")[0] or name, []).append(clip)
-    feet = {
-        performer: [standing_up(turned[:, 0], turned[:, 1:]) for turned in (_rotations(poses[clip]) for clip in own)]
-        for performer, own in performers.items()
-    }
-    usual_3 = usual_up([each for own in feet.values() for each in own])
     sixd = torch.empty(len(poses), len(POSED_JOINT_NAMES), 6)
-    for performer, own in performers.items():
-        left, right = (np.concatenate(side) for side in zip(*feet[performer], strict=True))
-        up = own_up((left, right), usual_3)
-        for clip in own:
-            local_FJ33 = untilt_arms(turn_feet(_rotations(poses[clip])[:, 1:], up), CMU_TILT)
-            sixd[clip] = rotation.matrix_to_sixd(torch.from_numpy(local_FJ33))
+    for clip, up in zip(clips, _ups(poses, clips, names.tolist()), strict=True):
+        local_FJ33 = untilt_arms(turn_feet(_rotations(poses[clip])[:, 1:], up), CMU_TILT)
+        sixd[clip] = rotation.matrix_to_sixd(torch.from_numpy(local_FJ33))
     return sixd, clips, names.tolist()
+
+
+def _ups(poses: np.ndarray, clips: list[slice], names: list[str]) -> list[Feet]:
+    """What is up for each foot where it stands, of each clip: that of the performer."""
+    performers = [name.rpartition("_")[0] or name for name in names]
+    standing: dict[str, list[Feet]] = {performer: [] for performer in performers}
+    for clip, performer in zip(clips, performers, strict=True):
+        turned_FJ33 = _rotations(poses[clip])
+        standing[performer].append(standing_up(turned_FJ33[:, 0], turned_FJ33[:, 1:]))
+    usual_3 = usual_up([feet for own in standing.values() for feet in own])
+    ups = {}
+    for performer, own in standing.items():
+        left, right = (np.concatenate(side) for side in zip(*own, strict=True))
+        ups[performer] = own_up((left, right), usual_3)
+    return [ups[performer] for performer in performers]
 
 
 def _rotations(poses: np.ndarray) -> np.ndarray:

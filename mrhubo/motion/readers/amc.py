@@ -13,7 +13,8 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.asf_file import read_amc, read_asf
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
-from mrhubo.motion.readers.options import NoRate, ReadOptions
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import asked_rate
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
 
@@ -39,12 +40,11 @@ def read_acclaim(path: Path, options: ReadOptions) -> Motion:
         UserError: a file is missing, damaged or too large, no human is found in them, or the frame rate is not known.
     """
     skeleton = read_asf(_find_skeleton(path))
-    if options.rate is None:
-        raise NoRate(path, "an .amc file does not tell its frame rate (most of CMU's and HDM05's have 120)")
+    rate = asked_rate(path, options, "an .amc file does not tell its frame rate (most of CMU's and HDM05's have 120)")
     tree, notes = read_amc(path, skeleton)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     kind = f"ASF/AMC files, skeleton {skeleton.path.name}:"
-    return tree_motion(tree, motion_name(path), str(path), options.rate, kind, given, tuple(notes))
+    return tree_motion(tree, motion_name(path), str(path), rate, kind, given, tuple(notes))
 
 
 def _find_skeleton(path: Path) -> Path:

@@ -12,6 +12,7 @@ from mrhubo.motion.readers.bvh_file import read_bvh_file
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
+from mrhubo.motion.readers.rate import asked_rate
 from mrhubo.motion.readers.tracks import Person, choose
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
@@ -44,7 +45,7 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
             notes.append(f"the file says {told:.6g} frames per second, which is believed, and not {rate:g}")
         rate = told
     if rate is None:
-        raise NoRate(path, "holds no frame rate")
+        rate = asked_rate(path, options)
     tree = _of_person(path, tree, options, notes)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     return tree_motion(tree, motion_name(path), str(path), rate, "BVH file:", given, tuple(notes))

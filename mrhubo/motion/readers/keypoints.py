@@ -21,7 +21,7 @@ from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
-from mrhubo.motion.readers.sightings import MAX_FRAMES, known_points
+from mrhubo.motion.readers.sightings import check_size, known_points
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
 
 _SAMPLES = 256
@@ -75,8 +75,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
         NoMotion: they are no points of a body in the order of a set that is known, and have no names.
         UserError: as for `read_keypoints`.
     """
-    if len(found.point_TK3) > MAX_FRAMES:
-        raise UserError(f"{path}: has {len(found.point_TK3):,} frames; at most {MAX_FRAMES:,} are read")
+    check_size(path, found.where, len(found.point_TK3), 1)
     if (np.abs(np.nan_to_num(found.point_TK3)) > _LARGEST).any():
         raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
     _refuse_flat(path, found)

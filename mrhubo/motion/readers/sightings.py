@@ -21,7 +21,7 @@ from mrhubo.motion.readers.tracks import Person, check_span, choose
 
 UNSURE = 0.3
 """Points that their source is less sure of are taken as missing; detectors draw no point below it."""
-MAX_FRAMES = 500_000
+_MAX_FRAMES = 500_000
 """Of points."""
 _MOST_POINTS, _MOST_IN_ALL = 1_000, 2**23
 """In a frame, and in all frames."""
@@ -77,8 +77,8 @@ def check_size(path: Path, where: str, frames: int, points: int) -> None:
     Raises:
         UserError: there are too many frames, too many points in each, or in all of them.
     """
-    if frames > MAX_FRAMES:
-        raise UserError(f"{path}: has {frames:,} frames; at most {MAX_FRAMES:,} are read")
+    if frames > _MAX_FRAMES:
+        raise UserError(f"{path}: has {frames:,} frames; at most {_MAX_FRAMES:,} are read")
     if points > _MOST_POINTS:
         raise UserError(f"{path}: {where} has {points:,} points a frame; expected at most {_MOST_POINTS:,}")
     if frames * points > _MOST_IN_ALL:
