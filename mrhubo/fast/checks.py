@@ -199,6 +199,9 @@ def _check_prior(d: Description, sizes: dict[str, int]) -> None:
     latent = len(d.prior.encoder[-1][1]) if d.prior.encoder else 0
     _check_layers("prior", d.prior.encoder, numbers, latent)
     _check_layers("prior", d.prior.decoder, latent, numbers)
+    for space_ER, (weight, _) in zip(d.prior.spaces or (), d.prior.encoder, strict=False):
+        fits = space_ER.ndim == 2 and space_ER.shape[0] == weight.shape[1] and space_ER.shape[1] <= space_ER.shape[0]
+        _refuse(not fits or space_ER.dtype != np.float32, "a space of the prior does not fit the layer that reads it")
 
 
 def _check_stage(name: str, stage: tuple[Part, ...], inputs: int, outputs: int) -> None:

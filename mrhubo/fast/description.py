@@ -92,6 +92,7 @@ class Description:
                 found |= _of_layers(f"{stage}.{number}", part.layers)
         for coder in ("encoder", "decoder"):
             found |= _of_layers(f"prior.{coder}", getattr(self.prior, coder))
+        found |= {f"{_SPACES}{i}": space for i, space in enumerate(self.prior.spaces or ())}
         if self.universal is not None:
             found |= {f"universal.{name}": getattr(self.universal, name) for name in _UNIVERSAL}
             found |= {f"{_WEIGHTS}{name}": array for name, array in self.universal.weights.items()}
@@ -116,7 +117,9 @@ class Description:
         names = {name: tuple(told[name]) for name in ("joint_names", "direction_names", "branch_names")}
         sections: dict[str, Any] = {name: _section(kind, name, arrays) for name, kind in SECTIONS.items()}
         stages: dict[str, Any] = {stage: _parts(stage, arrays) for stage in ("pre", "post")}
-        prior = Prior(_layers("prior.encoder", arrays), _layers("prior.decoder", arrays))
+        encoder, decoder = (_layers(f"prior.{coder}", arrays) for coder in ("encoder", "decoder"))
+        spaces = tuple(arrays[f"{_SPACES}{i}"] for i in range(len(encoder))) if f"{_SPACES}0" in arrays else None
+        prior = Prior(encoder, decoder, spaces)
         universal = _universal(arrays) if "universal.block_E" in arrays else None
         legs = _section(Legs, "legs", arrays) if "legs.body_H" in arrays else None
         root = _section(RootTurn, "root", arrays) if "root.leg_D" in arrays else None
@@ -146,7 +149,7 @@ class Description:
 
 
 Kind = TypeVar("Kind")
-_WEIGHTS = "universal.weights."
+_SPACES, _WEIGHTS = "prior.spaces.", "universal.weights."
 _UNIVERSAL = [field.name for field in fields(Universal) if field.name != "weights"]
 
 

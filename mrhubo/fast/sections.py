@@ -227,6 +227,9 @@ class Prior:
 
     encoder: Layers
     decoder: Layers
+    spaces: tuple[np.ndarray, ...] | None = None
+    """For each layer of the encoder, columns (E, R) whose space holds what it reads (`mrhubo.fast.narrowing`), none
+    where there is no small one; None: it is to be looked for."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ Legend: as in `mrhubo.fast.sections`.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, PARENTS, ancestors
 from mrhubo.body.vposer import VPoser
 from mrhubo.errors import UserError
 from mrhubo.fast.description import Description
+from mrhubo.fast.narrowing import find_spaces
 from mrhubo.fast.plain.human import BEND_DEG
 from mrhubo.fast.sections import (
     BEND,
@@ -116,7 +117,9 @@ def describe(retargeter: Retargeter) -> Description:
 
 
 def write_description(description: Description, file: Path) -> Path:
-    """Writes a description; the file's path."""
+    """Writes a description; the file's path. What would take long to look for at each start is looked for here."""
+    prior = replace(description.prior, spaces=find_spaces(description))
+    description = replace(description, prior=prior)
     tensors = {name: torch.from_numpy(array) for name, array in description.arrays().items()}
     write_tensors(file, tensors, description.metadata())
     return file

@@ -11,14 +11,16 @@ import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.errors import UserError, listed, shortened, unknown_name
 from mrhubo.files.regular import read_regular
 from mrhubo.robot_motion.motion import RobotMotion, find_repeated
+
+if TYPE_CHECKING:
+    from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 _MAX_BYTES = 20_000_000
 _MAX_JOINTS = 4_096
@@ -150,6 +152,8 @@ def _lines(text: str) -> Iterator[str]:
 
 
 def _parse(path: Path, content: bytes) -> etree._Element:
+    from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]; an answer needs none
+
     parser = etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
     )

@@ -9,7 +9,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.retargeter import Retargeter
 
 pytest.importorskip("numba")
-from mrhubo.fast.compiled.narrowing import LARGE, narrowed
+from mrhubo.fast.narrowing import LARGE, narrowed
 from mrhubo.fast.plain.networks import ACTIVATIONS
 
 

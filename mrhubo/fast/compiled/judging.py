@@ -194,11 +194,11 @@ def prior_input(local_T33, out_BF, k):
 
 
 @njit(**INNER)
-def reconstruct(t, activation, one_BE, two_BE, three_BE, frames):
-    """The body prior's six numbers for each turned joint, of its input; both stand in `one_BE`."""
+def reconstruct(t, activation, rooms, frames):
+    """The body prior's six numbers for each turned joint, of its input; both stand in the first of `make_rooms`."""
     coder = whole(t, COUNT_6, STAGES)
-    mlp(t, coder, activation, 0, one_BE, two_BE, three_BE, frames)
-    mlp(t, coder + 1, activation, 0, one_BE, two_BE, three_BE, frames)
+    mlp(t, coder, activation, 0, rooms, frames)
+    mlp(t, coder + 1, activation, 0, rooms, frames)
 
 
 @njit(**INNER)

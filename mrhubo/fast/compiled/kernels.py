@@ -37,10 +37,8 @@ class Kernels(NamedTuple):
 CHECK, DIRECT, ANSWER = 1, 2, 4
 """What `look` does, added up."""
 AT_ONCE = 48
-"""Frames that go through the networks together: their numbers, of which there are fewer than 400 a frame, stay in the
-processor's nearest memory beside the weights that are at work."""
-FEWER_AT_ONCE = 24
-"""The same for the body prior's layers, which are wider."""
+"""Frames that go through networks together: so many that weights are read once for all of them, and so few that
+their numbers stay in the processor's nearer memory."""
 
 
 @cache
@@ -58,9 +56,9 @@ def make_kernels() -> Kernels:
         """
         _ = version
         nets = tables.whole(t, tables.COUNT_6, tables.STAGES)
-        frames, widest = len(local_BJ33), networks.widest(t, nets)
+        frames = len(local_BJ33)
         at_once = min(AT_ONCE, frames) if what & ANSWER else 1
-        one_BE, two_BE, three_BE = networks.make_rooms(at_once, widest)
+        rooms = networks.make_rooms(t, at_once, nets)
         link_BM = np.empty((at_once, 6 * out_BN.shape[1]), np.float32)
         feature_BF = np.empty((at_once, tables.size(t, tables.CENTER_F)), np.float32)
         unit_I3 = np.empty((tables.size(t, tables.INPUT_I), 3))
@@ -77,7 +75,7 @@ def make_kernels() -> Kernels:
                 if what & ANSWER:
                     networks.features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k)
             if what & ANSWER:
-                networks.joint_angles(t, feature_BF, link_BM, one_BE, two_BE, three_BE, out_BN, first, count)
+                networks.joint_angles(t, feature_BF, link_BM, rooms, out_BN, first, count)
         return -1
 
     @njit(cache=True, **tables.COMPILED)
@@ -112,8 +110,9 @@ def make_kernels() -> Kernels:
         work = robots.make_work(t)
         frames, turned = len(target_BD3), tables.size(t, tables.PARENT_T)
         nets = tables.whole(t, tables.COUNT_6, tables.STAGES) + 2
-        at_once = min(FEWER_AT_ONCE, frames) if judge else 1
-        one_BE, two_BE, three_BE = networks.make_rooms(at_once, networks.widest(t, nets) if judge else 1)
+        at_once = min(AT_ONCE, frames) if judge else 1
+        rooms = networks.make_rooms(t, at_once, nets if judge else 0)
+        one_BE = rooms[0]
         turn_T33, local_BT33 = np.empty((turned + 1, 3, 3)), np.empty((at_once, turned, 3, 3))
         between_333, free_B = np.empty((3, 3, 3)), np.empty(at_once, np.bool_)
         angle_D, error_T, excess_T = np.empty(target_BD3.shape[1]), np.empty(turned), np.empty(turned)
@@ -142,7 +141,7 @@ def make_kernels() -> Kernels:
                     judging.prior_input(local_BT33[k], one_BE, k)
             if not judge:
                 continue
-            judging.reconstruct(t, activation, one_BE, two_BE, three_BE, count)
+            judging.reconstruct(t, activation, rooms, count)
             for k in range(count):
                 b = first + k
                 for n in range(joints):

@@ -13,6 +13,7 @@ from mrhubo.fast.compiled.tables import (
     BEND_W,
     CENTER_F,
     COLUMN,
+    COLUMNS,
     COUNT_6,
     FIRST_O,
     FIRST_STAGE,
@@ -42,7 +43,7 @@ from mrhubo.fast.compiled.tables import (
     spaced,
     whole,
 )
-from mrhubo.fast.compiled.tile import ROWS, multiply, multiply_row
+from mrhubo.fast.compiled.tile import ROWS, multiply, multiply_row, multiply_short_row, unpack
 from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
 
 _ZERO, _ONE, _HALF, _ROOT, _END = (
@@ -95,14 +96,16 @@ def activate(kind, x_BE, out_BE, frames, count):
 
 
 @njit(**INNER)
-def affine(t, layer, x_BI, out_BO, frames):
-    """A layer: weights x + biases. Arrays are as long and as wide as whole tiles are."""
+def affine(t, layer, x_BI, out_BO, loose_IC, frames):
+    """A layer: weights x + biases. Arrays are as long and as wide as whole tiles are. Weights of 16 bits are unpacked
+    into `loose_IC`, a tile's columns at a time, for all frames.
+    """
     inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
-    number, begin, begin_turned = t[2], t[0][2 * NUMBER], t[0][2 * TURNED]
+    number, begin, begin_turned, wide = t[2], t[0][2 * NUMBER], t[0][2 * TURNED], spaced(outputs)
     weights = whole(t, LAYER_G5, 5 * layer + 2)
     # A view tells that places are not negative, without which numba is five times slower.
     if not whole(t, LAYER_G5, 5 * layer + 4) & SHORT:
-        at, wide = begin_turned + weights, spaced(outputs)
+        at = begin_turned + weights
         weight_IO = number[at : at + inputs * wide].reshape(inputs, wide)
         bias_O = number[at + inputs * wide : at + (inputs + 1) * wide]
         if frames == 1:
@@ -110,61 +113,30 @@ def affine(t, layer, x_BI, out_BO, frames):
         else:
             multiply(x_BI, 0, weight_IO, 0, bias_O, 0, 0, out_BO, 0, frames, outputs, inputs)
         return
-    biases = begin + whole(t, LAYER_G5, 5 * layer + 3)
-    _products(t[3][weights : weights + outputs * inputs].reshape(outputs, inputs), x_BI, out_BO, frames)
-    for b in range(frames):
+    short_IO = t[3][weights : weights + inputs * wide].reshape(inputs, wide)
+    at = begin + whole(t, LAYER_G5, 5 * layer + 3)
+    bias_O, scale_O = number[at : at + wide], number[at + wide : at + 2 * wide]
+    if frames == 1:
+        for o in range(wide):
+            out_BO[0, o] = 0
+        multiply_short_row(x_BI, short_IO, out_BO, out_BO, outputs)
         for o in range(outputs):
-            out_BO[b, o] = out_BO[b, o] * number[biases + outputs + o] + number[biases + o]
+            out_BO[0, o] = out_BO[0, o] * scale_O[o] + bias_O[o]
+        return
+    for first in range(0, outputs, COLUMNS):
+        unpack(short_IO, first, wide, scale_O, first, loose_IC, inputs)  # pyright: ignore[reportCallIssue]
+        multiply(x_BI, 0, loose_IC, 0, bias_O, first, 0, out_BO, first, frames, COLUMNS, inputs)
 
 
 @njit(**INNER)
-def _products(weight_OI, x_BI, out_BO, frames):
-    """Four rows and three frames at a time: each number that is read is used several times, and twelve sums are as many
-    as the processor has room for.
+def mlp(t, net, kind, residual, rooms, frames):
+    """A network of what stands in the first of `make_rooms`, with these activations; the output stands there again.
+    Hidden layers after the first are added to what came in where it is residual.
     """
-    outputs, inputs = weight_OI.shape
-    rows, several = outputs - outputs % 4, frames - frames % 3
-    for o in range(0, rows, 4):
-        for b in range(0, several, 3):
-            a0, a1, a2, b0, b1, b2 = _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
-            c0, c1, c2, d0, d1, d2 = _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
-            for i in range(inputs):
-                x, y, z = x_BI[b, i], x_BI[b + 1, i], x_BI[b + 2, i]
-                w = np.float32(weight_OI[o, i])
-                a0, a1, a2 = a0 + w * x, a1 + w * y, a2 + w * z
-                w = np.float32(weight_OI[o + 1, i])
-                b0, b1, b2 = b0 + w * x, b1 + w * y, b2 + w * z
-                w = np.float32(weight_OI[o + 2, i])
-                c0, c1, c2 = c0 + w * x, c1 + w * y, c2 + w * z
-                w = np.float32(weight_OI[o + 3, i])
-                d0, d1, d2 = d0 + w * x, d1 + w * y, d2 + w * z
-            out_BO[b, o], out_BO[b, o + 1], out_BO[b, o + 2], out_BO[b, o + 3] = a0, b0, c0, d0
-            out_BO[b + 1, o], out_BO[b + 1, o + 1], out_BO[b + 1, o + 2], out_BO[b + 1, o + 3] = a1, b1, c1, d1
-            out_BO[b + 2, o], out_BO[b + 2, o + 1], out_BO[b + 2, o + 2], out_BO[b + 2, o + 3] = a2, b2, c2, d2
-        for b in range(several, frames):
-            a0, b0, c0, d0 = _ZERO, _ZERO, _ZERO, _ZERO
-            for i in range(inputs):
-                a0 += np.float32(weight_OI[o, i]) * x_BI[b, i]
-                b0 += np.float32(weight_OI[o + 1, i]) * x_BI[b, i]
-                c0 += np.float32(weight_OI[o + 2, i]) * x_BI[b, i]
-                d0 += np.float32(weight_OI[o + 3, i]) * x_BI[b, i]
-            out_BO[b, o], out_BO[b, o + 1], out_BO[b, o + 2], out_BO[b, o + 3] = a0, b0, c0, d0
-    for o in range(rows, outputs):
-        for b in range(frames):
-            a0 = _ZERO
-            for i in range(inputs):
-                a0 += np.float32(weight_OI[o, i]) * x_BI[b, i]
-            out_BO[b, o] = a0
-
-
-@njit(**INNER)
-def mlp(t, net, kind, residual, one_BE, two_BE, three_BE, frames):
-    """A network of what stands in `one_BE`, with these activations; the output stands in `one_BE` again. Hidden layers
-    after the first are added to what came in where it is residual.
-    """
+    one_BE, two_BE, three_BE, loose_IC = rooms
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
     width = whole(t, LAYER_G5, 5 * first + 1)
-    affine(t, first, one_BE, three_BE, frames)
+    affine(t, first, one_BE, three_BE, loose_IC, frames)
     for b in range(frames):
         for e in range(width):
             one_BE[b, e] = three_BE[b, e]
@@ -174,7 +146,7 @@ def mlp(t, net, kind, residual, one_BE, two_BE, three_BE, frames):
         if not whole(t, LAYER_G5, 5 * layer + 4) & LINEAR:
             activate(kind, one_BE, two_BE, frames, before)
             given_BE = two_BE
-        affine(t, layer, given_BE, three_BE, frames)
+        affine(t, layer, given_BE, three_BE, loose_IC, frames)
         adds = residual and layer < first + layers - 1
         for b in range(frames):
             for e in range(width):
@@ -182,9 +154,9 @@ def mlp(t, net, kind, residual, one_BE, two_BE, three_BE, frames):
 
 
 @njit(**INNER)
-def joint_angles(t, feature_BF, link_BM, one_BE, two_BE, three_BE, out_BN, first, frames):
+def joint_angles(t, feature_BF, link_BM, rooms, out_BN, first, frames):
     """Joint angles [rad], inside the limits, of what the networks see (B, F), from a first frame of the output on."""
-    first_stage = whole(t, COUNT_6, FIRST_STAGE)
+    first_stage, one_BE = whole(t, COUNT_6, FIRST_STAGE), rooms[0]
     for net in range(whole(t, COUNT_6, STAGES)):
         inputs, outputs = whole(t, NET_H6, 6 * net + 3), whole(t, NET_H6, 6 * net + 5)
         last = net >= first_stage
@@ -192,7 +164,7 @@ def joint_angles(t, feature_BF, link_BM, one_BE, two_BE, three_BE, out_BN, first
             c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 2) + i)
             for b in range(frames):
                 one_BE[b, i] = link_BM[b, c] if last and first_stage else feature_BF[b, c]
-        mlp(t, net, GELU, whole(t, COUNT_6, RESIDUAL), one_BE, two_BE, three_BE, frames)
+        mlp(t, net, GELU, whole(t, COUNT_6, RESIDUAL), rooms, frames)
         for o in range(outputs):
             c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 4) + o)
             for b in range(frames):
@@ -249,18 +221,16 @@ def features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k):
 
 
 @njit(**INNER)
-def make_rooms(frames, width):
-    """Three arrays for numbers between layers."""
-    shape = (frames + -frames % ROWS, spaced(width))
-    return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-
-
-@njit(**INNER)
-def widest(t, nets):
-    """The most numbers between layers of the first networks."""
-    found = 0
+def make_rooms(t, frames, nets):
+    """Three arrays for numbers between layers of the first networks, and one for weights that are unpacked."""
+    widest, longest = 1, 1
     for net in range(nets):
         first = whole(t, NET_H6, 6 * net)
         for g in range(first, first + whole(t, NET_H6, 6 * net + 1)):
-            found = max(found, whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1))
-    return found
+            inputs, outputs = whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1)
+            widest = max(widest, max(inputs, outputs))
+            if frames > 1 and whole(t, LAYER_G5, 5 * g + 4) & SHORT:
+                longest = max(longest, inputs)
+    shape = (frames + -frames % ROWS, spaced(widest))
+    loose_IC = np.empty((longest, COLUMNS), np.float32)
+    return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32), loose_IC

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.narrowing import LARGE, narrowed
 from mrhubo.fast.description import Description
 from mrhubo.fast.leg_section import Legs
+from mrhubo.fast.narrowing import LARGE, narrowed
 from mrhubo.fast.plain.avoidance import CLEARANCE
 from mrhubo.fast.plain.broad_phase import make_groups, reaches
 from mrhubo.fast.plain.collision import clearances
@@ -21,7 +21,7 @@ from mrhubo.fast.plain.human import skew
 from mrhubo.fast.plain.soles import moved_points
 from mrhubo.fast.sections import SECTIONS, Part
 
-_KEYS = (
+KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
     "parent_A", "rotary_A", "column_A", "limb_D", "start_body_D", "end_body_D", "view_body_V", "direction_Q",
     "joint_Q", "column_Q", "ratio_A", "offset_A", "axis_A3", "position_A3", "origin_A33", "across_A33", "twice_A33",
@@ -48,10 +48,10 @@ their first steps. scale_4: good and excessive angle, shaking [degrees], usual p
 and its radius. clear_Y: distance [m] that a pair is to keep. Pairs stand group by group
 (`mrhubo.fast.plain.broad_phase`). reach_Z: how far [m] a group's capsule and ball must be apart so that no pair is
 nearer than that. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
-network, the prior's coders last; layer_G5: numbers in and out, where weights begin in `turned`, as `_turned` lays a
-layer out, 0, and 0; or where weights begin in `shorts`, where biases and then scales begin in `number`, and SHORT; and
-LINEAR where no activation stands before the layer; column: all columns; count_6: networks
-of the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
+network, the prior's coders last; layer_G5: numbers in and out, where weights and then biases begin in `turned`, as
+`in_columns` lays a layer out, 0, and 0; or where weights begin in `shorts`, where biases and then scales begin in
+`number`, and SHORT; and LINEAR where no activation stands before the layer; column: all columns; count_6: networks of
+the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
 distance. pool_CXU: the pool's directions, block after block, and in each cell after cell; first_CS: where each cell
 begins, and last where all end; pool_CU: which pose of the pool each is; pool_ridge_CU likewise. block_H: the block
 whose joints move a point of a sole, -1: none does. What is of legs is empty for robots without feet.
@@ -71,7 +71,7 @@ whose joints move a point of a sole, -1: none does. What is of legs is empty for
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
     JOINT_L, PARENT_L, OFFSET_L3, START_R, SOLE_H, SOLE_H3, CARRIER_1, AXES_33, ROOT_3, BODY_H, POINT_H3, BALL_BODY_J,
     BALL_J3, RADIUS_J, NEAR_HJ, SCALE_1, HIP_R3, LIMB_R2, LENGTH_R2, FOOT_R2, BUILT_R23, BLOCK_H,
-) = np.arange(len(_KEYS))  # fmt: skip
+) = np.arange(len(KEYS))  # fmt: skip
 # Numbers of NumPy, as numba compiles a function anew for each of Python's that it is called with.
 PLANE_LOW, PLANE_HIGH, NEEDED_LOW, NEEDED_HIGH = FAR, GAIN, STARTS, FIRST_STEPS = np.arange(4)
 """Places in bend_4, and in polish_4."""
@@ -113,9 +113,9 @@ def pack(description: Description) -> Packed:
     shorts, clear_Y = [np.zeros(0, np.int16)], clearances(description, CLEARANCE)
     found |= _of_legs(description)
     found |= {**_derived(description, clear_Y), **_nets(description, shorts, bool((clear_Y > _ROUNDED).all()))}
-    integers: list[np.ndarray] = [np.zeros(2 * len(_KEYS), np.int64)]
+    integers: list[np.ndarray] = [np.zeros(2 * len(KEYS), np.int64)]
     floats, singles = [np.zeros(0)], [np.zeros(0, np.float32)]
-    for place, key in enumerate(_KEYS):
+    for place, key in enumerate(KEYS):
         table = np.asarray(found[key]).reshape(-1)
         into = {"i": integers, "f": floats if table.dtype == np.float64 else singles}[table.dtype.kind]
         integers[0][2 * place : 2 * place + 2] = _append(into, table)
@@ -185,10 +185,10 @@ def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np
         kind = SHORT * short + LINEAR * linear
         if short:
             scale_O = np.abs(weight).max(axis=1).clip(1e-30) / _STEPS
-            place, _ = _append(shorts, np.round(weight / scale_O[:, None]).astype(np.int16).reshape(-1))
-            scaled, _ = _append(numbers, np.concatenate((bias, scale_O.astype(np.float32))))
+            place, _ = _append(shorts, in_columns(np.round(weight / scale_O[:, None]).astype(np.int16)))
+            scaled, _ = _append(numbers, in_columns(np.stack((bias, scale_O.astype(np.float32)), axis=1)))
         else:
-            (place, _), scaled = _append(turned, _turned(weight, bias)), 0
+            (place, _), scaled = _append(turned, in_columns(np.column_stack((weight, bias)))), 0
         layers.append([weight.shape[1], weight.shape[0], place, scaled, kind])
 
     for part in (*d.pre, *d.post):
@@ -205,12 +205,10 @@ def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np
     }  # fmt: skip
 
 
-def _turned(weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """Weights with the numbers that come in along the first axis, and biases after them, with zeros behind, so that
-    there are as many columns as `spaced` says.
-    """
-    more = spaced.py_func(len(bias)) - len(bias)
-    return np.pad(np.vstack((weight.T, bias)), [(0, 0), (0, more)]).reshape(-1)
+def in_columns(rows_OE: np.ndarray) -> np.ndarray:
+    """A layer's rows as columns, with zeros behind, so that there are as many columns as `spaced` says."""
+    more = spaced.py_func(len(rows_OE)) - len(rows_OE)
+    return np.pad(rows_OE.T, [(0, 0), (0, more)]).reshape(-1)
 
 
 def _append(into: list[np.ndarray], array: np.ndarray) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""Products of small matrices of float32, four rows by sixteen columns at a time.
+"""Products of small matrices of float32, twelve or four rows by sixteen columns at a time.
 
 The sums of such a tile stay in the processor's registers while the inner index runs, so that a multiplication waits for
 no memory. What numba makes of a loop over arrays loads and stores each sum at every step, which takes two to four
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir  # pyright: ignore[reportMissingImports]
+from llvmlite.binding import get_host_cpu_features  # pyright: ignore[reportMissingImports]
 from numba import njit, types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
 from numba.extending import intrinsic  # pyright: ignore[reportMissingImports]
@@ -17,8 +18,12 @@ from numba.extending import intrinsic  # pyright: ignore[reportMissingImports]
 from mrhubo.fast.compiled.tables import COLUMNS, INNER
 
 ROWS = 4
-"""Of a tile, and `COLUMNS`. Arrays have room for whole ones: what is beyond a product's own rows and columns is
-written over."""
+"""Of the smallest tile, and `COLUMNS`. Arrays have room for whole ones: what is beyond a product's own rows and columns
+is written over."""
+_MANY = 12
+"""Rows of which the sums, sixteen columns wide, fill the registers of AVX-512 as far as two of them wait for another;
+those of half of them fill AVX's."""
+_TALL = _MANY if get_host_cpu_features().get("avx512f") else _MANY // 2
 _ROUNDED_ONCE = ("contract",)
 """A product and its sum, where the processor can."""
 
@@ -28,47 +33,57 @@ def whole_tiles(count: int, each: int) -> int:
     return count + -count % each
 
 
-@intrinsic
-def _tile(typing_context, x, x_at, x_step, w, w_at, w_step, begin, begin_at, begin_step, out, out_at, out_step, inputs):
-    """out = begin + x w in one tile. Of each array, the place where its part begins, and from one row to the next."""
-    arrays = {0: x, 3: w, 6: begin, 9: out}
-    fits = all(isinstance(a, types.Array) and a.dtype == types.float32 and a.layout == "C" for a in arrays.values())
-    return (types.void(*(arrays.get(k, types.intp) for k in range(13))), _generate) if fits else None
+def _make_tile(count: int) -> Any:
+    """A function that finds out = begin + x w in one tile of so many rows. Of each array, it is told the place where
+    its part begins, and from one row to the next.
+    """
+
+    @intrinsic
+    def tile(
+        typing_context, x, x_at, x_step, w, w_at, w_step, begin, begin_at, begin_step, out, out_at, out_step, inputs
+    ):
+        arrays = {0: x, 3: w, 6: begin, 9: out}
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            vector, lanes = ir.VectorType(ir.FloatType(), COLUMNS), ir.VectorType(ir.IntType(32), COLUMNS)
+            index = values[1].type
+            unset = ir.Constant(vector, ir.Undefined)
+
+            def address(array: int, row: Any, column: Any) -> Any:
+                data = context.make_array(signature.args[array])(context, builder, values[array]).data
+                place = builder.add(values[array + 1], builder.mul(row, values[array + 2]))
+                return builder.gep(data, [builder.add(place, column)])
+
+            def columns(array: int, row: Any) -> Any:
+                return builder.bitcast(address(array, row, ir.Constant(index, 0)), vector.as_pointer())
+
+            rows = [ir.Constant(index, row) for row in range(count)]
+            sums = [cgutils.alloca_once(builder, vector) for _ in rows]
+            for row, found in zip(rows, sums, strict=True):
+                builder.store(builder.load(columns(6, row), align=4), found)
+            with cgutils.for_range(builder, values[12], intp=index) as loop:
+                weight = builder.load(columns(3, loop.index), align=4)
+                for row, found in zip(rows, sums, strict=True):
+                    number = builder.load(address(0, row, loop.index))
+                    first = builder.insert_element(unset, number, ir.Constant(ir.IntType(32), 0))
+                    each = builder.shuffle_vector(first, unset, ir.Constant(lanes, [0] * COLUMNS))
+                    product = builder.fmul(each, weight, flags=_ROUNDED_ONCE)
+                    builder.store(builder.fadd(builder.load(found), product, flags=_ROUNDED_ONCE), found)
+            for row, found in zip(rows, sums, strict=True):
+                builder.store(builder.load(found), columns(9, row), align=4)
+            return context.get_dummy_value()
+
+        fits = all(isinstance(a, types.Array) and a.dtype == types.float32 and a.layout == "C" for a in arrays.values())
+        return (types.void(*(arrays.get(k, types.intp) for k in range(13))), generate) if fits else None
+
+    return tile
 
 
-def _generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    """The tile's operations."""
-    vector, lanes = ir.VectorType(ir.FloatType(), COLUMNS), ir.VectorType(ir.IntType(32), COLUMNS)
-    index = values[1].type
-    unset = ir.Constant(vector, ir.Undefined)
-
-    def address(array: int, row: Any, column: Any) -> Any:
-        data = context.make_array(signature.args[array])(context, builder, values[array]).data
-        place = builder.add(values[array + 1], builder.mul(row, values[array + 2]))
-        return builder.gep(data, [builder.add(place, column)])
-
-    def columns(array: int, row: Any) -> Any:
-        return builder.bitcast(address(array, row, ir.Constant(index, 0)), vector.as_pointer())
-
-    rows = [ir.Constant(index, row) for row in range(ROWS)]
-    sums = [cgutils.alloca_once(builder, vector) for _ in rows]
-    for row, found in zip(rows, sums, strict=True):
-        builder.store(builder.load(columns(6, row), align=4), found)
-    with cgutils.for_range(builder, values[12], intp=index) as loop:
-        weight = builder.load(columns(3, loop.index), align=4)
-        for row, found in zip(rows, sums, strict=True):
-            number = builder.load(address(0, row, loop.index))
-            first = builder.insert_element(unset, number, ir.Constant(ir.IntType(32), 0))
-            each = builder.shuffle_vector(first, unset, ir.Constant(lanes, [0] * COLUMNS))
-            product = builder.fmul(each, weight, flags=_ROUNDED_ONCE)
-            builder.store(builder.fadd(builder.load(found), product, flags=_ROUNDED_ONCE), found)
-    for row, found in zip(rows, sums, strict=True):
-        builder.store(builder.load(found), columns(9, row), align=4)
-    return context.get_dummy_value()
-
-
-def _make_line(parts: int) -> Any:
-    """A function as `_tile`, for one row and so many times sixteen columns, which read memory in its own order."""
+def _make_line(parts: int, short: bool = False) -> Any:
+    """A function as those of tiles, for one row and so many times sixteen columns, which read memory in its own order.
+    `short`: weights are int16.
+    """
+    kinds = {0: types.float32, 1: types.int16 if short else types.float32, 4: types.float32, 6: types.float32}
 
     @intrinsic
     def line(typing_context, x, w, w_at, w_step, begin, begin_at, out, out_at, inputs):
@@ -76,12 +91,13 @@ def _make_line(parts: int) -> Any:
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             vector, lanes = ir.VectorType(ir.FloatType(), COLUMNS), ir.VectorType(ir.IntType(32), COLUMNS)
+            read = ir.VectorType(ir.IntType(16), COLUMNS) if short else vector
             index, unset = values[2].type, ir.Constant(vector, ir.Undefined)
             data = {k: context.make_array(signature.args[k])(context, builder, values[k]).data for k in arrays}
 
             def columns(array: int, place: Any, part: int) -> Any:
                 address = builder.gep(data[array], [builder.add(place, ir.Constant(index, COLUMNS * part))])
-                return builder.bitcast(address, vector.as_pointer())
+                return builder.bitcast(address, (read if array == 1 else vector).as_pointer())
 
             sums = [cgutils.alloca_once(builder, vector) for _ in range(parts)]
             for part, found in enumerate(sums):
@@ -92,40 +108,78 @@ def _make_line(parts: int) -> Any:
                 each = builder.shuffle_vector(first, unset, ir.Constant(lanes, [0] * COLUMNS))
                 place = builder.add(values[2], builder.mul(loop.index, values[3]))
                 for part, found in enumerate(sums):
-                    weight = builder.load(columns(1, place, part), align=4)
+                    weight = builder.load(columns(1, place, part), align=2 if short else 4)
+                    if short:
+                        weight = builder.sitofp(builder.sext(weight, lanes), vector)
                     product = builder.fmul(each, weight, flags=_ROUNDED_ONCE)
                     builder.store(builder.fadd(builder.load(found), product, flags=_ROUNDED_ONCE), found)
             for part, found in enumerate(sums):
                 builder.store(builder.load(found), columns(6, values[7], part), align=4)
             return context.get_dummy_value()
 
-        fits = all(isinstance(a, types.Array) and a.dtype == types.float32 and a.layout == "C" for a in arrays.values())
+        fits = all(isinstance(a, types.Array) and a.dtype == kinds[k] and a.layout == "C" for k, a in arrays.items())
         return (types.void(*(arrays.get(k, types.intp) for k in range(9))), generate) if fits else None
 
     return line
 
 
-_ten, _four, _one = _make_line(10), _make_line(4), _make_line(1)
-
-
-@njit(**INNER)
-def multiply_row(x, w, begin, out, columns):
-    """out[0] = begin + x[0] w, for a matrix (inputs, columns) alone; `w` is as wide as whole tiles are. As many sums as
-    there are registers run side by side, so that weights, which are read once, are read from one end to the other.
+@intrinsic
+def unpack(typing_context, w, w_at, w_step, scale, scale_at, out, inputs):
+    """out[i] = w[i] * scale: sixteen columns of int16, from a place on, and from one row to the next, become rows of
+    float32 of their own.
     """
-    inputs, wide = w.shape
-    o = 0
-    while o < columns:
-        left = columns - o
-        if left > 9 * COLUMNS:
-            _ten(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
-            o += 10 * COLUMNS
-        elif left > 3 * COLUMNS:
-            _four(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
-            o += 4 * COLUMNS
-        else:
-            _one(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
-            o += COLUMNS
+    kinds = {0: (w, types.int16), 3: (scale, types.float32), 5: (out, types.float32)}
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        vector, lanes = ir.VectorType(ir.FloatType(), COLUMNS), ir.VectorType(ir.IntType(32), COLUMNS)
+        short, index = ir.VectorType(ir.IntType(16), COLUMNS), values[1].type
+        data = {k: context.make_array(signature.args[k])(context, builder, values[k]).data for k in kinds}
+
+        def columns(array: int, place: Any, read: Any) -> Any:
+            return builder.bitcast(builder.gep(data[array], [place]), read.as_pointer())
+
+        each = builder.load(columns(3, values[4], vector), align=4)
+        with cgutils.for_range(builder, values[6], intp=index) as loop:
+            place = builder.add(values[1], builder.mul(loop.index, values[2]))
+            weight = builder.sitofp(builder.sext(builder.load(columns(0, place, short), align=2), lanes), vector)
+            into = builder.mul(loop.index, ir.Constant(index, COLUMNS))
+            builder.store(builder.fmul(weight, each), columns(5, into, vector), align=4)
+        return context.get_dummy_value()
+
+    fits = all(isinstance(a, types.Array) and a.dtype == kind and a.layout == "C" for a, kind in kinds.values())
+    return (types.void(*(kinds[k][0] if k in kinds else types.intp for k in range(7))), generate) if fits else None
+
+
+_low, _tall = _make_tile(ROWS), _make_tile(_TALL)
+
+
+def _make_row(short: bool) -> Any:
+    """`multiply_row`, or `multiply_short_row`."""
+    ten, four, one = (_make_line(parts, short) for parts in (10, 4, 1))
+
+    @njit(**INNER)
+    def row(x, w, begin, out, columns):
+        inputs, wide = w.shape
+        o = 0
+        while o < columns:
+            left = columns - o
+            if left > 9 * COLUMNS:
+                ten(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
+                o += 10 * COLUMNS
+            elif left > 3 * COLUMNS:
+                four(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
+                o += 4 * COLUMNS
+            else:
+                one(x, w, o, wide, begin, o, out, o, inputs)  # pyright: ignore[reportCallIssue]
+                o += COLUMNS
+
+    return row
+
+
+multiply_row, multiply_short_row = _make_row(False), _make_row(True)
+"""out[0] = begin + x[0] w, for a matrix w (inputs, columns) alone, of float32 or int16, which is as wide as whole tiles
+are. As many sums as there are registers run side by side, so that weights, which are read once, are read from one end
+to the other."""
 
 
 @njit(**INNER)
@@ -134,8 +188,20 @@ def multiply(x, x_at, w, w_at, begin, begin_at, begin_step, out, out_at, rows, c
     counted through its array. `begin_step` is from one row to the next, 0 for one that is the same for all.
     """
     for o in range(0, columns, COLUMNS):
-        for r in range(0, rows, ROWS):
-            _tile(  # pyright: ignore[reportCallIssue] (numba adds the first argument)
-                x, x_at + r * x.shape[1], x.shape[1], w, w_at + o, w.shape[1], begin, begin_at + o + r * begin_step,
-                begin_step, out, out_at + o + r * out.shape[1], out.shape[1], inputs,
-            )  # fmt: skip
+        r = 0
+        while r < rows:
+            many = r + _MANY <= rows
+            for _ in range(_MANY // _TALL if many else 1):
+                if many:
+                    _tall(  # pyright: ignore[reportCallIssue] (numba adds the first argument)
+                        x, x_at + r * x.shape[1], x.shape[1], w, w_at + o, w.shape[1], begin,
+                        begin_at + o + r * begin_step, begin_step, out, out_at + o + r * out.shape[1], out.shape[1],
+                        inputs,
+                    )  # fmt: skip
+                else:
+                    _low(  # pyright: ignore[reportCallIssue]
+                        x, x_at + r * x.shape[1], x.shape[1], w, w_at + o, w.shape[1], begin,
+                        begin_at + o + r * begin_step, begin_step, out, out_at + o + r * out.shape[1], out.shape[1],
+                        inputs,
+                    )  # fmt: skip
+                r += _TALL if many else ROWS

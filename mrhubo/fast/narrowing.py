@@ -30,22 +30,34 @@ _SMALL, _WILD = (0.02, 0.6), (0.1, 2.5)
 """Standard deviations of turns [rad], from the first pose to the last of each half."""
 
 
-def narrowed(d: Description) -> list[tuple[np.ndarray, np.ndarray, bool]]:
-    """The encoder's layers: weights (O, E), biases (O,), and whether no activation stands before. The decoder's fewer
-    numbers need nearly all of their dimensions.
+def find_spaces(d: Description) -> tuple[np.ndarray, ...]:
+    """For each layer of the encoder, columns (E, R), float32, whose space holds what it reads; none where it is small,
+    or the space is not much smaller. The decoder's fewer numbers need nearly all of their dimensions.
     """
-    act, found = ACTIVATIONS[d.settings.activation], []
-    for number, (weight, bias) in enumerate(d.prior.encoder):
-        found.append((weight, bias, False))
+    act, spaces = ACTIVATIONS[d.settings.activation], []
+    for number, (weight, _) in enumerate(d.prior.encoder):
+        spaces.append(np.zeros((weight.shape[1], 0), np.float32))
         if weight.size < LARGE:
             continue
         x_SE = _inputs(d)
-        for before in range(number):
-            x_SE = act(x_SE @ d.prior.encoder[before][0].T + d.prior.encoder[before][1])
+        for before, bias in d.prior.encoder[:number]:
+            x_SE = act(x_SE @ before.T + bias)
         space_ER = _space(x_SE)
         if space_ER is not None and space_ER.shape[1] * sum(weight.shape) <= weight.size / 2:
-            none = np.zeros(space_ER.shape[1], np.float32)
-            found[-1:] = [(np.ascontiguousarray(space_ER.T), none, False), (weight @ space_ER, bias, True)]
+            spaces[-1] = space_ER
+    return tuple(spaces)
+
+
+def narrowed(d: Description) -> list[tuple[np.ndarray, np.ndarray, bool]]:
+    """The encoder's layers: weights (O, E), biases (O,), and whether no activation stands before."""
+    found = []
+    spaces = find_spaces(d) if d.prior.spaces is None else d.prior.spaces
+    for (weight, bias), space_ER in zip(d.prior.encoder, spaces, strict=True):
+        if count := space_ER.shape[1]:
+            found.append((np.ascontiguousarray(space_ER.T), np.zeros(count, np.float32), False))
+            found.append((weight @ space_ER, bias, True))
+        else:
+            found.append((weight, bias, False))
     return found
 
 
