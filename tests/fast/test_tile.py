@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("numba")
 from numba import njit
+
 from mrhubo.fast.compiled import networks, tables, tile
 
 
