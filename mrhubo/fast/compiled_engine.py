@@ -230,14 +230,13 @@ class CompiledEngine:
         coupling_KTMM = np.zeros((len(system.couplings_TMM), frames, joints, joints))
         for lag, coupling_TMM in enumerate(system.couplings_TMM, start=1):
             coupling_KTMM[lag - 1, : frames - lag] = coupling_TMM
-        lower_RW = np.empty((frames * joints, (len(coupling_KTMM) + 1) * joints))
         # In one order of memory: for each other one, numba compiles anew.
         within_TMM, diagonal_TM = np.ascontiguousarray(system.within_TMM), np.ascontiguousarray(system.diagonal_TM)
-        self._motion_kernels.factor(within_TMM, diagonal_TM, coupling_KTMM, lower_RW)
+        column_RV = self._motion_kernels.factor(within_TMM, diagonal_TM, coupling_KTMM)
 
         def solve(right_TM: np.ndarray) -> np.ndarray:
             found_R = right_TM.flatten()
-            self._motion_kernels.solve(lower_RW, found_R)
+            self._motion_kernels.solve(column_RV, found_R)
             return found_R.reshape(right_TM.shape)
 
         return solve

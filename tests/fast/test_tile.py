@@ -73,5 +73,5 @@ def test_one_frame_and_many_agree_on_layers_of_16_bits() -> None:
 @njit(**tables.COMPILED)
 def layer(t: Any, x_BI: Any, frames: Any) -> Any:
     one_BE, _, _, loose_IC = networks.make_rooms(t, frames, 1)
-    networks.affine(t, 0, x_BI, one_BE, loose_IC, frames)
+    networks.affine(t, 0, x_BI, one_BE, loose_IC, False, frames)
     return one_BE

@@ -1,19 +1,18 @@
 """What refining a whole motion needs, compiled: the cost of frames, and systems of all of them.
 
 Legend: B frames, T frames of a motion, D directions, N joints, C blocks, M joints of one block, K couplings, R = T M
-rows, W entries of a row from the first that is not 0 to the diagonal.
+rows, V entries of a column.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled import avoidance, collision, cost, human, steps, tables
+from mrhubo.fast.compiled import avoidance, band, collision, cost, human, steps, tables
 from mrhubo.fast.compiled import robot as robots
 from mrhubo.fast.compiled.reading import read_quickly
 from mrhubo.fast.kept import checksum, drop_others
@@ -93,54 +92,16 @@ def make_motion_kernels() -> MotionKernels:
             close_B[b] = collision.touches(t, work, True)
 
     @njit(cache=True, **tables.COMPILED)
-    def factor(within_TMM, diagonal_TM, coupling_KTMM, lower_RW):
-        """Cholesky factor of a `Banded`, row after row; the last entry of a row is the reciprocal of its diagonal."""
+    def factor(within_TMM, diagonal_TM, coupling_KTMM):
+        """As `band.factor`."""
         _ = version
-        frames, joints = diagonal_TM.shape
-        reach, width = len(coupling_KTMM), lower_RW.shape[1] - 1
-        for t in range(frames):
-            earlier = min(reach, t)
-            for m in range(joints):
-                r, first = t * joints + m, width - m - earlier * joints
-                row_W = lower_RW[r]
-                row_W[:] = 0.0
-                for lag in range(1, earlier + 1):
-                    for n in range(joints):
-                        row_W[width - m - lag * joints + n] = coupling_KTMM[lag - 1, t - lag, m, n]
-                for n in range(m):
-                    row_W[width - m + n] = within_TMM[t, m, n]
-                for y in range(first, width):
-                    other_W = lower_RW[r - width + y]
-                    found = row_W[y]
-                    for k in range(first, y):  # what lies before the first entry is 0
-                        found -= row_W[k] * other_W[width - y + k]
-                    row_W[y] = found * other_W[width]
-                found = diagonal_TM[t, m]
-                for k in range(first, width):
-                    found -= row_W[k] * row_W[k]
-                row_W[width] = 1 / math.sqrt(found)
+        return band.factor(within_TMM, diagonal_TM, coupling_KTMM)
 
     @njit(cache=True, **tables.COMPILED)
-    def solve(lower_RW, x_R):
-        """The solution of a system whose factor is given, in the place of its right side."""
+    def solve(column_RV, x_R):
+        """As `band.solve`."""
         _ = version
-        rows, width = len(x_R), lower_RW.shape[1] - 1
-        for r in range(rows):
-            row_W = lower_RW[r]
-            first = max(0, r - width)
-            before_X = x_R[first:r]
-            found = x_R[r]
-            for k in range(len(before_X)):
-                found -= row_W[width - len(before_X) + k] * before_X[k]
-            x_R[r] = found * row_W[width]
-        for r in range(rows - 1, -1, -1):
-            row_W = lower_RW[r]
-            x_R[r] *= row_W[width]
-            found = x_R[r]
-            first = max(0, r - width)
-            before_X = x_R[first:r]
-            for k in range(len(before_X)):
-                before_X[k] -= row_W[width - len(before_X) + k] * found
+        band.solve(column_RV, x_R)
 
     drop_others(quadratic.stats.cache_path)
     return MotionKernels(*map(read_quickly, (quadratic, whole, turning, close, factor, solve)))

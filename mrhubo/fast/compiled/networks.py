@@ -96,9 +96,10 @@ def activate(kind, x_BE, out_BE, frames, count):
 
 
 @njit(**INNER)
-def affine(t, layer, x_BI, out_BO, loose_IC, frames):
-    """A layer: weights x + biases. Arrays are as long and as wide as whole tiles are. Weights of 16 bits are unpacked
-    into `loose_IC`, a tile's columns at a time, for all frames.
+def affine(t, layer, x_BI, out_BO, loose_IC, adds, frames):
+    """A layer: weights x + biases, added to what is there where it `adds`. Arrays are as long and as wide as whole
+    tiles are, and `x_BI` a number wider than what comes in. Weights of 16 bits, which add nothing, are unpacked into
+    `loose_IC`, a tile's columns at a time, for all frames.
     """
     inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
     number, begin, begin_turned, wide = t[2], t[0][2 * NUMBER], t[0][2 * TURNED], spaced(outputs)
@@ -107,11 +108,16 @@ def affine(t, layer, x_BI, out_BO, loose_IC, frames):
     if not whole(t, LAYER_G5, 5 * layer + 4) & SHORT:
         at = begin_turned + weights
         weight_IO = number[at : at + inputs * wide].reshape(inputs, wide)
-        bias_O = number[at + inputs * wide : at + (inputs + 1) * wide]
+        begin_BO, step = number[at + inputs * wide : at + (inputs + 1) * wide].reshape(1, wide), 0
+        if adds:  # biases, which stand after the weights, are then those of an input that is 1
+            for b in range(frames):
+                x_BI[b, inputs] = 1
+            weight_IO = number[at : at + (inputs + 1) * wide].reshape(inputs + 1, wide)
+            begin_BO, step = out_BO, out_BO.shape[1]
         if frames == 1:
-            multiply_row(x_BI, weight_IO, bias_O, out_BO, outputs)
+            multiply_row(x_BI, weight_IO, begin_BO, out_BO, outputs)
         else:
-            multiply(x_BI, 0, weight_IO, 0, bias_O, 0, 0, out_BO, 0, frames, outputs, inputs)
+            multiply(x_BI, 0, weight_IO, 0, begin_BO, 0, step, out_BO, 0, frames, outputs, len(weight_IO))
         return
     short_IO = t[3][weights : weights + inputs * wide].reshape(inputs, wide)
     at = begin + whole(t, LAYER_G5, 5 * layer + 3)
@@ -136,21 +142,22 @@ def mlp(t, net, kind, residual, rooms, frames):
     one_BE, two_BE, three_BE, loose_IC = rooms
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
     width = whole(t, LAYER_G5, 5 * first + 1)
-    affine(t, first, one_BE, three_BE, loose_IC, frames)
-    for b in range(frames):
-        for e in range(width):
-            one_BE[b, e] = three_BE[b, e]
+    affine(t, first, one_BE, three_BE, loose_IC, False, frames)
+    own_BE, other_BE = three_BE, one_BE
     for layer in range(first + 1, first + layers):
         before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
-        given_BE = one_BE
+        given_BE = own_BE
         if not whole(t, LAYER_G5, 5 * layer + 4) & LINEAR:
-            activate(kind, one_BE, two_BE, frames, before)
+            activate(kind, own_BE, two_BE, frames, before)
             given_BE = two_BE
-        affine(t, layer, given_BE, three_BE, loose_IC, frames)
-        adds = residual and layer < first + layers - 1
-        for b in range(frames):
-            for e in range(width):
-                one_BE[b, e] = one_BE[b, e] + three_BE[b, e] if adds else three_BE[b, e]
+        if residual and layer < first + layers - 1:
+            affine(t, layer, given_BE, own_BE, loose_IC, True, frames)
+        else:
+            affine(t, layer, given_BE, other_BE, loose_IC, False, frames)
+            own_BE, other_BE = other_BE, own_BE
+    for b in range(frames):
+        for e in range(width):
+            one_BE[b, e] = own_BE[b, e]
 
 
 @njit(**INNER)
@@ -231,6 +238,6 @@ def make_rooms(t, frames, nets):
             widest = max(widest, max(inputs, outputs))
             if frames > 1 and whole(t, LAYER_G5, 5 * g + 4) & SHORT:
                 longest = max(longest, inputs)
-    shape = (frames + -frames % ROWS, spaced(widest))
+    shape = (frames + -frames % ROWS, spaced(widest + 1))
     loose_IC = np.empty((longest, COLUMNS), np.float32)
     return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32), loose_IC

@@ -93,5 +93,5 @@ def _from_inside(matrix: Banded, right_TM: np.ndarray, bounds: Bounds, factor: F
 
 def _reach(value: np.ndarray, change: np.ndarray) -> float:
     """How much of a change, at most all of it, keeps everything positive."""
-    falls = change < 0
-    return min(1.0, float((-value[falls] / change[falls]).min())) if falls.any() else 1.0
+    fall = -float((change / value).min())
+    return 1.0 if fall <= 1 else 1 / fall
