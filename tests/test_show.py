@@ -126,7 +126,7 @@ def test_a_robot_motion_alone_as_every_kind_of_file(
         (["--robot-motion", "THEIRS", "--robot", "reachy"], "no robot that is given has all of its joints; reachy lacks HeadYaw"),
         (["--motion", "WAVE", "--port", "70000"], "must be a whole number from 1 to 65535"),
         (["--motion", "WAVE", "--save", "FOLDER.png"], "is a folder"),
-        (["--motion", "COPY.html", "--save", "COPY.html"], "is the motion itself"),
+        (["--motion", "COPY.html", "--save", "COPY.html"], "would be written over what is read"),
     ],
 )  # fmt: skip
 def test_what_is_refused(
