@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrhubo.config import CommandParser, run_command, whole_number
-from mrhubo.errors import UserError, listed
+from mrhubo.errors import UserError, encodable, listed
 from mrhubo.files.regular import refuse_input
 from mrhubo.lazy import import_optional
 from mrhubo.retarget import (
@@ -121,7 +121,7 @@ def _stage(options: Namespace) -> tuple[Stage, str]:
     performances += _given(options, robots, motion)
     person = None if motion is None else read_person(motion)
     title = (motion.description or motion.name) if motion is not None else performances[0].motion.name
-    return arrange(person, performances), title.rstrip(".") or "mrhubo"
+    return arrange(person, performances), encodable(title).rstrip(".") or "mrhubo"
 
 
 def _answers(options: Namespace, motion: Motion | None) -> tuple[list[Robot], list[Performance]]:
