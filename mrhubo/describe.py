@@ -91,14 +91,13 @@ def _show_tree(word: str) -> int:
 
 
 def _draw_config(word: str, out: Path | None, force: bool) -> int:
-    from mrhubo.describing.picture import is_our_picture
-    from mrhubo.describing.run import refuse_existing
+    from mrhubo.describing.run import refuse_foreign
 
     file = find_config(word)
     beside = file.with_suffix(".png") if str(file) == word else Path(f"{file.stem}.png")
     picture = out or beside
-    if not force and picture.exists() and not is_our_picture(picture):
-        refuse_existing(picture)
+    if not force:
+        refuse_foreign(picture)
     print(f"picture:  {picture}")
     status = _draw(file, picture)
     from mrhubo.robot.unsure import needed_answers

@@ -50,6 +50,16 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
+def encodable(text: str) -> str:
+    """The text as a file can hold it in UTF-8: what a file's name has that the system could not read is read as UTF-8,
+    and where it is none, a mark stands in its place.
+    """
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    except UnicodeEncodeError:  # halves of letters that stand for no byte
+        return text.encode("utf-8", "replace").decode("utf-8")
+
+
 def first_line(error: BaseException) -> str:
     """What an error says, without what libraries write below it; its type, if it says nothing."""
     return next(iter(str(error).strip().splitlines()), type(error).__name__)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mrhubo.config import CommandParser, run_command
 from mrhubo.config.answering import add_who_flags, add_whole_body_flag, check_whole_body
+from mrhubo.files.regular import refuse_input
 
 DESCRIPTION = (
     "Writes the networks of a package as one ONNX file, or as a Python file that needs NumPy alone with its weights"
@@ -35,6 +36,7 @@ def main(argv: list[str]) -> None:
 
     check_whole_body(options)
     out = Path(options.out)
+    refuse_input("--out", out, [options.robot])
     if options.retargeter is not None:
         retargeter = mrhubo.load(options.retargeter)
     else:

@@ -78,7 +78,8 @@ def main(argv: list[str]) -> int:
         check_method(options.method, METHODS, options.retargeter is not None)
     check_whole_body(options)
     files = find_files([Path(name) for name in options.motion or options.video])
-    places = plan_places(options.out, options.format, files)
+    others = (options.robot, options.joint_order, options.bvh_map)
+    places = plan_places(options.out, options.format, files, others)
     request = read_request(options, options.joint_order)
     if options.retargeter is not None:
         answerer = of_package(options.retargeter, options.avoid_collisions)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrhubo.config import CommandParser, run_command, whole_number
-from mrhubo.errors import UserError, listed
+from mrhubo.errors import UserError, encodable, listed
+from mrhubo.files.regular import refuse_input
 from mrhubo.lazy import import_optional
 from mrhubo.retarget import (
     METHOD_MEANING,
@@ -96,9 +97,7 @@ def _check(options: Namespace) -> Path | None:
             raise UserError(f"--save {out}: the name must end in {', '.join(_ENDINGS)}")
         if out.is_dir():
             raise UserError(f"--save {out}: is a folder; name a file in it")
-        inputs = [Path(name) for name in (options.motion, *options.robot_motion) if name]
-        if out.exists() and any(file.exists() and out.samefile(file) for file in inputs):
-            raise UserError(f"--save {out}: is the motion itself; name another file")
+        refuse_input("--save", out, (options.motion, *options.robot_motion))
         needed = {".html": "viser", ".mp4": "av"}.get(out.suffix.lower())
     if needed is not None:
         what = "a page in the browser" if needed == "viser" else "an .mp4 file"
@@ -122,7 +121,7 @@ def _stage(options: Namespace) -> tuple[Stage, str]:
     performances += _given(options, robots, motion)
     person = None if motion is None else read_person(motion)
     title = (motion.description or motion.name) if motion is not None else performances[0].motion.name
-    return arrange(person, performances), title.rstrip(".") or "mrhubo"
+    return arrange(person, performances), encodable(title).rstrip(".") or "mrhubo"
 
 
 def _answers(options: Namespace, motion: Motion | None) -> tuple[list[Robot], list[Performance]]:

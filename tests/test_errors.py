@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mrhubo.errors import nearest, unknown_name
+from mrhubo.errors import encodable, nearest, unknown_name
 
 PARTS = ["chest", "head", "left_elbow", "left_hand", "left_shoulder", "left_wrist", "right_hand", "right_wrist"]
 KEYS = ["accelerator", "batch_size", "loss", "lr", "max_steps", "precision", "seed", "validate_every", "weight_decay"]
@@ -40,6 +40,13 @@ KEYS = ["accelerator", "batch_size", "loss", "lr", "max_steps", "precision", "se
 )
 def test_near(name: str, names: list[str], near: str | None) -> None:
     assert nearest(name, names) == near
+
+
+def test_what_a_name_has_that_is_no_letter_becomes_one() -> None:
+    assert encodable("wällen 1") == "wällen 1"
+    assert encodable("w\udcc3\udca4llen") == "wällen"  # UTF-8, of a system that knows no UTF-8
+    assert encodable("w\udce4llen") == "w\ufffdllen"  # Latin-1
+    assert encodable("\ud800") == "?"
 
 
 @given(st.sampled_from(PARTS + KEYS), st.data())

@@ -110,6 +110,14 @@ def test_a_robot_motion_alone_as_every_kind_of_file(
     assert main(["--robot-motion", str(theirs), "--robot", "nao", "--save", str(tmp_path / "a.png")]) == 0  # replaced
 
 
+def test_names_need_not_be_utf_8(wave: Path, tmp_path: Path) -> None:
+    odd = Path(shutil.copy(wave, tmp_path / "w\udce4lle.npz"))
+    for ending in ("html", "png", "mp4"):
+        out = tmp_path / f"\udcfc.{ending}"
+        assert main(["--motion", str(odd), "--robot", "nao", "--to", "0.2", "--save", str(out)]) == 0
+        assert out.is_file()
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -126,7 +134,7 @@ def test_a_robot_motion_alone_as_every_kind_of_file(
         (["--robot-motion", "THEIRS", "--robot", "reachy"], "no robot that is given has all of its joints; reachy lacks HeadYaw"),
         (["--motion", "WAVE", "--port", "70000"], "must be a whole number from 1 to 65535"),
         (["--motion", "WAVE", "--save", "FOLDER.png"], "is a folder"),
-        (["--motion", "COPY.html", "--save", "COPY.html"], "is the motion itself"),
+        (["--motion", "COPY.html", "--save", "COPY.html"], "would be written over what is read"),
     ],
 )  # fmt: skip
 def test_what_is_refused(

@@ -139,6 +139,11 @@ def test_a_known_config_is_not_trained_again(arguments: list[str], tmp_path: Pat
             "line 4: space.model.layers: ",
         ),
         ("name: tiny\nspace: {model.hidden: [8, 9]}\nfixed:\n  model.stages: 3\n", "line 4: fixed.model.stages: "),
+        (
+            "name: tiny\nspace: {model.hidden: [8, 9]}\nfixed: {model.hidden: 8}\n",
+            "line 2: space.model.hidden: is to vary, and model.hidden=8 is to hold for all trials",
+        ),
+        ("name: tiny\nspace: {trainer.max_steps: [8, 9]}\n", "line 2: space.trainer.max_steps: is to vary, and"),
         ("name: tiny\nspaces: {}\n", "'spaces' .*'space'"),
         ("name: tiny\nspace: {model.hidden: [8, 9]}\nstorage: nonsense\n", "sweep.yaml, line 3: storage: .*nonsense"),
     ],

@@ -76,7 +76,7 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
             options, rest = self.parse_known_intermixed_args(argv, namespace)
         except argparse.ArgumentError as error:
             raise UserError(self._sentence(error)) from None
-        words = [*vars(options).pop("words"), *rest]
+        words = [*vars(options).pop("words"), *rest, *self._take_overrides(options)]
         vars(options).pop(_StoreOnce.SEEN, None)
         if self.word is not None:
             if len(words) != 1:
@@ -150,6 +150,20 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
             raise UserError(f"command line: {self.prog} takes no --config: it has its own configs")
         known = [*self._option_string_actions, "--help"]
         raise UserError(f"command line: {unknown_name('flag', name, known)}")
+
+    def _take_overrides(self, options: Any) -> list[str]:
+        """The KEY=VALUE of the config behind a flag of several values, which argparse takes for more of these."""
+        sections = () if self.schema is None else tuple(key.name for key in walk(self.schema) if "." not in key.name)
+        taken: list[str] = []
+        for action in self._flags():
+            given = getattr(options, action.dest, None)
+            if sections and action.nargs == "+" and given:
+                own = [word for word in given if re.split("[.=]", word)[0] not in sections or "=" not in word]
+                taken += [word for word in given if word not in own]
+                if not own:
+                    raise UserError(f"command line: {action.option_strings[0]} needs a value: {_spelt(action)}")
+                setattr(options, action.dest, own)
+        return taken
 
     def _config_word(self, word: str) -> str:
         """A word without "=", if it can name a config."""

@@ -221,6 +221,8 @@ class _Converter:
             raise UserError(f"{node.where}: nested more than {MAX_DEPTH} levels deep")
         if not found.tag.startswith("tag:yaml.org,2002:") or found.tag[18:] not in ("str", "seq", "map"):
             raise UserError(f"{node.where}: the YAML tag '{found.tag}' is not supported")
+        if isinstance(found, yaml.ScalarNode) and not _is_text(found.value):
+            raise UserError(f"{node.where}: {found.value!r} holds half of a letter, which is no text")
         if isinstance(found, yaml.MappingNode):
             node.content = {}
             for key, value in found.value:
@@ -243,10 +245,21 @@ class _Converter:
     def key(self, found: yaml.Node) -> str:
         if not isinstance(found, yaml.ScalarNode):
             raise UserError(f"{self.where(found)}: a key must be text, found a list or a mapping")
+        if not _is_text(found.value):
+            raise UserError(f"{self.where(found)}: key {found.value!r} holds half of a letter, which is no text")
         return found.value
 
     def where(self, found: yaml.Node) -> str:
         return Node(None, self.source, found.start_mark.line + 1 if self.lines else None).where
+
+
+def _is_text(value: str) -> bool:
+    """Whether a file or a database can hold it; halves of letters that stand for a byte of a file's name are typed."""
+    try:
+        value.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _missing_file(file: Path) -> str:

@@ -88,6 +88,7 @@ def describe_model(word: str, out: Path | None = None, force: bool = False, whol
         picture = file.with_suffix(".png")
         if not force:
             refuse_existing(file)
+            refuse_foreign(picture)
         text = described_yaml(found, urdf, file, picture, path.name)
         with atomic_path(file) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -172,6 +173,15 @@ def refuse_existing(file: Path) -> None:
         raise UserError(f"{file} is there already, and may hold work of yours; name another by --out, or give --force")
 
 
+def refuse_foreign(picture: Path) -> None:
+    """Refuses to replace a picture that is none of ours, as a photograph of the robot."""
+    if picture.exists():
+        from mrhubo.describing.picture import is_our_picture
+
+        if not is_our_picture(picture):
+            refuse_existing(picture)
+
+
 def _discover(description: Description, whole_body: bool = False) -> Discovery:
     """What the links of a robot stand for; where joints cannot be used, and no whole robot is left, they are to blame.
 
@@ -207,7 +217,7 @@ def _robot(description: Description, found: Discovery, name: str) -> Robot:
 @contextlib.contextmanager
 def _as_urdf(path: Path, file: Path, force: bool) -> Iterator[tuple[Path, tuple[str, ...]]]:
     """The model's URDF, and what was left out of it. One that is made of MuJoCo's model lies beside the config to be;
-    it goes away again where the work in here fails.
+    where the work in here fails it goes away again, and what was there before is back.
     """
     if not is_mjcf(path):
         yield path, ()
@@ -216,12 +226,17 @@ def _as_urdf(path: Path, file: Path, force: bool) -> Iterator[tuple[Path, tuple[
     made = urdf_of_mjcf(path, urdf.parent)
     if not force:
         refuse_existing(urdf)
+    former = urdf.read_bytes() if urdf.is_file() else None
     with atomic_path(urdf) as temporary:
         temporary.write_text(made.urdf, encoding="utf-8")
     try:
         yield urdf, made.notes
     except BaseException:
-        urdf.unlink(missing_ok=True)
+        if former is None:
+            urdf.unlink(missing_ok=True)
+        else:
+            with atomic_path(urdf) as temporary:
+                temporary.write_bytes(former)
         raise
 
 

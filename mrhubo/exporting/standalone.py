@@ -131,4 +131,9 @@ def load(path: str | Path) -> Retargeter:
 if __name__ == "__main__":
     if len(sys.argv) != 3:
         sys.exit(f"usage: python {sys.argv[0]} poses.npy angles.npy")
-    np.save(sys.argv[2], load(Path(__file__).with_suffix(".npz"))(np.load(sys.argv[1], allow_pickle=False)))
+    try:
+        retargeter = load(Path(__file__).with_suffix(".npz"))
+        np.save(sys.argv[2], retargeter(np.load(sys.argv[1], allow_pickle=False)))
+    except Exception as error:
+        print(f"error: {' '.join(f'{type(error).__name__}: {error}'.split())}", file=sys.stderr)
+        sys.exit(2)

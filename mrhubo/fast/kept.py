@@ -7,13 +7,16 @@ as long as those files are there and neither mrhubo nor numba, Python or the mac
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import importlib.metadata
 import importlib.util
 import json
 import os
 import platform
+import shutil
 import sys
+import tempfile
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -25,6 +28,8 @@ from mrhubo.files.atomic import atomic_path
 from mrhubo.files.cache import user_cache
 
 _SOURCES = ("compiled", "plain")
+_FOLDER = "NUMBA_CACHE_DIR"
+"""The environment's variable for the folder in which numba keeps what it compiles."""
 _MARK = "mrhubo-compiled.txt"
 """Beside numba's files: which version of the sources they are of."""
 
@@ -50,7 +55,7 @@ def is_kept(universal: bool = False) -> bool:
     try:
         files = json.loads(_note(universal).read_text())
         return bool(files) and all(os.path.isfile(file) for file in files)
-    except (OSError, ValueError, TypeError, importlib.metadata.PackageNotFoundError):
+    except (OSError, ValueError, TypeError, UserError, importlib.metadata.PackageNotFoundError):
         return False
 
 
@@ -60,6 +65,32 @@ def note_kept(folders: Iterable[str], universal: bool = False) -> None:
     with contextlib.suppress(UserError, importlib.metadata.PackageNotFoundError):
         with atomic_path(_note(universal)) as half:
             half.write_text(json.dumps(files))
+
+
+def make_room() -> None:
+    """Gives numba a folder that ends with this process where it can keep nothing: it fails without one, and where the
+    user has no home it makes one called `~`. To be called before numba is imported.
+    """
+    if os.environ.get(_FOLDER) or _takes_files(Path(__file__).parent / "compiled" / "__pycache__"):
+        return
+    with contextlib.suppress(UserError):
+        if _takes_files(user_cache().with_name("numba")):
+            return
+    os.environ[_FOLDER] = folder = tempfile.mkdtemp(prefix="mrhubo-")
+    if "numba" in sys.modules:
+        sys.modules["numba"].config.CACHE_DIR = folder
+    process = os.getpid()
+    atexit.register(lambda: os.getpid() == process and shutil.rmtree(folder, ignore_errors=True))
+
+
+def _takes_files(folder: Path) -> bool:
+    """Whether files can be made in a folder, which is made for that; as numba finds it out."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
 
 
 def drop_others(folder: str | None) -> None:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 from mrhubo.fast.plain.human import cross, norm
 from mrhubo.fast.rotations import axis_angle_to_matrix
 
 NOT_FINITE = "NaN or infinite numbers"
+LOWEST_RATE, HIGHEST_RATE = 1e-3, 1e6
+"""Frames per second: a frame in a quarter of an hour, and more than any camera's."""
+_MOST_STEPS = 1_000_000
 _JOINTS = 21
 _MOST_TURN = 6 * math.pi
 _FLAT = 1e-4
@@ -44,11 +48,10 @@ def read_poses(given: Any, frame_rate: float | None, own_rest: bool) -> Poses:
                 "this retargeter is for a body model with a rest pose of its own; give it an array for that"
             )
         frame_rate, name, source, given = given.frame_rate, given.name, given.source, given.arrays.local_TJ33
-    array = np.asarray(given)
+    array = to_array(given)
     if array.dtype.kind not in "fiu":
         raise UserError(f"human motion: expected a Motion or an array of numbers, found {array.dtype}")
-    if frame_rate is not None:
-        check_frame_rate(frame_rate)
+    check_frame_rate(frame_rate)
     for axes, read in ((_JOINTS, 3, 3), None), ((_JOINTS, 6), _of_sixd), ((3 * _JOINTS,), _of_axis_angle):
         if array.shape[-len(axes) :] == axes:
             shape = array.shape[: -len(axes)]
@@ -69,10 +72,44 @@ def is_motion(given: Any) -> bool:
     return hasattr(type(given), "local_TJ33")  # an object's own would be a tensor, and import PyTorch
 
 
-def check_frame_rate(frame_rate: float) -> None:
-    """Refuses what is no positive number of frames per second."""
-    if not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
-        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")
+def to_array(given: Any) -> np.ndarray:
+    """What a user gives, as NumPy's: an array, nested lists, a tensor of PyTorch, which is not imported for that.
+
+    Raises:
+        UserError: NumPy makes no array of it, as of ragged lists.
+    """
+    with contextlib.suppress(Exception):
+        return np.asarray(given)
+    try:  # a tensor that takes gradients, lies on a GPU, or has numbers that NumPy does not know
+        return given.detach().cpu().float().numpy()
+    except Exception as error:
+        kind = type(given).__name__
+        raise UserError(f"human motion: expected a Motion or an array of numbers, found {kind}") from error
+
+
+def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
+    """Refuses what is no number of frames per second, or one with whose powers nobody can reckon; None is one that is
+    not known, unless it is needed.
+    """
+    if frame_rate is None and not needed:
+        return
+    number = isinstance(frame_rate, int | float | np.integer | np.floating) and not isinstance(frame_rate, bool)
+    if not (number and 0 < frame_rate < math.inf):
+        raise UserError(f"human motion: the frame rate must be a positive number, found {shortened(frame_rate)}")
+    if not LOWEST_RATE <= frame_rate <= HIGHEST_RATE:
+        bounds = f"{LOWEST_RATE:g} to {HIGHEST_RATE:,.0f}"
+        raise UserError(f"human motion: the frame rate must be from {bounds} a second, found {shortened(frame_rate)}")
+
+
+def checked_polish(polish: int) -> int:
+    """The number of steps of optimisation that is asked for.
+
+    Raises:
+        UserError: it is negative, no whole number, or more than anybody waits for.
+    """
+    if isinstance(polish, bool) or not isinstance(polish, int | np.integer) or not 0 <= polish <= _MOST_STEPS:
+        raise UserError(f"polish must be 0 or more steps, at most {_MOST_STEPS:,}, found {shortened(polish)}")
+    return int(polish)
 
 
 def refuse(wrong: tuple[int, str] | None, shape: tuple[int, ...]) -> None:

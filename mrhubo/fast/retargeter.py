@@ -23,7 +23,7 @@ from mrhubo.fast.answers import Answers, Engine
 from mrhubo.fast.description import Description
 from mrhubo.fast.engines import FORMS, make_engine
 from mrhubo.fast.plain import judging
-from mrhubo.fast.poses import read_poses, refuse
+from mrhubo.fast.poses import checked_polish, read_poses, refuse, to_array
 from mrhubo.fast.together.motion import join_frames
 from mrhubo.robot_motion import FollowingJoint, RobotFacts, RobotMotion
 
@@ -108,7 +108,7 @@ class FastRetargeter:
             UserError: the array has another shape, or holds what is no rotation (says in which frame); `polish` is
                 negative, or the frame rate not positive, or missing and needed.
         """
-        _check(polish)
+        polish = checked_polish(polish)
         poses = read_poses(motion, frame_rate, self.description.settings.own_rest)
         rate = poses.frame_rate
         if together and rate is None:
@@ -123,7 +123,7 @@ class FastRetargeter:
 
     def predict(self, motion: Any, polish: int = 0, avoid_collisions: bool = True) -> np.ndarray:
         """Joint angles (..., N) [rad] alone, as `__call__` has them; without steps, in a fifth of the time."""
-        _check(polish)
+        polish = checked_polish(polish)
         poses = read_poses(motion, None, self.description.settings.own_rest)
         target_TD3, network_TN = self.engine.look(poses.local_TJ33, poses.shape)
         q_TN = self.engine.polish(network_TN, target_TD3, polish, avoid_collisions)
@@ -138,13 +138,17 @@ class FastRetargeter:
             UserError: the networks see rotations, the array has another shape, or holds NaN or infinite numbers or a
                 limb's direction that is no unit vector.
         """
-        _check(polish)
+        polish = checked_polish(polish)
         settings, cost = self.description.settings, self.description.cost
         if settings.features != "directions":
             raise UserError("this retargeter's networks see rotations, not directions; give it poses")
-        target_XD3 = np.asarray(directions, np.float64)
-        if target_XD3.shape[-2:] != (len(cost.weight_D), 3):
-            raise UserError(f"directions must have the shape (..., {len(cost.weight_D)}, 3), found {target_XD3.shape}")
+        given_XD3 = to_array(directions)
+        if given_XD3.dtype.kind not in "fiu" or given_XD3.shape[-2:] != (len(cost.weight_D), 3):
+            raise UserError(
+                f"directions must be numbers of the shape (..., {len(cost.weight_D)}, 3), found {given_XD3.dtype} of"
+                f" shape {given_XD3.shape}"
+            )
+        target_XD3 = given_XD3.astype(np.float64)
         length_XD = np.sqrt((target_XD3**2).sum(-1))
         full_XD = np.where(cost.partial_D > 0, length_XD < 1 + 1e-3, np.abs(length_XD - 1) < 1e-3)
         if not full_XD.all():  # nor NaN
@@ -213,11 +217,6 @@ def _clips(frames: int, shape: tuple[int, ...]) -> list[slice]:
     """Which of some frames are one motion: those of the last leading axis."""
     length = max(1, shape[-1] if shape else 1)
     return [slice(first, first + length) for first in range(0, frames, length)]
-
-
-def _check(polish: int) -> None:
-    if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
-        raise UserError(f"polish must be 0 or more steps, found {polish}")
 
 
 __all__ = ["FORMS", "POLISH", "FastRetargeter"]

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.fast.poses import to_array
 
 CROOKED = 1e-2
 """How far a rotation's numbers may be from those of one: files round them."""
@@ -41,8 +42,8 @@ def read_root(root: Any, contacts: Any, points: Sequence[str]) -> Root | None:
         UserError: one of them has another shape or holds no numbers, or the matrix is no rotation.
     """
     try:
-        turn, place = (np.asarray(part) for part in root)
-    except (TypeError, ValueError) as error:
+        turn, place = (to_array(part) for part in root)
+    except (TypeError, ValueError, UserError) as error:
         raise UserError(f"stream: a root is a rotation (3, 3) and a place (3,) [m]: {error}") from error
     if turn.dtype.kind not in "fiu" or place.dtype.kind not in "fiu" or turn.shape != (3, 3) or place.shape != (3,):
         raise UserError(
@@ -51,7 +52,7 @@ def read_root(root: Any, contacts: Any, points: Sequence[str]) -> Root | None:
         )
     given_H = None
     if contacts is not None:
-        given_H = np.asarray(contacts)
+        given_H = to_array(contacts)
         if given_H.dtype.kind not in "biu" or given_H.shape != (len(points),):
             raise UserError(f"stream: expected contacts of {len(points)} points: {', '.join(points)}")
         given_H = given_H.astype(bool)

@@ -23,7 +23,7 @@ from mrhubo.fast.plain.ground import Base, Seen, Stance
 from mrhubo.fast.plain.human import orthonormal_columns
 from mrhubo.fast.plain.judging import quaternions
 from mrhubo.fast.plain.root_turn import root_turn
-from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse
+from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse, to_array
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.roots import read_root
 from mrhubo.fast.stream_clock import StreamClock
@@ -54,7 +54,7 @@ class FastStream:
         Raises:
             UserError: the rate is not positive, or the floor no number.
         """
-        check_frame_rate(rate)
+        check_frame_rate(rate, needed=True)
         if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
             raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
         self.retargeter, self.rate, self.settings = retargeter, float(rate), settings or StreamSettings()
@@ -261,7 +261,7 @@ class FastStream:
             raise UserError(
                 f"stream: expected a pose, found a motion of {poses.shape[0]} frames; give its frames one by one"
             )
-        given = np.asarray(pose)[None]
+        given = to_array(pose)[None]
         seen = not _has_gaps(given)
         poses = read_poses(given if seen else given[:0], None, own_rest)
         if len(poses.shape) != 1:
@@ -276,7 +276,7 @@ class FastStream:
 
     def _standing(self, q: Any) -> np.ndarray:
         """Joint angles (N,), float32, that a user gives."""
-        cost, q_N = self._cost, np.asarray(q)
+        cost, q_N = self._cost, to_array(q)
         if q_N.dtype.kind not in "fiu" or q_N.shape != cost.lower_N.shape:
             raise UserError(f"stream: q must have {len(cost.lower_N)} angles, found {q_N.dtype} of shape {q_N.shape}")
         q_N = q_N.astype(np.float32)

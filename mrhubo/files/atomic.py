@@ -20,8 +20,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
     """Yields a temporary path in the same folder; on success its content is synced and takes the place of `path`.
 
     Raises:
-        UserError: the folder or the disk refuses the file (no space, no permission); nothing half-written stays.
+        UserError: the path has no name (``.``, ``/``), or the folder or the disk refuses the file (no space, no
+            permission); nothing half-written stays.
     """
+    if not path.name:
+        raise UserError(f"{path}: is a folder; name a file")
     temporary = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

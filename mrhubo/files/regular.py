@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -33,6 +34,23 @@ def naming(path: Path) -> Iterator[None]:
     except UserError as error:
         said = str(error)
         raise UserError(said if said.startswith(f"{path}: ") else f"{path}: {said}") from error
+
+
+def refuse_input(what: str, path: Path, inputs: Iterable[Path | str | None]) -> None:
+    """Refuses to write over a file that is read, by whatever name.
+
+    Args:
+        what: whose file is written, ``--out``, for the sentence.
+        path: the file that is going to be written.
+        inputs: what is read, files or not; None: nothing is.
+
+    Raises:
+        UserError: it is one of them.
+    """
+    for given in inputs:
+        with contextlib.suppress(OSError, ValueError):  # one of the two is not there, or no name of a file
+            if given is not None and os.path.samefile(path, given):
+                raise UserError(f"{what} {path}: would be written over what is read, {given}; name another file")
 
 
 def check_regular(path: Path, max_bytes: int = MAX_BYTES) -> int:

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from mrhubo.errors import UserError, listed, unknown_name
 from mrhubo.evaluation import Motions, evaluate_clips, motion_table, solve_references, table
+from mrhubo.files.regular import naming
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.motion import Motion, resample, trim
 from mrhubo.robot import Robot
@@ -25,6 +26,8 @@ _SPARE = 1
 """Frames by which a prediction may be shorter or longer than the motion: who resamples may round otherwise."""
 _MOVES = 1e-3
 """Range [rad] from which on a joint is said to move."""
+_FAR, _ROUNDED = 1.0, 1e-2
+"""Beyond a limit [rad]: what no retargeter's own limits explain, and what rounding does."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,8 @@ def measure_predictions(prepared: Prepared, report: Reporter, files: Sequence[Pa
     robot, known = prepared.body_map.robot, {motion.name: motion for motion in prepared.motions.all}
     found: dict[str, _Prediction] = {}
     for file in files:
-        prediction = _match(file, read_robot_motion(file), known, robot)
+        with naming(file):
+            prediction = _match(file, read_robot_motion(file), known, robot)
         name = prediction.motion.name
         if name in found:
             raise UserError(f"{file}: answers '{name}', as another file does; measure one retargeter at a time")
@@ -110,5 +114,16 @@ def _notes(name: str, found: RobotMotion, robot: Robot, q_TN: Tensor) -> list[st
     outside = (q_TN < robot.lower_N - 1e-5) | (q_TN > robot.upper_N + 1e-5)
     if bool(outside.any()):
         share = float(outside.any(dim=1).float().mean())
-        notes.append(f"'{name}': {share:.1%} of the frames are outside the joints' limits")
+        degrees = "; they look like degrees, and are read as radians" if _look_like_degrees(q_TN, robot) else ""
+        notes.append(f"'{name}': {share:.1%} of the frames are outside the joints' limits{degrees}")
     return notes
+
+
+def _look_like_degrees(q_TN: Tensor, robot: Robot) -> bool:
+    """Whether most frames are far outside the limits [rad], and nearly all would be inside them in degrees."""
+
+    def share(q_TN: Tensor, spare: float) -> float:
+        beyond = (q_TN < robot.lower_N - spare) | (q_TN > robot.upper_N + spare)
+        return float(beyond.any(dim=1).float().mean())
+
+    return share(q_TN, _FAR) > 0.5 and share(torch.deg2rad(q_TN), _ROUNDED) < 0.01

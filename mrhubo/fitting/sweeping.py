@@ -28,7 +28,7 @@ from mrhubo.runtime.runs import close_run, find_run, log_all, reopen, start_run
 from mrhubo.runtime.tables import markdown
 from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.workspace import Workspace
-from mrhubo.search import open_study, open_trials, override, read_space, remaining, work_on
+from mrhubo.search import open_study, open_trials, override, read_space, refuse_fixed, remaining, work_on
 
 if TYPE_CHECKING:
     from mlflow.entities import Run
@@ -139,6 +139,7 @@ class Sweep:
         self.overrides = [*(override(key, value) for key, value in settings.fixed.items()), *overrides]
         self.base = self._config([])
         self.space = read_space(settings.space, lambda text: self._config([text]), method.schema)
+        refuse_fixed(self.space, self.overrides)
         check_name("name", settings.name)
         prepared = prepare(self.base)
         self.folder = prepared.tracking_dir

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
 from mrhubo.errors import UserError, shortened, unknown_name
+from mrhubo.files.regular import refuse_input
 from mrhubo.live.certificate import ServerCertificate
 from mrhubo.live.endpoints import LOOPBACK, Endpoint
 from mrhubo.live.loop import Sink, Source
@@ -25,6 +26,8 @@ class Plan:
         self._servers: dict[int, Server] = {}
         self.sources: list[Source] = []
         self.sinks: list[Sink] = []
+        self.read: list[Path] = []
+        """The files that are replayed or simulated."""
 
     @property
     def has_page(self) -> bool:
@@ -57,8 +60,8 @@ class Plan:
             "udp": self._udp_source,
             "vmc": self._vmc_source,
             "pico": _pico,
-            "replay": lambda where: _replay(where, False),
-            "replay-loop": lambda where: _replay(where, True),
+            "replay": lambda where: self._replay(where, False),
+            "replay-loop": lambda where: self._replay(where, True),
         }
         self.sources.append(_chosen("source", name, makers)(where))
 
@@ -75,10 +78,22 @@ class Plan:
             "file": _file_sink,
             "mcap": _mcap_sink,
             "ros2": _ros2_sink,
-            "mujoco": lambda where: _mujoco_sink(where, False),
-            "mujoco-free": lambda where: _mujoco_sink(where, True),
+            "mujoco": lambda where: self._mujoco_sink(where, False),
+            "mujoco-free": lambda where: self._mujoco_sink(where, True),
         }
         self.sinks.append(_chosen("sink", name, makers)(where))
+
+    def refuse_inputs(self, more: Iterable[str | None]) -> None:
+        """Refuses sinks that would write over a file that is read, by a source, or `more` of them.
+
+        Raises:
+            UserError: one would.
+        """
+        inputs = [*self.read, *more]
+        for sink in self.sinks:
+            path = getattr(sink, "path", None)
+            if isinstance(path, Path):
+                refuse_input("--sink", path, inputs)
 
     def _server(self, where: str, text: str) -> Server:
         endpoint = Endpoint.read(where, text, PORT, self._host)
@@ -94,6 +109,22 @@ class Plan:
 
         return VmcSource(Endpoint.read(where, "--source vmc", PORT))
 
+    def _replay(self, where: str, loop: bool) -> Source:
+        from mrhubo.live.sources.replay import ReplaySource
+
+        path, rate = _at_rate(where)
+        if not path:
+            raise UserError("--source replay: names no file; write replay:dance.bvh")
+        self.read.append(Path(path))
+        return ReplaySource.of_file(Path(path), loop, rate)
+
+    def _mujoco_sink(self, where: str, free: bool) -> Sink:
+        from mrhubo.live.sinks.mujoco import MujocoSink
+
+        model = Path(where) if where else None
+        self.read += [] if model is None else [model]
+        return MujocoSink(model, free)
+
 
 def _chosen(kind: str, name: str, makers: Mapping[str, Callable[[str], Part]]) -> Callable[[str], Part]:
     if name not in makers:
@@ -105,15 +136,6 @@ def _pico(where: str) -> Source:
     from mrhubo.live.sources.pico import PicoSource
 
     return PicoSource()
-
-
-def _replay(where: str, loop: bool) -> Source:
-    from mrhubo.live.sources.replay import ReplaySource
-
-    path, rate = _at_rate(where)
-    if not path:
-        raise UserError("--source replay: names no file; write replay:dance.bvh")
-    return ReplaySource.of_file(Path(path), loop, rate)
 
 
 def _at_rate(where: str) -> tuple[str, float | None]:
@@ -153,9 +175,3 @@ def _ros2_sink(where: str) -> Sink:
     from mrhubo.live.sinks.ros2 import Ros2Sink
 
     return Ros2Sink(where)
-
-
-def _mujoco_sink(where: str, free: bool) -> Sink:
-    from mrhubo.live.sinks.mujoco import MujocoSink
-
-    return MujocoSink(Path(where) if where else None, free)

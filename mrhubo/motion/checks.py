@@ -1,4 +1,4 @@
-"""What a motion may be: how fast its frames come, and how far its joints turn.
+"""What a motion may be: how far its joints turn.
 
 Legend: T frames, J joints.
 """
@@ -9,8 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-
-from mrhubo.errors import UserError
 
 MAX_TURN = 6 * math.pi
 """No joint of a body turns three times [rad]; numbers in degrees say so."""
@@ -50,10 +48,3 @@ class Turns:
         """In words, for a sentence."""
         share = 100 * self.beyond_half / self.joints
         return f"{share:.0f}% of the joints would turn by more than half a turn, up to {self.largest:.3g} rad"
-
-
-def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
-    """Refuses what is no positive number of frames per second; None is one that is not known, unless it is needed."""
-    known = needed or frame_rate is not None
-    if known and not (isinstance(frame_rate, int | float | np.number) and 0 < frame_rate < math.inf):
-        raise UserError(f"human motion: the frame rate must be a positive number, found {frame_rate}")

@@ -17,8 +17,9 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton
 from mrhubo.errors import UserError
+from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.rotations import SKEW
-from mrhubo.motion.checks import MAX_TURN, Turns, check_frame_rate
+from mrhubo.motion.checks import MAX_TURN, Turns
 from mrhubo.motion.motion import Motion
 from mrhubo.rotation import axis_angle_to_matrix, stack_columns
 
@@ -107,6 +108,9 @@ def to_tensor(array: MotionLike, skeleton: Skeleton | None = None) -> Tensor:
         or array.is_complex()
         or array.dtype == torch.bool
         or array.layout != torch.strided
+        or array.is_nested
+        or array.is_quantized
+        or array.is_meta
     ):
         kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray | Tensor) else kind
         raise UserError(f"human motion: expected a Motion, or a NumPy or torch array of numbers, found {kind}")

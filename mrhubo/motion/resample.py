@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
-from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.motion import Motion
 
 _MOST_FRAMES = 10_000_000

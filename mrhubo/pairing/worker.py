@@ -1,8 +1,8 @@
 """A process that makes the shards it is told to, started by `mrhubo.pairing.workers`.
 
-The first line on standard input is the config, YAML as a JSON string; every other line is the index of a shard to
-make and write. Each is answered by one line of JSON: {"shard": index, "cost": ..., "residual_m": ...} or
-{"error": sentence}.
+The first line on standard input is a JSON list of the config, as YAML, and of the fingerprint of its pairs, which the
+files that the config names have to give here too; every other line is the index of a shard to make and write. Each is
+answered by one line of JSON: {"shard": index, "cost": ..., "residual_m": ...} or {"error": sentence}.
 """
 
 from __future__ import annotations
@@ -30,9 +30,15 @@ def main() -> None:
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "config.yaml"
-            path.write_text(json.loads(next(lines)), encoding="utf-8")
+            text, fingerprint = json.loads(next(lines))
+            path.write_text(text, encoding="utf-8")
             config = load_config(path)
         setup = PairSetup.open(config)
+        if setup.store.header["fingerprint"] != fingerprint:
+            raise UserError(
+                f"{config.robot.urdf}: it, or another file that the config names, has changed since this command"
+                " began; start it again"
+            )
         generator = PairGenerator(setup.body_map, setup.prior, config)
         generator.prepare(setup.store)
         for line in lines:

@@ -107,7 +107,7 @@ def _make(
         for index in indices:
             yield make_shard(generator, store, index)
         return
-    with _workers(config, count) as workers:
+    with _workers(config, store.header["fingerprint"], count) as workers:
         yield from _dispatch(workers, indices)
 
 
@@ -166,7 +166,7 @@ def _name(number: int) -> str:
 
 
 @contextmanager
-def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]]:
+def _workers(config: Config, fingerprint: str, count: int) -> Iterator[list[subprocess.Popen[str]]]:
     """Fresh interpreters that know the config; ended on leaving, whatever they are doing: files are whole or absent."""
     package = str(Path(mrhubo.__file__).parent.parent)
     path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -183,7 +183,7 @@ def _workers(config: Config, count: int) -> Iterator[list[subprocess.Popen[str]]
         for worker in workers:
             assert worker.stdin
             with suppress(OSError):  # it has ended already; it is told when it does not answer
-                worker.stdin.write(json.dumps(to_yaml(config)) + "\n")
+                worker.stdin.write(json.dumps([to_yaml(config), fingerprint]) + "\n")
                 worker.stdin.flush()
         yield workers
     finally:

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
-from mrhubo.motion.checks import check_frame_rate
+from mrhubo.fast.poses import check_frame_rate
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.poses import MotionLike, read_poses, to_tensor
 from mrhubo.motion.steady import steady_root

@@ -32,7 +32,7 @@ def calibrated(retargeter: Retargeter) -> ConfidenceModel:
     """As `calibrate`; of a robot that it was asked for before, what it found then."""
     try:
         folder = user_cache()
-    except RuntimeError:  # a user without a home
+    except UserError:  # a user without a home
         return calibrate(retargeter)
     path = folder / f"confidence-{_checksum(retargeter)}.json"
     with contextlib.suppress(OSError, UserError, UnicodeDecodeError), open_regular(path) as file:

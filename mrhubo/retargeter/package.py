@@ -24,9 +24,9 @@ from mrhubo.body.vposer import VPoser
 from mrhubo.config import Config
 from mrhubo.errors import UserError
 from mrhubo.fast.description import FILE, Description
+from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.retargeter import POLISH
 from mrhubo.motion import Motion, MotionLike, read_poses
-from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.steady import steady_root
 from mrhubo.reference import Avoidance, DirectionProblem, Polish
 from mrhubo.reference.standing import Standing

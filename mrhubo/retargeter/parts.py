@@ -13,6 +13,7 @@ from torch import Tensor
 from mrhubo.body import Skeleton
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.fast.poses import checked_polish
 from mrhubo.motion import NOT_FINITE, MotionLike, refuse_frames, to_tensor
 
 _CHUNK = 8_192
@@ -21,23 +22,13 @@ _LARGEST = 2.0
 """No number of a rotation matrix is larger than 1; those that come near to one may be a little."""
 
 
-def check_polish(polish: int) -> None:
-    """Refuses what is no number of steps of optimisation.
-
-    Raises:
-        UserError: it is negative, or no whole number.
-    """
-    if isinstance(polish, bool) or not isinstance(polish, int) or polish < 0:
-        raise UserError(f"polish must be 0 or more steps, found {polish}")
-
-
 def checked_parts(local_TJ33: MotionLike, skeleton: Skeleton, device: torch.device, polish: int) -> list[Tensor]:
     """`pose_parts` of what is to be answered with so many steps of optimisation.
 
     Raises:
-        UserError: as `check_polish` and `pose_parts`.
+        UserError: as `checked_polish` and `pose_parts`.
     """
-    check_polish(polish)
+    checked_polish(polish)
     return list(pose_parts(local_TJ33, skeleton, device))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import json
 import os
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -48,14 +47,12 @@ def write_package(
     folder.mkdir(parents=True, exist_ok=True)
     robot = body_map.robot
     with atomic_path(folder / _URDF) as temporary:
-        if robot.description.solids.of_meshes:  # their files stay where they are
-            temporary.write_bytes(urdf_without_meshes(robot.description))
-        else:
-            shutil.copyfile(config.robot.urdf, temporary)
+        meshes = robot.description.solids.of_meshes  # their files stay where they are
+        temporary.write_bytes(urdf_without_meshes(robot.description) if meshes else robot.description.text)
     prior.save(folder / _PRIOR)
     save_skeleton(folder / _SKELETON, body_map.skeleton)
     with atomic_path(folder / _CONFIG) as temporary:
-        temporary.write_text(_portable(config))
+        temporary.write_text(_portable(config), encoding="utf-8")
     metadata = {
         "schema": SCHEMA,
         "robot": robot.name,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mrhubo.errors import UserError
+from mrhubo.files.regular import refuse_input
 from mrhubo.motion import motion_files
 from mrhubo.robot_motion import FORMATS, find_format
 from mrhubo.robot_motion.lerobot import check_lerobot_folder
@@ -36,6 +37,8 @@ class Places:
     """A key of `FORMATS`."""
     is_folder: bool
     """Whether `out` is a folder with a file a motion."""
+    inputs: Sequence[Path | str | None] = ()
+    """What is read, and so not written over."""
     used: set[str] = field(default_factory=set)
 
     @property
@@ -44,7 +47,11 @@ class Places:
         return not FORMATS[self.format].ending
 
     def path(self, name: str) -> Path:
-        """Where the motion of a name goes; one whose name is taken gets a number."""
+        """Where the motion of a name goes; one whose name is taken gets a number.
+
+        Raises:
+            UserError: there is what is read.
+        """
         if not self.is_folder or self.is_dataset:
             return self.out
         found, number = name, 1
@@ -52,19 +59,24 @@ class Places:
             number += 1
             found = f"{name}_{number}"
         self.used.add(found)
-        return self.out / f"{found}{FORMATS[self.format].ending}"
+        path = self.out / f"{found}{FORMATS[self.format].ending}"
+        refuse_input("--out", path, self.inputs)
+        return path
 
 
-def plan_places(out: str, format: str | None, inputs: Sequence[Path]) -> Places:
+def plan_places(
+    out: str, format: str | None, inputs: Sequence[Path], others: Sequence[Path | str | None] = ()
+) -> Places:
     """Where the answers to some motions go.
 
     Args:
         out: a file, or a folder: what is one, ends in a slash, or has no ending; with several motions always.
         format: a key of `FORMATS`; default: by the ending of a file, else .npz.
         inputs: the motions' files.
+        others: what else is read.
 
     Raises:
-        UserError: there is no such format, several motions would go into one file, or one over its own input.
+        UserError: there is no such format, several motions would go into one file, or one over what is read.
     """
     path = Path(out)
     known = None if format is None else find_format(path, format)
@@ -77,9 +89,9 @@ def plan_places(out: str, format: str | None, inputs: Sequence[Path]) -> Places:
                         f"{path.with_suffix('')}/")  # fmt: skip
     if is_folder and path.is_file():
         raise UserError(f"--out {out}: is a file; name a folder, or a file with an ending")
-    places = Places(path, known or (_DEFAULT if is_folder else find_format(path)), is_folder)
-    if not is_folder and any(os.path.exists(path) and os.path.samefile(path, file) for file in inputs if file.exists()):
-        raise UserError(f"--out {out}: is the motion itself; name another file")
+    places = Places(path, known or (_DEFAULT if is_folder else find_format(path)), is_folder, (*inputs, *others))
+    for likely in (path / f"{file.stem}{FORMATS[places.format].ending}" if is_folder else path for file in inputs):
+        refuse_input("--out", likely, places.inputs)
     return _usable(places)
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mrhubo.errors import UserError
+from mrhubo.fast.poses import check_frame_rate
 from mrhubo.motion import Motion, ReadOptions, mirror, read_motion, resample, trim
-from mrhubo.motion.checks import check_frame_rate
 from mrhubo.motion.editing import check_span
 from mrhubo.retargeting.answering import Answerer
 from mrhubo.retargeting.places import Places

@@ -7,6 +7,7 @@ https://mujoco.readthedocs.io/en/stable/XMLreference.html
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from mrhubo.robot.mjcf_bodies import Converted, UrdfWriter
 
 _TINY = 1e-3
 """Size [m] of the sphere that stands for a mesh until its place is known."""
+_HEAD = 1 << 20
+"""Bytes in which the root element begins."""
 _GROWING = ("replicate", "composite", "flexcomp", "flex", "plugin")
 """Elements that make many of one, or run somebody's library."""
 
@@ -29,7 +32,8 @@ def is_mjcf(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            _, root = next(etree.iterparse(file, events=("start",), resolve_entities=False, no_network=True))
+            head = io.BytesIO(file.read(_HEAD))  # of a file, lxml would take the name, which may not be UTF-8
+        _, root = next(etree.iterparse(head, events=("start",), resolve_entities=False, no_network=True))
     except (OSError, StopIteration, etree.XMLSyntaxError):
         return False
     return root.tag == "mujoco"
@@ -70,7 +74,7 @@ def _refuse_growing(path: Path) -> None:
     try:
         if path.stat().st_size > 50_000_000:
             raise UserError(f"{path} has more than 50,000,000 bytes, which is the most that is read")
-        root = etree.parse(str(path), parser).getroot()
+        root = etree.fromstring(path.read_bytes(), parser)
     except (OSError, etree.XMLSyntaxError) as error:
         raise UserError(f"{path} is no well-formed XML: {first_line(error)}") from error
     for tag in _GROWING:

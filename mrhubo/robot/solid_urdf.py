@@ -14,7 +14,7 @@ def urdf_without_meshes(description: Description) -> bytes:
     """The robot's file, in which collision meshes that were read are capsules: a cylinder with a ball at either end, as
     `mrhubo.robot.shapes` reads them. A link with a mesh that could not be read keeps all of its meshes.
     """
-    robot = read_document(description.path).robot
+    robot = read_document(description.path, description.text).robot
     for link in robot.findall("link"):
         name = str(link.get("name"))
         shapes = [shape for shape in description.solids.of_meshes if shape.link == name]

@@ -56,6 +56,8 @@ class Description:
     """Links with a collision element that cannot be read."""
     masses: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict, repr=False, compare=False)
     """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
+    text: bytes = field(default=b"", repr=False, compare=False)
+    """What was read, unpacked: the file may be another one by the time that a package takes it along."""
     _read: dict[str, SolidShapes] = field(default_factory=dict, repr=False, compare=False)
     """What has been read when it was first asked for; the same robot in another form knows it too."""
     _found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -204,7 +206,7 @@ def _described(path: Path, text: bytes) -> Description:
     above = {joint.child: joint for joint in joints.values()}
     return Description(
         path, tree.root, tree.links, joints, above, parsed,
-        tree.faults, tree.doubts, tree.left_out, tree.unread_collisions, tree.masses,
+        tree.faults, tree.doubts, tree.left_out, tree.unread_collisions, tree.masses, text,
     )  # fmt: skip
 
 

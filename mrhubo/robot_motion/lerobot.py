@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mrhubo.errors import UserError, shortened
+from mrhubo.errors import UserError, encodable, shortened
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.regular import read_regular
 from mrhubo.robot_motion.clock import in_full
@@ -57,7 +57,7 @@ def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
     check_lerobot_folder(folder)
     arrow, parquet = import_pyarrow()
     frames = _frames(motions, int(first.frame_rate or 0))
-    names = [motion.name or "motion" for motion in motions]
+    names = [encodable(motion.name) or "motion" for motion in motions]
     tasks = list(dict.fromkeys(names))
     frames["task_index"] = np.repeat([tasks.index(name) for name in names], [len(motion) for motion in motions])
     tables = {
@@ -67,8 +67,8 @@ def write_lerobot(motions: Sequence[RobotMotion], folder: Path) -> None:
     }
     texts = {_STATS: _statistics(frames), _INFO: _info(motions, frames, len(tasks))}  # the last one makes it a dataset
     for name, table in tables.items():
-        with atomic_path(folder / name) as temporary:
-            parquet.write_table(table, temporary)
+        with atomic_path(folder / name) as temporary, open(temporary, "wb") as file:
+            parquet.write_table(table, file)
     for name, content in texts.items():
         with atomic_path(folder / name) as temporary:
             temporary.write_text(json.dumps(content, indent=4, ensure_ascii=False), encoding="utf-8")
@@ -170,7 +170,7 @@ def _info(motions: Sequence[RobotMotion], frames: dict[str, np.ndarray], tasks: 
         features[name] = {"dtype": kind, "shape": [1] if names is None else [array.shape[1]], "names": names}
     return {
         "codebase_version": _VERSION,
-        "robot_type": motions[0].robot.name,
+        "robot_type": encodable(motions[0].robot.name),
         "total_episodes": len(motions),
         "total_frames": len(frames["index"]),
         "total_tasks": tasks,

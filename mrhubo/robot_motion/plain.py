@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mrhubo.errors import UserError, shortened
+from mrhubo.errors import UserError, encodable, shortened
 from mrhubo.robot_motion.motion import PER_FRAME, FollowingJoint, RobotFacts, RobotMotion
 
 FORMAT = "mrhubo.robot_motion/1"
@@ -49,6 +49,7 @@ def facts_of(motion: RobotMotion) -> dict[str, Any]:
         "other_multiplier": [other.multiplier for other in others],
         "other_offset_rad": [other.offset for other in others],
     }
+    found |= {key: encodable(found[key]) for key in TEXTS}
     return {key: value for key, value in found.items() if value is not None and value != [] and value != ""}
 
 

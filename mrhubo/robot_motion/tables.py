@@ -16,7 +16,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, first_line, shortened
 from mrhubo.files.atomic import atomic_path
-from mrhubo.files.regular import check_regular, read_regular
+from mrhubo.files.regular import open_regular, read_regular
 from mrhubo.lazy import import_optional
 from mrhubo.robot_motion.columns import from_columns, to_columns
 from mrhubo.robot_motion.motion import FLAGS, RobotMotion, find_repeated
@@ -112,8 +112,8 @@ def write_parquet(motion: RobotMotion, path: Path) -> None:
     columns = to_columns(motion)
     table = arrow.table({name: np.ascontiguousarray(column) for name, column in columns.items()})
     table = table.replace_schema_metadata({_HEADER: json.dumps(facts_of(motion))})
-    with atomic_path(path) as temporary:
-        parquet.write_table(table, temporary)
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:  # pyarrow takes no name that is not UTF-8
+        parquet.write_table(table, file)
 
 
 def read_parquet(path: Path) -> RobotMotion:
@@ -144,10 +144,9 @@ def read_table(path: Path) -> tuple[Any, Mapping[bytes, bytes]]:
         UserError: the file is missing, damaged or too large.
     """
     _, parquet = import_pyarrow()
-    check_regular(path)
     try:
         # Neither memory maps nor threads: what is wrong with a stranger's file stays an exception.
-        with parquet.ParquetFile(path, memory_map=False) as file:
+        with open_regular(path) as opened, parquet.ParquetFile(opened, memory_map=False) as file:
             rows, columns = file.metadata.num_rows, file.metadata.num_columns
             if columns > _MAX_COLUMNS or rows * columns > _MAX_NUMBERS:
                 raise UserError(f"{path}: claims {rows} rows of {columns} columns, which are not read")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from mrhubo.config.secrets import HIDDEN, credentials, has_hidden, redacted
 from mrhubo.errors import UserError, first_line, shortened, was_interrupted
 from mrhubo.runtime.database import NAME, database_uri, open_database, sqlite_file
+from mrhubo.runtime.names import writable
 from mrhubo.runtime.runs import close_the_dead
 
 if TYPE_CHECKING:
@@ -126,6 +127,8 @@ def _hand_over_credentials(uri: str) -> str:
 def _open_experiment(client: TrackingClient, name: str, location: str | None) -> str:
     from mlflow.exceptions import MlflowException
 
+    if writable(name) != name:
+        raise UserError(f"tracking.experiment: {name!r} holds what is no letter; databases do not take it")
     found = client.get_experiment_by_name(name)
     if found is None:
         # The tag opens the experiment in the dashboard's view of trainings, not of language models.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +92,22 @@ def check_fixed(fixed: Mapping[str, Any], check: Callable[[str], object]) -> Non
     """
     for key, value in fixed.items():
         _check(f"fixed.{key}", override(key, value), check)
+
+
+def refuse_fixed(space: Sequence[Dimension], overrides: Sequence[str]) -> None:
+    """Refuses what varies though `key=value` says that it does not: no trial would have that value.
+
+    Raises:
+        UserError: there is such a key.
+    """
+    for text in overrides:
+        fixed = text.partition("=")[0].strip()
+        for key in (dimension.key for dimension in space):
+            if fixed == key or fixed.startswith(f"{key}."):
+                raise UserError(
+                    f"space.{key}: is to vary, and {text} is to hold for all trials; take one of them out, of the"
+                    " sweep's file (space, fixed) or of the command line"
+                )
 
 
 def _check(name: str, text: str, check: Callable[[str], object]) -> None:

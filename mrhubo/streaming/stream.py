@@ -21,9 +21,9 @@ from torch import Tensor
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.fast import StreamSettings
+from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.motion import Motion, MotionLike, read_poses
-from mrhubo.motion.checks import check_frame_rate
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.standing import (
     Legs,

@@ -52,7 +52,7 @@ _MAX_MEMBERS = 1_000
 def models_folder() -> Path:
     """Where the models are kept: the folder that the environment names, else one in the user's cache."""
     if named := os.environ.get(FOLDER_VARIABLE):
-        return Path(named).expanduser()
+        return Path(os.path.expanduser(named))  # of an unknown user it stays as it is, and is then not found
     return user_cache() / "pose" / VERSION
 
 

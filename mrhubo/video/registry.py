@@ -43,7 +43,7 @@ def registry_url(package: str) -> str:
 
 def _user_settings(environment: dict[str, str]) -> dict[str, str]:
     """What the user's `.npmrc` says, as far as it can be read."""
-    path = Path(environment.get("npm_config_userconfig") or Path.home() / ".npmrc")
+    path = Path(environment.get("npm_config_userconfig") or os.path.expanduser("~/.npmrc"))
     try:
         with open(path, encoding="utf-8", errors="replace") as handle:
             lines = handle.read(_MAX_SETTINGS).splitlines()

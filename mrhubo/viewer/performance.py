@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, encodable
 from mrhubo.robot import Robot
 from mrhubo.robot_motion import RobotMotion
 from mrhubo.viewer.bodies import Body, dress, link_places, read_bodies
@@ -72,7 +72,7 @@ def perform(
     Raises:
         UserError: there is no such joint, no frame, or nobody tells the frame rate.
     """
-    motion = motion.single()
+    motion, label = motion.single(), encodable(label)
     rate = motion.frame_rate or frame_rate
     if not len(motion):
         raise UserError(f"{label}: the robot's motion has no frames, so there is nothing to show")

@@ -12,7 +12,7 @@ import numpy as np
 
 from mrhubo.body import KEYPOINT_NAMES, Skeleton
 from mrhubo.body.joints import PAIRED_KEYPOINTS
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, encodable
 from mrhubo.frames import human_to_world
 from mrhubo.motion import NOT_FINITE, Motion, refuse_frames
 from mrhubo.motion.contacts import find_contacts, root_scale
@@ -85,7 +85,7 @@ def read_person(motion: Motion) -> Person:
     else:
         root_T3, planted_TP = _on_floor(way_T3.double().numpy(), soles_TP3, motion.frame_rate)
     return Person(
-        motion.name, motion.frame_rate, place_TJ3, turn_TJ33, points_TK3, root_T3, root_T33, planted_TP,
+        encodable(motion.name), motion.frame_rate, place_TJ3, turn_TJ33, points_TK3, root_T3, root_T33, planted_TP,
         way_T3 is not None,
     )  # fmt: skip
 

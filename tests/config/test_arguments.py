@@ -66,6 +66,15 @@ def test_config_flags_and_overrides_in_any_order(file: Path) -> None:
         given = given[1:] + given[:1]
 
 
+def test_overrides_behind_a_flag_of_several_values(file: Path) -> None:
+    several = parser()
+    several.add_argument("--files", metavar="FILE", nargs="+", help="what from")
+    config, options = parse_arguments(several, [str(file), "--files", "a", "b=c", "steps=7", "d", "name=x=y"])
+    assert config == Small(7, "x=y") and options.files == ["a", "b=c", "d"]
+    with pytest.raises(UserError, match="--files needs a value: --files FILE ..."):
+        parse_arguments(several, [str(file), "--files", "steps=7"])
+
+
 def test_what_stands_for_the_config(file: Path) -> None:
     for argv in ([str(file)], ["--config", str(file)], [f"--config={file}"]):
         config, options = parse(*argv)

@@ -417,6 +417,8 @@ def test_aliases_are_copies(tmp_path):
         ),
         ("<<: {on: true}", "test.yaml, line 3: merge keys ("),
         ("? {a: b}\n: c", "test.yaml, line 3: a key must be text"),
+        ('either: "\\ud800"', "test.yaml, line 3: '\\ud800' holds half of a letter"),
+        ('"a\\udfff": 1', "test.yaml, line 3: key 'a\\udfff' holds half of a letter"),
     ],
 )
 def test_sentences(tmp_path, text, sentence):

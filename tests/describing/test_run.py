@@ -44,6 +44,28 @@ def test_nothing_is_replaced_without_force(urdf: Path) -> None:
     assert load_config("conf/my.yaml").robot.joints
 
 
+def test_a_photograph_in_place_of_the_picture_stays(urdf: Path) -> None:
+    Path("conf").mkdir()
+    Path("conf/my.png").write_bytes(b"a photograph")
+    with pytest.raises(UserError, match=r"conf/my\.png is there already, and may hold work of yours"):
+        describe_model("my.urdf")
+    assert Path("conf/my.png").read_bytes() == b"a photograph" and not Path("conf/my.yaml").exists()
+    assert describe_model("my.urdf", force=True).file.exists()
+
+
+def test_a_urdf_that_was_to_be_replaced_is_back_where_the_model_is_no_humanoid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
+    monkeypatch.chdir(tmp_path)
+    chair = '<body name="seat"><joint name="turn"/><geom size="0.1"/></body>'
+    Path("m.xml").write_text(f"<mujoco><worldbody>{chair}</worldbody></mujoco>")
+    Path("m.urdf").write_text(PAIR)
+    with pytest.raises(UserError, match="no two arms"):
+        describe_model("m.xml", Path("m.yaml"), force=True)
+    assert Path("m.urdf").read_text() == PAIR and files(tmp_path) == {"m.xml", "m.urdf"}
+
+
 @pytest.mark.parametrize(
     ("name", "text", "sentence"),
     [

@@ -100,6 +100,40 @@ def test_the_numpy_file_runs_without_mrhubo(retargeter: Retargeter, poses: torch
 
 
 @pytest.mark.parametrize("retargeter", ["nao"], indirect=True)
+@pytest.mark.parametrize(
+    ("poses", "sentence"), [(None, "FileNotFoundError"), (np.zeros((2, 63)), "poses must be finite, of shape")]
+)
+def test_the_numpy_file_says_what_is_wrong(
+    retargeter: Retargeter, poses: np.ndarray | None, sentence: str, tmp_path: Path
+) -> None:
+    write_numpy(retargeter, tmp_path / "robot.py")
+    if poses is not None:
+        np.save(tmp_path / "poses.npy", poses)
+    command = [sys.executable, "robot.py", "poses.npy", "a.npy"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and sentence in done.stderr
+
+
+@pytest.mark.parametrize("retargeter", ["nao"], indirect=True)
+def test_what_is_read_or_another_file_is_not_written_over(
+    retargeter: Retargeter, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savez("nao.npz", poses=np.zeros((3, 63)))
+    kept = Path("nao.npz").read_bytes()
+    with pytest.raises(UserError, match="nao.npz: is there already and holds no weights of an export"):
+        write_numpy(retargeter, Path("nao.py"))
+    assert Path("nao.npz").read_bytes() == kept and not Path("nao.py").exists()
+    for _ in range(2):
+        write_numpy(retargeter, Path("again.py"))
+    Path("my.urdf").write_bytes((root / "data/robots/nao/nao.urdf").read_bytes())
+    with pytest.raises(UserError, match="--out my.urdf: would be written over what is read"):
+        export.main(["--robot", "my.urdf", "--to", "onnx", "--out", "my.urdf"])
+    with pytest.raises(UserError, match=r"\.: is a folder; name a file"):
+        write_onnx(retargeter, Path("."))
+
+
+@pytest.mark.parametrize("retargeter", ["nao"], indirect=True)
 def test_the_command(retargeter: Retargeter, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     package = str(retargeter.save(tmp_path / "package", {}))
     export.main(["--retargeter", package, "--to", "numpy", "--out", str(tmp_path / "nao.py")])

@@ -15,7 +15,7 @@ from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import checksum_file
 from mrhubo.files.npz import open_npz
-from mrhubo.files.regular import MissingFile, check_regular, read_regular
+from mrhubo.files.regular import MissingFile, check_regular, read_regular, refuse_input
 from mrhubo.files.storage import read_tensors
 from mrhubo.motion import read_motion
 
@@ -89,3 +89,13 @@ def test_sizes_and_rights(tmp_path: Path) -> None:
         file.truncate(5 * 2**30)  # takes no room on the disk
     with pytest.raises(UserError, match="sparse: has 5 GiB; at most 4 GiB are read"):
         read_regular(tmp_path / "sparse")
+
+
+def test_what_is_read_is_known_by_any_name(tmp_path: Path) -> None:
+    (tmp_path / "a.npz").touch()
+    (tmp_path / "link").symlink_to("a.npz")
+    os.link(tmp_path / "a.npz", tmp_path / "hard")
+    for name in ("a.npz", "link", "hard"):
+        with pytest.raises(UserError, match="--out .*: would be written over what is read"):
+            refuse_input("--out", tmp_path / name, [None, "nao", "a\0b", tmp_path / "missing", tmp_path / "a.npz"])
+    refuse_input("--out", tmp_path / "new.npz", [tmp_path / "a.npz"])

@@ -130,6 +130,12 @@ def holder(lock: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+@pytest.mark.parametrize("path", [".", "/"])
+def test_a_path_without_a_name_is_a_clear_error(path: str) -> None:
+    with pytest.raises(UserError, match="is a folder; name a file"), atomic_path(Path(path)):
+        pass
+
+
 def test_a_lock_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
     lock = tmp_path / "work" / "lock"
     with holder(lock, 60) as process:

@@ -90,6 +90,19 @@ def test_what_does_not_fit_is_refused(
         measure_predictions(prepared, SILENT, [tmp_path / f"{name}.npz"])
 
 
+def test_several_motions_in_a_file_name_it(prepared: Prepared, answer: RobotMotion, tmp_path: Path) -> None:
+    np.savez(tmp_path / "wave.npz", q=answer.q[None], joint_names=answer.joint_names, frame_rate=answer.frame_rate)
+    with pytest.raises(UserError, match=r"wave\.npz: such a file holds one motion"):
+        measure_predictions(prepared, SILENT, [tmp_path / "wave.npz"])
+
+
+def test_degrees_are_told(prepared: Prepared, answer: RobotMotion, tmp_path: Path) -> None:
+    for scale, told in ((1.0, False), (np.rad2deg(1.0), True), (500.0, False)):
+        scaled = dataclasses.replace(answer, q=answer.q * scale)
+        write_robot_motion(scaled, tmp_path / "wave.npz")
+        assert ("look like degrees" in measure_predictions(prepared, SILENT, [tmp_path / "wave.npz"])) == told
+
+
 def test_two_answers_to_a_motion_are_refused(prepared: Prepared, answer: RobotMotion, tmp_path: Path) -> None:
     for name in ("a.npz", "b.npz"):
         write_robot_motion(answer, tmp_path / name)
@@ -101,6 +114,8 @@ def test_the_command(root: Path, prepared: Prepared, answer: RobotMotion, tmp_pa
     write_robot_motion(answer, tmp_path / "a.npz")
     settings = [f"pairs.dir={prepared.config.pairs.dir}", f"evaluation.motions=[{prepared.motions.folder}]"]
     given = ["nao", "--predictions", str(tmp_path / "a.npz"), "--quiet", *settings]
+    main(["nao", "--quiet", "--predictions", str(tmp_path / "a.npz"), *settings])
+    capsys.readouterr()
     main(given)
     assert rows(capsys.readouterr().out)["wave"][2] == "0.000"
     with pytest.raises(UserError, match="--polish and --validation are for a package"):

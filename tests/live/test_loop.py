@@ -311,6 +311,22 @@ def test_what_a_command_line_may_get_wrong(add: Callable[[Plan], object], senten
         add(Plan())
 
 
+@pytest.mark.parametrize("sink", ["file:walk.npz", "mcap:walk.npz", "file:./walk.npz", "file:my.yaml"])
+def test_what_is_replayed_or_read_is_not_written_over(
+    sink: str, tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("walk.npz").write_bytes((root / "data/motions/wave.npz").read_bytes())
+    Path("my.yaml").touch()
+    plan = Plan()
+    plan.add_source("replay-loop:walk.npz")
+    plan.add_sink("file:other.npz")
+    plan.refuse_inputs([None, "nao", "my.yaml"])
+    plan.add_sink(sink)
+    with pytest.raises(UserError, match="--sink .*: would be written over what is read"):
+        plan.refuse_inputs([None, "nao", "my.yaml"])
+
+
 def test_source_and_sink_on_one_port_share_a_server() -> None:
     plan = Plan()
     plan.add_source("ws:8111")

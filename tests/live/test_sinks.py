@@ -83,6 +83,37 @@ def walking(tmp_path_factory: pytest.TempPathFactory) -> tuple[LiveRobot, list[O
 
 
 @pytest.mark.parametrize("kind", [FileSink, McapSink])
+def test_a_file_has_one_sink(tmp_path: Path, outputs: list[Output], kind: type[FileSink | McapSink]) -> None:
+    path = tmp_path / ("a.npz" if kind is FileSink else "a.mcap")
+    if kind is McapSink:
+        pytest.importorskip("mcap_ros2")
+    first, second = kind(path), kind(path)
+    first.open(make_robot(), CONFIG)
+    for output in outputs:
+        first.send(output)
+    with pytest.raises(UserError, match="another sink writes it"):
+        second.open(make_robot(), CONFIG)
+    first.close()
+    assert len(mrhubo.read_robot_motion(path)) == len(outputs)
+    second.open(make_robot(), CONFIG)
+    for output in outputs[:3]:
+        second.send(output)
+    second.close()
+    assert len(mrhubo.read_robot_motion(path)) == 3 and [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_row_that_is_not_whole_is_left_out(tmp_path: Path, outputs: list[Output]) -> None:
+    sink = FileSink(tmp_path / "a.npz")
+    sink.open(make_robot(), CONFIG)
+    for output in outputs[:2]:
+        sink.send(output)
+    assert sink._file is not None
+    sink._file.write(b"1234")
+    sink.close()
+    assert len(mrhubo.read_robot_motion(tmp_path / "a.npz")) == 2
+
+
+@pytest.mark.parametrize("kind", [FileSink, McapSink])
 def test_files_and_bags_tell_where_the_base_is(
     tmp_path: Path, walking: tuple[LiveRobot, list[Output]], kind: Callable[[Path], FileSink | McapSink]
 ) -> None:

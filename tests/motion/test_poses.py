@@ -120,6 +120,7 @@ MIRROR, STRETCH = torch.diag(torch.tensor([1.0, 1.0, -1.0])), 1.1 * torch.eye(3)
         (torch.zeros(2, 63, dtype=torch.bool), "found an array of torch.bool"),
         ([[0.0] * 63, [0.0] * 62], "expected a Motion.*found list"),
         ("wave.npz", "expected a Motion.*found str"),
+        (torch.zeros(2, 63, device="meta"), "found an array of torch.float32"),
         (bad((9,), (4, 3), torch.nan), "human pose 4 holds NaN or infinite numbers"),
         (bad((2, 9), (1, 7, 3), torch.inf), r"human pose \(1, 7\) holds NaN"),
         (bad((), (3,), torch.nan), "human pose holds NaN"),
@@ -136,7 +137,7 @@ def test_what_is_no_pose_is_named(array: object, message: str) -> None:
         read_poses(array)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("rate", [0.0, -24.0, math.nan, math.inf, "24", [24.0]])
+@pytest.mark.parametrize("rate", [0.0, -24.0, math.nan, math.inf, "24", [24.0], True])
 def test_a_frame_rate_is_positive(rate: float) -> None:
     with pytest.raises(UserError, match="frame rate must be a positive number"):
         read_poses(identity(2), rate)

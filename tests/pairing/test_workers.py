@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from mrhubo.config import load_config, to_yaml
 from mrhubo.errors import UserError
 from mrhubo.pairing.workers import _dispatch
 
@@ -36,3 +39,12 @@ def test_one_that_ends_is_one_sentence_and_the_others_are_not_waited_for(end: st
         for process in both:
             process.kill()
             process.communicate()
+
+
+def test_a_worker_makes_no_pairs_of_a_robot_that_has_changed_meanwhile(root: Path, tmp_path: Path) -> None:
+    config = load_config(root / "conf" / "nao.yaml", [f"pairs.dir={tmp_path}", "pairs.solver=direct"])
+    lines = json.dumps([to_yaml(config), "another"]) + "\n0\n"
+    command = [sys.executable, "-c", "from mrhubo.pairing.worker import main; main()"]
+    done = subprocess.run(command, input=lines, capture_output=True, text=True, cwd=root)
+    assert "has changed since this command began; start it again" in json.loads(done.stdout)["error"], done.stderr
+    assert not list(tmp_path.rglob("*.safetensors"))

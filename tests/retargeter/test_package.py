@@ -53,6 +53,23 @@ def test_round_trip_also_after_a_move(made: Retargeter, folder: Path, tmp_path: 
     torch.testing.assert_close(opened.retarget(pose).confidence, made.retarget(pose).confidence)
 
 
+@pytest.mark.parametrize("change", ["longer", "gone"])
+def test_a_urdf_that_changes_while_a_fit_trains_changes_no_package(root: Path, tmp_path: Path, change: str) -> None:
+    urdf = Path(shutil.copy(root / "data/robots/nao/nao.urdf", tmp_path / "my.urdf"))
+    config = load_config(root / "conf" / "nao.yaml", ["model.hidden=8", f"robot.urdf={urdf}"])
+    body_map = build_body_map(config.robot)
+    made = Retargeter(build_network(config, body_map), body_map, BodyPrior(hidden=8).eval(), config, phi_threshold=0.01)
+    text = urdf.read_text()
+    if change == "gone":
+        urdf.unlink()
+    else:
+        urdf.write_text(text.replace('xyz="0.105', 'xyz="0.205'))
+    folder = made.save(tmp_path / "package", {})
+    assert (folder / "robot.urdf").read_text() == text
+    pose = human(3)
+    torch.testing.assert_close(Retargeter.load(folder)(pose).q, made(pose).q)
+
+
 def test_a_package_knows_what_its_root_follows(root: Path, tmp_path: Path) -> None:
     """And its networks answer alike in all forms; files of layers alone cannot, and say so."""
     config = load_config(root / "conf" / "coman-whole-body.yaml", ["model.hidden=8", "robot.root_follows=chest"])

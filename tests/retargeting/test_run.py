@@ -129,8 +129,18 @@ def test_out_is_a_file_or_a_folder(
 def test_what_cannot_be_written_is_said_before_any_work(tmp_path: Path, files: list[Path]) -> None:
     with pytest.raises(UserError, match=r"2 motions do not go into one file; name a folder, for instance .*/all/"):
         plan_places(f"{tmp_path}/all.csv", None, files)
-    with pytest.raises(UserError, match="is the motion itself"):
+    with pytest.raises(UserError, match="would be written over what is read"):
         plan_places(str(files[0]), None, files[:1])
+    with pytest.raises(UserError, match="would be written over what is read"):
+        plan_places(f"{files[0].parent}/", None, files)
+    order = tmp_path / "order.csv"
+    order.touch()
+    with pytest.raises(UserError, match="order.csv: would be written over what is read"):
+        plan_places(str(order), None, files[:1], [None, "nao", order])
+    places = plan_places(f"{files[0].parent}/", "csv", files, [files[0].parent / "a.csv"])
+    (files[0].parent / "a.csv").touch()
+    with pytest.raises(UserError, match="a.csv: would be written over what is read"):
+        places.path("a")
     with pytest.raises(UserError, match="is a file; name a folder"):
         (tmp_path / "file").write_text("")
         plan_places(f"{tmp_path}/file", None, files)

@@ -206,7 +206,12 @@ def test_a_model_without_mujoco_says_what_to_install(tmp_path: Path, monkeypatch
 
 
 def test_models_are_known_by_their_root(tmp_path: Path) -> None:
-    for name, text, known in (("a.xml", MODEL, True), ("b.xml", '<robot name="x"/>', False), ("c.xml", "x", False)):
+    for name, text, known in (
+        ("a.xml", MODEL, True),
+        ("a\udcfc.xml", MODEL, True),
+        ("b.xml", '<robot name="x"/>', False),
+        ("c.xml", "x", False),
+    ):
         (tmp_path / name).write_text(text.strip())
         assert is_mjcf(tmp_path / name) == known
     assert not is_mjcf(tmp_path / "none.xml") and not is_mjcf(tmp_path)

@@ -227,6 +227,20 @@ def test_the_ending_says_the_format_unless_one_is_asked_for(path: str, name: str
     assert find_format(Path(path), name) == found
 
 
+@pytest.mark.parametrize("name", FORMATS)
+def test_names_need_not_be_utf_8(tmp_path: Path, name: str) -> None:
+    """As those of files from another system."""
+    need(name)
+    path = tmp_path / "w\udce4lle" / f"a\udcfc{FORMATS[name].ending}"
+    path.parent.mkdir()
+    motion = plain()
+    told = dataclasses.replace(motion, name="a\udcfc", source="from w\udce4lle")
+    write_robot_motion(told, path, name)
+    found = read_robot_motion(path, told.joint_names, told.frame_rate)
+    np.testing.assert_allclose(found.q, motion.q, atol=1e-6)
+    assert found.name in ("a\ufffd", "a\udcfc", "")
+
+
 def test_formats_that_do_not_exist_are_told_what_there_is() -> None:
     with pytest.raises(UserError, match=r"a\.txt: the name must end in \.npz, .*or a format be named: lerobot, mujoco"):
         find_format(Path("a.txt"))

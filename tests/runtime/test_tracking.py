@@ -100,6 +100,11 @@ def test_make_dashboard_opens_what_is_there(
     assert (tmp_path / "mlruns" / "artifacts").as_uri() in places
 
 
+def test_a_byte_that_is_no_letter_is_no_name_of_an_experiment(folder: Path) -> None:
+    with pytest.raises(UserError, match="^tracking.experiment: 'a.udcff' holds what is no letter"):
+        open_client(folder, "a\udcff")
+
+
 @pytest.mark.parametrize("name", ["", "n" * 600])
 def test_impossible_names_of_experiments_are_named(folder: Path, name: str) -> None:
     with pytest.raises(UserError, match="^tracking.experiment: MLflow does not take '") as error:

@@ -2,3 +2,7 @@
 
 Each module says what one of `mrhubo.fast.plain` says, for a single frame, in loops over numbers.
 """
+
+from mrhubo.fast.kept import make_room
+
+make_room()

@@ -6,11 +6,11 @@ import functools
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+import xxhash
 from PIL.Image import Image
 
 from mrhubo.config import to_plain, to_yaml
 from mrhubo.config.secrets import without_secrets
-from mrhubo.files.atomic import checksum_file
 from mrhubo.fitting.preparation import Prepared
 from mrhubo.fitting.record.inputs import mlflow_datasets
 from mrhubo.fitting.record.naming import run_name
@@ -128,7 +128,7 @@ class Recording:
 def _provenance(prepared: Prepared) -> dict[str, str]:
     return {
         "git_commit": git_commit(project_root()),
-        "urdf_xxh3": checksum_file(prepared.config.robot.urdf),
+        "urdf_xxh3": xxhash.xxh3_64(prepared.body_map.robot.description.text).hexdigest(),
         "prior_xxh3": prepared.store.header["prior_xxh3"],
         "pairs_fingerprint": prepared.store.header["fingerprint"],
     }

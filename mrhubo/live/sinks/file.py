@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -11,6 +12,7 @@ from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.own_file import open_own
 from mrhubo.robot_motion import FORMATS, RobotMotion, find_format, write_robot_motion
 
 PART = ".part"
@@ -39,14 +41,10 @@ class FileSink:
         """Makes the part.
 
         Raises:
-            UserError: the folder or the disk refuses it.
+            UserError: another sink writes it, or the folder or the disk refuses it.
         """
         self._robot, self._rate = robot, config.rate
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = open(self._part, "wb")
-        except OSError as error:
-            raise UserError(f"{self._part}: cannot be written: {error.strerror or error}") from error
+        self._file = open_own(self._part)
 
     def send(self, output: Output) -> None:
         """Appends a row: the joint angles, where the base is and which feet are planted, and the least confidence.
@@ -72,15 +70,24 @@ class FileSink:
         if file is None or self._robot is None:
             return
         try:
-            file.close()
-            joints, feet = len(self._robot.joint_names), self._robot.foot_names
-            base = _BASE + len(feet) if feet else 0
-            rows_TX = np.fromfile(self._part, np.float32).reshape(-1, joints + base + 1)
+            self._finish(file, self._robot)
+        finally:
+            with contextlib.suppress(OSError):  # what could not be flushed
+                file.close()
+
+    def _finish(self, file: BinaryIO, robot: LiveRobot) -> None:
+        """Makes the file of its part, which nobody else may begin anew meanwhile."""
+        joints, feet = len(robot.joint_names), robot.foot_names
+        width = joints + (_BASE + len(feet) if feet else 0) + 1
+        try:
+            file.flush()
+            numbers = np.fromfile(self._part, np.float32)
         except OSError as error:
             raise UserError(f"{self._part}: cannot be written: {error.strerror or error}") from error
+        rows_TX = numbers[: len(numbers) // width * width].reshape(-1, width)  # a full disk takes parts of a row
         motion = RobotMotion(
-            rows_TX[:, :joints], self._robot.joint_names, self._rate, name=self.path.stem, source="a live session",
-            robot=self._robot.facts, confidence=rows_TX[:, -1], **_base_of(rows_TX[:, joints:-1], feet),
+            rows_TX[:, :joints], robot.joint_names, self._rate, name=self.path.stem, source="a live session",
+            robot=robot.facts, confidence=rows_TX[:, -1], **_base_of(rows_TX[:, joints:-1], feet),
         )  # fmt: skip
         write_robot_motion(motion, self.path)
         self._part.unlink(missing_ok=True)

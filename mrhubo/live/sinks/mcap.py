@@ -11,6 +11,7 @@ from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.own_file import open_own
 from mrhubo.live.sinks.trajectory import stamped, trajectory
 from mrhubo.robot_motion.mcap import (
     BASE_TOPIC,
@@ -43,12 +44,11 @@ class McapSink:
         """Begins the file.
 
         Raises:
-            UserError: the folder or the disk refuses it.
+            UserError: another sink writes it, or the folder or the disk refuses it.
         """
         self._period, self._first = 1.0 / config.rate, 0
+        self._file = open_own(self.path)
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = open(self.path, "wb")
             self._bag = JointTrajectoryBag(self._file)
         except OSError as error:
             raise self._refused(error) from error

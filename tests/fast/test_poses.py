@@ -1,0 +1,74 @@
+"""What a retargeter without PyTorch is given: tensors and lists of all kinds, rates and numbers of steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from mrhubo.errors import UserError
+from mrhubo.fast import FastRetargeter, FastStream
+from mrhubo.retargeter import Retargeter
+from mrhubo.streaming import Stream
+
+
+@pytest.fixture(scope="module")
+def fast(make: Callable[[str], Retargeter]) -> FastRetargeter:
+    return FastRetargeter(make("nao").describe(), "numpy")
+
+
+@pytest.mark.parametrize(
+    "made", [lambda t: t.requires_grad_(), lambda t: t.double().requires_grad_(), lambda t: t.bfloat16()]
+)
+def test_tensors_that_numpy_does_not_take_as_they_are(
+    fast: FastRetargeter, array: np.ndarray, made: Callable[[torch.Tensor], torch.Tensor]
+) -> None:
+    sixd = torch.from_numpy(array[:3, ..., :2].swapaxes(-1, -2).reshape(3, 21, 6).copy())
+    given = made(sixd)
+    wanted = fast(given.detach().float().numpy())
+    np.testing.assert_array_equal(fast(given).q, wanted.q)
+    np.testing.assert_array_equal(FastStream(fast)(given[0]).q, FastStream(fast)(given[0].detach().float().numpy()).q)
+
+
+@pytest.mark.parametrize(
+    "given", [[[1.0], [2.0, 3.0]], torch.zeros(2, 63, device="meta"), torch.zeros(2, 63).to_sparse()]
+)
+def test_what_is_no_array_is_refused(fast: FastRetargeter, given: Any) -> None:
+    stream = FastStream(fast)
+    for take in (fast, fast.predict, fast.directions, fast.imitate, stream, stream.reset):
+        with pytest.raises(UserError, match="expected a Motion or an array of numbers, found (list|Tensor)"):
+            take(given)
+    with pytest.raises(UserError, match="directions must be numbers of the shape"):
+        fast.imitate("up")
+
+
+@pytest.mark.parametrize("rate", [1e-300, 1e-4, 2e6, 1e300, 10**400])
+def test_a_rate_with_which_nobody_can_reckon_is_refused(
+    make: Callable[[str], Retargeter], fast: FastRetargeter, array: np.ndarray, rate: float
+) -> None:
+    for take in (make("nao"), fast):
+        with pytest.raises(UserError, match="the frame rate must be from 0.001 to 1,000,000 a second, found "):
+            take(array, frame_rate=rate)
+    for begin in (lambda: Stream(make("nao"), rate), lambda: FastStream(fast, rate)):
+        with pytest.raises(UserError, match="the frame rate must be from 0.001 to 1,000,000 a second"):
+            begin()
+
+
+@pytest.mark.parametrize("rate", [1e-3, 1e6, np.float32(60), np.int64(60)])
+def test_the_rates_at_the_ends_have_answers(
+    make: Callable[[str], Retargeter], fast: FastRetargeter, array: np.ndarray, rate: float
+) -> None:
+    assert torch.isfinite(make("nao")(array, frame_rate=rate).q).all()
+    assert np.isfinite(fast(array, frame_rate=rate).q).all()
+
+
+def test_a_number_of_steps_may_be_numpys(
+    make: Callable[[str], Retargeter], fast: FastRetargeter, array: np.ndarray
+) -> None:
+    for take in (make("nao"), fast):
+        np.testing.assert_array_equal(np.asarray(take(array, np.int64(2)).q), np.asarray(take(array, 2).q))
+        with pytest.raises(UserError, match="polish must be 0 or more steps, at most 1,000,000, found 10{20}"):
+            take(array, 10**20)
