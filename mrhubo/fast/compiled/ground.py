@@ -63,6 +63,7 @@ class Floor(NamedTuple):
     off_3: np.ndarray
     pointing_H3: np.ndarray
     anchor_H3: np.ndarray
+    above_H: np.ndarray
     sole_H3: np.ndarray
     """Points of the person's soles, or of the robot's from its root, in the world [m]."""
     turn_L33: np.ndarray
@@ -138,7 +139,7 @@ def ask(t, f, root, aim_X3, passed, longest_step):
     for h in range(points):
         place, weight = pointing(t, f, aim_X3, h), f.weight_H[h]
         moved = add(moved, add(add(gone, row(f.pointing_H3, h), 1.0), place, -1.0), weight)
-        level -= weight * (path[1] + place[1])
+        level += weight * (f.above_H[h] - path[1] - place[1])
         total += weight
         put(f.pointing_H3, h, place)
     level /= max(total, 1e-9)
@@ -163,7 +164,7 @@ def ask(t, f, root, aim_X3, passed, longest_step):
     for h in range(points):
         wanted = add(add(path, off, 1.0), row(f.pointing_H3, h), 1.0)
         under = max(-wanted[1], 0.0)
-        wanted = (wanted[0], 0.0 if f.planted_H[h] else wanted[1] + under, wanted[2])
+        wanted = (wanted[0], f.above_H[h] if f.planted_H[h] else wanted[1] + under, wanted[2])
         if f.held_H[h]:
             wanted = (f.anchor_H3[h, 0], wanted[1], f.anchor_H3[h, 2])
         counts = max(f.weight_H[h], min(under / UNDER_M, 1.0))
@@ -188,6 +189,7 @@ def stand(t, work, f):
         put(f.sole_H3, h, point)
         low = _lowest(t, work, f, h, root)
         lowest = min(lowest, low)
+        f.above_H[h] = point[1] - low
         if not f.held_H[h]:
             put(f.anchor_H3, h, (planned[0] + point[0], 0.0, planned[2] + point[2]))
         weight = f.weight_H[h]
