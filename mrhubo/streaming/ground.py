@@ -131,8 +131,8 @@ class Ground:
         return replace(state, contacts=contacts, path_B3=path_B3, turn_B33=turn_B33)
 
     def level(self, state: GroundState, target_BD3: Tensor) -> Tensor:
-        """Directions (B, D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is
-        the world's.
+        """Directions (B, D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor
+        are planted, its up is the world's.
         """
         weight_BP = torch.from_numpy(state.contacts.weight_BP).to(target_BD3)
         return stand_flat(target_BD3, state.turn_B33[:, 1].to(target_BD3), weight_BP, self.legs)

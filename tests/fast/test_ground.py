@@ -29,7 +29,7 @@ from mrhubo.robot_motion import RobotMotion
 from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.streaming import Stream
 from tests.fast.exact import double, in_double
-from tests.reference.standing.steppers import bow, jump, kneel, moved, squat, walk
+from tests.reference.standing.steppers import bow, jump, kneel, lie, moved, squat, walk
 from tests.reference.walkers import walker, write_urdf
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -122,6 +122,11 @@ def kneeling() -> Frames:
     return frames_of(kneel(12))
 
 
+def lying() -> Frames:
+    """Feet that lie on their sides."""
+    return frames_of(lie(10))
+
+
 def flying() -> Frames:
     """A jump, elsewhere."""
     return frames_of(moved(jump(24, 30.0), 1.0, (0.3, 0.4, 1.0)))
@@ -157,6 +162,7 @@ def quickly(fast: FastRetargeter, frames: Frames, settings: StreamSettings) -> l
         ("chest", told),
         ("pelvis", flying),
         ("nao", kneeling),
+        ("pelvis", lying),
         ("nao", touching),
         ("chest", flying),
         ("pelvis chest", bowing),

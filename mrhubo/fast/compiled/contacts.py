@@ -94,11 +94,12 @@ def _next_contact(f, h, new, passed, given_H):
     else:
         f.age_H[h] += passed
     f.planted_H[h], f.held_H[h] = planted, was and planted and not began
-    f.weight_H[h] = _smooth(f.age_H[h] / RAMP_S) * _smooth(leaves) if planted else 0.0
+    f.weight_H[h] = smooth(f.age_H[h] / RAMP_S) * smooth(leaves) if planted else 0.0
 
 
 @njit(**INNER_EXACT)
-def _smooth(share):
+def smooth(share):
+    """As `mrhubo.fast.plain.contacts.smooth_share`."""
     share = min(max(share, 0.0), 1.0)
     return share * share * (3 - 2 * share)
 

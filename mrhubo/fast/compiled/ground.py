@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.contacts import FLOOR, KNOWN, USUAL
+from mrhubo.fast.compiled.contacts import FLOOR, KNOWN, USUAL, smooth
 from mrhubo.fast.compiled.human import add, cross, dot, put, row, turn, turn_back, unit
 from mrhubo.fast.compiled.soles import carrier, turned_point
 from mrhubo.fast.compiled.tables import (
@@ -39,6 +39,7 @@ from mrhubo.fast.compiled.tables import (
     vector,
     whole,
 )
+from mrhubo.fast.plain.contacts import LIES, STANDS
 from mrhubo.fast.plain.ground import FREE, PLANTED, RETURN_S, RETURN_SPEED, SETTLE_S, UNDER_M, USUAL_S
 
 
@@ -104,8 +105,8 @@ def stand_flat(t, f, aim_X3):
     up = (f.turn_133[0, 1, 0], f.turn_133[0, 1, 1], f.turn_133[0, 1, 2])
     for r in range(size(t, START_R)):
         ahead, above = whole(t, FOOT_R2, 2 * r), whole(t, FOOT_R2, 2 * r + 1)
-        share = min(f.weight_H[2 * r], f.weight_H[2 * r + 1])
         own = row(aim_X3, above)
+        share = min(f.weight_H[2 * r], f.weight_H[2 * r + 1]) * smooth((dot(own, up) - LIES) / (STANDS - LIES))
         upright = unit(add(own, add(up, own, -1.0), share))
         forward = row(aim_X3, ahead)
         forward = unit(add(forward, upright, -dot(forward, upright)))

@@ -24,6 +24,9 @@ WANDERED_M = 0.06
 """How far a planted point may be from where it was planted; then it is planted anew: a shuffling foot never lifts."""
 RAMP_S = 0.1
 """How long [s] it takes until a contact counts in full, and before it ends, no more: a heel strike takes as long."""
+STANDS, LIES = 0.5, 0.2
+"""Cosine of the angle between a sole's up and the world's from which on a planted foot stands on its sole, and up to
+which it lies on its side or its instep: of people who stand, walk and dance it is above 0.75."""
 BAND_M = 0.04
 """Heights of points on one floor."""
 GATHERED = 0.5
@@ -130,6 +133,11 @@ def smooth_share(share: np.ndarray) -> np.ndarray:
     """How much a contact counts, 0..1, some share of the way into its ramp: it begins and ends without a corner."""
     share = np.clip(share, 0.0, 1.0)
     return share**2 * (3 - 2 * share)
+
+
+def standing_share(up_X: np.ndarray) -> np.ndarray:
+    """How much feet stand on their soles, 0..1, of the cosines of `STANDS`."""
+    return smooth_share((up_X - LIES) / (STANDS - LIES))
 
 
 def _usual(height_BP: np.ndarray, from_B: np.ndarray, heights: int) -> np.ndarray:

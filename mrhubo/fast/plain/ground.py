@@ -15,7 +15,7 @@ import numpy as np
 
 from mrhubo.fast.description import Description
 from mrhubo.fast.leg_section import Legs
-from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
+from mrhubo.fast.plain.contacts import LiveContacts, next_contacts, standing_share
 from mrhubo.fast.plain.human import cross, norm, normalize
 from mrhubo.fast.plain.robot import Placed, place
 from mrhubo.fast.plain.soles import carrier, turned_points
@@ -237,11 +237,11 @@ def pointing(legs: Legs, aim_D3: np.ndarray) -> np.ndarray:
 
 
 def stand_flat(legs: Legs, aim_D3: np.ndarray, up_3: np.ndarray, weight_H: np.ndarray) -> np.ndarray:
-    """Directions (D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is the
-    world's, `up_3` as directions see it.
+    """Directions (D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor are
+    planted, its up is the world's, `up_3` as directions see it.
     """
     found_D3, (ahead_R, above_R) = aim_D3.copy(), legs.foot_R2.T
-    share_R1 = weight_H.reshape(-1, 2).min(axis=1)[:, None]
+    share_R1 = (weight_H.reshape(-1, 2).min(axis=1) * standing_share(aim_D3[above_R] @ up_3))[:, None]
     upright_R3 = normalize(aim_D3[above_R] + share_R1 * (up_3 - aim_D3[above_R]))
     forward_R3 = aim_D3[ahead_R]
     forward_R3 = forward_R3 - upright_R3 * (forward_R3 * upright_R3).sum(-1, keepdims=True)

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from mrhubo.fast.plain.contacts import LIES, STANDS
 from mrhubo.fast.roots import CROOKED, FAR_M
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import SOLE_POINTS, Motion
@@ -102,8 +103,8 @@ def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor,
 
 
 def flatten(target_TD3: Tensor, steps: HumanSteps, legs: Legs) -> Tensor:
-    """Directions (T, D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is the
-    world's.
+    """Directions (T, D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor are
+    planted, its up is the world's.
     """
     up_T3 = steps.turn_T33[:, 1].to(target_TD3)  # the world's up, seen from what carries the legs
     return stand_flat(target_TD3, up_T3, torch.from_numpy(steps.contacts.weight_TP).to(target_TD3), legs)
@@ -114,9 +115,16 @@ def stand_flat(target_TD3: Tensor, up_T3: Tensor, weight_TP: Tensor, legs: Legs)
     found_TD3, names = target_TD3.clone(), legs.body_map.direction_names
     for number, sole in enumerate(legs.soles):
         ahead, above = (names.index(name) for name in sole.part.direction_names)
-        share_T1 = weight_TP[:, 2 * number : 2 * number + 2].amin(dim=1, keepdim=True)
+        facing_T1 = (target_TD3[:, above] * up_T3).sum(-1, keepdim=True)
+        share_T1 = weight_TP[:, 2 * number : 2 * number + 2].amin(dim=1, keepdim=True) * _standing_share(facing_T1)
         upright_T3 = normalize(torch.lerp(target_TD3[:, above], up_T3, share_T1), dim=-1)
         forward_T3 = target_TD3[:, ahead]
         forward_T3 = forward_T3 - upright_T3 * (forward_T3 * upright_T3).sum(-1, keepdim=True)
         found_TD3[:, above], found_TD3[:, ahead] = upright_T3, normalize(forward_T3, dim=-1)
     return found_TD3
+
+
+def _standing_share(up_X: Tensor) -> Tensor:
+    """As `mrhubo.fast.plain.contacts.standing_share`."""
+    share_X = ((up_X - LIES) / (STANDS - LIES)).clamp(0, 1)
+    return share_X.square() * (3 - 2 * share_X)

@@ -17,7 +17,7 @@ from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.standing import Legs
 from mrhubo.robot import BodyMap, Robot
-from tests.reference.standing.steppers import bow, jump, lunge, moved, squat
+from tests.reference.standing.steppers import bow, jump, lie, lunge, moved, squat
 from tests.reference.walkers import ROOTS, walker
 
 
@@ -65,6 +65,15 @@ def test_the_root_may_do_what_the_waist_cannot(tmp_path: Path, waist: bool, most
     assert found["chest"][0] < most_deg and found["pelvis"][0] > 15
     assert found["between"][0] == pytest.approx(found["pelvis"][0] / 2, abs=1.0)
     torch.testing.assert_close(found["chest"][1], found["pelvis"][1], atol=1e-5, rtol=0)
+
+
+def test_who_lies_on_a_side_does_not_stand_on_that_foot(retargeter: OptimizationRetargeter) -> None:
+    """Its heel and toe rest on the floor, and its sole faces elsewhere."""
+    motion = lie()
+    result = retargeter(motion)
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert result.contact is not None and result.contact.tolist() == [[False, True]] * len(motion)
+    assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 2 and score.sunk_max_cm < 0.05
 
 
 def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: OptimizationRetargeter) -> None:
