@@ -127,6 +127,15 @@ def lying() -> Frames:
     return frames_of(lie(10))
 
 
+def lost() -> Frames:
+    """Somebody who is found elsewhere from one frame to the next."""
+    found = frames_of(squat(12, 30.0))
+    for t in range(6, 12):
+        pose, time, (turn, place) = found[t]
+        found[t] = pose, time, (turn, place + torch.tensor([2.0, 0.3, -1.0]))
+    return found
+
+
 def flying() -> Frames:
     """A jump, elsewhere."""
     return frames_of(moved(jump(24, 30.0), 1.0, (0.3, 0.4, 1.0)))
@@ -163,6 +172,7 @@ def quickly(fast: FastRetargeter, frames: Frames, settings: StreamSettings) -> l
         ("pelvis", flying),
         ("nao", kneeling),
         ("pelvis", lying),
+        ("chest", lost),
         ("nao", touching),
         ("chest", flying),
         ("pelvis chest", bowing),

@@ -78,6 +78,14 @@ def test_who_kneels_on_the_instep_points_as_the_person_does() -> None:
     assert answer[1][:, 2].diff().abs().max() < 0.01
 
 
+def test_a_root_that_jumps_leaves_the_robot_where_it_stands(biped: Retargeter, squatting) -> None:  # noqa: ANN001
+    motion, answer = squatting
+    place_T3 = motion.root_position_T3.clone()
+    place_T3[20:] += torch.tensor([3.0, 0.5, 0.0])
+    found = followed(biped, motion.changed(root_position_T3=place_T3))
+    torch.testing.assert_close(found[1], answer[1], atol=0.01, rtol=0)
+
+
 def test_who_jumps_flies_as_high_as_the_person(biped: Retargeter) -> None:
     motion = jump(48, rate=60.0)
     answer = followed(biped, motion)

@@ -7,6 +7,7 @@ Legend: T frames, P points of soles, D directions.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,16 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from mrhubo.errors import InputWarning
 from mrhubo.fast.plain.contacts import LIES, STANDS
-from mrhubo.fast.roots import CROOKED, FAR_M
+from mrhubo.fast.roots import CROOKED, FAR_M, without_jumps
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
+
+_MANY = 0.05
+"""Share of the frames with a jump from which on something else must be wrong."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,7 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion |
     if not legs.has_feet or not has_root(motion) or not len(motion):
         return None
     root_T33, way_T3 = motion_root(motion, local_TJ33, legs)
+    _warn_of_jumps(motion)
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
     world_TK3 = points_TK3 @ root_T33.mT + way_T3[:, None]
     soles_TP3 = world_TK3[:, legs.contacts]
@@ -81,8 +87,9 @@ def given_contacts(motion: Motion, legs: Legs) -> np.ndarray | None:
     return np.asarray(contact_T4, dtype=bool)[:, columns]
 
 
-def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor, Tensor]:
-    """Rotation (T, 3, 3) and place (T, 3) [m] of a motion's root, whose way is made to fit the skeleton's legs.
+def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs, keep_height: bool = False) -> tuple[Tensor, Tensor]:
+    """Rotation (T, 3, 3) and place (T, 3) [m] of a motion's root, whose way has no jumps (`mrhubo.fast.roots`, which
+    tells of `keep_height`), and is made to fit the skeleton's legs.
 
     Raises:
         UserError: as for `read_steps`.
@@ -96,10 +103,29 @@ def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor,
         (root_T3.abs().amax(dim=1) > FAR_M, f"a root farther than {FAR_M / 1000:.0f} km from the origin"),
     ):
         refuse_frames(wrong_T, what)
+    if len(root_T3):
+        root_T3 = torch.from_numpy(without_jumps(root_T3.double().cpu().numpy(), motion.frame_rate, keep_height)[0])
     root_T33, root_T3 = root_T33.to(local_TJ33), root_T3.to(local_TJ33)
     turned_TP3 = legs.body_map.skeleton.keypoints(local_TJ33)[:, legs.contacts] @ root_T33.mT
     soles_TP3, way_T3 = (x.double().cpu().numpy() for x in (turned_TP3, root_T3))
     return root_T33, root_scale(soles_TP3, way_T3, motion.frame_rate) * root_T3
+
+
+def _warn_of_jumps(motion: Motion) -> None:
+    place_T3 = motion.arrays.root_position_T3
+    assert place_T3 is not None
+    far_T = np.linalg.norm(without_jumps(place_T3, motion.frame_rate)[1], axis=1)
+    if not far_T.any():
+        return
+    count, frame = int((far_T > 0).sum()), int(far_T.argmax())
+    jumps = "jumps" if count == 1 else f"jumps {count} times, the most"
+    doubt = "; are its numbers metres, and is the frame rate right?" if count > _MANY * len(far_T) else ""
+    warnings.warn(
+        f"{motion.name}: the root {jumps} by {far_T[frame]:.3g} m to frame {frame}, counted from 0, faster than "
+        f"anybody goes; the robot goes on from where it is{doubt}",
+        InputWarning,
+        stacklevel=3,
+    )
 
 
 def flatten(target_TD3: Tensor, steps: HumanSteps, legs: Legs) -> Tensor:

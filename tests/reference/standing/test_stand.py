@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.errors import UserError
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.evaluation.whole_body import lowest, score_whole_body
 from mrhubo.motion import Motion, read_motion
 from mrhubo.reference import OptimizationRetargeter
@@ -74,6 +74,18 @@ def test_who_lies_on_a_side_does_not_stand_on_that_foot(retargeter: Optimization
     score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
     assert result.contact is not None and result.contact.tolist() == [[False, True]] * len(motion)
     assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 2 and score.sunk_max_cm < 0.05
+
+
+def test_a_root_that_jumps_leaves_the_robot_where_it_stands(retargeter: OptimizationRetargeter) -> None:
+    motion = squat()
+    assert motion.root_position_T3 is not None
+    place_T3 = motion.root_position_T3.clone()
+    place_T3[20:] += torch.tensor([3.0, 0.5, 0.0])
+    with pytest.warns(InputWarning, match=r"person: the root jumps by 3.06 m to frame 20, counted from 0"):
+        result = retargeter(motion.changed(root_position_T3=place_T3))
+    torch.testing.assert_close(result.root_position, retargeter(motion).root_position, atol=0.03, rtol=0)
+    with pytest.warns(InputWarning, match=r"jumps 47 times.* are its numbers metres"):
+        retargeter(motion.changed(root_position_T3=100 * motion.root_position_T3 + 10 * torch.arange(48)[:, None]))
 
 
 def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: OptimizationRetargeter) -> None:
