@@ -136,6 +136,15 @@ def lost() -> Frames:
     return found
 
 
+def climbing() -> Frames:
+    """Somebody whose floor is soon 4 m higher."""
+    found = frames_of(squat(16, 30.0))
+    for t in range(16):
+        pose, time, (turn, place) = found[t]
+        found[t] = pose, time, (turn, place + torch.tensor([0.0, 0.4 * min(t, 10), 0.0]))
+    return found
+
+
 def flying() -> Frames:
     """A jump, elsewhere."""
     return frames_of(moved(jump(24, 30.0), 1.0, (0.3, 0.4, 1.0)))
@@ -173,6 +182,7 @@ def quickly(fast: FastRetargeter, frames: Frames, settings: StreamSettings) -> l
         ("nao", kneeling),
         ("pelvis", lying),
         ("chest", lost),
+        ("pelvis", climbing),
         ("nao", touching),
         ("chest", flying),
         ("pelvis chest", bowing),

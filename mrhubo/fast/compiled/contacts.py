@@ -47,6 +47,7 @@ def next_contacts(f, passed, floor, given_H):
         f.slow_Y[:] = 0.0
         if abs(lowest) < USUAL_M:
             f.slow_Y[int(-f.number_4[FROM] / STEP_M)] = USUAL_S
+    _move_along(f, lowest)
     share = passed / (passed + SMOOTH_S)
     fade = math.exp(-passed / MEMORY_S)
     for y in range(HEIGHTS):
@@ -71,6 +72,18 @@ def next_contacts(f, passed, floor, given_H):
     f.number_4[FLOOR] = height
     for h in range(points):
         _next_contact(f, h, new, passed, given_H)
+
+
+@njit(**INNER_EXACT)
+def _move_along(f, lowest):
+    """Lets the heights begin elsewhere, so that the lowest point is among them."""
+    at = math.floor((lowest - f.number_4[FROM]) / STEP_M)
+    over = max(at - (HEIGHTS - 1), 0.0) + min(at, 0.0)
+    if over != 0:
+        for y in range(HEIGHTS):
+            f.total_Y[y] = f.slow_Y[int(y + over)] if 0 <= y + over < HEIGHTS else 0.0
+        f.slow_Y[:] = f.total_Y[:HEIGHTS]
+        f.number_4[FROM] += over * STEP_M
 
 
 @njit(**INNER_EXACT)

@@ -35,7 +35,8 @@ step stood on the floor too."""
 SMOOTH_S = 0.02
 """Time constant [s] of speeds."""
 HEIGHTS_M, STEP_M = 3.0, 0.005
-"""Heights at which the floor is looked for, up and down from where it was first, and how finely."""
+"""Heights at which the floor is looked for, up and down from where it was first, and how finely; they go along with who
+climbs or sinks out of them."""
 USUAL_S, USUAL_M = 3.0, 0.15
 """A floor at 0 counts like a point that rests there for so long [s], where the lowest point begins that near to it."""
 MEMORY_S = 10.0
@@ -105,6 +106,7 @@ def next_contacts(
     speed_BP, height_BP = np.linalg.norm(velocity_BP3, axis=-1), place_BP3[..., 1]
     from_B = np.where(new_B, height_BP.min(axis=1) - HEIGHTS_M, last.from_B)
     slow_BH = _chosen(new_B, _usual(height_BP, from_B, last.slow_BH.shape[1]), last.slow_BH)
+    slow_BH, from_B = _moved_along(slow_BH, from_B, height_BP)
     slow_BP = (speed_BP < PLANTED_SPEED) & ~new_B[:, None]  # how fast those are that are new is not known
     slow_BH = _gather(slow_BH, height_BP - from_B[:, None], slow_BP, passed_B)
     floor_B = from_B + _lowest_band(slow_BH) if floor is None else np.full(len(new_B), floor)
@@ -146,6 +148,20 @@ def _usual(height_BP: np.ndarray, from_B: np.ndarray, heights: int) -> np.ndarra
     near_X = np.flatnonzero(np.abs(height_BP.min(axis=1)) < USUAL_M)
     found_BH[near_X, (-from_B[near_X] / STEP_M).astype(int)] = USUAL_S
     return found_BH
+
+
+def _moved_along(slow_BH: np.ndarray, from_B: np.ndarray, height_BP: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How long slow points were at each height, and where heights begin [m], so that the lowest point is among them."""
+    heights = slow_BH.shape[1]
+    at_B = np.floor((height_BP.min(axis=1) - from_B) / STEP_M)
+    over_B = np.maximum(at_B - (heights - 1), 0.0) + np.minimum(at_B, 0.0)
+    for person in np.flatnonzero(over_B):
+        before_H = np.arange(heights) + over_B[person]
+        kept_H = (before_H >= 0) & (before_H < heights)
+        moved_H = np.zeros(heights)
+        moved_H[kept_H] = slow_BH[person, before_H[kept_H].astype(int)]
+        slow_BH[person] = moved_H
+    return slow_BH, from_B + over_B * STEP_M
 
 
 def _gather(slow_BH: np.ndarray, up_BP: np.ndarray, slow_BP: np.ndarray, passed_B: np.ndarray) -> np.ndarray:
