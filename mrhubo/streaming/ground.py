@@ -124,11 +124,9 @@ class Ground:
         """
         legs = self.legs
         world_BK3 = point_BK3.double() + seen.place_B3.double()[:, None]
-        contacts = next_contacts(
-            state.contacts, _array(world_BK3[:, legs.contacts]), passed_B, self.floor, seen.given_BP
-        )
-        path_B3 = legs.scale * _array(legs.human_root(world_BK3))
-        return replace(state, contacts=contacts, path_B3=path_B3, turn_B33=turn_B33)
+        sole_BP3, root_B3 = _array(world_BK3[:, legs.contacts]), _array(legs.human_root(world_BK3))
+        contacts = next_contacts(state.contacts, sole_BP3, passed_B, self.floor, seen.given_BP, root_B3[:, UP])
+        return replace(state, contacts=contacts, path_B3=legs.scale * root_B3, turn_B33=turn_B33)
 
     def level(self, state: GroundState, target_BD3: Tensor) -> Tensor:
         """Directions (B, D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor

@@ -145,6 +145,15 @@ def climbing() -> Frames:
     return found
 
 
+def on_hands() -> Frames:
+    """Somebody who stands, and then stands upside down."""
+    found, over_33 = frames_of(squat(12, 30.0)), torch.diag(torch.tensor([1.0, -1.0, -1.0]))
+    for t in range(5, 12):
+        pose, time, (turn, place) = found[t]
+        found[t] = pose, time, (over_33 @ turn, place + torch.tensor([0.0, 0.2, 0.0]))
+    return found
+
+
 def flying() -> Frames:
     """A jump, elsewhere."""
     return frames_of(moved(jump(24, 30.0), 1.0, (0.3, 0.4, 1.0)))
@@ -183,6 +192,7 @@ def quickly(fast: FastRetargeter, frames: Frames, settings: StreamSettings) -> l
         ("pelvis", lying),
         ("chest", lost),
         ("pelvis", climbing),
+        ("nao", on_hands),
         ("nao", touching),
         ("chest", flying),
         ("pelvis chest", bowing),

@@ -33,9 +33,9 @@ the path, usually [m]; 1 where somebody has been seen."""
 
 
 @njit(**INNER_EXACT)
-def next_contacts(f, passed, floor, given_H):
+def next_contacts(f, passed, floor, given_H, root):
     """The contacts after one more frame, whose points of soles stand in `f.sole_H3`. `floor` [m]: NaN, it is learned;
-    `given_H`: empty, contacts are found.
+    `given_H`: empty, contacts are found; `root`: its height [m].
     """
     points, last_floor = len(f.planted_H), f.number_4[FLOOR]
     new = math.isnan(last_floor)
@@ -62,7 +62,7 @@ def next_contacts(f, passed, floor, given_H):
             speed += f.velocity_H3[h, i] * f.velocity_H3[h, i]
         f.speed_H[h] = math.sqrt(speed)
         up = f.sole_H3[h, 1] - f.number_4[FROM]
-        if f.speed_H[h] < PLANTED_SPEED and not new and 0 <= up < 2 * HEIGHTS_M:
+        if f.speed_H[h] < PLANTED_SPEED and f.sole_H3[h, 1] < root and not new and 0 <= up < 2 * HEIGHTS_M:
             f.slow_Y[min(int(up / STEP_M), HEIGHTS - 1)] += passed
     height = floor
     if math.isnan(floor):
@@ -71,7 +71,7 @@ def next_contacts(f, passed, floor, given_H):
         height = lowest if new else min(lowest, last_floor)
     f.number_4[FLOOR] = height
     for h in range(points):
-        _next_contact(f, h, new, passed, given_H)
+        _next_contact(f, h, new, passed, given_H, root)
 
 
 @njit(**INNER_EXACT)
@@ -87,13 +87,14 @@ def _move_along(f, lowest):
 
 
 @njit(**INNER_EXACT)
-def _next_contact(f, h, new, passed, given_H):
+def _next_contact(f, h, new, passed, given_H, root):
     """Whether a point is planted, and how much that counts."""
     above, speed, was = f.place_H3[h, 1] - f.number_4[FLOOR], f.speed_H[h], f.planted_H[h]
     planted = was
-    if above < PLANTED_M and speed < PLANTED_SPEED:
+    under = f.place_H3[h, 1] < root
+    if above < PLANTED_M and speed < PLANTED_SPEED and under:
         planted = True
-    elif above > LIFTED_M or speed > LIFTED_SPEED:
+    elif above > LIFTED_M or speed > LIFTED_SPEED or not under:
         planted = False
     leaves = min((LIFTED_SPEED - speed) / (LIFTED_SPEED - PLANTED_SPEED), (LIFTED_M - above) / (LIFTED_M - PLANTED_M))
     if len(given_H):

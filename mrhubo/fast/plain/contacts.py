@@ -88,6 +88,7 @@ def next_contacts(
     passed_B: np.ndarray,
     floor: float | None = None,
     given_BP: np.ndarray | None = None,
+    root_B: np.ndarray | None = None,
 ) -> LiveContacts:
     """The contacts after one more frame.
 
@@ -97,6 +98,7 @@ def next_contacts(
         passed_B: time since the last frame [s], more than 0.
         floor: height of the floor [m]; None: it is learned.
         given_BP: which points are planted, where that is known; else it is found.
+        root_B: height of the root (B,) [m], as for `mrhubo.motion.contacts.find_contacts`.
     """
     new_B, passed_B1 = np.isnan(last.floor_B), passed_B[:, None]
     share_B11 = (passed_B / (passed_B + SMOOTH_S))[:, None, None]
@@ -107,14 +109,15 @@ def next_contacts(
     from_B = np.where(new_B, height_BP.min(axis=1) - HEIGHTS_M, last.from_B)
     slow_BH = _chosen(new_B, _usual(height_BP, from_B, last.slow_BH.shape[1]), last.slow_BH)
     slow_BH, from_B = _moved_along(slow_BH, from_B, height_BP)
-    slow_BP = (speed_BP < PLANTED_SPEED) & ~new_B[:, None]  # how fast those are that are new is not known
+    under_BP = height_BP < (np.inf if root_B is None else root_B[:, None])
+    slow_BP = (speed_BP < PLANTED_SPEED) & under_BP & ~new_B[:, None]  # how fast those are that are new is not known
     slow_BH = _gather(slow_BH, height_BP - from_B[:, None], slow_BP, passed_B)
     floor_B = from_B + _lowest_band(slow_BH) if floor is None else np.full(len(new_B), floor)
     nowhere_B = ~np.isfinite(floor_B)  # nothing has been slow
     floor_B = np.where(nowhere_B, np.fmin(height_BP.min(axis=1), last.floor_B), floor_B)
     above_BP = height_BP - floor_B[:, None]
-    begins_BP = (above_BP < PLANTED_M) & (speed_BP < PLANTED_SPEED)
-    ends_BP = (above_BP > LIFTED_M) | (speed_BP > LIFTED_SPEED)
+    begins_BP = (above_BP < PLANTED_M) & (speed_BP < PLANTED_SPEED) & under_BP
+    ends_BP = (above_BP > LIFTED_M) | (speed_BP > LIFTED_SPEED) | ~under_BP
     planted_BP = np.where(begins_BP, True, np.where(ends_BP, False, last.planted_BP))
     if given_BP is not None:
         planted_BP = given_BP

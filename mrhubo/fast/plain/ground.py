@@ -142,7 +142,9 @@ class PlainGround:
         last, legs = self._state, self._legs
         root_3, sole_H3 = person_points(legs, seen)
         given_1H = None if seen.given_H is None else seen.given_H[None]
-        contacts = next_contacts(last.contacts, sole_H3[None], np.array([passed]), self._floor, given_1H)
+        contacts = next_contacts(
+            last.contacts, sole_H3[None], np.array([passed]), self._floor, given_1H, root_3[None, UP]
+        )
         held_H = (last.contacts.planted_BP & contacts.planted_BP & ~contacts.began_BP)[0]
         aim_D3 = stand_flat(legs, aim_D3, turn_33[UP], contacts.weight_BP[0])
         state = replace(last, contacts=contacts, held_H=held_H, path_3=legs.scale_1[0] * root_3, turn_33=turn_33)

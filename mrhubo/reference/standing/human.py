@@ -23,6 +23,8 @@ from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
 
+_LOWEST = 0.02
+"""Share of the frames in which the body may be under a floor that no sole tells."""
 _MANY = 0.05
 """Share of the frames with a jump from which on something else must be wrong."""
 
@@ -66,8 +68,13 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion |
         points_TK3 = skeleton.keypoints(as_seen.for_skeleton(skeleton).local_TJ33.to(local_TJ33))
         soles_TP3 = points_TK3[:, legs.contacts] @ as_seen.root_rotation_T33.to(local_TJ33).mT + way_T3[:, None]
     place_TP3 = soles_TP3.double().cpu().numpy()
-    contacts = find_contacts(place_TP3, motion.frame_rate, given_TP=given_contacts(motion, legs))
-    path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
+    human_T3, given_TP = legs.human_root(world_TK3), given_contacts(motion, legs)
+    root_T = human_T3[:, 1].double().cpu().numpy()
+    floor = None
+    if given_TP is None and not (place_TP3[..., 1] < root_T[:, None]).any():  # who stands on the hands throughout
+        floor = float(np.quantile(world_TK3[..., 1].amin(dim=1).double().cpu().numpy(), _LOWEST))
+    contacts = find_contacts(place_TP3, motion.frame_rate, floor, given_TP, root_T)
+    path_T3 = human_T3 - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
     return HumanSteps(
         root_T33 @ legs.asked(local_TJ33, turns_TJ33), legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
     )

@@ -76,6 +76,19 @@ def test_who_lies_on_a_side_does_not_stand_on_that_foot(retargeter: Optimization
     assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 2 and score.sunk_max_cm < 0.05
 
 
+def test_who_stands_on_the_hands_throughout_is_not_under_the_floor(retargeter: OptimizationRetargeter) -> None:
+    motion = squat(12)
+    over_33 = torch.diag(torch.tensor([1.0, -1.0, -1.0])).repeat(12, 1, 1)
+    motion = motion.changed(root_rotation_T33=over_33, root_position_T3=torch.tensor([[0.0, 1.2, 0.0]]).repeat(12, 1))
+    result = retargeter(motion)
+    assert result.contact is not None and not result.contact.any()
+    legs = Legs(retargeter.body_map)
+    root_T3 = legs.root(retargeter.body_map.robot.forward(result.q), *base(result))
+    assert root_T3[:, 2].min() > 0.2
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 4
+
+
 def test_a_root_that_jumps_leaves_the_robot_where_it_stands(retargeter: OptimizationRetargeter) -> None:
     motion = squat()
     assert motion.root_position_T3 is not None
