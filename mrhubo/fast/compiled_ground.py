@@ -32,7 +32,7 @@ class CompiledGround:
         self._f = Floor(
             places, places.copy(), numbers, flags, flags.copy(), numbers.copy(), places.copy(), numbers.copy(),
             np.zeros(HEIGHTS), np.zeros(HEIGHTS + 1), np.zeros(4), np.zeros(3), np.eye(3)[None].copy(), np.zeros(3),
-            places.copy(), places.copy(), places.copy(), np.zeros((joints + 1, 3, 3)),
+            places.copy(), places.copy(), numbers.copy(), places.copy(), np.zeros((joints + 1, 3, 3)),
             np.zeros((joints + 1, 3)), np.zeros((4, 3)),
         )  # fmt: skip
         self._f.number_4[FLOOR] = np.nan

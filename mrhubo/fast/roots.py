@@ -1,6 +1,10 @@
-"""Where a person with a root is, and which points of the soles are planted, as a user gives them to a stream.
+"""Where a person with a root is, and which points of the soles are planted, as a user gives them to a stream; and what
+no person's way does.
 
-Legend: H points of soles.
+Who tracks a person loses sight of them, and finds them elsewhere in the next frame: the root jumps. A robot's base that
+did the same would be torn away from its feet. So the way goes on after a jump from where it was before.
+
+Legend: B people, T frames, H points of soles.
 """
 
 from __future__ import annotations
@@ -17,6 +21,10 @@ CROOKED = 1e-2
 """How far a rotation's numbers may be from those of one: files round them."""
 FAR_M = 1e5
 """No motion goes so far [m]; in float32, places out there are centimetres apart."""
+
+JUMP_M, JUMP_SPEED = 0.5, 15.0
+"""A root that goes farther [m] and faster [m/s] from one frame to the next has jumped: nobody runs faster than 12.4."""
+_UP = 1
 
 
 class Root(NamedTuple):
@@ -62,3 +70,37 @@ def read_root(root: Any, contacts: Any, points: Sequence[str]) -> Root | None:
     if np.abs(turn_33.T @ turn_33 - np.eye(3)).max() > CROOKED:
         raise UserError("stream: the root's matrix is no rotation")
     return Root(turn_33, place_3, given_H)
+
+
+class Ways:
+    """The ways of some people, frame after frame, without jumps."""
+
+    def __init__(self, people: int, keep_height: bool) -> None:
+        """Nobody has been seen. `keep_height`: a jump's height stays, as the floor's is told."""
+        self._last_B3, self._away_B3 = np.zeros((people, 3)), np.zeros((people, 3))
+        self._keep_height = keep_height
+
+    def follow(self, place_B3: np.ndarray, seen_B: np.ndarray, since_B: np.ndarray) -> np.ndarray:
+        """Places (B, 3) [m], float64, of the people who are seen (B,), and were last some time (B,) [s] ago; infinite:
+        never.
+        """
+        jump_B3 = _jumps(place_B3 - self._last_B3, since_B, self._keep_height)
+        self._away_B3 = np.where(seen_B[:, None], self._away_B3 + jump_B3, self._away_B3)
+        self._last_B3 = np.where(seen_B[:, None], place_B3, self._last_B3)
+        return place_B3 - self._away_B3
+
+
+def without_jumps(place_T3: np.ndarray, frame_rate: float, keep_height: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """A way (T, 3) [m] as `Ways` has it, float64, and how far it jumps from the frame before to each (T, 3) [m]."""
+    step_T3 = np.diff(place_T3.astype(np.float64), axis=0, prepend=place_T3[:1])
+    jump_T3 = _jumps(step_T3, 1 / frame_rate, keep_height)
+    return place_T3 - jump_T3.cumsum(axis=0), jump_T3
+
+
+def _jumps(step_X3: np.ndarray, passed_X: Any, keep_height: bool) -> np.ndarray:
+    """What of steps (X, 3) [m] in some time [s] is a jump."""
+    far_X = np.sqrt((step_X3 * step_X3).sum(axis=1)) > np.maximum(JUMP_M, JUMP_SPEED * passed_X)
+    jump_X3 = np.where(far_X[:, None], step_X3, 0.0)
+    if keep_height:
+        jump_X3[:, _UP] = 0.0
+    return jump_X3

@@ -25,7 +25,7 @@ from mrhubo.fast.plain.judging import quaternions
 from mrhubo.fast.plain.root_turn import root_turn
 from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse, to_array
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
-from mrhubo.fast.roots import read_root
+from mrhubo.fast.roots import Ways, read_root
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.fast.stream_settings import StreamSettings
 from mrhubo.robot_motion import RobotMotion
@@ -95,7 +95,7 @@ class FastStream:
         self._quaternion_4: np.ndarray | None = None
         self._unseen, self._placed = math.inf, q is not None
         self._seen_1J33 = _REST_J33[None].copy()
-        self._clock = StreamClock(self.rate)
+        self._clock, self._ways = StreamClock(self.rate), Ways(1, self.floor is not None)
 
     def __call__(
         self, pose: Any, time: float | None = None, root: tuple[Any, Any] | None = None, contacts: Any = None
@@ -171,7 +171,11 @@ class FastStream:
             self._stand_up()
         target_1D3 = self._engine.directions(local_1J33)
         if passed > 0:
-            person = None if stands is None else Seen(local_1J33[0], *stands)
+            person = None
+            if stands is not None and seen:
+                since_1 = np.array([self._unseen + passed])
+                way_3 = self._ways.follow(stands.place_3[None], np.array([True]), since_1)[0]
+                person = Seen(local_1J33[0], *stands._replace(place_3=way_3))
             self._work(local_1J33, target_1D3[0], seen, person, passed)
         self._seen_1J33, self._clock.time = local_1J33, time
         return seen, target_1D3

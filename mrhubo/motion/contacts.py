@@ -49,7 +49,11 @@ class FootContacts:
 
 
 def find_contacts(
-    place_TP3: np.ndarray, frame_rate: float, floor: float | None = None, given_TP: np.ndarray | None = None
+    place_TP3: np.ndarray,
+    frame_rate: float,
+    floor: float | None = None,
+    given_TP: np.ndarray | None = None,
+    root_T: np.ndarray | None = None,
 ) -> FootContacts:
     """The contacts of points of soles.
 
@@ -58,8 +62,12 @@ def find_contacts(
         frame_rate: frames per second.
         floor: height of the floor [m]; None: it is looked for.
         given_TP: which points are planted (T, P), where that is known; None: it is found.
+        root_T: height of the root (T,) [m], above which no sole stands: that of who stands on the hands or lies with
+            raised legs tells nothing of the floor. None: all may.
     """
     speed_TP = speeds(place_TP3, frame_rate)
+    if root_T is not None:
+        speed_TP = np.where(place_TP3[..., 1] < root_T[:, None], speed_TP, np.inf)
     if floor is None and given_TP is not None and given_TP.any():
         floor = float(np.median(place_TP3[..., 1][given_TP]))
     floor = find_floor(place_TP3[..., 1], speed_TP) if floor is None else floor
@@ -95,7 +103,8 @@ def root_scale(from_root_TP3: np.ndarray, root_T3: np.ndarray, frame_rate: float
     leg_TP3, way_T13 = (np.gradient(x, 1 / frame_rate, axis=0) for x in (from_root_TP3, root_T3[:, None]))
     scale = 1.0
     for _ in range(_SCALE_ROUNDS):
-        weight_TP1 = find_contacts(from_root_TP3 + scale * root_T3[:, None], frame_rate).weight_TP[..., None]
+        place_TP3, height_T = from_root_TP3 + scale * root_T3[:, None], scale * root_T3[:, 1]
+        weight_TP1 = find_contacts(place_TP3, frame_rate, root_T=height_T).weight_TP[..., None]
         still = _STILL**2 * weight_TP1.sum()
         whole = float((weight_TP1 * way_T13**2).sum() + still)
         scale = (float(still - (weight_TP1 * way_T13 * leg_TP3).sum()) / whole) if whole else 1.0

@@ -3,15 +3,20 @@
 Markers change places for a frame, and estimators of pose doubt for a few: the pelvis then turns by 10 or 30 degrees and
 back within a thirtieth of a second, while the limbs, which other markers tell, stay where they are. A robot's base is
 turned as the pelvis is. So its rotation is smoothed over time, robustly: frames that differ much from their neighbours
-have no say.
+have no say. Its place stays as it is, but for such frames: they go where the others are.
+
+Legend: T frames, X numbers of a frame.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from scipy.linalg import solveh_banded
 
 from mrhubo.body.joints import PARENTS
+from mrhubo.fast.roots import without_jumps
 from mrhubo.motion.motion import Motion
 
 CUTOFF_HZ = 8.0
@@ -20,6 +25,9 @@ CUTOFF_HZ = 8.0
 pirouettes and kicks pass unchanged."""
 DOUBT_RAD = 0.05
 """Angle from the smooth motion at which a frame counts a quarter (3 degrees)."""
+SPIKE_M, DOUBT_M = 0.03, 0.02
+"""How far a place is from the smooth way that is none [m]: of people who run and dance it is 6 mm at most; and where a
+frame counts a quarter."""
 _ROUNDS = 12
 _ORDER = 3
 """Differences over time that a smooth motion has small: of the third order, so that turns at any speed, and those that
@@ -31,7 +39,8 @@ _HANGING = [joint - 1 for joint, parent in enumerate(PARENTS) if parent == 0]
 
 
 def steady_root(motion: Motion) -> Motion:
-    """The motion with a root that turns smoothly; all limbs are turned in the world as they were.
+    """The motion with a root that turns smoothly and has no spikes in its way, nor jumps (`mrhubo.fast.roots`); all
+    limbs are turned in the world as they were.
 
     A Whittaker smoother of the rotation matrices (E. T. Whittaker, "On a new method of graduation", 1923) whose frames
     are weighted anew by how far they are from it (Geman-McClure's weights).
@@ -47,26 +56,59 @@ def steady_root(motion: Motion) -> Motion:
     back_T33 = (smooth_T33.swapaxes(1, 2) @ root_T33).astype(np.float32)
     local_TJ33 = motion.arrays.local_TJ33.copy()
     local_TJ33[:, _HANGING] = back_T33[:, None] @ local_TJ33[:, _HANGING]
-    return motion.changed(root_rotation_T33=smooth_T33.astype(np.float32), local_TJ33=local_TJ33)
+    place_T3 = motion.arrays.root_position_T3
+    if place_T3 is not None and np.isfinite(place_T3).all():
+        place_T3 = without_spikes(place_T3, motion.frame_rate)
+    return motion.changed(
+        root_rotation_T33=smooth_T33.astype(np.float32), root_position_T3=place_T3, local_TJ33=local_TJ33
+    )
+
+
+def without_spikes(place_T3: np.ndarray, frame_rate: float) -> np.ndarray:
+    """A way (T, 3) [m], with its own type, whose jumps are taken out and whose spikes are where frames around tell;
+    itself, if it has none; `_SHORTEST` frames or more.
+    """
+    way_T3, jump_T3 = without_jumps(place_T3, frame_rate)
+    smooth_T3, off_T = _smooth(way_T3, frame_rate, DOUBT_M, lambda found_TX: found_TX, _distances)
+    spike_T = off_T > SPIKE_M
+    if not spike_T.any() and not jump_T3.any():
+        return place_T3
+    return np.where(spike_T[:, None], smooth_T3, way_T3).astype(place_T3.dtype)
 
 
 def smooth_rotations(rotation_T33: np.ndarray, frame_rate: float) -> np.ndarray:
     """Rotations (T, 3, 3) without what is faster than `CUTOFF_HZ`, and without frames that are nothing like the others
     around; float64, `_SHORTEST` frames or more.
     """
-    value_T9 = rotation_T33.reshape(-1, 9)
+    return _smooth(rotation_T33.reshape(-1, 9), frame_rate, DOUBT_RAD, _nearest_rotations, _angles)[0].reshape(-1, 3, 3)
+
+
+def _smooth(
+    value_TX: np.ndarray,
+    frame_rate: float,
+    doubt: float,
+    nearest: Callable[[np.ndarray], np.ndarray],
+    apart: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smooth values (T, X), made such as there are by `nearest`, and how far those that were given are `apart` (T,)."""
     share = np.sin(np.pi * min(CUTOFF_HZ / frame_rate, 0.5))
-    penalty = _penalty(len(value_T9)) / (2 * share) ** (2 * _ORDER)
-    weight_T = np.ones(len(value_T9))
-    found_T33 = rotation_T33
+    penalty = _penalty(len(value_TX)) / (2 * share) ** (2 * _ORDER)
+    weight_T, found_TX, off_T = np.ones(len(value_TX)), value_TX, np.zeros(len(value_TX))
     for _ in range(_ROUNDS):
         banded = penalty.copy()
         banded[-1] += weight_T
-        found_T33 = _nearest_rotations(solveh_banded(banded, weight_T[:, None] * value_T9).reshape(-1, 3, 3))
-        cosine_T = 0.5 * (np.einsum("tij,tij->t", found_T33, rotation_T33) - 1)
-        off_T = np.arccos(np.clip(cosine_T, -1, 1))
-        weight_T = (1 + (off_T / DOUBT_RAD) ** 2) ** -2
-    return found_T33
+        found_TX = nearest(solveh_banded(banded, weight_T[:, None] * value_TX))
+        off_T = apart(found_TX, value_TX)
+        weight_T = (1 + (off_T / doubt) ** 2) ** -2
+    return found_TX, off_T
+
+
+def _distances(one_TX: np.ndarray, other_TX: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(one_TX - other_TX, axis=1)
+
+
+def _angles(one_T9: np.ndarray, other_T9: np.ndarray) -> np.ndarray:
+    return np.arccos(np.clip(0.5 * (np.einsum("ti,ti->t", one_T9, other_T9) - 1), -1, 1))
 
 
 def _penalty(count: int) -> np.ndarray:
@@ -82,7 +124,7 @@ def _penalty(count: int) -> np.ndarray:
     return bands
 
 
-def _nearest_rotations(matrix_T33: np.ndarray) -> np.ndarray:
-    u_T33, _, v_T33 = np.linalg.svd(matrix_T33)
+def _nearest_rotations(matrix_T9: np.ndarray) -> np.ndarray:
+    u_T33, _, v_T33 = np.linalg.svd(matrix_T9.reshape(-1, 3, 3))
     u_T33[:, :, 2] *= np.linalg.det(u_T33 @ v_T33)[:, None]
-    return u_T33 @ v_T33
+    return (u_T33 @ v_T33).reshape(-1, 9)

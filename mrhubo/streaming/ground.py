@@ -58,6 +58,9 @@ class GroundState:
     """Where soles would be from the root, if legs pointed as the person's do, along the world's axes."""
     anchor_BP2: np.ndarray
     """Where each point has been planted, on the floor."""
+    above_BP: np.ndarray
+    """How far each point of the robot's soles was over what is lowest there [m]: who stands on a toe stands on its
+    round edge, and who kneels, on the instep."""
     root_B3: np.ndarray
     """Where the robot's root is."""
     known_B: np.ndarray
@@ -69,8 +72,8 @@ class GroundState:
         zeros_B3 = np.zeros((people, 3))
         return cls(
             LiveContacts.none(people, points), zeros_B3, torch.eye(3).to(like).expand(people, 3, 3), zeros_B3,
-            np.zeros(people), np.zeros((people, points, 3)), np.zeros((people, points, 2)), zeros_B3,
-            np.zeros(people, dtype=bool),
+            np.zeros(people), np.zeros((people, points, 3)), np.zeros((people, points, 2)), np.zeros((people, points)),
+            zeros_B3, np.zeros(people, dtype=bool),
         )  # fmt: skip
 
     def where(self, chosen_B: np.ndarray, other: Self) -> Self:
@@ -121,15 +124,13 @@ class Ground:
         """
         legs = self.legs
         world_BK3 = point_BK3.double() + seen.place_B3.double()[:, None]
-        contacts = next_contacts(
-            state.contacts, _array(world_BK3[:, legs.contacts]), passed_B, self.floor, seen.given_BP
-        )
-        path_B3 = legs.scale * _array(legs.human_root(world_BK3))
-        return replace(state, contacts=contacts, path_B3=path_B3, turn_B33=turn_B33)
+        sole_BP3, root_B3 = _array(world_BK3[:, legs.contacts]), _array(legs.human_root(world_BK3))
+        contacts = next_contacts(state.contacts, sole_BP3, passed_B, self.floor, seen.given_BP, root_B3[:, UP])
+        return replace(state, contacts=contacts, path_B3=legs.scale * root_B3, turn_B33=turn_B33)
 
     def level(self, state: GroundState, target_BD3: Tensor) -> Tensor:
-        """Directions (B, D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is
-        the world's.
+        """Directions (B, D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor
+        are planted, its up is the world's.
         """
         weight_BP = torch.from_numpy(state.contacts.weight_BP).to(target_BD3)
         return stand_flat(target_BD3, state.turn_B33[:, 1].to(target_BD3), weight_BP, self.legs)
@@ -157,7 +158,7 @@ class Ground:
         step_B = np.minimum(passed_B, self.longest_step)
         off_B3[:, FLAT] -= _back(off_B3[:, FLAT], step_B)
         share_B = np.minimum(whole_B1[:, 0], 1.0)
-        level_B = (weight_BP * -(state.path_B3[:, None] + pointing_BP3)[..., UP]).sum(axis=1)
+        level_B = (weight_BP * (last.above_BP - (state.path_B3[:, None] + pointing_BP3)[..., UP])).sum(axis=1)
         level_B = level_B / np.maximum(whole_B1[:, 0], 1e-9)
         begun_B = np.where(share_B > 0, level_B, -self.legs.scale * contacts.floor_B)
         usual_B = np.where(last.known_B, last.usual_B, begun_B)
@@ -172,9 +173,9 @@ class Ground:
         wanted_BP3 = root_B3[:, None] + pointing_BP3
         under_BP = np.maximum(-wanted_BP3[..., UP], 0.0)
         wanted_BP3[..., UP] += under_BP
-        anchor_BP3 = np.stack((last.anchor_BP2[..., 0], np.zeros_like(weight_BP), last.anchor_BP2[..., 1]), axis=-1)
+        anchor_BP3 = np.stack((last.anchor_BP2[..., 0], last.above_BP, last.anchor_BP2[..., 1]), axis=-1)
         held_BP1 = (last.contacts.planted_BP & contacts.planted_BP & ~contacts.began_BP)[..., None]
-        on_floor_BP3 = wanted_BP3 * [1.0, 0.0, 1.0]
+        on_floor_BP3 = np.stack((wanted_BP3[..., 0], last.above_BP, wanted_BP3[..., 2]), axis=-1)
         wanted_BP3 = np.where(held_BP1, anchor_BP3, np.where(contacts.planted_BP[..., None], on_floor_BP3, wanted_BP3))
         counts_BP = np.maximum(weight_BP, np.minimum(under_BP / UNDER_M, 1.0))
         wanted_BP3 = torch.from_numpy(wanted_BP3 - root_B3[:, None]).to(target_BD3) @ turn_B33
@@ -203,7 +204,8 @@ class Ground:
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         loose_BP1 = 1.0 - weight_BP[..., None]
         anchor_BP2 = anchor_BP2 + loose_BP1 * ((root_B3[:, None] + point_BP3)[..., FLAT] - anchor_BP2)
-        return replace(state, root_B3=root_B3, off_B3=root_B3 - state.path_B3, anchor_BP2=anchor_BP2)
+        above_BP = point_BP3[..., UP] - low_BP
+        return replace(state, root_B3=root_B3, off_B3=root_B3 - state.path_B3, anchor_BP2=anchor_BP2, above_BP=above_BP)
 
     def base(self, state: GroundState, poses: LinkPoses) -> tuple[Tensor, Tensor]:
         """Place (B, 3) [m] and rotation (B, 3, 3) of the robot's base, x forward, y left, z up."""

@@ -22,6 +22,7 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.fast import StreamSettings
 from mrhubo.fast.poses import check_frame_rate
+from mrhubo.fast.roots import Ways
 from mrhubo.fast.stream_clock import StreamClock
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.reference import OptimizationRetargeter
@@ -95,6 +96,7 @@ class Stream:
         """None: no frame has come, so it is not known whether roots will come with them."""
         self._seen_BJ33 = rest_33.expand(self.people or 1, len(POSED_JOINT_NAMES), 3, 3)
         self._root_B33, self._place_B3 = rest_33.expand(self.people or 1, 3, 3), rest_33.new_zeros(self.people or 1, 3)
+        self._ways = Ways(self.people or 1, self.floor is not None)
         self._turn_B4: Tensor | None = None
         self._clock = StreamClock(self.rate)
 
@@ -170,7 +172,9 @@ class Stream:
             self._state = self._follower.begin(self.people or 1, at_BN)
         if passed > 0:
             target_BD3 = self.retargeter.body_map.human_directions(local_BJ33)
-            seen = Seen(local_BJ33, root_B33, place_B3, given_BP)
+            frame = (place_B3.double(), seen_B, (self._state.unseen_B + passed).double())
+            way_B3 = torch.from_numpy(self._ways.follow(*(part.cpu().numpy() for part in frame)))
+            seen = Seen(local_BJ33, root_B33, way_B3.to(place_B3), given_BP)
             self._state = self._follower.advance(self._state, local_BJ33, target_BD3, seen_B, passed, seen)
         self._seen_BJ33, self._clock.time = local_BJ33, time
         self._root_B33, self._place_B3 = root_B33, place_B3
@@ -254,7 +258,8 @@ class Stream:
 
     def _people(self, motions: Sequence[Motion], poses: Sequence[Tensor]) -> list[Seen]:
         """People with a root, frame by frame."""
-        roots = [motion_root(motion, local, self._legs) for motion, local in zip(motions, poses, strict=True)]
+        roots = [motion_root(motion, local, self._legs, self.floor is not None)
+                 for motion, local in zip(motions, poses, strict=True)]  # fmt: skip
         pad = torch.nn.utils.rnn.pad_sequence
         local_TBJ33, turn_TB33, place_TB3 = (
             pad(list(found)) for found in (poses, [turn for turn, _ in roots], [place for _, place in roots])

@@ -96,5 +96,5 @@ def _on_floor(way_T3: np.ndarray, soles_TP3: np.ndarray, frame_rate: float) -> t
     """
     turned_TP3 = soles_TP3[..., [1, 2, 0]]
     way_T3 = root_scale(turned_TP3, way_T3, frame_rate) * way_T3
-    contacts = find_contacts(turned_TP3 + way_T3[:, None], frame_rate)
+    contacts = find_contacts(turned_TP3 + way_T3[:, None], frame_rate, root_T=way_T3[:, 1])
     return human_to_world(way_T3) - [0.0, 0.0, contacts.floor], contacts.planted_TP

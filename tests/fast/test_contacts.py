@@ -55,6 +55,28 @@ def test_they_are_those_of_the_whole_motion_a_little_later(rate: float, floor: f
     assert weight_TP[live_TP].max() == 1
 
 
+def test_soles_above_the_root_tell_nothing_of_the_floor() -> None:
+    """Who stands on the hands for half a minute."""
+    place_TP3 = np.concatenate((np.zeros((60, 4, 3)), np.zeros((1800, 4, 3)) + [0.0, 2.2, 0.0]))
+    found = live(place_TP3, 60.0, root_B=np.array([1.0]))
+    assert found[59].planted_BP.all() and not any(state.planted_BP.any() for state in found[60:])
+    assert abs(found[-1].floor_B[0]) < 0.01
+    assert live(place_TP3, 60.0)[-1].floor_B[0] == pytest.approx(2.2, abs=0.01)  # on a stool, say
+
+
+@pytest.mark.parametrize("storeys", [3.0, -3.0])
+def test_a_floor_is_found_on_every_storey(storeys: float) -> None:
+    """Who climbs or sinks far, or whose tracker does, stands there too."""
+    here, rate = stepping(60.0), 60.0
+    parts = [here + [0.0, k * storeys, 0.0] for k in range(3)]
+    stairs = [np.linspace(a[-1], b[0], 240) for a, b in zip(parts, parts[1:], strict=False)]
+    found = live(np.concatenate([parts[0], stairs[0], parts[1], stairs[1], parts[2], parts[2]]), rate)
+    assert found[-1].floor_B[0] == pytest.approx(2 * storeys, abs=0.01)
+    live_TP = np.stack([state.planted_BP[0] for state in found[-len(here) :]])
+    whole_TP = find_contacts(here, rate).planted_TP
+    assert (live_TP == whole_TP).mean() > 0.9
+
+
 def test_contacts_that_are_given_are_taken(rate: float = 60.0) -> None:
     place_TP3 = stepping(rate, 1.0)
     given_BP = np.array([[True, False, True, False]])

@@ -98,3 +98,12 @@ def test_a_roots_way_is_made_to_fit_the_legs(person: float, rate: float) -> None
 def test_motions_of_a_frame_or_two(frames: int) -> None:
     found = find_contacts(np.zeros((frames, 2, 3)), 30.0)
     assert found.planted_TP.all() and found.weight_TP.min() == 1.0 and found.floor == 0.0
+
+
+def test_soles_above_the_root_tell_nothing_of_the_floor() -> None:
+    """Who stands for a second and then on the hands for five."""
+    place_TP3 = np.zeros((180, 2, 3))
+    place_TP3[30:, :, 1] = np.minimum(np.arange(150) / 15, 1)[:, None] * 2.2
+    found = find_contacts(place_TP3, 30.0, root_T=np.full(180, 1.0))
+    assert found.floor == 0 and found.planted_TP[:30].all() and not found.planted_TP[32:].any()
+    assert find_contacts(place_TP3, 30.0).floor == pytest.approx(2.2)  # on a stool, say

@@ -9,7 +9,7 @@ import torch
 from mrhubo import rotation
 from mrhubo.body import Skeleton
 from mrhubo.motion import Motion
-from mrhubo.motion.steady import smooth_rotations, steady_root
+from mrhubo.motion.steady import SPIKE_M, smooth_rotations, steady_root, without_spikes
 
 RATES = [24.0, 60.0, 120.0]
 
@@ -48,6 +48,39 @@ def test_a_spike_goes(rate: float, frames: int) -> None:
         seen_T33[start : start + frames] = seen_T33[start : start + frames] @ turns(np.array([[0.4, 0.3, -0.3]]))
     off_T = off_deg(smooth_rotations(seen_T33, rate), true_T33)
     assert off_T.max() < 2.0
+
+
+def walked(rate: float, seconds: float = 3.0) -> np.ndarray:
+    """A way (T, 3) [m] that goes up and down and from side to side."""
+    time_T = np.arange(round(rate * seconds)) / rate
+    return np.stack((0.05 * np.sin(6 * time_T), 0.9 + 0.03 * np.sin(12 * time_T), 1.5 * time_T), axis=1)
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_a_way_without_spikes_stays_as_it_is(rate: float) -> None:
+    way_T3 = walked(rate).astype(np.float32)
+    assert without_spikes(way_T3, rate) is way_T3
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("far", [0.05, 0.2, 0.45, 3.0])
+def test_spikes_of_a_way_go(rate: float, far: float) -> None:
+    """For a fortieth of a second."""
+    true_T3, frames = walked(rate), max(1, round(rate / 40))
+    seen_T3 = true_T3.copy()
+    for start in (len(seen_T3) // 4, len(seen_T3) // 2):
+        seen_T3[start : start + frames] += [far, 0.0, 0.0]
+    found_T3 = without_spikes(seen_T3, rate)
+    assert np.linalg.norm(found_T3 - true_T3, axis=1).max() < (SPIKE_M if far < 1 else 5 * 1.6 / rate)
+
+
+def test_a_spike_moves_no_other_frame() -> None:
+    motion = Motion("m", torch.eye(3).repeat(180, 21, 1, 1), 60.0, root_rotation_T33=torch.eye(3).repeat(180, 1, 1))
+    place_T3 = torch.from_numpy(walked(60.0)).float()
+    place_T3[90, 1] += 0.3
+    found_T3 = steady_root(motion.changed(root_position_T3=place_T3)).root_position_T3
+    assert found_T3 is not None and torch.nonzero((found_T3 != place_T3).any(dim=1)).tolist() == [[90]]
+    assert float(found_T3[90, 1]) == pytest.approx(walked(60.0)[90, 1], abs=0.005)
 
 
 def test_noise_becomes_less() -> None:

@@ -17,8 +17,9 @@ from mrhubo.frames import human_to_world
 from mrhubo.motion import Motion
 from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.nearest import NearestJoints
+from mrhubo.robot import BodyMap, Robot
 from mrhubo.streaming import Stream, StreamSettings
-from tests.reference.standing.steppers import jump, moved, squat, walk
+from tests.reference.standing.steppers import jump, kneel, moved, squat, walk
 from tests.reference.walkers import walker
 
 SETTINGS = StreamSettings(avoid_collisions=False)
@@ -61,6 +62,28 @@ def test_planted_feet_stay_and_no_sole_is_under_the_floor(biped: Retargeter, squ
     score = score_whole_body(biped.body_map, motion, *answer)
     assert score.speed_max <= 1 and score.outside == 0 and score.sunk == 0 and score.floating == 0
     assert score.slide_cm_s < 1 and score.heading_deg < 0.1 and score.parts_deg["knee"] < 4
+
+
+def test_who_kneels_on_the_instep_points_as_the_person_does() -> None:
+    """A foot that lies with its sole up, as thick as NAO's, touches the floor with what is lowest, and not with its
+    sole.
+    """
+    body_map = BodyMap.of(Robot.from_config("nao-whole-body"))
+    retargeter = Retargeter(NearestJoints(body_map), body_map, BodyPrior.open(), None, phi_threshold=0.01)
+    motion = kneel()
+    answer = followed(retargeter, motion)
+    score = score_whole_body(body_map, motion, *answer)
+    assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 3
+    assert score.sunk == 0 and score.floating_max_cm < 1
+    assert answer[1][:, 2].diff().abs().max() < 0.01
+
+
+def test_a_root_that_jumps_leaves_the_robot_where_it_stands(biped: Retargeter, squatting) -> None:  # noqa: ANN001
+    motion, answer = squatting
+    place_T3 = motion.root_position_T3.clone()
+    place_T3[20:] += torch.tensor([3.0, 0.5, 0.0])
+    found = followed(biped, motion.changed(root_position_T3=place_T3))
+    torch.testing.assert_close(found[1], answer[1], atol=0.01, rtol=0)
 
 
 def test_who_jumps_flies_as_high_as_the_person(biped: Retargeter) -> None:

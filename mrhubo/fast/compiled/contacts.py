@@ -33,9 +33,9 @@ the path, usually [m]; 1 where somebody has been seen."""
 
 
 @njit(**INNER_EXACT)
-def next_contacts(f, passed, floor, given_H):
+def next_contacts(f, passed, floor, given_H, root):
     """The contacts after one more frame, whose points of soles stand in `f.sole_H3`. `floor` [m]: NaN, it is learned;
-    `given_H`: empty, contacts are found.
+    `given_H`: empty, contacts are found; `root`: its height [m].
     """
     points, last_floor = len(f.planted_H), f.number_4[FLOOR]
     new = math.isnan(last_floor)
@@ -47,6 +47,7 @@ def next_contacts(f, passed, floor, given_H):
         f.slow_Y[:] = 0.0
         if abs(lowest) < USUAL_M:
             f.slow_Y[int(-f.number_4[FROM] / STEP_M)] = USUAL_S
+    _move_along(f, lowest)
     share = passed / (passed + SMOOTH_S)
     fade = math.exp(-passed / MEMORY_S)
     for y in range(HEIGHTS):
@@ -61,7 +62,7 @@ def next_contacts(f, passed, floor, given_H):
             speed += f.velocity_H3[h, i] * f.velocity_H3[h, i]
         f.speed_H[h] = math.sqrt(speed)
         up = f.sole_H3[h, 1] - f.number_4[FROM]
-        if f.speed_H[h] < PLANTED_SPEED and not new and 0 <= up < 2 * HEIGHTS_M:
+        if f.speed_H[h] < PLANTED_SPEED and f.sole_H3[h, 1] < root and not new and 0 <= up < 2 * HEIGHTS_M:
             f.slow_Y[min(int(up / STEP_M), HEIGHTS - 1)] += passed
     height = floor
     if math.isnan(floor):
@@ -70,17 +71,30 @@ def next_contacts(f, passed, floor, given_H):
         height = lowest if new else min(lowest, last_floor)
     f.number_4[FLOOR] = height
     for h in range(points):
-        _next_contact(f, h, new, passed, given_H)
+        _next_contact(f, h, new, passed, given_H, root)
 
 
 @njit(**INNER_EXACT)
-def _next_contact(f, h, new, passed, given_H):
+def _move_along(f, lowest):
+    """Lets the heights begin elsewhere, so that the lowest point is among them."""
+    at = math.floor((lowest - f.number_4[FROM]) / STEP_M)
+    over = max(at - (HEIGHTS - 1), 0.0) + min(at, 0.0)
+    if over != 0:
+        for y in range(HEIGHTS):
+            f.total_Y[y] = f.slow_Y[int(y + over)] if 0 <= y + over < HEIGHTS else 0.0
+        f.slow_Y[:] = f.total_Y[:HEIGHTS]
+        f.number_4[FROM] += over * STEP_M
+
+
+@njit(**INNER_EXACT)
+def _next_contact(f, h, new, passed, given_H, root):
     """Whether a point is planted, and how much that counts."""
     above, speed, was = f.place_H3[h, 1] - f.number_4[FLOOR], f.speed_H[h], f.planted_H[h]
     planted = was
-    if above < PLANTED_M and speed < PLANTED_SPEED:
+    under = f.place_H3[h, 1] < root
+    if above < PLANTED_M and speed < PLANTED_SPEED and under:
         planted = True
-    elif above > LIFTED_M or speed > LIFTED_SPEED:
+    elif above > LIFTED_M or speed > LIFTED_SPEED or not under:
         planted = False
     leaves = min((LIFTED_SPEED - speed) / (LIFTED_SPEED - PLANTED_SPEED), (LIFTED_M - above) / (LIFTED_M - PLANTED_M))
     if len(given_H):
@@ -94,11 +108,12 @@ def _next_contact(f, h, new, passed, given_H):
     else:
         f.age_H[h] += passed
     f.planted_H[h], f.held_H[h] = planted, was and planted and not began
-    f.weight_H[h] = _smooth(f.age_H[h] / RAMP_S) * _smooth(leaves) if planted else 0.0
+    f.weight_H[h] = smooth(f.age_H[h] / RAMP_S) * smooth(leaves) if planted else 0.0
 
 
 @njit(**INNER_EXACT)
-def _smooth(share):
+def smooth(share):
+    """As `mrhubo.fast.plain.contacts.smooth_share`."""
     share = min(max(share, 0.0), 1.0)
     return share * share * (3 - 2 * share)
 

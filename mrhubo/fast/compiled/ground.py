@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.contacts import FLOOR, KNOWN, USUAL
+from mrhubo.fast.compiled.contacts import FLOOR, KNOWN, USUAL, smooth
 from mrhubo.fast.compiled.human import add, cross, dot, put, row, turn, turn_back, unit
 from mrhubo.fast.compiled.soles import carrier, turned_point
 from mrhubo.fast.compiled.tables import (
@@ -39,6 +39,7 @@ from mrhubo.fast.compiled.tables import (
     vector,
     whole,
 )
+from mrhubo.fast.plain.contacts import LIES, STANDS
 from mrhubo.fast.plain.ground import FREE, PLANTED, RETURN_S, RETURN_SPEED, SETTLE_S, UNDER_M, USUAL_S
 
 
@@ -63,6 +64,7 @@ class Floor(NamedTuple):
     off_3: np.ndarray
     pointing_H3: np.ndarray
     anchor_H3: np.ndarray
+    above_H: np.ndarray
     sole_H3: np.ndarray
     """Points of the person's soles, or of the robot's from its root, in the world [m]."""
     turn_L33: np.ndarray
@@ -103,8 +105,8 @@ def stand_flat(t, f, aim_X3):
     up = (f.turn_133[0, 1, 0], f.turn_133[0, 1, 1], f.turn_133[0, 1, 2])
     for r in range(size(t, START_R)):
         ahead, above = whole(t, FOOT_R2, 2 * r), whole(t, FOOT_R2, 2 * r + 1)
-        share = min(f.weight_H[2 * r], f.weight_H[2 * r + 1])
         own = row(aim_X3, above)
+        share = min(f.weight_H[2 * r], f.weight_H[2 * r + 1]) * smooth((dot(own, up) - LIES) / (STANDS - LIES))
         upright = unit(add(own, add(up, own, -1.0), share))
         forward = row(aim_X3, ahead)
         forward = unit(add(forward, upright, -dot(forward, upright)))
@@ -138,7 +140,7 @@ def ask(t, f, root, aim_X3, passed, longest_step):
     for h in range(points):
         place, weight = pointing(t, f, aim_X3, h), f.weight_H[h]
         moved = add(moved, add(add(gone, row(f.pointing_H3, h), 1.0), place, -1.0), weight)
-        level -= weight * (path[1] + place[1])
+        level += weight * (f.above_H[h] - path[1] - place[1])
         total += weight
         put(f.pointing_H3, h, place)
     level /= max(total, 1e-9)
@@ -163,7 +165,7 @@ def ask(t, f, root, aim_X3, passed, longest_step):
     for h in range(points):
         wanted = add(add(path, off, 1.0), row(f.pointing_H3, h), 1.0)
         under = max(-wanted[1], 0.0)
-        wanted = (wanted[0], 0.0 if f.planted_H[h] else wanted[1] + under, wanted[2])
+        wanted = (wanted[0], f.above_H[h] if f.planted_H[h] else wanted[1] + under, wanted[2])
         if f.held_H[h]:
             wanted = (f.anchor_H3[h, 0], wanted[1], f.anchor_H3[h, 2])
         counts = max(f.weight_H[h], min(under / UNDER_M, 1.0))
@@ -188,6 +190,7 @@ def stand(t, work, f):
         put(f.sole_H3, h, point)
         low = _lowest(t, work, f, h, root)
         lowest = min(lowest, low)
+        f.above_H[h] = point[1] - low
         if not f.held_H[h]:
             put(f.anchor_H3, h, (planned[0] + point[0], 0.0, planned[2] + point[2]))
         weight = f.weight_H[h]

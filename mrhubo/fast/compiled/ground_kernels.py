@@ -50,7 +50,7 @@ def make_ground_kernels() -> GroundKernels:
         """
         _ = version
         root = ground.person(t, f, local_J33, root_43[1:], root_43[0])
-        contacts.next_contacts(f, passed, floor, given_H)
+        contacts.next_contacts(f, passed, floor, given_H, root[1])
         ground.stand_flat(t, f, aim_X3)
         ground.ask(t, f, root, aim_X3, passed, longest_step)
 

@@ -24,6 +24,9 @@ WANDERED_M = 0.06
 """How far a planted point may be from where it was planted; then it is planted anew: a shuffling foot never lifts."""
 RAMP_S = 0.1
 """How long [s] it takes until a contact counts in full, and before it ends, no more: a heel strike takes as long."""
+STANDS, LIES = 0.5, 0.2
+"""Cosine of the angle between a sole's up and the world's from which on a planted foot stands on its sole, and up to
+which it lies on its side or its instep: of people who stand, walk and dance it is above 0.75."""
 BAND_M = 0.04
 """Heights of points on one floor."""
 GATHERED = 0.5
@@ -32,7 +35,8 @@ step stood on the floor too."""
 SMOOTH_S = 0.02
 """Time constant [s] of speeds."""
 HEIGHTS_M, STEP_M = 3.0, 0.005
-"""Heights at which the floor is looked for, up and down from where it was first, and how finely."""
+"""Heights at which the floor is looked for, up and down from where it was first, and how finely; they go along with who
+climbs or sinks out of them."""
 USUAL_S, USUAL_M = 3.0, 0.15
 """A floor at 0 counts like a point that rests there for so long [s], where the lowest point begins that near to it."""
 MEMORY_S = 10.0
@@ -84,6 +88,7 @@ def next_contacts(
     passed_B: np.ndarray,
     floor: float | None = None,
     given_BP: np.ndarray | None = None,
+    root_B: np.ndarray | None = None,
 ) -> LiveContacts:
     """The contacts after one more frame.
 
@@ -93,6 +98,7 @@ def next_contacts(
         passed_B: time since the last frame [s], more than 0.
         floor: height of the floor [m]; None: it is learned.
         given_BP: which points are planted, where that is known; else it is found.
+        root_B: height of the root (B,) [m], as for `mrhubo.motion.contacts.find_contacts`.
     """
     new_B, passed_B1 = np.isnan(last.floor_B), passed_B[:, None]
     share_B11 = (passed_B / (passed_B + SMOOTH_S))[:, None, None]
@@ -102,14 +108,16 @@ def next_contacts(
     speed_BP, height_BP = np.linalg.norm(velocity_BP3, axis=-1), place_BP3[..., 1]
     from_B = np.where(new_B, height_BP.min(axis=1) - HEIGHTS_M, last.from_B)
     slow_BH = _chosen(new_B, _usual(height_BP, from_B, last.slow_BH.shape[1]), last.slow_BH)
-    slow_BP = (speed_BP < PLANTED_SPEED) & ~new_B[:, None]  # how fast those are that are new is not known
+    slow_BH, from_B = _moved_along(slow_BH, from_B, height_BP)
+    under_BP = height_BP < (np.inf if root_B is None else root_B[:, None])
+    slow_BP = (speed_BP < PLANTED_SPEED) & under_BP & ~new_B[:, None]  # how fast those are that are new is not known
     slow_BH = _gather(slow_BH, height_BP - from_B[:, None], slow_BP, passed_B)
     floor_B = from_B + _lowest_band(slow_BH) if floor is None else np.full(len(new_B), floor)
     nowhere_B = ~np.isfinite(floor_B)  # nothing has been slow
     floor_B = np.where(nowhere_B, np.fmin(height_BP.min(axis=1), last.floor_B), floor_B)
     above_BP = height_BP - floor_B[:, None]
-    begins_BP = (above_BP < PLANTED_M) & (speed_BP < PLANTED_SPEED)
-    ends_BP = (above_BP > LIFTED_M) | (speed_BP > LIFTED_SPEED)
+    begins_BP = (above_BP < PLANTED_M) & (speed_BP < PLANTED_SPEED) & under_BP
+    ends_BP = (above_BP > LIFTED_M) | (speed_BP > LIFTED_SPEED) | ~under_BP
     planted_BP = np.where(begins_BP, True, np.where(ends_BP, False, last.planted_BP))
     if given_BP is not None:
         planted_BP = given_BP
@@ -132,12 +140,31 @@ def smooth_share(share: np.ndarray) -> np.ndarray:
     return share**2 * (3 - 2 * share)
 
 
+def standing_share(up_X: np.ndarray) -> np.ndarray:
+    """How much feet stand on their soles, 0..1, of the cosines of `STANDS`."""
+    return smooth_share((up_X - LIES) / (STANDS - LIES))
+
+
 def _usual(height_BP: np.ndarray, from_B: np.ndarray, heights: int) -> np.ndarray:
     """What is known of slow points' heights before the first frame (B, H) [s]."""
     found_BH = np.zeros((len(height_BP), heights))
     near_X = np.flatnonzero(np.abs(height_BP.min(axis=1)) < USUAL_M)
     found_BH[near_X, (-from_B[near_X] / STEP_M).astype(int)] = USUAL_S
     return found_BH
+
+
+def _moved_along(slow_BH: np.ndarray, from_B: np.ndarray, height_BP: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How long slow points were at each height, and where heights begin [m], so that the lowest point is among them."""
+    heights = slow_BH.shape[1]
+    at_B = np.floor((height_BP.min(axis=1) - from_B) / STEP_M)
+    over_B = np.maximum(at_B - (heights - 1), 0.0) + np.minimum(at_B, 0.0)
+    for person in np.flatnonzero(over_B):
+        before_H = np.arange(heights) + over_B[person]
+        kept_H = (before_H >= 0) & (before_H < heights)
+        moved_H = np.zeros(heights)
+        moved_H[kept_H] = slow_BH[person, before_H[kept_H].astype(int)]
+        slow_BH[person] = moved_H
+    return slow_BH, from_B + over_B * STEP_M
 
 
 def _gather(slow_BH: np.ndarray, up_BP: np.ndarray, slow_BP: np.ndarray, passed_B: np.ndarray) -> np.ndarray:

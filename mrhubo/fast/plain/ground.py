@@ -15,7 +15,7 @@ import numpy as np
 
 from mrhubo.fast.description import Description
 from mrhubo.fast.leg_section import Legs
-from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
+from mrhubo.fast.plain.contacts import LiveContacts, next_contacts, standing_share
 from mrhubo.fast.plain.human import cross, norm, normalize
 from mrhubo.fast.plain.robot import Placed, place
 from mrhubo.fast.plain.soles import carrier, turned_points
@@ -90,6 +90,8 @@ class GroundState:
     """Where soles would be from the root, if legs pointed as the person's do, along the world's axes."""
     anchor_H2: np.ndarray
     """Where each point has been planted, on the floor."""
+    above_H: np.ndarray
+    """How far each point of the robot's soles was over what is lowest there [m]."""
     known: bool
     """Whether somebody has been seen."""
 
@@ -98,7 +100,7 @@ class GroundState:
         """Nobody has been seen."""
         contacts, zeros_3 = LiveContacts.none(1, points), np.zeros(3)
         return cls(contacts, contacts.planted_BP[0], zeros_3, np.eye(3), zeros_3, 0.0, np.zeros((points, 3)),
-                   np.zeros((points, 2)), False)  # fmt: skip
+                   np.zeros((points, 2)), np.zeros(points), False)  # fmt: skip
 
 
 class PlainGround:
@@ -140,7 +142,9 @@ class PlainGround:
         last, legs = self._state, self._legs
         root_3, sole_H3 = person_points(legs, seen)
         given_1H = None if seen.given_H is None else seen.given_H[None]
-        contacts = next_contacts(last.contacts, sole_H3[None], np.array([passed]), self._floor, given_1H)
+        contacts = next_contacts(
+            last.contacts, sole_H3[None], np.array([passed]), self._floor, given_1H, root_3[None, UP]
+        )
         held_H = (last.contacts.planted_BP & contacts.planted_BP & ~contacts.began_BP)[0]
         aim_D3 = stand_flat(legs, aim_D3, turn_33[UP], contacts.weight_BP[0])
         state = replace(last, contacts=contacts, held_H=held_H, path_3=legs.scale_1[0] * root_3, turn_33=turn_33)
@@ -164,7 +168,7 @@ class PlainGround:
         off_3, step = last.off_3 + moved_3, min(passed, self._longest_step)
         off_3[FLAT] -= _back(off_3[FLAT], step)
         share = min(whole, 1.0)
-        level = float(weight_H @ -(state.path_3 + pointing_H3)[:, UP]) / max(whole, 1e-9)
+        level = float(weight_H @ (last.above_H - (state.path_3 + pointing_H3)[:, UP])) / max(whole, 1e-9)
         begun = level if share > 0 else -legs.scale_1[0] * contacts.floor_B[0]
         usual = last.usual if last.known else begun
         usual += share * (1 - np.exp(-step / USUAL_S)) * (level - usual)
@@ -177,7 +181,7 @@ class PlainGround:
         under_H = np.maximum(-wanted_H3[:, UP], 0.0)
         wanted_H3[:, UP] += under_H
         planted_H = contacts.planted_BP[0]
-        wanted_H3[:, UP] = np.where(planted_H, 0.0, wanted_H3[:, UP])
+        wanted_H3[:, UP] = np.where(planted_H, last.above_H, wanted_H3[:, UP])
         wanted_H3[:, FLAT] = np.where(state.held_H[:, None], last.anchor_H2, wanted_H3[:, FLAT])
         counts_H = np.maximum(weight_H, np.minimum(under_H / UNDER_M, 1.0))
         return state, (wanted_H3 - root_3) @ state.turn_33, FREE + (PLANTED - FREE) * counts_H
@@ -200,7 +204,7 @@ class PlainGround:
         root_3[UP] = max(rise, -low_H.min())  # no sole is under the floor
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         anchor_H2 = anchor_H2 + (1.0 - weight_H[:, None]) * ((root_3 + point_H3)[:, FLAT] - anchor_H2)
-        self._state = replace(state, off_3=root_3 - state.path_3, anchor_H2=anchor_H2)
+        self._state = replace(state, off_3=root_3 - state.path_3, anchor_H2=anchor_H2, above_H=point_H3[:, UP] - low_H)
         base_33 = state.turn_33[WORLD] @ axes_33.T
         return Base(root_3[WORLD] - base_33 @ from_3, base_33)
 
@@ -235,11 +239,11 @@ def pointing(legs: Legs, aim_D3: np.ndarray) -> np.ndarray:
 
 
 def stand_flat(legs: Legs, aim_D3: np.ndarray, up_3: np.ndarray, weight_H: np.ndarray) -> np.ndarray:
-    """Directions (D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is the
-    world's, `up_3` as directions see it.
+    """Directions (D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor are
+    planted, its up is the world's, `up_3` as directions see it.
     """
     found_D3, (ahead_R, above_R) = aim_D3.copy(), legs.foot_R2.T
-    share_R1 = weight_H.reshape(-1, 2).min(axis=1)[:, None]
+    share_R1 = (weight_H.reshape(-1, 2).min(axis=1) * standing_share(aim_D3[above_R] @ up_3))[:, None]
     upright_R3 = normalize(aim_D3[above_R] + share_R1 * (up_3 - aim_D3[above_R]))
     forward_R3 = aim_D3[ahead_R]
     forward_R3 = forward_R3 - upright_R3 * (forward_R3 * upright_R3).sum(-1, keepdims=True)

@@ -36,6 +36,7 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
+from mrhubo.motion.readers.units import find_unit
 from mrhubo.motion.readers.world import WORLDS
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
@@ -106,7 +107,17 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         family=family,
         notes=tuple(notes),
     )
-    return to_our_rest(upright(motion, WORLDS, rest))
+    return to_our_rest(_in_metres(upright(motion, WORLDS, rest)))
+
+
+def _in_metres(motion: Motion) -> Motion:
+    """The motion with places in metres, and a note where the file's were not."""
+    place_T3 = motion.arrays.root_position_T3
+    unit = None if place_T3 is None else find_unit(place_T3, motion.frame_rate)
+    if place_T3 is None or unit is None:
+        return motion
+    note = f"'trans' is in {unit[0]}, by how fast or how high the root is: told in metres"
+    return motion.changed(root_position_T3=place_T3 * np.float32(unit[1]), notes=(*motion.notes, note))
 
 
 def _read_pose(file: NpzFile) -> tuple[str, Form, np.ndarray]:

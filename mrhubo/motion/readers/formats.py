@@ -13,6 +13,7 @@ from mrhubo.motion.readers.advice import advice
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.frame_files import frame_files
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.repeats import fill_repeats
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
     if frames := frame_files(path) if os.path.isdir(path) else []:
         from mrhubo.motion.readers.frame_folders import read_frames
 
-        return read_frames(path, frames, options)
+        return fill_repeats(read_frames(path, frames, options))
     content = Content.open(path)
     row = find_format(content)
     if row is None:
@@ -89,7 +90,7 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
         )
     else:
         try:
-            return row.read(path, options)
+            return fill_repeats(row.read(path, options))
         except NoMotion as error:  # a reader may take a file for its own that is none: JSON of anything with joints
             refusal = error
     if (what_to_do := advice(content)) is not None:

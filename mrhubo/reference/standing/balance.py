@@ -27,6 +27,9 @@ MARGIN = 0.3
 STILL_M_S, GOING_M_S = 0.1, 0.3
 """Speeds [m/s] of a person's root, on the robot's scale and level with the floor, up to which it stands still, and from
 which it does not; between them balance counts less and less."""
+LOW_M, AWAY_M = (0.75, 0.6), (0.25, 0.35)
+"""Who sits, kneels or lies is not held by the feet: there the root is lower over the floor than the first height, and
+farther beside the feet than the first distance [m]; from the second ones on that is sure."""
 SMOOTH_S = 0.5
 """Over which time [s] that speed, and then the shift, is the mean."""
 _ALONG = 0.8
@@ -66,7 +69,7 @@ class Balance(nn.Module):
         mass_T3, corner_TC3 = self.places(poses, steps, torch.from_numpy(root_T3))
         corner_TC3 = corner_TC3 + torch.from_numpy(moved_TP3).repeat_interleave(2, dim=1)
         counts_TC = torch.from_numpy(steps.contacts.planted_TP).repeat_interleave(2, dim=1)
-        gone_T2, still_T1 = np.zeros((len(root_T3), 2)), stillness(steps)[:, None]
+        gone_T2, still_T1 = np.zeros((len(root_T3), 2)), (stillness(steps) * on_feet(steps, self.legs.scale))[:, None]
         width = 2 * round(SMOOTH_S * steps.frame_rate / 2) + 1
         for _ in range(_ROUNDS):
             there_T2 = mass_T3[:, _FLAT] + _ALONG * torch.from_numpy(gone_T2)
@@ -95,6 +98,18 @@ def stillness(steps: HumanSteps) -> np.ndarray:
     speed_T = uniform_filter1d(speed_T, 2 * round(SMOOTH_S * rate / 2) + 1, mode="nearest")
     slow_T = np.clip((GOING_M_S - speed_T) / (GOING_M_S - STILL_M_S), 0.0, 1.0)
     return slow_T * steps.contacts.weight_TP.max(axis=1)
+
+
+def on_feet(steps: HumanSteps, scale: float) -> np.ndarray:
+    """How surely it is the feet that hold a person (T,), 0..1, whose path is on the robot's scale."""
+    root_T3 = steps.path_T3.double().cpu() / scale
+    off_T2 = outside(root_T3[:, _FLAT], torch.from_numpy(steps.place_TP3[..., _FLAT]),
+                     torch.from_numpy(steps.contacts.planted_TP))  # fmt: skip
+    shares = [
+        np.clip((value_T.numpy() - first) / (second - first), 0.0, 1.0)
+        for value_T, (first, second) in ((root_T3[:, 1], LOW_M), (off_T2.norm(dim=1), AWAY_M))
+    ]
+    return 1 - shares[0] * shares[1]
 
 
 def outside(point_B2: Tensor, corner_BC2: Tensor, counts_BC: Tensor) -> Tensor:

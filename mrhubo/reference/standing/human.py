@@ -7,6 +7,7 @@ Legend: T frames, P points of soles, D directions.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +15,18 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from mrhubo.fast.roots import CROOKED, FAR_M
+from mrhubo.errors import InputWarning
+from mrhubo.fast.plain.contacts import LIES, STANDS
+from mrhubo.fast.roots import CROOKED, FAR_M, without_jumps
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
+
+_LOWEST = 0.02
+"""Share of the frames in which the body may be under a floor that no sole tells."""
+_MANY = 0.05
+"""Share of the frames with a jump from which on something else must be wrong."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +59,7 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion |
     if not legs.has_feet or not has_root(motion) or not len(motion):
         return None
     root_T33, way_T3 = motion_root(motion, local_TJ33, legs)
+    _warn_of_jumps(as_seen or motion)
     points_TK3, turns_TJ33 = legs.body_map.skeleton.keypoints_and_rotations(local_TJ33)
     world_TK3 = points_TK3 @ root_T33.mT + way_T3[:, None]
     soles_TP3 = world_TK3[:, legs.contacts]
@@ -59,8 +68,13 @@ def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion |
         points_TK3 = skeleton.keypoints(as_seen.for_skeleton(skeleton).local_TJ33.to(local_TJ33))
         soles_TP3 = points_TK3[:, legs.contacts] @ as_seen.root_rotation_T33.to(local_TJ33).mT + way_T3[:, None]
     place_TP3 = soles_TP3.double().cpu().numpy()
-    contacts = find_contacts(place_TP3, motion.frame_rate, given_TP=given_contacts(motion, legs))
-    path_T3 = legs.human_root(world_TK3) - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
+    human_T3, given_TP = legs.human_root(world_TK3), given_contacts(motion, legs)
+    root_T = human_T3[:, 1].double().cpu().numpy()
+    floor = None
+    if given_TP is None and not (place_TP3[..., 1] < root_T[:, None]).any():  # who stands on the hands throughout
+        floor = float(np.quantile(world_TK3[..., 1].amin(dim=1).double().cpu().numpy(), _LOWEST))
+    contacts = find_contacts(place_TP3, motion.frame_rate, floor, given_TP, root_T)
+    path_T3 = human_T3 - world_TK3.new_tensor([0.0, contacts.floor, 0.0])
     return HumanSteps(
         root_T33 @ legs.asked(local_TJ33, turns_TJ33), legs.scale * path_T3, contacts, motion.frame_rate, place_TP3
     )
@@ -80,8 +94,9 @@ def given_contacts(motion: Motion, legs: Legs) -> np.ndarray | None:
     return np.asarray(contact_T4, dtype=bool)[:, columns]
 
 
-def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor, Tensor]:
-    """Rotation (T, 3, 3) and place (T, 3) [m] of a motion's root, whose way is made to fit the skeleton's legs.
+def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs, keep_height: bool = False) -> tuple[Tensor, Tensor]:
+    """Rotation (T, 3, 3) and place (T, 3) [m] of a motion's root, whose way has no jumps (`mrhubo.fast.roots`, which
+    tells of `keep_height`), and is made to fit the skeleton's legs.
 
     Raises:
         UserError: as for `read_steps`.
@@ -95,15 +110,35 @@ def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs) -> tuple[Tensor,
         (root_T3.abs().amax(dim=1) > FAR_M, f"a root farther than {FAR_M / 1000:.0f} km from the origin"),
     ):
         refuse_frames(wrong_T, what)
+    if len(root_T3):
+        root_T3 = torch.from_numpy(without_jumps(root_T3.double().cpu().numpy(), motion.frame_rate, keep_height)[0])
     root_T33, root_T3 = root_T33.to(local_TJ33), root_T3.to(local_TJ33)
     turned_TP3 = legs.body_map.skeleton.keypoints(local_TJ33)[:, legs.contacts] @ root_T33.mT
     soles_TP3, way_T3 = (x.double().cpu().numpy() for x in (turned_TP3, root_T3))
     return root_T33, root_scale(soles_TP3, way_T3, motion.frame_rate) * root_T3
 
 
+def _warn_of_jumps(motion: Motion) -> None:
+    place_T3 = motion.arrays.root_position_T3
+    if place_T3 is None:
+        return
+    far_T = np.linalg.norm(without_jumps(place_T3, motion.frame_rate)[1], axis=1)
+    if not far_T.any():
+        return
+    count, frame = int((far_T > 0).sum()), int(far_T.argmax())
+    jumps = "jumps" if count == 1 else f"jumps {count} times, the most"
+    doubt = "; are its numbers metres, and is the frame rate right?" if count > _MANY * len(far_T) else ""
+    warnings.warn(
+        f"{motion.name}: the root {jumps} by {far_T[frame]:.3g} m to frame {frame}, counted from 0, faster than "
+        f"anybody goes; the robot goes on from where it is{doubt}",
+        InputWarning,
+        stacklevel=3,
+    )
+
+
 def flatten(target_TD3: Tensor, steps: HumanSteps, legs: Legs) -> Tensor:
-    """Directions (T, D, 3) whose planted feet stand flat: as far as rear and front of a sole are planted, its up is the
-    world's.
+    """Directions (T, D, 3) whose planted feet stand flat: as far as rear and front of a sole that faces the floor are
+    planted, its up is the world's.
     """
     up_T3 = steps.turn_T33[:, 1].to(target_TD3)  # the world's up, seen from what carries the legs
     return stand_flat(target_TD3, up_T3, torch.from_numpy(steps.contacts.weight_TP).to(target_TD3), legs)
@@ -114,9 +149,16 @@ def stand_flat(target_TD3: Tensor, up_T3: Tensor, weight_TP: Tensor, legs: Legs)
     found_TD3, names = target_TD3.clone(), legs.body_map.direction_names
     for number, sole in enumerate(legs.soles):
         ahead, above = (names.index(name) for name in sole.part.direction_names)
-        share_T1 = weight_TP[:, 2 * number : 2 * number + 2].amin(dim=1, keepdim=True)
+        facing_T1 = (target_TD3[:, above] * up_T3).sum(-1, keepdim=True)
+        share_T1 = weight_TP[:, 2 * number : 2 * number + 2].amin(dim=1, keepdim=True) * _standing_share(facing_T1)
         upright_T3 = normalize(torch.lerp(target_TD3[:, above], up_T3, share_T1), dim=-1)
         forward_T3 = target_TD3[:, ahead]
         forward_T3 = forward_T3 - upright_T3 * (forward_T3 * upright_T3).sum(-1, keepdim=True)
         found_TD3[:, above], found_TD3[:, ahead] = upright_T3, normalize(forward_T3, dim=-1)
     return found_TD3
+
+
+def _standing_share(up_X: Tensor) -> Tensor:
+    """As `mrhubo.fast.plain.contacts.standing_share`."""
+    share_X = ((up_X - LIES) / (STANDS - LIES)).clamp(0, 1)
+    return share_X.square() * (3 - 2 * share_X)

@@ -46,6 +46,27 @@ def lunge(frames: int = 24, rate: float = 24.0) -> Motion:
     return still.changed(local_TJ33=local_TJ33, root_position_T3=place_T3)
 
 
+def kneel(frames: int = 24, rate: float = 24.0, ankle: float = 0.5) -> Motion:
+    """Kneels upright on shins and insteps, with feet that point backwards [rad], and breathes."""
+    still = _standing(torch.zeros(frames), torch.zeros(frames), rate, 0.0)
+    local_TJ33, breath_T = still.local_TJ33.clone(), 0.01 * torch.linspace(0, 2 * torch.pi, frames).sin()
+    for side in ("left", "right"):
+        knee, foot = (POSED_JOINT_NAMES.index(f"{side}_{name}") for name in ("knee", "ankle"))
+        local_TJ33[:, knee], local_TJ33[:, foot] = _pitch(torch.pi / 2 + breath_T), _pitch(ankle + 0 * breath_T)
+    lowest_T = Skeleton().keypoints(local_TJ33)[..., 1].amin(dim=1)
+    place_T3 = torch.stack((0 * lowest_T, -lowest_T, 0 * lowest_T), dim=1)
+    return still.changed(local_TJ33=local_TJ33, root_position_T3=place_T3)
+
+
+def lie(frames: int = 24, rate: float = 24.0) -> Motion:
+    """Lies still on the right side, legs stretched."""
+    still = _standing(torch.zeros(frames), torch.zeros(frames), rate, 0.0)
+    turn_33 = rotation.axis_angle_to_matrix(torch.tensor([0.0, 0.0, torch.pi / 2]))
+    point_TK3 = Skeleton().keypoints(still.local_TJ33)[:, keypoint_indices(["right_heel", "right_toe"])] @ turn_33.T
+    up_3 = torch.tensor([0.0, -float(point_TK3[..., 1].min()), 0.0])
+    return still.changed(root_rotation_T33=turn_33.repeat(frames, 1, 1), root_position_T3=up_3.repeat(frames, 1))
+
+
 def walk(frames: int, speed: float = 0.6) -> Motion:
     """Goes straight on with bent knees [m/s]: each foot is planted for half a second and swings forward for another; at
     60 frames a second.

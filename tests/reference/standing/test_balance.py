@@ -12,13 +12,14 @@ from mrhubo import rotation
 from mrhubo.config import load_config
 from mrhubo.errors import UserError
 from mrhubo.evaluation.whole_body import score_whole_body
+from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.standing import Legs, read_steps
 from mrhubo.reference.standing.balance import MARGIN, Balance, outside, stillness
 from mrhubo.robot import BodyMap, build_body_map
 from mrhubo.robot.centre_of_mass import CentreOfMass
-from tests.reference.standing.steppers import squat, walk
+from tests.reference.standing.steppers import kneel, lie, squat, walk
 from tests.reference.walkers import ROOTS, walker
 
 
@@ -51,6 +52,17 @@ def test_who_stands_still_is_balanced_and_feet_stay(tmp_path: Path, root: str) -
     assert found[0.0][0] > 0.02 and found[1.0][0] < 0.004
     assert found[1.0][0] < found[0.5][0] < found[0.0][0]
     torch.testing.assert_close(found[1.0][1], found[0.0][1], atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("motion", [lie(), kneel()], ids=["lies", "kneels"])
+def test_who_is_not_held_by_the_feet_is_left_alone(tmp_path: Path, motion: Motion) -> None:
+    """Whose centre of mass is beside them for good."""
+    found = []
+    for balance in (0.0, 1.0):
+        result = OptimizationRetargeter(walker(tmp_path, balance=balance, masses=True))(motion)
+        found.append((result.q, *base(result)))
+    for one, other in zip(*found, strict=True):
+        torch.testing.assert_close(one, other, atol=1e-4, rtol=0)
 
 
 def test_who_walks_is_left_alone(tmp_path: Path) -> None:

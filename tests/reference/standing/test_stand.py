@@ -10,14 +10,14 @@ import torch
 from torch import Tensor
 
 from mrhubo import rotation
-from mrhubo.errors import UserError
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.evaluation.whole_body import lowest, score_whole_body
 from mrhubo.motion import Motion, read_motion
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
 from mrhubo.reference.standing import Legs
 from mrhubo.robot import BodyMap, Robot
-from tests.reference.standing.steppers import bow, jump, lunge, moved, squat
+from tests.reference.standing.steppers import bow, jump, lie, lunge, moved, squat
 from tests.reference.walkers import ROOTS, walker
 
 
@@ -65,6 +65,40 @@ def test_the_root_may_do_what_the_waist_cannot(tmp_path: Path, waist: bool, most
     assert found["chest"][0] < most_deg and found["pelvis"][0] > 15
     assert found["between"][0] == pytest.approx(found["pelvis"][0] / 2, abs=1.0)
     torch.testing.assert_close(found["chest"][1], found["pelvis"][1], atol=1e-5, rtol=0)
+
+
+def test_who_lies_on_a_side_does_not_stand_on_that_foot(retargeter: OptimizationRetargeter) -> None:
+    """Its heel and toe rest on the floor, and its sole faces elsewhere."""
+    motion = lie()
+    result = retargeter(motion)
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert result.contact is not None and result.contact.tolist() == [[False, True]] * len(motion)
+    assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 2 and score.sunk_max_cm < 0.05
+
+
+def test_who_stands_on_the_hands_throughout_is_not_under_the_floor(retargeter: OptimizationRetargeter) -> None:
+    motion = squat(12)
+    over_33 = torch.diag(torch.tensor([1.0, -1.0, -1.0])).repeat(12, 1, 1)
+    motion = motion.changed(root_rotation_T33=over_33, root_position_T3=torch.tensor([[0.0, 1.2, 0.0]]).repeat(12, 1))
+    result = retargeter(motion)
+    assert result.contact is not None and not result.contact.any()
+    legs = Legs(retargeter.body_map)
+    root_T3 = legs.root(retargeter.body_map.robot.forward(result.q), *base(result))
+    assert root_T3[:, 2].min() > 0.2
+    score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
+    assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 4
+
+
+def test_a_root_that_jumps_leaves_the_robot_where_it_stands(retargeter: OptimizationRetargeter) -> None:
+    motion = squat()
+    assert motion.root_position_T3 is not None
+    place_T3 = motion.root_position_T3.clone()
+    place_T3[20:] += torch.tensor([3.0, 0.5, 0.0])
+    with pytest.warns(InputWarning, match=r"person: the root jumps by 3.06 m to frame 20, counted from 0"):
+        result = retargeter(motion.changed(root_position_T3=place_T3))
+    torch.testing.assert_close(result.root_position, retargeter(motion).root_position, atol=0.03, rtol=0)
+    with pytest.warns(InputWarning, match=r"jumps 47 times.* are its numbers metres"):
+        retargeter(motion.changed(root_position_T3=100 * motion.root_position_T3 + 10 * torch.arange(48)[:, None]))
 
 
 def test_who_cannot_stand_flat_on_both_feet_stands_on_both(retargeter: OptimizationRetargeter) -> None:
