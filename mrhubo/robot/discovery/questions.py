@@ -10,7 +10,7 @@ from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
 from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.ranges import driver
-from mrhubo.robot.discovery.result import Candidate, Question
+from mrhubo.robot.discovery.result import Candidate, FoundRange, Question
 from mrhubo.robot.discovery.roles import Roles
 from mrhubo.robot.limits import beyond_turns
 from mrhubo.robot.soles import sole_balls
@@ -133,9 +133,15 @@ def shared_hips(limbs: Limbs) -> dict[str, str]:
     return found
 
 
-def notes(limbs: Limbs) -> Iterator[str]:
-    """Sentences about the whole robot."""
+def notes(limbs: Limbs, ranges: Mapping[str, FoundRange]) -> Iterator[str]:
+    """Sentences about the whole robot, whose joints have these ranges."""
     bodies = limbs.bodies
+    if guessed := [name for name, found in ranges.items() if found.guessed]:
+        more = f" and {len(guessed) - 1} more" if len(guessed) > 1 else ""
+        yield (
+            f"the file tells no limits of '{guessed[0]}'{more}; robot.ranges holds guesses: write the robot's own "
+            "there before it moves"
+        )
     if bodies.degrees:
         joint = next(j for j in bodies.description.joints.values() if j.kind == "revolute" and beyond_turns(j))
         yield (

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
+from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Chain, Hinge, Step
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
@@ -23,7 +23,11 @@ line from hip to ankle on some robots, which then stand on it bent that way."""
 _TIED, _CLEAR = 0.1, 0.3
 """How much further one way a joint bends than the other, as a share, that tells nothing; and from which on it does, as
 the cosine of where the limb goes."""
-_TURN = math.pi
+_TURN, _QUARTER = math.pi, math.pi / 2
+"""How far either way joints without limits are taken to turn: all, and those of which no human's turns farther. Three
+axes that turn all the way round reach every place of a limb twice, once with hip or shoulder turned inside out."""
+_ONE_TURN = 6.6
+"""Range up to which limits of an arm that all are a full turn are a drawing program's, and not the robot's [rad]."""
 _MOST = 14.0
 """Limits wider than that mean none (`robot.limits`)."""
 
@@ -65,6 +69,7 @@ def find_ranges(
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
     steps = [step for chain in chains for step in chain]
+    short = _short(arms, legs, steps)
     for step in steps:
         hinge = driver(bodies, step)
         if hinge is None or not hinge.rotary:
@@ -75,7 +80,14 @@ def find_ranges(
             why = "the URDF calls it continuous, and gives it these limits all the same"
             found[hinge.name] = FoundRange(float(hinge.lower or 0.0), float(hinge.upper or 0.0), why)
         if not _limits_meant(hinge.lower, hinge.upper):
-            found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
+            turn, what = (_QUARTER, "a quarter turn either way") if hinge in short else (_TURN, "a full turn")
+            why = f"the URDF gives it no limits; {what} was taken"
+            found[hinge.name] = FoundRange(-turn, turn, why, guessed=True)
+        elif hinge in short and not hinge.limited:
+            lower, upper = max(float(hinge.lower or 0.0), -_QUARTER), min(float(hinge.upper or 0.0), _QUARTER)
+            if lower < upper:
+                why = "the URDF lets it turn all the way round; a quarter turn either way was taken"
+                found[hinge.name] = FoundRange(lower, upper, why, guessed=True)
     for bend in _bends(arms, legs, forward_3):
         gear = _gear(bodies, bend.step, {step.hinge.name for step in steps})
         if gear is None:
@@ -86,6 +98,29 @@ def find_ranges(
         if question is not None:
             asked.append(question)
     return found, asked
+
+
+def _short(arms: Mapping[str, Arm], legs: Mapping[str, Leg], steps: Iterable[Step]) -> set[Hinge]:
+    """Joints that a human's body turns by a quarter turn at most either way from how it stands, if a file that gives
+    them no limits does not mean it: all of legs, waist and neck but the hip's pitch and the knee; and of an arm of
+    which no joint has limits, clavicles, the twist of the upper arm, and the wrist's.
+    """
+    short = {step.hinge for step in steps} - {step.hinge for arm in arms.values() for step in arm.chain}
+    for leg in legs.values():
+        bends = leg.chain[: leg.knee_at] if leg.hip_at is None else (leg.chain[leg.hip_at],)
+        short -= {step.hinge for step in (*bends, leg.chain[leg.knee_at])}
+    for arm in arms.values():
+        if all(_turns_round(step.hinge) for step in arm.chain):
+            wrist_at = (arm.elbow_at if arm.forearm_twist_at is None else arm.forearm_twist_at) + 1
+            twists = () if arm.twist_at is None else (arm.chain[arm.twist_at],)
+            short |= {step.hinge for step in (*arm.chain[: arm.clavicles], *twists, *arm.chain[wrist_at:])}
+    return short
+
+
+def _turns_round(hinge: Hinge) -> bool:
+    """Whether a file gives a joint no limits, or about one turn, as a drawing program does that knows none."""
+    given = _limits_meant(hinge.lower, hinge.upper)
+    return not given or FULL_TURN < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < _ONE_TURN
 
 
 def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarray) -> Iterator[_Bend]:

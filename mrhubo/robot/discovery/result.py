@@ -70,6 +70,8 @@ class FoundRange:
     lower: float
     upper: float
     why: str
+    guessed: bool = False
+    """Whether the URDF tells no limits at all, so that it is no more than what a human's joint does."""
 
 
 @dataclass(frozen=True)
