@@ -34,7 +34,7 @@ def test_no_hip_and_no_shoulder_can_be_turned_inside_out(root: Path, tmp_path: P
     # Thighs swing, and arms are raised, as far as the file lets them.
     for name in {"LHipSag", "LShSag", "LShLat"} & set(found.ranges):
         assert (found.ranges[name].lower, found.ranges[name].upper) == pytest.approx((-math.pi, math.pi))
-    assert any("tells no limits" in note and "before it moves" in note for note in found.notes)
+    assert any("no limits, or a full turn" in note and "before it moves" in note for note in found.notes)
 
 
 def test_a_joint_that_turns_all_the_way_round_on_an_arm_with_limits_still_does(root: Path, tmp_path: Path) -> None:
