@@ -69,7 +69,7 @@ def find_ranges(
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
     steps = [step for chain in chains for step in chain]
-    short = _short(arms, legs, steps)
+    short, none = _short(arms, legs, steps), not any(step.hinge.limited for step in steps)
     for step in steps:
         hinge = driver(bodies, step)
         if hinge is None or not hinge.rotary:
@@ -82,7 +82,8 @@ def find_ranges(
         if not _limits_meant(hinge.lower, hinge.upper):
             turn, what = (_QUARTER, "a quarter turn either way") if hinge in short else (_TURN, "a full turn")
             why = f"the URDF gives it no limits; {what} was taken"
-            found[hinge.name] = FoundRange(-turn, turn, why, guessed=True)
+            # What has no limits among joints that have some is meant to turn all the way round.
+            found[hinge.name] = FoundRange(-turn, turn, why, guessed=none or hinge in short)
         elif hinge in short and not hinge.limited:
             lower, upper = max(float(hinge.lower or 0.0), -_QUARTER), min(float(hinge.upper or 0.0), _QUARTER)
             if lower < upper:

@@ -71,7 +71,7 @@ class FoundRange:
     upper: float
     why: str
     guessed: bool = False
-    """Whether the URDF tells no limits at all, so that it is no more than what a human's joint does."""
+    """Whether the URDF tells no limits, and does not seem to mean that, so that it is what a human's joint does."""
 
 
 @dataclass(frozen=True)
