@@ -13,6 +13,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies, Step
+from mrhubo.robot.discovery.ends import carried_along
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import turned, usual_range
 from mrhubo.robot.joint import drive
@@ -79,6 +80,11 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
         far = float(np.linalg.norm(bases_3 - arm.wrist.point_3)) > span
         if far and np.linalg.norm(out_3) > 0.5 and -0.2 < float(unit(out_3) @ forearm_3) < _STRAIGHT:
             fingers_3, how = unit(bases_3 - arm.wrist.point_3), "from the wrist to the fingers' bases"
+    # A forearm that only twists ends where what it carries does.
+    tool_3 = None if arm.chain[arm.forearm_twist_at or 0] is last else carried_along(bodies, last, arm.wrist.point_3)
+    if tool_3 is not None and float(tool_3 @ forearm_3) < _STRAIGHT:
+        # At zero the hand is folded against the forearm, as those of Franka's and Universal Robots' arms are.
+        fingers_3, how = tool_3, "along the axis of the last joint, where all lies that it carries"
     thumb_3, told, sure, doubt = rest_3, "the thumb as a human's in the zero pose", 0.4, None
     if len(fingers) >= 3:
         thumb_3, told, sure, doubt = _dexterous(fingers, fingers_3, left, rest_3)

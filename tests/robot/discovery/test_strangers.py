@@ -114,6 +114,35 @@ def test_a_finger_of_three_links_is_no_wrist(tmp_path: Path) -> None:
     assert found.chains["left_arm"][-1] == "left_forearm_joint" and len(found.chains["left_arm"]) == 5
 
 
+def test_a_hand_that_is_folded_at_zero_points_along_the_axis_on_which_it_rolls(tmp_path: Path) -> None:
+    """As Franka's, which lies back along the forearm there."""
+    made = Made()
+    for side in SIDES:
+        wrist = made.join(f"{side}_wrist", made.forearm(side, made.arm(side)), (0, 0, -0.15), Y)
+        roll = made.join(f"{side}_roll", wrist, (0.05, 0, 0), Z)
+        made.join(f"{side}_tool", roll, (0, 0, 0.15), Z, None, "fixed")
+    found = made.found(tmp_path)
+    for side in SIDES:
+        hand = found.ends[f"{side}_hand"]
+        assert (hand.link, hand.axes["fingers"]) == (f"{side}_roll", (0, 0, 1))
+
+
+def test_what_rolls_a_flange_is_no_jaw(tmp_path: Path) -> None:
+    """As the last joint of Universal Robots' arms, which is parallel to the first one of their wrists at zero."""
+    made = Made()
+    for side, sign in SIDES.items():
+        pan = made.join(f"{side}_pan", "chest", (0, 0.2 * sign, 0.4), (0, sign, 0), (-3, 3))
+        lift = made.join(f"{side}_lift", pan, (0, 0.1 * sign, 0), Z, (-3, 3))
+        elbow = made.join(f"{side}_elbow", lift, (0.4, 0, -0.1), Z, (-2.6, 0.0))
+        first = made.join(f"{side}_first", elbow, (0.39, 0, 0), Z)
+        second = made.join(f"{side}_second", first, (0, 0, -0.1), X)
+        third = made.join(f"{side}_third", second, (0.095, 0, 0), Z)
+        made.join(f"{side}_tool", third, (0, 0, -0.08), Z, None, "fixed")
+    found = made.found(tmp_path)
+    assert found.chains["left_arm"][-1] == "left_third_joint" and not found.left_out
+    assert found.ends["left_hand"].axes["fingers"] == pytest.approx((0, 0, -1))
+
+
 def test_a_leg_on_a_wheel_has_no_ankle_that_turns(tmp_path: Path) -> None:
     made = Made()
     for side in SIDES:
