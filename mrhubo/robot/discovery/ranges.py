@@ -26,8 +26,8 @@ the cosine of where the limb goes."""
 _TURN, _QUARTER = math.pi, math.pi / 2
 """How far either way joints without limits are taken to turn: all, and those of which no human's turns farther. Three
 axes that turn all the way round reach every place of a limb twice, once with hip or shoulder turned inside out."""
-_ONE_TURN = 6.6
-"""Range up to which limits of an arm that all are a full turn are a drawing program's, and not the robot's [rad]."""
+_SLACK = 0.3
+"""How much more than one turn is one [rad]. Where all joints of an arm have that, a drawing program wrote it."""
 _MOST = 14.0
 """Limits wider than that mean none (`robot.limits`)."""
 
@@ -84,11 +84,8 @@ def find_ranges(
             why = f"the URDF gives it no limits; {what} was taken"
             # What has no limits among joints that have some is meant to turn all the way round.
             found[hinge.name] = FoundRange(-turn, turn, why, guessed=none or hinge in short)
-        elif hinge in short and not hinge.limited:
-            lower, upper = max(float(hinge.lower or 0.0), -_QUARTER), min(float(hinge.upper or 0.0), _QUARTER)
-            if lower < upper:
-                why = "the URDF lets it turn all the way round; a quarter turn either way was taken"
-                found[hinge.name] = FoundRange(lower, upper, why, guessed=True)
+        elif hinge is step.hinge and (turn := _turn_of(hinge, hinge in short)) is not None:
+            found[hinge.name] = turn
     for bend in _bends(arms, legs, forward_3):
         gear = _gear(bodies, bend.step, {step.hinge.name for step in steps})
         if gear is None:
@@ -103,25 +100,39 @@ def find_ranges(
 
 def _short(arms: Mapping[str, Arm], legs: Mapping[str, Leg], steps: Iterable[Step]) -> set[Hinge]:
     """Joints that a human's body turns by a quarter turn at most either way from how it stands, if a file that gives
-    them no limits does not mean it: all of legs, waist and neck but the hip's pitch and the knee; and of an arm of
-    which no joint has limits, clavicles, the twist of the upper arm, and the wrist's.
+    them no limits does not mean it: all of legs, waist and neck but the hip's pitch and the knee; and of an arm whose
+    upper arm twists, and of which no joint has limits, clavicles, that twist, and the wrist's.
     """
     short = {step.hinge for step in steps} - {step.hinge for arm in arms.values() for step in arm.chain}
     for leg in legs.values():
         bends = leg.chain[: leg.knee_at] if leg.hip_at is None else (leg.chain[leg.hip_at],)
         short -= {step.hinge for step in (*bends, leg.chain[leg.knee_at])}
     for arm in arms.values():
-        if all(_turns_round(step.hinge) for step in arm.chain):
+        if arm.twist_at is not None and all(_turns_round(step.hinge) for step in arm.chain):
             wrist_at = (arm.elbow_at if arm.forearm_twist_at is None else arm.forearm_twist_at) + 1
-            twists = () if arm.twist_at is None else (arm.chain[arm.twist_at],)
-            short |= {step.hinge for step in (*arm.chain[: arm.clavicles], *twists, *arm.chain[wrist_at:])}
+            steps = (*arm.chain[: arm.clavicles], arm.chain[arm.twist_at], *arm.chain[wrist_at:])
+            short |= {step.hinge for step in steps}
     return short
+
+
+def _turn_of(hinge: Hinge, short: bool) -> FoundRange | None:
+    """The part of a range of a turn or more that is needed; None if it is all of it."""
+    lower, upper = float(hinge.lower or 0.0), float(hinge.upper or 0.0)
+    if short and not hinge.limited:
+        lower, upper = max(lower, -_QUARTER), min(upper, _QUARTER)
+        why = "the URDF lets it turn all the way round; a quarter turn either way was taken"
+        return FoundRange(lower, upper, why, guessed=True) if lower < upper else None
+    if upper - lower <= math.tau + _SLACK:
+        return None
+    middle = float(np.clip(0.0, lower + _TURN, upper - _TURN))
+    why = f"the URDF lets it turn farther, {lower:.2f} .. {upper:.2f}; one turn reaches all, and winds nothing up"
+    return FoundRange(middle - _TURN, middle + _TURN, why)
 
 
 def _turns_round(hinge: Hinge) -> bool:
     """Whether a file gives a joint no limits, or about one turn, as a drawing program does that knows none."""
     given = _limits_meant(hinge.lower, hinge.upper)
-    return not given or FULL_TURN < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < _ONE_TURN
+    return not given or FULL_TURN < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < math.tau + _SLACK
 
 
 def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarray) -> Iterator[_Bend]:

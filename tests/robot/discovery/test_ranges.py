@@ -48,6 +48,15 @@ def test_a_joint_that_turns_all_the_way_round_on_an_arm_with_limits_still_does(r
     assert (ends.lower, ends.upper) == pytest.approx((-math.pi, math.pi)) and not found.notes
 
 
+def test_no_joint_winds_up(root: Path, tmp_path: Path) -> None:
+    """Limits of two turns, as of Universal Robots' arms, are cut to the one around 0; an elbow is narrowed after."""
+    found = coman(root, tmp_path, 'lower="-6.28" upper="6.28"', "revolute")
+    for name in ("LShSag", "LShLat", "LForearmPlate"):
+        assert (found.ranges[name].lower, found.ranges[name].upper) == pytest.approx((-math.pi, math.pi)), name
+        assert not found.ranges[name].guessed
+    assert (found.ranges["LElbj"].lower, found.ranges["LElbj"].upper) == pytest.approx((-math.pi, 0.0), abs=1e-3)
+
+
 def test_a_robot_with_limits_is_not_said_to_have_none(root: Path) -> None:
     found = discover(root / "data/robots/coman/coman.urdf", whole_body=True)
     assert not any("limits" in note for note in found.notes) and not any(ends.guessed for ends in found.ranges.values())
