@@ -199,12 +199,13 @@ def _dexterous(
 
 
 def _odd(finger: _Finger, fingers: list[_Finger]) -> float:
-    """How unlike the others a finger is: its axis, and where it begins."""
+    """How unlike the others a finger is: its axis, which way it closes, and where it begins."""
     others = [other for other in fingers if other is not finger]
+    against = 1 - float(np.mean([unit(finger.curl_3) @ unit(other.curl_3) for other in others]))
     turned_away = 1 - float(np.mean([abs(float(finger.axis_3 @ other.axis_3)) for other in others]))
     middle_3 = np.mean([other.base_3 for other in others], axis=0)
     spread = float(np.mean([np.linalg.norm(other.base_3 - middle_3) for other in others]))
-    return turned_away + 0.5 * float(np.linalg.norm(finger.base_3 - middle_3)) / max(spread, 1e-4)
+    return turned_away + 0.5 * against + 0.5 * float(np.linalg.norm(finger.base_3 - middle_3)) / max(spread, 1e-4)
 
 
 def _jaws(

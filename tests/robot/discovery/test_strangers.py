@@ -127,6 +127,24 @@ def test_a_hand_that_is_folded_at_zero_points_along_the_axis_on_which_it_rolls(t
         assert (hand.link, hand.axes["fingers"]) == (f"{side}_roll", (0, 0, 1))
 
 
+def test_the_thumb_of_three_fingers_is_the_one_that_closes_against_the_others(tmp_path: Path) -> None:
+    """As the middle one of Robotiq's hand, which begins no farther from the others than these from each other."""
+    made = Made()
+    for side in SIDES:
+        hand = made.wrist(side, made.forearm(side, made.arm(side)))
+        for word, x, y, axis in (
+            ("one", 0.045, -0.036, X),
+            ("two", -0.045, -0.036, X),
+            ("three", 0, 0.036, (-1, 0, 0)),
+        ):
+            link = made.join(f"{side}_{word}", hand, (x, y, -0.08), axis, (0.0, 1.2))
+            made.join(f"{side}_{word}_tip", link, (0, 0, -0.05), axis, (0.0, 1.2))
+    found = made.found(tmp_path)
+    # Both palms face left, as the first two fingers close.
+    assert found.ends["left_hand"].axes["thumb"] == pytest.approx((-1, 0, 0))
+    assert found.ends["right_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
+
+
 def test_what_rolls_a_flange_is_no_jaw(tmp_path: Path) -> None:
     """As the last joint of Universal Robots' arms, which is parallel to the first one of their wrists at zero."""
     made = Made()
