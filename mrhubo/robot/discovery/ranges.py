@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,8 +82,9 @@ def find_ranges(
         if not _limits_meant(hinge.lower, hinge.upper):
             turn, what = (_QUARTER, "a quarter turn either way") if hinge in short else (_TURN, "a full turn")
             why = f"the URDF gives it no limits; {what} was taken"
-            # What has no limits among joints that have some is meant to turn all the way round.
-            found[hinge.name] = FoundRange(-turn, turn, why, guessed=none or hinge in short)
+            # What is continuous among joints with limits is meant to turn all the way round.
+            guessed = none or hinge in short or bodies.description.joints[hinge.name].kind == "revolute"
+            found[hinge.name] = FoundRange(-turn, turn, why, guessed)
         elif hinge is step.hinge and (turn := _turn_of(hinge, hinge in short)) is not None:
             found[hinge.name] = turn
     for bend in _bends(arms, legs, forward_3):
@@ -92,7 +93,8 @@ def find_ranges(
             continue
         narrowed, question = _human_range(bodies, bend, gear, found)
         if narrowed is not None:
-            found[gear.joint] = narrowed
+            whole = found.get(gear.joint)
+            found[gear.joint] = replace(narrowed, guessed=whole is not None and whole.guessed)
         if question is not None:
             asked.append(question)
     return found, asked

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from mrhubo.errors import UserError
 from mrhubo.robot.discovery import Discovery, discover
 
 _LIMIT = re.compile(r'<limit lower="[^"]*" upper="[^"]*"')
@@ -23,7 +24,9 @@ def coman(root: Path, folder: Path, limit: str, kind: str) -> Discovery:
 
 
 @pytest.mark.parametrize(
-    ("limit", "kind"), [("", "continuous"), ('lower="-3.14159" upper="3.14159"', "revolute")], ids=["none", "a turn"]
+    ("limit", "kind"),
+    [("", "continuous"), ('lower="0" upper="0"', "revolute"), ('lower="-3.14159" upper="3.14159"', "revolute")],
+    ids=["none", "empty", "a turn"],
 )
 def test_no_hip_and_no_shoulder_can_be_turned_inside_out(root: Path, tmp_path: Path, limit: str, kind: str) -> None:
     found = coman(root, tmp_path, limit, kind)
@@ -35,6 +38,15 @@ def test_no_hip_and_no_shoulder_can_be_turned_inside_out(root: Path, tmp_path: P
     for name in {"LHipSag", "LShSag", "LShLat"} & set(found.ranges):
         assert (found.ranges[name].lower, found.ranges[name].upper) == pytest.approx((-math.pi, math.pi))
     assert any("no limits, or a full turn" in note and "before it moves" in note for note in found.notes)
+
+
+def test_limits_that_leave_no_way_to_move_are_named_where_they_hide_the_arms(root: Path, tmp_path: Path) -> None:
+    text = (root / "data/robots/coman/coman.urdf").read_text()
+    joint = re.search(r'<joint name="LShSag".*?</joint>', text, re.DOTALL)
+    assert joint is not None
+    (tmp_path / "robot.urdf").write_text(text.replace(joint[0], _LIMIT.sub('<limit lower="0" upper="0"', joint[0])))
+    with pytest.raises(UserError, match=r"no arms were found; 'LShSag' cannot move, by limits as 0 .. 0: correct them"):
+        discover(tmp_path / "robot.urdf")
 
 
 def test_a_joint_that_turns_all_the_way_round_on_an_arm_with_limits_still_does(root: Path, tmp_path: Path) -> None:
