@@ -22,6 +22,8 @@ _STRAIGHT = 0.8
 """Cosine (37 degrees) up to which fingers are taken to go on as the forearm does: bases of fingers are spread."""
 _CLEAR = 0.35
 """Cosine from which on a direction tells a side."""
+_ALIKE, _PLANE = 0.98, 0.25
+"""Cosine from which on axes are parallel, and how far apart along them jaws begin, as a share of how far across."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
     fingers_3, how = forearm_3, "the forearm's direction at the zero pose"
     rest_3 = _rest_thumb(arm, left * left_3, forward_3)
     span = 0.1 * arm.length
-    fingers = [finger for finger in fingers if np.linalg.norm(finger.tip_3 - arm.wrist.point_3) > span / 2]
+    fingers = _without_rods([f for f in fingers if np.linalg.norm(f.tip_3 - arm.wrist.point_3) > span / 2])
     if fingers:
         bases_3 = np.mean([finger.base_3 for finger in fingers], axis=0)
         tips_3 = np.mean([finger.tip_3 for finger in fingers], axis=0)
@@ -142,6 +144,25 @@ def _fingers(bodies: Bodies, last: Step, wrist_3: np.ndarray) -> list[_Finger]:
         thumb = any("thumb" in name.lower() for name in (on.hinge.name, on.outer_link))
         found.append(_Finger(base_3, tip_3, curl_3, axis_3, slides, thumb))
     return found
+
+
+def _without_rods(fingers: list[_Finger]) -> list[_Finger]:
+    """Two jaws without the rods beside them of loops that a URDF had to cut: all turn about parallel axes, and begin in
+    a plane across these, as many on the one side as on the other, where fingers of a hand lie side by side.
+    """
+    axis_3 = fingers[0].axis_3 if fingers else np.zeros(3)
+    if len(fingers) < 3 or any(abs(float(finger.axis_3 @ axis_3)) < _ALIKE for finger in fingers):
+        return fingers
+    bases = np.array([finger.base_3 for finger in fingers])
+    bases = bases - bases.mean(axis=0)
+    along_N = bases @ axis_3
+    if np.ptp(along_N) > _PLANE * float(np.linalg.norm(bases, axis=-1).max()):
+        return fingers
+    sides_N = bases @ np.linalg.svd(bases - np.outer(along_N, axis_3))[2][0]
+    pairs = [[finger for finger, side in zip(fingers, sides_N, strict=True) if side * sign > 0] for sign in (1, -1)]
+    if len(pairs[0]) != len(pairs[1]) or len(pairs[0]) + len(pairs[1]) < len(fingers):
+        return fingers
+    return [max(pair, key=lambda finger: float(np.linalg.norm(finger.tip_3 - finger.base_3))) for pair in pairs]
 
 
 def _closing(bodies: Bodies, name: str) -> float:

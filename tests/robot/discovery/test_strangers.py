@@ -145,6 +145,23 @@ def test_the_thumb_of_three_fingers_is_the_one_that_closes_against_the_others(tm
     assert found.ends["right_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
 
 
+def test_two_jaws_with_a_rod_beside_each_are_no_four_fingers(tmp_path: Path) -> None:
+    """As Robotiq's grippers without the loops, and without <mimic>."""
+    made = Made()
+    for side in SIDES:
+        hand = made.wrist(side, made.forearm(side, made.arm(side)))
+        for word, y in (("driver", 0.03), ("spring", 0.013), ("other_driver", -0.03), ("other_spring", -0.013)):
+            link = made.join(f"{side}_{word}", hand, (0, y, -0.06), X if y < 0 else (-1, 0, 0), (0.0, 0.8))
+            made.join(f"{side}_{word}_end", link, (0, y, -0.05), X, (-0.8, 0.8))
+    found = made.found(tmp_path)
+    for side, sign in SIDES.items():
+        assert found.ends[f"{side}_hand"].axes["thumb"] == pytest.approx((0, -sign, 0))
+        assert any(
+            question.about == f"{side}_hand" and "a gripper has no thumb" in question.text
+            for question in found.questions
+        )
+
+
 def test_what_rolls_a_flange_is_no_jaw(tmp_path: Path) -> None:
     """As the last joint of Universal Robots' arms, which is parallel to the first one of their wrists at zero."""
     made = Made()
