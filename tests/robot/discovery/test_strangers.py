@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mrhubo.describing.run import open_robot
 from mrhubo.errors import UserError
+from mrhubo.robot import BodyMap
 from mrhubo.robot.discovery import Discovery, discover
 from mrhubo.robot.generator import humanoid
 from mrhubo.robot.generator.score import mistakes
@@ -210,6 +212,37 @@ def test_an_ankle_that_no_joint_tells_lies_over_the_foot(tmp_path: Path, pitch: 
     ahead, aside, up = turn_33.T @ (ankle_3 - knee_3)
     assert aside == pytest.approx(0) and -0.03 < ahead < 0.03 and -0.43 < up < -0.36
     assert {"left_ankle", "right_ankle"} <= about(found)
+
+
+def test_no_warning_doubts_what_the_axes_tell_where_a_hinge_lies_far_beside_the_arm(
+    tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    """As the elbow of Franka's arm does: the forearm's length changes as it bends, and no other point is better."""
+    made = Made()
+    for side in SIDES:
+        elbow = made.join(f"{side}_elbow", made.arm(side), (0.08, 0, -0.3), Y, (-3.0, 0.0))
+        made.wrist(side, made.join(f"{side}_forearm", elbow, (-0.08, 0, -0.1), Z))
+    made.found(tmp_path)
+    BodyMap.of(open_robot(str(tmp_path / "made.urdf")))
+    assert not [str(warning.message) for warning in recwarn if "keeps its length" in str(warning.message)]
+
+
+def test_a_column_that_keeps_the_chest_upright_is_held(tmp_path: Path) -> None:
+    """As that of Rollin' Justin: no direction tells its angle, and a robot that moves it is refused."""
+    made = Made()
+    made.parts.append("<link name='base'/>")
+    yaw = made.join("yaw", "base", (0, 0, 0.4), Z)
+    column = made.join("column", yaw, (0, 0, 0.1), Y, (-1.0, 1.0))
+    made.parts.append(
+        f"<joint name='back' type='revolute'><parent link='{column}'/><child link='chest'/><origin xyz='0 0 0.4'/>"
+        "<axis xyz='0 -1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/><mimic joint='column_joint'/></joint>"
+    )
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    found = made.found(tmp_path)
+    assert found.chains["waist"] == ("yaw_joint", "column_joint", "back")
+    assert "yaw_joint" in found.joints and {"column_joint", "back"} <= set(found.held)
+    assert about(found) == {"left_hand", "right_hand"}
 
 
 def test_a_body_of_balls_is_read_as_its_bones(tmp_path: Path) -> None:
