@@ -34,6 +34,8 @@ _NO_LENGTH = 1e-4
 """Metres under which a limb has no direction, and under which a link stays where it is."""
 _STEADY, _STRETCHED = 1.1, 1.2
 """How many times longer than at its shortest a limb may be: to be one limb at all, and without a word."""
+_TOLD = 1e-3
+"""Metres from a joint's centre up to which a point lies there."""
 _LONG = 5.0
 """Metres beyond which a limb's length is probably in millimetres."""
 _RATIO = (0.2, 2.0)
@@ -165,7 +167,7 @@ def _check_lengths(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, 
                 f"direction; choose another link or an offset{advice}"
             )
         between = f"from '{limb.part.start}' ('{limb.start.link}') to '{limb.part.end}' ('{limb.end.link}')"
-        if longest > _STRETCHED * shortest:
+        if longest > _STRETCHED * shortest and not _as_told(body_map, limb):
             warn(
                 f"robot.keypoints: the {_words(limb)} {between} is {_centimetres((shortest, longest))} long, as the "
                 "joints stand, and a limb keeps its length; take links or offsets at its two joints"
@@ -184,6 +186,15 @@ def _check_lengths(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, 
                     f"what it hangs on {_centimetres(inner)} (are these points at the limbs' joints?)"
                     f"{advice}"
                 )
+
+
+def _as_told(body_map: BodyMap, limb: Limb) -> bool:
+    """Whether a limb's ends are where the axes tell them, as those of an elbow whose hinge lies far beside the arm, so
+    that there are no better ones.
+    """
+    ends = ((limb.part.start, limb.start), (limb.part.end, limb.end))
+    distances = [body_map.yardstick.distance(name, point) for name, point in ends]
+    return all(distance is not None and distance < _TOLD for distance in distances)
 
 
 def _words(limb: Limb) -> str:

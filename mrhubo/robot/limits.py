@@ -42,6 +42,19 @@ def with_soft_limits(joint: Joint, safety_controller: etree._Element | None) -> 
     return dataclasses.replace(joint, lower=lower, upper=upper, limited_by="the URDF's soft limits")
 
 
+def without_empty_limits(joints: Mapping[str, Joint]) -> dict[str, Joint]:
+    """The joints, those that turn without limits where a file has 0 .. 0 for all of them: drawing programs write that
+    where they know none, and a robot of which nothing can move is none.
+    """
+    turning = [joint for joint in joints.values() if joint.rotary]
+    if not turning or any((joint.lower, joint.upper) != (0.0, 0.0) for joint in turning):
+        return dict(joints)
+    return {
+        name: dataclasses.replace(joint, lower=None, upper=None) if joint.rotary else joint
+        for name, joint in joints.items()
+    }
+
+
 def _tighter(pick: Callable[[float, float], float], hard: float | None, soft: float | None) -> float | None:
     return hard if soft is None else soft if hard is None else pick(hard, soft)
 

@@ -61,7 +61,8 @@ def clean_joint(document: Document, joint: etree._Element, found: Findings) -> e
     clean = etree.Element("joint", name=str(joint.get("name")), type=str(joint.get("type")))
     for tag, attributes in _READ.items():
         element = joint.find(tag)
-        if element is None:
+        # Where a floating base is at the start says nothing of the robot; it is where the motion has it.
+        if element is None or (tag == "origin" and joint.get("type") == "floating"):
             continue
         given = {word: str(element.get(word)) for word in attributes if element.get(word) is not None}
         most, infinite = (math.inf, True) if tag == "limit" else (MOST_FACTOR, False)

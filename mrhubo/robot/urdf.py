@@ -22,7 +22,7 @@ from mrhubo.config import fingerprint
 from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.document import read_text
 from mrhubo.robot.joint import ROTARY, Joint, Mimic
-from mrhubo.robot.limits import with_soft_limits
+from mrhubo.robot.limits import with_soft_limits, without_empty_limits
 from mrhubo.robot.solid_shapes import SolidShapes, read_solids
 from mrhubo.robot.tree import Tree, read_tree
 
@@ -202,7 +202,7 @@ def _described(path: Path, text: bytes) -> Description:
     tree = read_tree(path, text)
     parsed = _parsed(tree)
     read = {joint.name: joint for joint in parsed.robot.joints}
-    joints = {name: _joint(element, read.get(name)) for name, element in tree.joints.items()}
+    joints = without_empty_limits({name: _joint(element, read.get(name)) for name, element in tree.joints.items()})
     above = {joint.child: joint for joint in joints.values()}
     return Description(
         path, tree.root, tree.links, joints, above, parsed,

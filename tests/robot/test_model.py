@@ -153,6 +153,20 @@ def test_a_floating_base_is_taken_as_fixed(arm: Arm) -> None:
     assert Robot(path, ["shoulder"]).description.root == "world"
 
 
+def test_where_a_floating_base_starts_is_no_part_of_the_robot(arm: Arm) -> None:
+    """MuJoCo's free joint has the place of the link that floats, and so has an answer, whose base is the root."""
+    free = (
+        '<joint name="free" type="floating"><origin xyz="0 0 0.9" rpy="0 0 1.5"/><parent link="world"/>'
+        '<child link="base"/></joint><joint name="shoulder"'
+    )
+    path = arm(('<link name="base"/>', '<link name="world"/><link name="base"/>'), ('<joint name="shoulder"', free))
+    robot = Robot(path, ["shoulder"], ["base"])
+    poses = robot.forward(robot.home()[None])
+    base = robot.link_index("base")
+    assert torch.equal(poses.position_BL3[0, base], torch.zeros(3))
+    assert torch.allclose(poses.rotation_BL33[0, base], torch.eye(3))
+
+
 def test_entities_are_not_expanded(arm: Arm) -> None:
     bomb = '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="arm">&a;'
     path = arm(('<robot name="arm">', bomb))

@@ -84,6 +84,7 @@ class _Finder:
         legs = self.legs if limbs.whole_body else {}
         ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading.forward_3)
         joints = limbs.moved()
+        ranges = {name: found for name, found in ranges.items() if name in joints}
         held = dict(limbs.held(joints))
         points = dict(self._points(spots))
         return Discovery(
@@ -96,10 +97,10 @@ class _Finder:
             joints=joints,
             held=held,
             left_out=dict(limbs.left_out({*joints, *held})),
-            ranges={name: found for name, found in ranges.items() if name in joints},
+            ranges=ranges,
             key_links=limbs.key_links(),
             questions=(*questions(limbs, spots, self.feet), *asked, *coupled(limbs)),
-            notes=tuple(notes(limbs)),
+            notes=tuple(notes(limbs, ranges)),
             geometric={name: point for name, point in points.items() if point.confidence >= 0.75},
             whole_body=limbs.whole_body,
         )

@@ -8,11 +8,13 @@ import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.limbs import ways_on
-from mrhubo.robot.discovery.lines import measure, unit
+from mrhubo.robot.discovery.lines import ON, measure, unit
 from mrhubo.robot.discovery.names import speaks_of
 
 OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
+_ROLLS = 0.02
+"""How far along its axis a hand reaches at least that rolls, as a share of the robot's size."""
 
 
 def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
@@ -79,3 +81,20 @@ def limb_end(
         f"a guess: as long as the limb before it, and straight, as nothing tells the {called}",
         0.1,
     )
+
+
+def carried_along(bodies: Bodies, last: Step, start_3: np.ndarray) -> np.ndarray | None:
+    """In which direction of a joint's axis all lies that it carries (3,), as a hand does on a wrist that rolls; None if
+    some lies beside it, as a finger does beside the axis of its jaw, or nothing tells.
+    """
+    line = last.hinge.line
+    points = np.concatenate([bodies.corners(body) for body in bodies.beyond(last)[0]])
+    # The joint's own origin lies on its axis, wherever along it a file puts it, and says nothing.
+    points = points[np.linalg.norm(points - bodies.position(last.outer_link), axis=-1) > ON * bodies.size]
+    if not len(points):
+        return None
+    out_N3 = points - line.nearest(start_3)
+    along_N = out_N3 @ line.axis_3
+    beside = float(np.linalg.norm(out_N3 - np.outer(along_N, line.axis_3), axis=-1).mean())
+    along = float(along_N.mean())
+    return line.axis_3 * np.sign(along) if abs(along) > max(_ROLLS * bodies.size, 2 * beside) else None

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import WRIST_JOINTS, ball_of, elbow_reach, find_elbow
+from mrhubo.robot.discovery.ends import carried_along
 from mrhubo.robot.discovery.lines import ON, PARALLEL, Line, feet, measure, sine, unit
 from mrhubo.robot.discovery.names import speaks_of
 
@@ -49,7 +50,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
             continue
         break
     if end == len(chain) and elbow_at and not bodies.onward(chain[-1]):
-        if end > first + 1 and _is_jaw(chain, elbow_at):
+        if end > first + 1 and _is_jaw(chain, elbow_at) and not _rolls(bodies, chain):
             end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
         elif end == first + 1 and _is_lone_jaw(bodies, chain, elbow_at):
             end, why = end - 1, "its axis lies beside the forearm's middle and it carries no more than a finger: a jaw"
@@ -93,6 +94,12 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
         return False  # two axes that cross are a wrist, wherever the forearm's twist passes them
     twists = [line for line in lines[first:-1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def _rolls(bodies: Bodies, chain: Chain) -> bool:
+    """Whether what the last joint carries lies along its axis, as a tool's flange does."""
+    before, last = lines_of(chain)[-2:]
+    return carried_along(bodies, chain[-1], feet(before, last)[1]) is not None
 
 
 def _is_lone_jaw(bodies: Bodies, chain: Chain, elbow_at: int) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies, Step
+from mrhubo.robot.discovery.ends import carried_along
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import turned, usual_range
 from mrhubo.robot.joint import drive
@@ -21,6 +22,8 @@ _STRAIGHT = 0.8
 """Cosine (37 degrees) up to which fingers are taken to go on as the forearm does: bases of fingers are spread."""
 _CLEAR = 0.35
 """Cosine from which on a direction tells a side."""
+_ALIKE, _PLANE = 0.98, 0.25
+"""Cosine from which on axes are parallel, and how far apart along them jaws begin, as a share of how far across."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
     fingers_3, how = forearm_3, "the forearm's direction at the zero pose"
     rest_3 = _rest_thumb(arm, left * left_3, forward_3)
     span = 0.1 * arm.length
-    fingers = [finger for finger in fingers if np.linalg.norm(finger.tip_3 - arm.wrist.point_3) > span / 2]
+    fingers = _without_rods([f for f in fingers if np.linalg.norm(f.tip_3 - arm.wrist.point_3) > span / 2])
     if fingers:
         bases_3 = np.mean([finger.base_3 for finger in fingers], axis=0)
         tips_3 = np.mean([finger.tip_3 for finger in fingers], axis=0)
@@ -79,6 +82,11 @@ def read_hand(bodies: Bodies, arm: Arm, left: float, left_3: np.ndarray, forward
         far = float(np.linalg.norm(bases_3 - arm.wrist.point_3)) > span
         if far and np.linalg.norm(out_3) > 0.5 and -0.2 < float(unit(out_3) @ forearm_3) < _STRAIGHT:
             fingers_3, how = unit(bases_3 - arm.wrist.point_3), "from the wrist to the fingers' bases"
+    # A forearm that only twists ends where what it carries does.
+    tool_3 = None if arm.chain[arm.forearm_twist_at or 0] is last else carried_along(bodies, last, arm.wrist.point_3)
+    if tool_3 is not None and float(tool_3 @ forearm_3) < _STRAIGHT:
+        # At zero the hand is folded against the forearm, as those of Franka's and Universal Robots' arms are.
+        fingers_3, how = tool_3, "along the axis of the last joint, where all lies that it carries"
     thumb_3, told, sure, doubt = rest_3, "the thumb as a human's in the zero pose", 0.4, None
     if len(fingers) >= 3:
         thumb_3, told, sure, doubt = _dexterous(fingers, fingers_3, left, rest_3)
@@ -138,6 +146,25 @@ def _fingers(bodies: Bodies, last: Step, wrist_3: np.ndarray) -> list[_Finger]:
     return found
 
 
+def _without_rods(fingers: list[_Finger]) -> list[_Finger]:
+    """Two jaws without the rods beside them of loops that a URDF had to cut: all turn about parallel axes, and begin in
+    a plane across these, as many on the one side as on the other, where fingers of a hand lie side by side.
+    """
+    axis_3 = fingers[0].axis_3 if fingers else np.zeros(3)
+    if len(fingers) < 3 or any(abs(float(finger.axis_3 @ axis_3)) < _ALIKE for finger in fingers):
+        return fingers
+    bases = np.array([finger.base_3 for finger in fingers])
+    bases = bases - bases.mean(axis=0)
+    along_N = bases @ axis_3
+    if np.ptp(along_N) > _PLANE * float(np.linalg.norm(bases, axis=-1).max()):
+        return fingers
+    sides_N = bases @ np.linalg.svd(bases - np.outer(along_N, axis_3))[2][0]
+    pairs = [[finger for finger, side in zip(fingers, sides_N, strict=True) if side * sign > 0] for sign in (1, -1)]
+    if len(pairs[0]) != len(pairs[1]) or len(pairs[0]) + len(pairs[1]) < len(fingers):
+        return fingers
+    return [max(pair, key=lambda finger: float(np.linalg.norm(finger.tip_3 - finger.base_3))) for pair in pairs]
+
+
 def _closing(bodies: Bodies, name: str) -> float:
     """Which way a joint of a finger goes as it closes: towards its longer side from zero."""
     joints = bodies.description.joints
@@ -193,12 +220,13 @@ def _dexterous(
 
 
 def _odd(finger: _Finger, fingers: list[_Finger]) -> float:
-    """How unlike the others a finger is: its axis, and where it begins."""
+    """How unlike the others a finger is: its axis, which way it closes, and where it begins."""
     others = [other for other in fingers if other is not finger]
+    against = 1 - float(np.mean([unit(finger.curl_3) @ unit(other.curl_3) for other in others]))
     turned_away = 1 - float(np.mean([abs(float(finger.axis_3 @ other.axis_3)) for other in others]))
     middle_3 = np.mean([other.base_3 for other in others], axis=0)
     spread = float(np.mean([np.linalg.norm(other.base_3 - middle_3) for other in others]))
-    return turned_away + 0.5 * float(np.linalg.norm(finger.base_3 - middle_3)) / max(spread, 1e-4)
+    return turned_away + 0.5 * against + 0.5 * float(np.linalg.norm(finger.base_3 - middle_3)) / max(spread, 1e-4)
 
 
 def _jaws(

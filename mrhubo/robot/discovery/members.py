@@ -6,13 +6,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Step
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step, lines_of
 from mrhubo.robot.discovery.facing import Heading
 from mrhubo.robot.discovery.hand import Hand
 from mrhubo.robot.discovery.leg import Leg
+from mrhubo.robot.discovery.lines import PARALLEL, sine
 from mrhubo.robot.discovery.ranges import driver
 from mrhubo.robot.discovery.roles import Roles
+from mrhubo.robot.joint import drive
+
+_STILL = 0.02
+"""By how much of a joint's angle a chain may turn that is meant not to: what rounded multipliers leave."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +56,25 @@ class Limbs:
 
     def moved(self) -> tuple[str, ...]:
         """The joints by which the limbs are driven, chain by chain."""
-        steps = [step for name in self.chains for step in self.moving.get(name, ())]
-        found = [hinge.name for step in steps if (hinge := driver(self.bodies, step)) is not None and hinge.rotary]
+        found = [
+            hinge.name
+            for name in self.chains for step in self.moving.get(name, ())
+            if (hinge := driver(self.bodies, step)) is not None and hinge.rotary
+            and not self._turned_back(self.moving[name], hinge)
+        ]  # fmt: skip
         return tuple(dict.fromkeys(found))
+
+    def _turned_back(self, chain: Chain, hinge: Hinge) -> bool:
+        """Whether what a joint turns of a chain is turned back by those that mimic it, as a column's parallelogram is,
+        so that it only carries.
+        """
+        at = [i for i, step in enumerate(chain) if driver(self.bodies, step) is hinge]
+        lines = lines_of(chain[at[0] : at[-1] + 1])
+        if len(at) < 2 or any(sine(line.axis_3, lines[0].axis_3) > PARALLEL for line in lines):
+            return False
+        joints = self.bodies.description.joints
+        net_3 = sum(chain[i].sign * drive(joints, chain[i].hinge.name).multiplier * lines[i - at[0]].axis_3 for i in at)
+        return float(np.linalg.norm(net_3)) < _STILL
 
     def held(self, moved: tuple[str, ...]) -> Iterator[tuple[str, str]]:
         """The other joints of the chains, and why they do not move."""

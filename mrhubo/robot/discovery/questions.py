@@ -10,7 +10,7 @@ from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
 from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.ranges import driver
-from mrhubo.robot.discovery.result import Candidate, Question
+from mrhubo.robot.discovery.result import Candidate, FoundRange, Question
 from mrhubo.robot.discovery.roles import Roles
 from mrhubo.robot.limits import beyond_turns
 from mrhubo.robot.soles import sole_balls
@@ -67,7 +67,8 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.legs is not None and (more := _more_legs(roles)):
         yield Question("pelvis", "it carries more than two limbs that may be legs; those were taken that are like a "
                        "human's, or longest, and the others stay as they are", more)  # fmt: skip
-    turning = tuple(step.hinge.name for step in roles.waist if step.hinge.rotary)
+    moved = limbs.moved()
+    turning = tuple(step.hinge.name for step in roles.waist if step.hinge.name in moved)
     if roles.legs is None and len(turning) > _BACK:
         yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
                        "which may be a tail or an arm", turning)  # fmt: skip
@@ -108,7 +109,7 @@ def _more_legs(roles: Roles) -> tuple[str, ...]:
 def coupled(limbs: Limbs) -> Iterator[Question]:
     """Joints of moving limbs that mimic others of them: as a file may have it that is for a show of one side."""
     moving = [step for chain in limbs.moving.values() for step in chain]
-    whole = {step.hinge.name for step in moving}
+    whole = {step.hinge.name for step in moving} & set(limbs.moved())
     for step in (step for step in moving if not step.hinge.free and step.hinge.name not in shared_hips(limbs)):
         source = driver(limbs.bodies, step)
         if source is not None and source.name in whole:
@@ -133,9 +134,15 @@ def shared_hips(limbs: Limbs) -> dict[str, str]:
     return found
 
 
-def notes(limbs: Limbs) -> Iterator[str]:
-    """Sentences about the whole robot."""
+def notes(limbs: Limbs, ranges: Mapping[str, FoundRange]) -> Iterator[str]:
+    """Sentences about the whole robot, whose joints have these ranges."""
     bodies = limbs.bodies
+    if guessed := [name for name, found in ranges.items() if found.guessed]:
+        more = f" and {len(guessed) - 1} more" if len(guessed) > 1 else ""
+        yield (
+            f"the file gives '{guessed[0]}'{more} no limits, or a full turn; robot.ranges holds guesses: write the "
+            "robot's own there before it moves"
+        )
     if bodies.degrees:
         joint = next(j for j in bodies.description.joints.values() if j.kind == "revolute" and beyond_turns(j))
         yield (

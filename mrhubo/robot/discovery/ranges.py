@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
+from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Chain, Hinge, Step
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
@@ -23,7 +23,11 @@ line from hip to ankle on some robots, which then stand on it bent that way."""
 _TIED, _CLEAR = 0.1, 0.3
 """How much further one way a joint bends than the other, as a share, that tells nothing; and from which on it does, as
 the cosine of where the limb goes."""
-_TURN = math.pi
+_TURN, _QUARTER = math.pi, math.pi / 2
+"""How far either way joints without limits are taken to turn: all, and those of which no human's turns farther. Three
+axes that turn all the way round reach every place of a limb twice, once with hip or shoulder turned inside out."""
+_SLACK = 0.3
+"""How much more than one turn is one [rad]. Where all joints of an arm have that, a drawing program wrote it."""
 _MOST = 14.0
 """Limits wider than that mean none (`robot.limits`)."""
 
@@ -65,6 +69,7 @@ def find_ranges(
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
     steps = [step for chain in chains for step in chain]
+    short, none = _short(arms, legs, steps), not any(step.hinge.limited for step in steps)
     for step in steps:
         hinge = driver(bodies, step)
         if hinge is None or not hinge.rotary:
@@ -75,17 +80,61 @@ def find_ranges(
             why = "the URDF calls it continuous, and gives it these limits all the same"
             found[hinge.name] = FoundRange(float(hinge.lower or 0.0), float(hinge.upper or 0.0), why)
         if not _limits_meant(hinge.lower, hinge.upper):
-            found[hinge.name] = FoundRange(-_TURN, _TURN, "the URDF gives it no limits; a full turn was taken")
+            turn, what = (_QUARTER, "a quarter turn either way") if hinge in short else (_TURN, "a full turn")
+            why = f"the URDF gives it no limits; {what} was taken"
+            # What is continuous among joints with limits is meant to turn all the way round.
+            guessed = none or hinge in short or bodies.description.joints[hinge.name].kind == "revolute"
+            found[hinge.name] = FoundRange(-turn, turn, why, guessed)
+        elif hinge is step.hinge and (turn := _turn_of(hinge, hinge in short)) is not None:
+            found[hinge.name] = turn
     for bend in _bends(arms, legs, forward_3):
         gear = _gear(bodies, bend.step, {step.hinge.name for step in steps})
         if gear is None:
             continue
         narrowed, question = _human_range(bodies, bend, gear, found)
         if narrowed is not None:
-            found[gear.joint] = narrowed
+            whole = found.get(gear.joint)
+            found[gear.joint] = replace(narrowed, guessed=whole is not None and whole.guessed)
         if question is not None:
             asked.append(question)
     return found, asked
+
+
+def _short(arms: Mapping[str, Arm], legs: Mapping[str, Leg], steps: Iterable[Step]) -> set[Hinge]:
+    """Joints that a human's body turns by a quarter turn at most either way from how it stands, if a file that gives
+    them no limits does not mean it: all of legs, waist and neck but the hip's pitch and the knee; and of an arm whose
+    upper arm twists, and of which no joint has limits, clavicles, that twist, and the wrist's.
+    """
+    short = {step.hinge for step in steps} - {step.hinge for arm in arms.values() for step in arm.chain}
+    for leg in legs.values():
+        bends = leg.chain[: leg.knee_at] if leg.hip_at is None else (leg.chain[leg.hip_at],)
+        short -= {step.hinge for step in (*bends, leg.chain[leg.knee_at])}
+    for arm in arms.values():
+        if arm.twist_at is not None and all(_turns_round(step.hinge) for step in arm.chain):
+            wrist_at = (arm.elbow_at if arm.forearm_twist_at is None else arm.forearm_twist_at) + 1
+            steps = (*arm.chain[: arm.clavicles], arm.chain[arm.twist_at], *arm.chain[wrist_at:])
+            short |= {step.hinge for step in steps}
+    return short
+
+
+def _turn_of(hinge: Hinge, short: bool) -> FoundRange | None:
+    """The part of a range of a turn or more that is needed; None if it is all of it."""
+    lower, upper = float(hinge.lower or 0.0), float(hinge.upper or 0.0)
+    if short and not hinge.limited:
+        lower, upper = max(lower, -_QUARTER), min(upper, _QUARTER)
+        why = "the URDF lets it turn all the way round; a quarter turn either way was taken"
+        return FoundRange(lower, upper, why, guessed=True) if lower < upper else None
+    if upper - lower <= math.tau + _SLACK:
+        return None
+    middle = float(np.clip(0.0, lower + _TURN, upper - _TURN))
+    why = f"the URDF lets it turn farther, {lower:.2f} .. {upper:.2f}; one turn reaches all, and winds nothing up"
+    return FoundRange(middle - _TURN, middle + _TURN, why)
+
+
+def _turns_round(hinge: Hinge) -> bool:
+    """Whether a file gives a joint no limits, or about one turn, as a drawing program does that knows none."""
+    given = _limits_meant(hinge.lower, hinge.upper)
+    return not given or FULL_TURN < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < math.tau + _SLACK
 
 
 def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarray) -> Iterator[_Bend]:

@@ -90,7 +90,7 @@ def _read(
                 joint.kind not in (*ROTARY, "prismatic")
                 or name in description.faults
                 or name in fixed
-                or _stuck(joint.lower, joint.upper)
+                or stuck(joint.lower, joint.upper)
             ):
                 body_of[joint.child] = body_of[link]
                 continue
@@ -118,7 +118,7 @@ def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else math.radians(degrees)
 
 
-def _stuck(lower: float | None, upper: float | None) -> bool:
+def stuck(lower: float | None, upper: float | None) -> bool:
     """Whether limits leave a joint no way to move."""
     return lower is not None and upper is not None and upper - lower < 1e-3
 

@@ -70,6 +70,8 @@ class FoundRange:
     lower: float
     upper: float
     why: str
+    guessed: bool = False
+    """Whether the URDF tells no limits, and does not seem to mean that, so that it is what a human's joint does."""
 
 
 @dataclass(frozen=True)

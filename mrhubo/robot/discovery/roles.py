@@ -16,6 +16,7 @@ from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
 from mrhubo.robot.discovery.necks import find_necks
+from mrhubo.robot.discovery.reading import stuck
 from mrhubo.robot.discovery.symmetry import Pair, alike
 
 _TINY = 0.1
@@ -150,7 +151,9 @@ def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
 
 
 def _following(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, which hides its own; else nothing."""
+    """The end of a sentence on a joint that mimics one of another limb, which hides its own, or on joints whose limits
+    leave them no way to move; else nothing.
+    """
     root = bodies.body_of[bodies.description.root]
     for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
         mimic = bodies.description.joints[hinge.name].mimic
@@ -161,7 +164,12 @@ def _following(bodies: Bodies) -> str:
                 f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
                 "take the <mimic> elements of such joints out of the URDF"
             )
-    return ""
+    still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint.lower, joint.upper)]
+    if not still:
+        return ""
+    first, more = still[0], f" and {len(still) - 1} more" * (len(still) > 1)
+    ends = f"{first.lower:g} .. {first.upper:g}"
+    return f"; '{first.name}'{more} cannot move, by limits as {ends}: correct them if it can"
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mrhubo.describing.run import open_robot
 from mrhubo.errors import UserError
+from mrhubo.robot import BodyMap
 from mrhubo.robot.discovery import Discovery, discover
 from mrhubo.robot.generator import humanoid
 from mrhubo.robot.generator.score import mistakes
@@ -114,6 +116,70 @@ def test_a_finger_of_three_links_is_no_wrist(tmp_path: Path) -> None:
     assert found.chains["left_arm"][-1] == "left_forearm_joint" and len(found.chains["left_arm"]) == 5
 
 
+def test_a_hand_that_is_folded_at_zero_points_along_the_axis_on_which_it_rolls(tmp_path: Path) -> None:
+    """As Franka's, which lies back along the forearm there."""
+    made = Made()
+    for side in SIDES:
+        wrist = made.join(f"{side}_wrist", made.forearm(side, made.arm(side)), (0, 0, -0.15), Y)
+        roll = made.join(f"{side}_roll", wrist, (0.05, 0, 0), Z)
+        made.join(f"{side}_tool", roll, (0, 0, 0.15), Z, None, "fixed")
+    found = made.found(tmp_path)
+    for side in SIDES:
+        hand = found.ends[f"{side}_hand"]
+        assert (hand.link, hand.axes["fingers"]) == (f"{side}_roll", (0, 0, 1))
+
+
+def test_the_thumb_of_three_fingers_is_the_one_that_closes_against_the_others(tmp_path: Path) -> None:
+    """As the middle one of Robotiq's hand, which begins no farther from the others than these from each other."""
+    made = Made()
+    for side in SIDES:
+        hand = made.wrist(side, made.forearm(side, made.arm(side)))
+        for word, x, y, axis in (
+            ("one", 0.045, -0.036, X),
+            ("two", -0.045, -0.036, X),
+            ("three", 0, 0.036, (-1, 0, 0)),
+        ):
+            link = made.join(f"{side}_{word}", hand, (x, y, -0.08), axis, (0.0, 1.2))
+            made.join(f"{side}_{word}_tip", link, (0, 0, -0.05), axis, (0.0, 1.2))
+    found = made.found(tmp_path)
+    # Both palms face left, as the first two fingers close.
+    assert found.ends["left_hand"].axes["thumb"] == pytest.approx((-1, 0, 0))
+    assert found.ends["right_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
+
+
+def test_two_jaws_with_a_rod_beside_each_are_no_four_fingers(tmp_path: Path) -> None:
+    """As Robotiq's grippers without the loops, and without <mimic>."""
+    made = Made()
+    for side in SIDES:
+        hand = made.wrist(side, made.forearm(side, made.arm(side)))
+        for word, y in (("driver", 0.03), ("spring", 0.013), ("other_driver", -0.03), ("other_spring", -0.013)):
+            link = made.join(f"{side}_{word}", hand, (0, y, -0.06), X if y < 0 else (-1, 0, 0), (0.0, 0.8))
+            made.join(f"{side}_{word}_end", link, (0, y, -0.05), X, (-0.8, 0.8))
+    found = made.found(tmp_path)
+    for side, sign in SIDES.items():
+        assert found.ends[f"{side}_hand"].axes["thumb"] == pytest.approx((0, -sign, 0))
+        assert any(
+            question.about == f"{side}_hand" and "a gripper has no thumb" in question.text
+            for question in found.questions
+        )
+
+
+def test_what_rolls_a_flange_is_no_jaw(tmp_path: Path) -> None:
+    """As the last joint of Universal Robots' arms, which is parallel to the first one of their wrists at zero."""
+    made = Made()
+    for side, sign in SIDES.items():
+        pan = made.join(f"{side}_pan", "chest", (0, 0.2 * sign, 0.4), (0, sign, 0), (-3, 3))
+        lift = made.join(f"{side}_lift", pan, (0, 0.1 * sign, 0), Z, (-3, 3))
+        elbow = made.join(f"{side}_elbow", lift, (0.4, 0, -0.1), Z, (-2.6, 0.0))
+        first = made.join(f"{side}_first", elbow, (0.39, 0, 0), Z)
+        second = made.join(f"{side}_second", first, (0, 0, -0.1), X)
+        third = made.join(f"{side}_third", second, (0.095, 0, 0), Z)
+        made.join(f"{side}_tool", third, (0, 0, -0.08), Z, None, "fixed")
+    found = made.found(tmp_path)
+    assert found.chains["left_arm"][-1] == "left_third_joint" and not found.left_out
+    assert found.ends["left_hand"].axes["fingers"] == pytest.approx((0, 0, -1))
+
+
 def test_a_leg_on_a_wheel_has_no_ankle_that_turns(tmp_path: Path) -> None:
     made = Made()
     for side in SIDES:
@@ -146,6 +212,37 @@ def test_an_ankle_that_no_joint_tells_lies_over_the_foot(tmp_path: Path, pitch: 
     ahead, aside, up = turn_33.T @ (ankle_3 - knee_3)
     assert aside == pytest.approx(0) and -0.03 < ahead < 0.03 and -0.43 < up < -0.36
     assert {"left_ankle", "right_ankle"} <= about(found)
+
+
+def test_no_warning_doubts_what_the_axes_tell_where_a_hinge_lies_far_beside_the_arm(
+    tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    """As the elbow of Franka's arm does: the forearm's length changes as it bends, and no other point is better."""
+    made = Made()
+    for side in SIDES:
+        elbow = made.join(f"{side}_elbow", made.arm(side), (0.08, 0, -0.3), Y, (-3.0, 0.0))
+        made.wrist(side, made.join(f"{side}_forearm", elbow, (-0.08, 0, -0.1), Z))
+    made.found(tmp_path)
+    BodyMap.of(open_robot(str(tmp_path / "made.urdf")))
+    assert not [str(warning.message) for warning in recwarn if "keeps its length" in str(warning.message)]
+
+
+def test_a_column_that_keeps_the_chest_upright_is_held(tmp_path: Path) -> None:
+    """As that of Rollin' Justin: no direction tells its angle, and a robot that moves it is refused."""
+    made = Made()
+    made.parts.append("<link name='base'/>")
+    yaw = made.join("yaw", "base", (0, 0, 0.4), Z)
+    column = made.join("column", yaw, (0, 0, 0.1), Y, (-1.0, 1.0))
+    made.parts.append(
+        f"<joint name='back' type='revolute'><parent link='{column}'/><child link='chest'/><origin xyz='0 0 0.4'/>"
+        "<axis xyz='0 -1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/><mimic joint='column_joint'/></joint>"
+    )
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    found = made.found(tmp_path)
+    assert found.chains["waist"] == ("yaw_joint", "column_joint", "back")
+    assert "yaw_joint" in found.joints and {"column_joint", "back"} <= set(found.held)
+    assert about(found) == {"left_hand", "right_hand"}
 
 
 def test_a_body_of_balls_is_read_as_its_bones(tmp_path: Path) -> None:
