@@ -244,9 +244,11 @@ def _prior(prior: BodyPrior, joint_T: np.ndarray) -> Prior:
     encoder = ((first[0][:, numbers], first[1]), *inner, (last_weight[: prior.latent], last_bias[: prior.latent]))
     *outer, (weight, bias) = _layers(decoder)
     bias = bias + single(decoder.identity_F)
-    found = Prior(tuple(encoder), (*outer, (weight[numbers], bias[numbers])))
-    return Prior(*(tuple((np.ascontiguousarray(w), np.ascontiguousarray(b)) for w, b in layers)
-                   for layers in (found.encoder, found.decoder)))  # fmt: skip
+    coders = encoder, (*outer, (weight[numbers], bias[numbers]))
+    return Prior(
+        *(tuple((np.ascontiguousarray(w), np.ascontiguousarray(b)) for w, b in layers) for layers in coders),
+        spaces=None,
+    )
 
 
 def _trust(retargeter: Retargeter, joint_T: np.ndarray) -> Trust:
