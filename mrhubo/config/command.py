@@ -44,6 +44,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     status: str | int | None
     try:
         try:
+            _stand_somewhere()
             status = main(sys.argv[1:])
         except SystemExit as stop:
             if was_interrupted(stop):
@@ -85,6 +86,14 @@ def _begin() -> None:
         for number in _ENDED_FROM_OUTSIDE:
             if signal.getsignal(number) is signal.SIG_DFL:  # else whoever started us wants something else (nohup)
                 signal.signal(number, _terminate)
+
+
+def _stand_somewhere() -> None:
+    """Refuses a current folder that was removed: libraries end the process over it, in words of their own."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise UserError("the current folder is gone, or may not be read; change to another one") from error
 
 
 def _wait_briefly() -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 import errno
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,12 +34,24 @@ def machine_fault(error: BaseException) -> str | None:
             name = one.filename2 or one.filename  # of two the second is written
             place = os.fsdecode(name) if isinstance(name, str | bytes) else ""
             reason = os.strerror(one.errno or 0)
+        elif isinstance(one, UnicodeEncodeError) and _is_of_names(one.encoding):
+            place, letter = "", one.object[one.start]
+            reason = (
+                f"this system's names of files, in {sys.getfilesystemencoding()}, have no letter '{letter}'; set"
+                " LC_ALL=C.UTF-8, or PYTHONUTF8=1"
+            )
         else:
             place, reason = "", next((words for words in _WORDS if words in str(one)), None)
         if reason is not None:
             place = place or (", ".join(_full_folders()) if reason in _FULL else "")
             return f"{place}: {reason}" if place else reason
     return None
+
+
+def _is_of_names(encoding: str) -> bool:
+    """Whether names of files are encoded so, and not as UTF-8, which has all letters."""
+    ours = codecs.lookup(sys.getfilesystemencoding()).name
+    return ours != "utf-8" and codecs.lookup(encoding).name == ours
 
 
 def _full_folders() -> Iterator[str]:

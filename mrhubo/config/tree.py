@@ -128,6 +128,8 @@ def parse(text: str, source: Source, lines: bool = True) -> Node | None:
         place = f"{source.name}, line {mark.line + 1}" if lines and mark else source.name
         raise UserError(f"{place}: not valid YAML: {error.problem or error.context}") from None
     except yaml.reader.ReaderError as error:
+        if source.typed:
+            raise UserError(f"{source.name}: '{shortened(text)}' has letters that are not printable") from None
         raise UserError(f"{source.name}: not a text file: character {error.position} is not printable") from None
     except RecursionError:
         raise UserError(f"{source.name}: nested more than {MAX_DEPTH} levels deep") from None

@@ -58,6 +58,8 @@ def check(d: Description) -> None:
         whole, real = array.dtype in (np.int64, np.int32), array.dtype in (np.float32, np.float64)
         _refuse(not (whole or (real and np.isfinite(array).all())), f"{name} holds what are no finite numbers")
     _refuse(sizes["A"] < 1 or sizes["N"] < 1 or sizes["D"] < 1 or sizes["C"] < 1, "nothing moves")
+    _refuse(bool((cost.lower_N > cost.upper_N).any()), "cost.lower_N is above cost.upper_N")
+    _refuse(bool((cost.velocity_N <= 0).any()), "cost.velocity_N lets a joint not turn")
     bodies, places, slots = sizes["A"] + 1, sizes["P"] + 1, sizes["T"] + 1
     for name, array, most in (
         ("human.joint", human.joint_P, _JOINTS), ("human.parent", human.parent_P, np.arange(1, places)),
@@ -79,6 +81,7 @@ def check(d: Description) -> None:
         *(("features", getattr(d.features, name), sizes["I"]) for name in _INPUTS),
     ):  # fmt: skip
         _refuse(not _are_places(array, most), f"{name} names what is not there")
+    _refuse(len(set(cost.block_N.tolist())) != sizes["C"], "cost.block_N leaves a block without a joint")
     needs_two = reading.kind_K > 0
     _refuse(bool((reading.direction_K3[needs_two, 1] < 0).any()), "reading.direction names what is not there")
     _refuse(

@@ -52,6 +52,16 @@ def test_ends(body, status, out, err):
     assert (done.returncode, done.stdout, done.stderr) == (status, out, err)
 
 
+def test_a_current_folder_that_is_gone_is_one_sentence(tmp_path: Path) -> None:
+    """Where a shell was left in a folder that somebody removed; the package is named, as it cannot be found from there."""
+    package = str(Path(__file__).resolve().parents[2])
+    gone = "import os, sys; os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone')\n"
+    text = f"import sys; sys.path.insert(0, {package!r})\n{gone}{script('print(1)')}"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr == "error: the current folder is gone, or may not be read; change to another one\n"
+
+
 def test_a_warning_about_the_users_input_is_one_line_once():
     body = "import warnings\nfrom mrhubo.errors import InputWarning\nfor text in ('odd\\n  thing', 'odd thing', 'b'):\n"
     done = run(body + "    warnings.warn(text, InputWarning)\nwarnings.warn('theirs', UserWarning)")

@@ -57,3 +57,16 @@ def test_what_was_handled_is_not_blamed() -> None:
             raise KeyError("a bug") from None
     except KeyError as error:
         assert machine_fault(error) is None
+
+
+def test_a_system_that_cannot_write_a_name_is_told_from_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
+    def error(encoding: str) -> UnicodeEncodeError:
+        with pytest.raises(UnicodeEncodeError) as caught:
+            "runs/J\ud800ürgen".encode(encoding)
+        return caught.value
+
+    assert machine_fault(error("ascii")) is machine_fault(error("utf-8")) is None
+    monkeypatch.setattr(faults.sys, "getfilesystemencoding", lambda: "ANSI_X3.4-1968")
+    found = machine_fault(error("ascii"))
+    assert found is not None and "in ANSI_X3.4-1968, have no letter" in found and "LC_ALL=C.UTF-8" in found
+    assert machine_fault(error("latin-1")) is machine_fault(error("utf-8")) is None

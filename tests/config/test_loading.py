@@ -435,6 +435,7 @@ def test_sentences(tmp_path, text, sentence):
         ("inner.rate.x=1", "command line: inner.rate must be a number from 0.0 to 1.0, found a mapping"),
         ("names.0=x", "command line: names must be a list of text, found a mapping"),
         ("names=[a", "command line: not valid YAML: "),
+        ("names=[w\udce4lle]", "command line: '[w\\udce4lle]' has letters that are not printable"),
         ("inner", "command line: 'inner' is not KEY=VALUE, for instance inner.rate=0.5"),
         ("=1", "command line: '=1' is not KEY=VALUE"),
         ("inner..rate=1", "command line: 'inner..rate=1' is not KEY=VALUE"),

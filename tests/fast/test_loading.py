@@ -148,3 +148,21 @@ def test_places_outside_an_array_are_refused(package: Path, tmp_path: Path) -> N
             write_tensors(tmp_path / "changed.safetensors", {**tensors, name: tensor[:-1].contiguous()}, metadata)
             with pytest.raises(UserError, match="no description"):
                 Description.read(tmp_path / "changed.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "sentence"),
+    [
+        ("cost.velocity_N", lambda array: -array, "cost.velocity_N lets a joint not turn"),
+        ("cost.upper_N", lambda array: array - 10, "cost.lower_N is above cost.upper_N"),
+        ("cost.block_N", lambda array: 0 * array, "cost.block_N leaves a block without a joint"),
+    ],
+)
+def test_numbers_that_no_robot_has_are_refused(
+    package: Path, tmp_path: Path, name: str, change: Callable[[torch.Tensor], torch.Tensor], sentence: str
+) -> None:
+    """Answers would be no numbers."""
+    tensors, metadata = read_tensors(package / FILE)
+    write_tensors(tmp_path / "changed.safetensors", {**tensors, name: change(tensors[name])}, metadata)
+    with pytest.raises(UserError, match=sentence):
+        Description.read(tmp_path / "changed.safetensors")
