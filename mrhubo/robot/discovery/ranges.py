@@ -12,7 +12,7 @@ from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Chain, Hinge, Step
 from mrhubo.robot.discovery.leg import Leg
-from mrhubo.robot.discovery.lines import cross
+from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
 from mrhubo.robot.discovery.result import FoundRange, Question
 from mrhubo.robot.joint import Mimic, drive
@@ -28,6 +28,8 @@ _TURN, _QUARTER = math.pi, math.pi / 2
 axes that turn all the way round reach every place of a limb twice, once with hip or shoulder turned inside out."""
 _SLACK = 0.3
 """How much more than one turn is one [rad]. Where all joints of an arm have that, a drawing program wrote it."""
+_BALL = 3
+"""Axes of a shoulder that turns all ways."""
 _MOST = 14.0
 """Limits wider than that mean none (`robot.limits`)."""
 
@@ -110,11 +112,22 @@ def _short(arms: Mapping[str, Arm], legs: Mapping[str, Leg], steps: Iterable[Ste
         bends = leg.chain[: leg.knee_at] if leg.hip_at is None else (leg.chain[leg.hip_at],)
         short -= {step.hinge for step in (*bends, leg.chain[leg.knee_at])}
     for arm in arms.values():
-        if arm.twist_at is not None and all(_turns_round(step.hinge) for step in arm.chain):
+        if (twist_at := _twist(arm)) is not None and all(_turns_round(step.hinge) for step in arm.chain):
             wrist_at = (arm.elbow_at if arm.forearm_twist_at is None else arm.forearm_twist_at) + 1
-            steps = (*arm.chain[: arm.clavicles], arm.chain[arm.twist_at], *arm.chain[wrist_at:])
+            steps = (*arm.chain[: arm.clavicles], arm.chain[twist_at], *arm.chain[wrist_at:])
             short |= {step.hinge for step in steps}
     return short
+
+
+def _twist(arm: Arm) -> int | None:
+    """Position of the axis that twists the upper arm: the one next to the elbow, or of a shoulder of three axes the one
+    that lies along the arm as it stands; None if it has none.
+    """
+    swings = range(arm.clavicles, arm.elbow_at)
+    if arm.twist_at is not None or len(swings) < _BALL:
+        return arm.twist_at
+    along_3 = unit(arm.elbow.point_3 - arm.shoulder.point_3)
+    return max(swings, key=lambda i: abs(float(arm.chain[i].hinge.line.axis_3 @ along_3)))
 
 
 def _turn_of(hinge: Hinge, short: bool) -> FoundRange | None:

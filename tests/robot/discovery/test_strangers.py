@@ -227,6 +227,24 @@ def test_no_warning_doubts_what_the_axes_tell_where_a_hinge_lies_far_beside_the_
     assert not [str(warning.message) for warning in recwarn if "keeps its length" in str(warning.message)]
 
 
+def test_a_shoulder_of_three_axes_in_any_order_is_not_turned_inside_out(tmp_path: Path) -> None:
+    """The axis that lies along the arm, which is the first one here, gets half a turn where a file gives no limits."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = "chest"
+        for word, axis in (("yaw", Z), ("roll", X), ("pitch", Y)):
+            at = (0, 0.2 * sign, 0.4) if word == "yaw" else (0, 0, 0)
+            link = made.join(f"{side}_{word}", link, at, axis, None, "continuous")
+        link = made.join(f"{side}_elbow", link, (0, 0, -0.3), Y, None, "continuous")
+        link = made.join(f"{side}_forearm", link, (0, 0, -0.1), Z, None, "continuous")
+        made.join(f"{side}_wrist", link, (0, 0, -0.15), Y, None, "continuous")
+    ranges = made.found(tmp_path).ranges
+    widths = {word: ranges[f"left_{word}_joint"].upper - ranges[f"left_{word}_joint"].lower
+              for word in ("yaw", "roll", "pitch", "elbow", "forearm", "wrist")}  # fmt: skip
+    half, whole = np.pi, 2 * np.pi
+    assert list(widths.values()) == pytest.approx([half, whole, whole, half, whole, half])
+
+
 def test_a_column_that_keeps_the_chest_upright_is_held(tmp_path: Path) -> None:
     """As that of Rollin' Justin: no direction tells its angle, and a robot that moves it is refused."""
     made = Made()
