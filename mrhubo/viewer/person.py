@@ -70,7 +70,7 @@ def read_person(motion: Motion) -> Person:
     refuse_frames(~local_TJ33.flatten(1).isfinite().all(dim=1), NOT_FINITE)
     for part in (way_T3, turn_T33):
         if part is not None:
-            refuse_frames(~part.flatten(1).isfinite().all(dim=1), NOT_FINITE)
+            refuse_frames(~part.flatten(1).isfinite().all(dim=1), f"a root of {NOT_FINITE}")
             refuse_frames(part.flatten(1).abs().amax(dim=1) > _FAR_M, "a root that is out of this world")
     place_TJ3, turn_TJ33 = joints_of(local_TJ33)
     points_TK3 = human_to_world(Skeleton().keypoints(local_TJ33).double().numpy())

@@ -105,7 +105,7 @@ def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs, keep_height: boo
     assert root_T33 is not None and root_T3 is not None
     crooked_T = (root_T33.mT @ root_T33 - torch.eye(3)).abs().amax(dim=(1, 2)) > CROOKED
     for wrong_T, what in (
-        (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), NOT_FINITE),
+        (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), f"a root of {NOT_FINITE}"),
         (crooked_T, "a root whose matrix is no rotation"),
         (root_T3.abs().amax(dim=1) > FAR_M, f"a root farther than {FAR_M / 1000:.0f} km from the origin"),
     ):
