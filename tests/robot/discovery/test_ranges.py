@@ -42,6 +42,7 @@ def test_no_hip_and_no_shoulder_can_be_turned_inside_out(root: Path, tmp_path: P
     # Thighs swing, and arms are raised, as far as the file lets them.
     for name in {"LHipSag", "LShSag", "LShLat"} & set(found.ranges):
         assert (found.ranges[name].lower, found.ranges[name].upper) == pytest.approx((-math.pi, math.pi))
+    assert {"LHipLat", "LWrj1", "WaistYaw"} <= set(found.guessed)
     assert any("no limits, or about a turn" in note and "before it moves" in note for note in found.notes)
 
 
