@@ -139,6 +139,14 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
         robot = _robot(description, found, _file_name(find_model(word)))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
+    if guessed := found.guessed:
+        more = f" and {len(guessed) - 1} more" * (len(guessed) > 1)
+        warnings.warn(
+            f"{word}: it gives '{guessed[0]}'{more} no limits, or about a turn, so those of a human's joints were "
+            "taken; `mrhubo describe` writes a config that can hold the robot's own",
+            InputWarning,
+            stacklevel=2,
+        )
     return robot
 
 

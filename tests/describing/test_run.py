@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -142,6 +143,15 @@ def test_guesses_are_told_where_no_config_holds_them(urdf: Path, monkeypatch: py
 
     monkeypatch.setattr(run, "unsure", lambda found: {"left_hand": "where is the thumb?"})
     with pytest.warns(InputWarning, match="left_hand: where is the thumb"):
+        open_robot("my.urdf")
+
+
+def test_limits_that_nobody_gives_are_told_where_no_config_holds_them(urdf: Path) -> None:
+    text = Path("my.urdf").read_text()
+    Path("my.urdf").write_text(re.sub(r'lower="[^"]*" upper="[^"]*"', "", text).replace("revolute", "continuous"))
+    with pytest.warns(
+        InputWarning, match=r"my.urdf: it gives '\w+' and \d+ more no limits, .* `mrhubo describe` writes"
+    ):
         open_robot("my.urdf")
 
 

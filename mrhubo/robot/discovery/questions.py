@@ -140,7 +140,7 @@ def notes(limbs: Limbs, ranges: Mapping[str, FoundRange]) -> Iterator[str]:
     if guessed := [name for name, found in ranges.items() if found.guessed]:
         more = f" and {len(guessed) - 1} more" if len(guessed) > 1 else ""
         yield (
-            f"the file gives '{guessed[0]}'{more} no limits, or a full turn; robot.ranges holds guesses: write the "
+            f"the file gives '{guessed[0]}'{more} no limits, or about a turn; robot.ranges holds guesses: write the "
             "robot's own there before it moves"
         )
     if bodies.degrees:

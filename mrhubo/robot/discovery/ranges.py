@@ -10,7 +10,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
-from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Chain, Hinge, Step
+from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
@@ -26,6 +26,8 @@ the cosine of where the limb goes."""
 _TURN, _QUARTER = math.pi, math.pi / 2
 """How far either way joints without limits are taken to turn: all, and those of which no human's turns farther. Three
 axes that turn all the way round reach every place of a limb twice, once with hip or shoulder turned inside out."""
+_WIDE = 5.6
+"""From where on a range says nothing of a joint that turns less [rad], as -3 .. 3; Unitree G1's hips turn by 5.5."""
 _SLACK = 0.3
 """How much more than one turn is one [rad]. Where all joints of an arm have that, a drawing program wrote it."""
 _BALL = 3
@@ -70,8 +72,10 @@ def find_ranges(
     """
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
+    chains = list(chains)
     steps = [step for chain in chains for step in chain]
     short, none = _short(arms, legs, steps), not any(step.hinge.limited for step in steps)
+    wide = _without_meaning(arms, legs, chains) & short
     for step in steps:
         hinge = driver(bodies, step)
         if hinge is None or not hinge.rotary:
@@ -87,7 +91,7 @@ def find_ranges(
             # What is continuous among joints with limits is meant to turn all the way round.
             guessed = none or hinge in short or bodies.description.joints[hinge.name].kind == "revolute"
             found[hinge.name] = FoundRange(-turn, turn, why, guessed)
-        elif hinge is step.hinge and (turn := _turn_of(hinge, hinge in short)) is not None:
+        elif hinge is step.hinge and (turn := _turn_of(hinge, hinge in wide)) is not None:
             found[hinge.name] = turn
     for bend in _bends(arms, legs, forward_3):
         gear = _gear(bodies, bend.step, {step.hinge.name for step in steps})
@@ -130,12 +134,29 @@ def _twist(arm: Arm) -> int | None:
     return max(swings, key=lambda i: abs(float(arm.chain[i].hinge.line.axis_3 @ along_3)))
 
 
-def _turn_of(hinge: Hinge, short: bool) -> FoundRange | None:
+def _without_meaning(arms: Mapping[str, Arm], legs: Mapping[str, Leg], chains: Iterable[Chain]) -> set[Hinge]:
+    """The joints of limbs that could be turned inside out, as all that would turn them so have limits of about a turn:
+    arms, legs by the hip's axes that do not swing the thigh forwards, and what else has three joints or more.
+    """
+    found = {step.hinge for arm in arms.values() for step in arm.chain}
+    for leg in legs.values():
+        hip = [step.hinge for i, step in enumerate(leg.chain[: leg.knee_at]) if i != leg.hip_at]
+        if len(hip) > 1 and all(map(_turns_round, hip)):
+            found |= {step.hinge for step in leg.chain}
+    limbs = [limb.chain[:1] for limb in (*arms.values(), *legs.values())]
+    for chain in (chain for chain in chains if chain[:1] not in limbs):
+        hinges = {step.hinge for step in chain if step.hinge.rotary}
+        if len(hinges) >= _BALL and all(map(_turns_round, hinges)):
+            found |= hinges
+    return found
+
+
+def _turn_of(hinge: Hinge, wide: bool) -> FoundRange | None:
     """The part of a range of a turn or more that is needed; None if it is all of it."""
     lower, upper = float(hinge.lower or 0.0), float(hinge.upper or 0.0)
-    if short and not hinge.limited:
+    if wide and upper - lower > _WIDE:
         lower, upper = max(lower, -_QUARTER), min(upper, _QUARTER)
-        why = "the URDF lets it turn all the way round; a quarter turn either way was taken"
+        why = "the URDF lets it turn nearly all the way round; a quarter turn either way was taken"
         return FoundRange(lower, upper, why, guessed=True) if lower < upper else None
     if upper - lower <= math.tau + _SLACK:
         return None
@@ -147,7 +168,7 @@ def _turn_of(hinge: Hinge, short: bool) -> FoundRange | None:
 def _turns_round(hinge: Hinge) -> bool:
     """Whether a file gives a joint no limits, or about one turn, as a drawing program does that knows none."""
     given = _limits_meant(hinge.lower, hinge.upper)
-    return not given or FULL_TURN < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < math.tau + _SLACK
+    return not given or _WIDE < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < math.tau + _SLACK
 
 
 def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarray) -> Iterator[_Bend]:

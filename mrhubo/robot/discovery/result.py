@@ -122,6 +122,11 @@ class Discovery:
     """Whether legs and waist move too."""
 
     @property
+    def guessed(self) -> tuple[str, ...]:
+        """The joints whose ranges are guesses, as the URDF tells none."""
+        return tuple(name for name, found in self.ranges.items() if found.guessed)
+
+    @property
     def sure(self) -> bool:
         """Whether nothing was left to ask."""
         return not self.questions

@@ -83,8 +83,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
         count = len(bodies.hinges)
         raise UserError(
             f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
-            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed"
-            f"{_following(bodies)}"
+            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed, or, of a "
+            f"robot with one arm, a config that is written by hand (docs/robots.md){_following(bodies)}"
         )
     # A waist and a neck that are alike, one below the chest and one above, are no limbs.
     armed = [pair for pair in armed if not any(_between(bodies, pair, other) for other in armed)]

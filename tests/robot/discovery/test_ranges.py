@@ -25,8 +25,13 @@ def coman(root: Path, folder: Path, limit: str, kind: str) -> Discovery:
 
 @pytest.mark.parametrize(
     ("limit", "kind"),
-    [("", "continuous"), ('lower="0" upper="0"', "revolute"), ('lower="-3.14159" upper="3.14159"', "revolute")],
-    ids=["none", "empty", "a turn"],
+    [
+        ("", "continuous"),
+        ('lower="0" upper="0"', "revolute"),
+        ('lower="-3.14159" upper="3.14159"', "revolute"),
+        ('lower="-3" upper="3"', "revolute"),
+    ],
+    ids=["none", "empty", "a turn", "nearly a turn"],
 )
 def test_no_hip_and_no_shoulder_can_be_turned_inside_out(root: Path, tmp_path: Path, limit: str, kind: str) -> None:
     found = coman(root, tmp_path, limit, kind)
@@ -37,7 +42,8 @@ def test_no_hip_and_no_shoulder_can_be_turned_inside_out(root: Path, tmp_path: P
     # Thighs swing, and arms are raised, as far as the file lets them.
     for name in {"LHipSag", "LShSag", "LShLat"} & set(found.ranges):
         assert (found.ranges[name].lower, found.ranges[name].upper) == pytest.approx((-math.pi, math.pi))
-    assert any("no limits, or a full turn" in note and "before it moves" in note for note in found.notes)
+    assert {"LHipLat", "LWrj1", "WaistYaw"} <= set(found.guessed)
+    assert any("no limits, or about a turn" in note and "before it moves" in note for note in found.notes)
 
 
 def test_limits_that_leave_no_way_to_move_are_named_where_they_hide_the_arms(root: Path, tmp_path: Path) -> None:
@@ -58,6 +64,16 @@ def test_a_joint_that_turns_all_the_way_round_on_an_arm_with_limits_still_does(r
     found = discover(tmp_path / "robot.urdf", whole_body=True)
     ends = found.ranges["LShYaw"]
     assert (ends.lower, ends.upper) == pytest.approx((-math.pi, math.pi)) and not found.notes
+
+
+def test_a_single_joint_of_a_leg_that_turns_far_is_left_as_it_is(root: Path, tmp_path: Path) -> None:
+    """As EngineAI PM01's hips: with the roll's limits they cannot be turned inside out."""
+    text = (root / "data/robots/coman/coman.urdf").read_text()
+    for joint in re.findall(r'<joint name="[LR]HipYaw".*?</joint>', text, re.DOTALL):
+        text = text.replace(joint, _LIMIT.sub('<limit lower="-3.14" upper="3.14"', joint))
+    (tmp_path / "robot.urdf").write_text(text)
+    found = discover(tmp_path / "robot.urdf", whole_body=True)
+    assert not {"LHipYaw", "RHipYaw"} & set(found.ranges) and not found.notes
 
 
 def test_no_joint_winds_up(root: Path, tmp_path: Path) -> None:

@@ -227,6 +227,15 @@ def test_no_warning_doubts_what_the_axes_tell_where_a_hinge_lies_far_beside_the_
     assert not [str(warning.message) for warning in recwarn if "keeps its length" in str(warning.message)]
 
 
+def test_a_robot_with_one_arm_is_told_what_it_needs(tmp_path: Path) -> None:
+    made = Made()
+    made.wrist("left", made.forearm("left", made.arm("left")))
+    with pytest.raises(
+        UserError, match=r"of a robot with one arm, a config that is written by hand \(docs/robots.md\)"
+    ):
+        made.found(tmp_path)
+
+
 def test_a_shoulder_of_three_axes_in_any_order_is_not_turned_inside_out(tmp_path: Path) -> None:
     """The axis that lies along the arm, which is the first one here, gets half a turn where a file gives no limits."""
     made = Made()
