@@ -145,22 +145,20 @@ def load_fast(source: str | os.PathLike[str] | Retargeter, form: str | None = No
     """A trained retargeter that needs no PyTorch and answers a frame in a fraction of a millisecond (docs/fast.md).
 
     Args:
-        source: the folder of a package, or its file `runtime.safetensors` alone. For a package that was made before
-            there was such a file, it is worked out anew, by PyTorch; so it is for a retargeter, such as `for_robot`
+        source: as for `load`, or a package's file `runtime.safetensors` alone. For a package that was made before there
+            was such a file, it is worked out anew, by PyTorch; so it is for a retargeter, such as `for_robot`
             gives for a robot without a package.
         form: "compiled" (needs numba: the extra `fast`) or "numpy"; None: compiled where numba is installed.
 
     Raises:
         UserError: there is no such package, it is damaged, or the form is wrong.
     """
-    from pathlib import Path
-
     from mrhubo.fast import FastRetargeter
     from mrhubo.fast.description import FILE
 
     if not isinstance(source, str | os.PathLike):
         return FastRetargeter(source.describe(), form)
-    folder = Path(source)
+    folder = package_folder(source)
     if folder.is_dir() and not (folder / FILE).exists():
         return FastRetargeter(load(folder).describe(), form)
     return FastRetargeter.load(folder, form)

@@ -36,7 +36,7 @@ def main(argv: list[str]) -> None:
 
     check_whole_body(options)
     out = Path(options.out)
-    refuse_input("--out", out, [options.robot])
+    refuse_input("--out", out, [options.robot, options.retargeter])
     if options.retargeter is not None:
         retargeter = mrhubo.load(options.retargeter)
     else:

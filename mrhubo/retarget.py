@@ -78,7 +78,7 @@ def main(argv: list[str]) -> int:
         check_method(options.method, METHODS, options.retargeter is not None)
     check_whole_body(options)
     files = find_files([Path(name) for name in options.motion or options.video])
-    others = (options.robot, options.joint_order, options.bvh_map)
+    others = (options.robot, options.retargeter, options.joint_order, options.bvh_map)
     places = plan_places(options.out, options.format, files, others)
     request = read_request(options, options.joint_order)
     if options.retargeter is not None:

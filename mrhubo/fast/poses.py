@@ -96,7 +96,7 @@ def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:
     if frame_rate is None and not needed:
         return
     number = isinstance(frame_rate, int | float | np.integer | np.floating) and not isinstance(frame_rate, bool)
-    if frame_rate is None or not number or not 0 < frame_rate < math.inf:
+    if frame_rate is None or not (number and 0 < frame_rate < math.inf):
         raise UserError(f"human motion: the frame rate must be a positive number, found {shortened(frame_rate)}")
     if not LOWEST_RATE <= frame_rate <= HIGHEST_RATE:
         bounds = f"{LOWEST_RATE:g} to {HIGHEST_RATE:,.0f}"

@@ -52,9 +52,11 @@ class FastStream:
             floor: height of the floor in the person's world [m], for robots with feet; None: it is learned on the way.
 
         Raises:
-            UserError: the rate is not positive, or the floor no number.
+            UserError: the rate is not positive, the floor no number, or the retargeter one with PyTorch.
         """
         check_frame_rate(rate, needed=True)
+        if not isinstance(retargeter, FastRetargeter):
+            raise UserError("stream: expected a retargeter of mrhubo.load_fast; the stream of others is mrhubo.Stream")
         if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
             raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
         self.retargeter, self.rate, self.settings = retargeter, float(rate), settings or StreamSettings()

@@ -42,14 +42,15 @@ def refuse_input(what: str, path: Path, inputs: Iterable[Path | str | None]) -> 
     Args:
         what: whose file is written, ``--out``, for the sentence.
         path: the file that is going to be written.
-        inputs: what is read, files or not; None: nothing is.
+        inputs: what is read, files, folders of files, or neither; None: nothing is.
 
     Raises:
-        UserError: it is one of them.
+        UserError: it is one of them, or in one of them.
     """
     for given in inputs:
         with contextlib.suppress(OSError, ValueError):  # one of the two is not there, or no name of a file
-            if given is not None and os.path.samefile(path, given):
+            place = path.parent if given is not None and os.path.isdir(given) and path.is_file() else path
+            if given is not None and os.path.samefile(place, given):
                 raise UserError(f"{what} {path}: would be written over what is read, {given}; name another file")
 
 

@@ -97,7 +97,7 @@ def main(argv: list[str]) -> int:
         plan.add_source(text)
     for text in options.sink:
         plan.add_sink(text)
-    plan.refuse_inputs([options.robot, options.certificate])
+    plan.refuse_inputs([options.robot, options.retargeter, options.certificate])
     if certificate is not None and not plan.has_page:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
     if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):

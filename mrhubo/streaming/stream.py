@@ -20,7 +20,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
-from mrhubo.fast import StreamSettings
+from mrhubo.fast import FastRetargeter, StreamSettings
 from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.roots import Ways
 from mrhubo.fast.stream_clock import StreamClock
@@ -67,9 +67,12 @@ class Stream:
             floor: height of the floor in the people's world [m], for robots with feet; None: it is learned on the way.
 
         Raises:
-            UserError: the rate is not positive, the number of people none, or the floor no number.
+            UserError: the rate is not positive, the number of people none, the floor no number, or the retargeter one
+                of `mrhubo.load_fast`.
         """
         check_frame_rate(rate, needed=True)
+        if isinstance(retargeter, FastRetargeter):
+            raise UserError("stream: this retargeter is without PyTorch, so its stream is mrhubo.FastStream")
         if isinstance(retargeter, OptimizationRetargeter):
             retargeter = optimised(retargeter.body_map)
         self.retargeter, self.rate, self.people = retargeter, float(rate), people

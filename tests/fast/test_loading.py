@@ -115,6 +115,13 @@ def test_an_older_package_is_described_anew(
     np.testing.assert_allclose(mrhubo.load_fast(folder, "numpy").predict(array), fast.predict(array), atol=2e-6)
 
 
+def test_a_version_in_the_registry_is_taken_too(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mrhubo.fitting.record.registry.fetch_package", lambda uri: package)
+    assert (
+        mrhubo.load_fast("models:/mrhubo-nao/1", "numpy").joint_names == mrhubo.load_fast(package, "numpy").joint_names
+    )
+
+
 def test_a_file_of_another_package_is_refused(package: Path, make: Callable[[str], Retargeter], tmp_path: Path) -> None:
     folder = shutil.copytree(package, tmp_path / "mixed")
     other = make("coman").save(tmp_path / "coman", {})

@@ -231,6 +231,15 @@ def test_what_a_stream_cannot_be(make_fast: Callable[[str, str], FastRetargeter]
         stream(read_motion(root / "data" / "motions" / "wave.npz"))
 
 
+def test_a_stream_says_which_one_is_for_a_retargeter(
+    make: Callable[[str], Retargeter], make_fast: Callable[[str, str], FastRetargeter]
+) -> None:
+    with pytest.raises(UserError, match=r"its stream is mrhubo\.FastStream"):
+        mrhubo.Stream(make_fast("nao", "numpy"))  # type: ignore[arg-type]
+    with pytest.raises(UserError, match=r"the stream of others is mrhubo\.Stream"):
+        FastStream(make("nao"))  # type: ignore[arg-type]
+
+
 def test_it_needs_no_pytorch(make: Callable[[str], Retargeter], seen: Tensor, tmp_path: Path) -> None:
     nao = make("nao")
     shutil.copy(nao.save(tmp_path / "nao", {}) / FILE, tmp_path / "robot.safetensors")

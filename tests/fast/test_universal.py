@@ -17,6 +17,7 @@ from mrhubo.errors import UserError
 from mrhubo.fast import FastRetargeter
 from mrhubo.fast.description import FILE, Description
 from mrhubo.fast.engines import FORMS
+from mrhubo.fast.plain.universal import _softmax
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.universal import UniversalJoints
@@ -136,3 +137,9 @@ def test_a_damaged_file_is_refused(made: Callable[[str], Retargeter], tmp_path: 
             with pytest.raises(UserError, match="no description"):
                 Description.read(tmp_path / "changed.safetensors")
     assert len(own) > 30
+
+
+def test_who_has_made_underflow_an_error_gets_answers() -> None:
+    """As `np.seterr(all="raise")` does; weights that are nearly 0 are as good as 0."""
+    with np.errstate(all="raise"):
+        np.testing.assert_array_equal(_softmax(np.array([[0.0, -1e3]], np.float32)), [[1.0, 0.0]])

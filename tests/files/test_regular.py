@@ -98,4 +98,6 @@ def test_what_is_read_is_known_by_any_name(tmp_path: Path) -> None:
     for name in ("a.npz", "link", "hard"):
         with pytest.raises(UserError, match="--out .*: would be written over what is read"):
             refuse_input("--out", tmp_path / name, [None, "nao", "a\0b", tmp_path / "missing", tmp_path / "a.npz"])
-    refuse_input("--out", tmp_path / "new.npz", [tmp_path / "a.npz"])
+    refuse_input("--out", tmp_path / "new.npz", [tmp_path / "a.npz", tmp_path])
+    with pytest.raises(UserError, match="--out .*a.npz: would be written over what is read"):  # a file of a package
+        refuse_input("--out", tmp_path / "a.npz", [tmp_path])

@@ -206,7 +206,8 @@ def _norm(w: Mapping[str, np.ndarray], name: str, x: np.ndarray) -> np.ndarray:
 
 
 def _softmax(x: np.ndarray) -> np.ndarray:
-    x = np.exp(x - x.max(axis=-1, keepdims=True))
+    with np.errstate(under="ignore"):  # who has made this an error means other sums
+        x = np.exp(x - x.max(axis=-1, keepdims=True))
     return x / x.sum(axis=-1, keepdims=True)
 
 

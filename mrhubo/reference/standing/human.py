@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from mrhubo.errors import InputWarning
+from mrhubo.errors import InputWarning, UserError
 from mrhubo.fast.plain.contacts import LIES, STANDS
 from mrhubo.fast.roots import CROOKED, FAR_M, without_jumps
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
@@ -103,6 +103,12 @@ def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs, keep_height: boo
     """
     root_T33, root_T3 = motion.root_rotation_T33, motion.root_position_T3
     assert root_T33 is not None and root_T3 is not None
+    frames = len(local_TJ33)
+    if root_T33.shape != (frames, 3, 3) or root_T3.shape != (frames, 3):
+        found = f"{tuple(root_T33.shape)} and {tuple(root_T3.shape)}"
+        raise UserError(
+            f"{motion.name}: its root must be a rotation ({frames}, 3, 3) and a place ({frames}, 3) [m], found {found}"
+        )
     crooked_T = (root_T33.mT @ root_T33 - torch.eye(3)).abs().amax(dim=(1, 2)) > CROOKED
     for wrong_T, what in (
         (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), f"a root of {NOT_FINITE}"),

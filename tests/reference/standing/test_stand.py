@@ -182,6 +182,7 @@ def test_a_frame_or_two_stand(retargeter: OptimizationRetargeter, frames: int) -
     [
         ({"root_position_T3": torch.full((48, 3), torch.nan)}, "human pose 0 holds a root of NaN"),
         ({"root_position_T3": torch.full((48, 3), 1e9)}, "farther than 100 km"),
+        ({"root_position_T3": torch.zeros(47, 3)}, r"its root must be a rotation \(48, 3, 3\) and a place \(48, 3\)"),
         ({"root_rotation_T33": 2 * torch.eye(3).repeat(48, 1, 1)}, "no rotation"),
     ],
 )
