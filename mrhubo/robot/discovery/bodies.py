@@ -177,6 +177,11 @@ class Bodies:
         """Mass of a body [kg]; 0 if the file gives none."""
         return sum(self.description.masses[link][0] for link in self.links_of[body] if link in self.description.masses)
 
+    @cached_property
+    def weighty(self) -> frozenset[int]:
+        """The bodies to which the file gives a mass."""
+        return frozenset(body for body in range(len(self.links_of)) if self.weight(body) > 0)
+
     def middle(self, body: int) -> np.ndarray:
         """About where a body is (3,): its centre of mass, else the mean of its corners."""
         centre_3 = self.centre(body)

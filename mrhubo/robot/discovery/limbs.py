@@ -37,8 +37,12 @@ def _next(bodies: Bodies, step: Step) -> Step | None:
 
 
 def ways_on(bodies: Bodies, step: Step) -> list[Step]:
-    """The joints at the body that a joint leads to with which a limb may go on: no linkages, no sliding jaws."""
+    """The joints at the body that a joint leads to with which a limb may go on: no linkages, no sliding jaws, and
+    nothing that weighs nothing beside what weighs something, as a leg's linkage that is drawn beside its model.
+    """
     onward = bodies.onward(step)
+    heavy = [on for on in onward if bodies.beyond(on)[0] & bodies.weighty]
+    onward = heavy or onward
     motors = _motors(bodies, onward)
     onward = [on for on in onward if on not in motors and (on in motors.values() or not _idle(bodies, on))]
     return [on for on in onward if not any(_drives(bodies, on, other, step) for other in onward if other is not on)]

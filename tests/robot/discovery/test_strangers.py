@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -225,6 +226,31 @@ def test_no_warning_doubts_what_the_axes_tell_where_a_hinge_lies_far_beside_the_
     made.found(tmp_path)
     BodyMap.of(open_robot(str(tmp_path / "made.urdf")))
     assert not [str(warning.message) for warning in recwarn if "keeps its length" in str(warning.message)]
+
+
+def test_a_linkage_without_masses_that_is_drawn_beside_a_leg_is_passed_over(tmp_path: Path) -> None:
+    """As the parallel legs of NimbRo-OP2X, which its URDF has beside the legs that weigh something."""
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        knee = made.leg(side)
+        made.join(f"{side}_ankle", knee, (0, 0, -0.4), Y)
+        parent = f"{side}_hip_roll"
+        for word, down, more in (
+            ("thigh", 0.02, ""),
+            ("knee", 0.36, "thigh"),
+            ("shin", 0.1, ""),
+            ("foot", 0.32, "shin"),
+        ):
+            mimic = f"<mimic joint='{side}_drawn_{more}_joint' multiplier='-1'/>" if more else ""
+            made.join(f"{side}_drawn_{word}", parent, (0.03, 0, -down), Y, None, "continuous", mimic)
+            made.parts[-1] = re.sub("<inertial>.*?</inertial>", "", made.parts[-1])
+            parent = f"{side}_drawn_{word}"
+    found = made.found(tmp_path)
+    assert found.chains["left_leg"] == tuple(
+        f"left_{word}_joint" for word in ("hip_roll", "hip_pitch", "knee", "ankle")
+    )
+    assert at(found, "left_knee") == pytest.approx([0, 0.1, -0.5], abs=1e-3)
 
 
 def test_a_robot_with_one_arm_is_told_what_it_needs(tmp_path: Path) -> None:
