@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,7 @@ from mrhubo.robot_motion import (
 )
 from mrhubo.robot_motion import plain as plain_module
 from mrhubo.robot_motion.motion import PER_FRAME
+from tests.files.bounded import bounded
 from tests.robot_motion.motions import assert_same, motions, plain, standing
 
 WHOLE, TABLES, ANGLES = ("npz", "json", "parquet"), ("csv",), ("mujoco", "unitree", "yaml", "mcap")
@@ -134,13 +134,8 @@ def test_writing_takes_little_memory(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(plain_module, "_BLOCK", 2_000)
     motion = RobotMotion(np.random.default_rng(0).normal(size=(2_000, 10)), tuple("abcdefghij"), 120.0)
     write_robot_motion(motion, tmp_path / "first.json")  # what is imported on demand
-    tracemalloc.start()
-    try:
+    with bounded(megabytes=60 * motion.q.size / 1e6, seconds=60):
         write_robot_motion(motion, tmp_path / f"a{FORMATS[name].ending}", name)
-        most = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert most < 60 * motion.q.size
 
 
 def test_several_motions_fit_into_an_npz_alone(tmp_path: Path) -> None:
