@@ -227,7 +227,7 @@ class CompiledEngine:
     def _factor(self, system: Banded) -> Solve:
         """Solves systems of whole motions by compiled functions."""
         frames, joints = system.diagonal_TM.shape
-        coupling_KTMM = np.zeros((len(system.couplings_TMM), frames, joints, joints))
+        coupling_KTMM = np.empty((len(system.couplings_TMM), frames, joints, joints))
         for lag, coupling_TMM in enumerate(system.couplings_TMM, start=1):
             coupling_KTMM[lag - 1, : frames - lag] = coupling_TMM
         # In one order of memory: for each other one, numba compiles anew.

@@ -23,8 +23,8 @@ from mrhubo.fast.plain.contacts import (
     PLANTED_SPEED,
     RAMP_S,
     WANDERED_M,
-    smooth_share,
 )
+from mrhubo.fast.plain.human import smooth_share
 
 _SCALE_ROUNDS, _SCALES = 4, (0.6, 1.6)
 """A child's legs, and a giant's, against those of readers' skeletons, and more."""

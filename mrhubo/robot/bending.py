@@ -49,8 +49,13 @@ class BendAxis:
 def _rising(bend_X: Tensor, ends_deg: tuple[float, float]) -> Tensor:
     """0 up to the first angle, 1 from the second on, smooth between."""
     low, high = map(math.radians, ends_deg)
-    share = ((bend_X - low) / (high - low)).clamp(0.0, 1.0)
-    return share.square() * (3 - 2 * share)
+    return smooth_share((bend_X - low) / (high - low))
+
+
+def smooth_share(share_X: Tensor) -> Tensor:
+    """As `mrhubo.fast.plain.human.smooth_share`."""
+    share_X = share_X.clamp(0.0, 1.0)
+    return share_X.square() * (3 - 2 * share_X)
 
 
 def bend_axis(upper_X3: Tensor, lower_X3: Tensor, own_X3: Tensor) -> tuple[Tensor, Tensor]:

@@ -18,7 +18,7 @@ def products(x: Any, w: Any, bias: Any, out: Any, rows: Any, columns: Any, input
 
 @njit(**tables.COMPILED)
 def unpacked(short: Any, first: Any, scale: Any, out: Any) -> None:
-    tile.unpack(short, first, short.shape[1], scale, first, out, short.shape[0])  # pyright: ignore[reportCallIssue]
+    tile.unpack(short, first, short.shape[1], scale, first, out, short.shape[0])
 
 
 @pytest.mark.parametrize("rows", [2, 4, 11, 12, 13, 24, 30, 48])

@@ -17,15 +17,15 @@ import numpy as np
 from llvmlite import ir  # pyright: ignore[reportMissingImports]
 from numba import njit, types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
-from numba.extending import intrinsic  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.tables import INNER
+from mrhubo.fast.compiled.vectors import add_product, everywhere, in_llvm, is_array
 
-SUMS = 16
+_SUMS = 16
 """Numbers of a column that are found together."""
-_BEYOND = SUMS - 1
+_BEYOND = _SUMS - 1
 """Zeros behind a column, as sixteen numbers are read from its last one on."""
-_ROUNDED_ONCE = ("contract",)
+_NUMBERS = ir.VectorType(ir.DoubleType(), _SUMS)
 
 
 def _make_column(at_diagonal: bool) -> Any:
@@ -34,43 +34,35 @@ def _make_column(at_diagonal: bool) -> Any:
     is given, and at a diagonal by the reciprocal of its square root, which it puts there. Returns what it scaled by.
     """
 
-    @intrinsic
+    @in_llvm
     def column(typing_context, array, at, first, step, apart, count, scale):
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            vector, lanes = ir.VectorType(ir.DoubleType(), SUMS), ir.VectorType(ir.IntType(32), SUMS)
             data = context.make_array(signature.args[0])(context, builder, values[0]).data
-            unset, begin = ir.Constant(vector, ir.Undefined), ir.Constant(ir.IntType(32), 0)
+            begin = ir.Constant(ir.IntType(32), 0)
 
             def numbers(place: Any) -> Any:
-                return builder.bitcast(builder.gep(data, [place]), vector.as_pointer())
+                return builder.bitcast(builder.gep(data, [place]), _NUMBERS.as_pointer())
 
-            def everywhere(number: Any) -> Any:
-                return builder.shuffle_vector(
-                    builder.insert_element(unset, number, begin), unset, ir.Constant(lanes, [0] * SUMS)
-                )
-
-            found = cgutils.alloca_once(builder, vector)
+            found = cgutils.alloca_once(builder, _NUMBERS)
             builder.store(builder.load(numbers(values[1]), align=8), found)
             with cgutils.for_range(builder, values[5], intp=values[1].type) as loop:
                 place = builder.add(values[2], builder.mul(loop.index, values[3]))
-                each = everywhere(builder.fneg(builder.load(builder.gep(data, [place]))))
-                others = builder.load(numbers(builder.add(place, values[4])), align=8)
-                product = builder.fmul(each, others, flags=_ROUNDED_ONCE)
-                builder.store(builder.fadd(builder.load(found), product, flags=_ROUNDED_ONCE), found)
+                each = everywhere(builder, builder.fneg(builder.load(builder.gep(data, [place]))), _NUMBERS)
+                add_product(builder, found, each, builder.load(numbers(builder.add(place, values[4])), align=8))
             less, by = builder.load(found), values[6]
             if at_diagonal:
                 root = builder.module.declare_intrinsic("llvm.sqrt", [ir.DoubleType()])
                 by = builder.fdiv(
                     ir.Constant(ir.DoubleType(), 1.0), builder.call(root, [builder.extract_element(less, begin)])
                 )
-            less = builder.fmul(less, everywhere(by))
+            less = builder.fmul(less, everywhere(builder, by, _NUMBERS))
             if at_diagonal:
                 less = builder.insert_element(less, by, begin)
             builder.store(less, numbers(values[1]), align=8)
             return by
 
-        fits = isinstance(array, types.Array) and array.dtype == types.float64 and array.layout == "C"
-        return (types.float64(array, *[types.intp] * 5, types.float64), generate) if fits else None
+        answer = types.float64(array, *[types.intp] * 5, types.float64)
+        return (answer, generate) if is_array(array, types.float64) else None
 
     return column
 
@@ -96,15 +88,11 @@ def factor(within_TMM, diagonal_TM, coupling_KTMM):
                 for m in range(joints):
                     own_V[lag * joints + m - n] = coupling_KTMM[lag - 1, t, m, n]
     for r in range(frames * joints):
-        earlier, scale = min(r, wide - 1), 0.0
-        scale = _first(  # pyright: ignore[reportCallIssue] (numba adds the first argument)
-            column_RV, r * long, (r - earlier) * long + earlier, long - 1, 0, earlier, scale
-        )
-        for v in range(SUMS, wide, SUMS):
+        earlier = min(r, wide - 1)
+        scale = _first(column_RV, r * long, (r - earlier) * long + earlier, long - 1, 0, earlier, 0.0)
+        for v in range(_SUMS, wide, _SUMS):
             earlier = min(r, wide - 1 - v)
-            _next(  # pyright: ignore[reportCallIssue]
-                column_RV, r * long + v, (r - earlier) * long + earlier, long - 1, v, earlier, scale
-            )
+            _next(column_RV, r * long + v, (r - earlier) * long + earlier, long - 1, v, earlier, scale)
     return column_RV
 
 

@@ -113,7 +113,7 @@ def _next_contact(f, h, new, passed, given_H, root):
 
 @njit(**INNER_EXACT)
 def smooth(share):
-    """As `mrhubo.fast.plain.contacts.smooth_share`."""
+    """As `mrhubo.fast.plain.human.smooth_share`."""
     share = min(max(share, 0.0), 1.0)
     return share * share * (3 - 2 * share)
 

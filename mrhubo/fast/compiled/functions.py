@@ -9,8 +9,9 @@ from llvmlite import ir  # pyright: ignore[reportMissingImports]
 from numba import njit, types  # pyright: ignore[reportMissingImports]
 from numba.extending import overload  # pyright: ignore[reportMissingImports]
 
-from mrhubo.fast.compiled.lanes import BARE, LANES, NUMBERS, Lanes, Truths, choose, in_llvm, nearest
+from mrhubo.fast.compiled.lanes import BARE, LANES, NUMBERS, Lanes, Truths, choose, nearest
 from mrhubo.fast.compiled.tables import INNER
+from mrhubo.fast.compiled.vectors import in_llvm
 
 # Minimax polynomials up to pi/4, of FreeBSD's msun (k_sin.c, k_cos.c).
 _S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04

@@ -20,7 +20,8 @@ from numba.extending import (  # pyright: ignore[reportMissingImports]
     register_model,
 )
 
-from mrhubo.fast.compiled.lanes import BARE, LANES, NUMBERS, Lanes, in_llvm, spread
+from mrhubo.fast.compiled.lanes import BARE, LANES, NUMBERS, Lanes, spread
+from mrhubo.fast.compiled.vectors import in_llvm
 
 
 class _LaneArrayType(types.Type):

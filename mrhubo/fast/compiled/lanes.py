@@ -21,12 +21,13 @@ from numba import types  # pyright: ignore[reportMissingImports]
 from numba.core import cgutils  # pyright: ignore[reportMissingImports]
 from numba.core.typeconv.castgraph import Conversion  # pyright: ignore[reportMissingImports]
 from numba.extending import (  # pyright: ignore[reportMissingImports]
-    intrinsic,
     lower_cast,
     models,
     overload,
     register_model,
 )
+
+from mrhubo.fast.compiled.vectors import everywhere, in_llvm
 
 LANES = 8
 NUMBERS = ir.VectorType(ir.DoubleType(), LANES)
@@ -37,11 +38,6 @@ _FAST = ("reassoc", "contract", "nsz")
 
 BARE: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of what compiled functions alone call: numba would make each callable from Python and from C too."""
-
-
-def in_llvm(define: Callable[..., Any]) -> Any:
-    """`numba.extending.intrinsic`: a function of LLVM's own operations, without its definition's typing context."""
-    return intrinsic(define)
 
 
 class _LanesType(types.Type):
@@ -73,14 +69,6 @@ class _LanesModel(models.PrimitiveModel):
 class _TruthsModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _TRUTHS)
-
-
-def everywhere(builder: Any, value: Any, vector: Any) -> Any:
-    """One number in all lanes."""
-    unset = ir.Constant(vector, ir.Undefined)
-    first = builder.insert_element(unset, value, ir.Constant(ir.IntType(32), 0))
-    same = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(first, unset, same)
 
 
 def _is_number(kind: Any) -> bool:

@@ -130,7 +130,7 @@ def affine(t, layer, x_BI, out_BO, loose_IC, adds, frames):
             out_BO[0, o] = out_BO[0, o] * scale_O[o] + bias_O[o]
         return
     for first in range(0, outputs, COLUMNS):
-        unpack(short_IO, first, wide, scale_O, first, loose_IC, inputs)  # pyright: ignore[reportCallIssue]
+        unpack(short_IO, first, wide, scale_O, first, loose_IC, inputs)
         multiply(x_BI, 0, loose_IC, 0, bias_O, first, 0, out_BO, first, frames, COLUMNS, inputs)
 
 

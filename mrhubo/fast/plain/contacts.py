@@ -15,6 +15,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from mrhubo.fast.plain.human import smooth_share
+
 PLANTED_M, PLANTED_SPEED = 0.04, 0.3
 """A point that is lower [m] and slower [m/s] is planted: soles of readers' skeletons lie up to 2 cm beside the
 person's; and a heel that lands still turns at some 20 cm/s."""
@@ -132,12 +134,6 @@ def next_contacts(
     return LiveContacts(
         place_BP3, velocity_BP3, floor_B, planted_BP, began_BP, age_BP, start_BP3, weight_BP, slow_BH, from_B
     )
-
-
-def smooth_share(share: np.ndarray) -> np.ndarray:
-    """How much a contact counts, 0..1, some share of the way into its ramp: it begins and ends without a corner."""
-    share = np.clip(share, 0.0, 1.0)
-    return share**2 * (3 - 2 * share)
 
 
 def standing_share(up_X: np.ndarray) -> np.ndarray:

@@ -98,5 +98,10 @@ def bend_axis(
 
 def _rising(bend_X: np.ndarray, low_deg: float, high_deg: float) -> np.ndarray:
     low, high = np.radians(low_deg), np.radians(high_deg)
-    share_X = np.clip((bend_X - low) / (high - low), 0.0, 1.0)
+    return smooth_share((bend_X - low) / (high - low))
+
+
+def smooth_share(share_X: np.ndarray) -> np.ndarray:
+    """Shares, 0..1, that begin and end without a corner; what is beyond is cut."""
+    share_X = np.clip(share_X, 0.0, 1.0)
     return share_X * share_X * (3 - 2 * share_X)

@@ -22,6 +22,7 @@ from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.poses import NOT_FINITE, refuse_frames
 from mrhubo.reference.standing.legs import Legs
+from mrhubo.robot.bending import smooth_share
 
 _LOWEST = 0.02
 """Share of the frames in which the body may be under a floor that no sole tells."""
@@ -166,5 +167,4 @@ def stand_flat(target_TD3: Tensor, up_T3: Tensor, weight_TP: Tensor, legs: Legs)
 
 def _standing_share(up_X: Tensor) -> Tensor:
     """As `mrhubo.fast.plain.contacts.standing_share`."""
-    share_X = ((up_X - LIES) / (STANDS - LIES)).clamp(0, 1)
-    return share_X.square() * (3 - 2 * share_X)
+    return smooth_share((up_X - LIES) / (STANDS - LIES))

@@ -83,7 +83,7 @@ class _Finder:
         spots = list(self._spots())
         legs = self.legs if limbs.whole_body else {}
         ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading.forward_3)
-        joints = limbs.moved()
+        joints = limbs.moved
         ranges = {name: found for name, found in ranges.items() if name in joints}
         held = dict(limbs.held(joints))
         points = dict(self._points(spots))

@@ -54,6 +54,7 @@ class Limbs:
             return found | {"neck": self.roles.neck}
         return {**self.chains, **found}
 
+    @cached_property
     def moved(self) -> tuple[str, ...]:
         """The joints by which the limbs are driven, chain by chain."""
         found = [

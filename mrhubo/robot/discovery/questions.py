@@ -67,7 +67,7 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     if roles.legs is not None and (more := _more_legs(roles)):
         yield Question("pelvis", "it carries more than two limbs that may be legs; those were taken that are like a "
                        "human's, or longest, and the others stay as they are", more)  # fmt: skip
-    moved = limbs.moved()
+    moved = limbs.moved
     turning = tuple(step.hinge.name for step in roles.waist if step.hinge.name in moved)
     if roles.legs is None and len(turning) > _BACK:
         yield Question("pelvis", f"there are no legs, and a chain of {len(turning)} joints was taken for a waist, "
@@ -109,7 +109,7 @@ def _more_legs(roles: Roles) -> tuple[str, ...]:
 def coupled(limbs: Limbs) -> Iterator[Question]:
     """Joints of moving limbs that mimic others of them: as a file may have it that is for a show of one side."""
     moving = [step for chain in limbs.moving.values() for step in chain]
-    whole = {step.hinge.name for step in moving} & set(limbs.moved())
+    whole = {step.hinge.name for step in moving} & set(limbs.moved)
     for step in (step for step in moving if not step.hinge.free and step.hinge.name not in shared_hips(limbs)):
         source = driver(limbs.bodies, step)
         if source is not None and source.name in whole:
