@@ -107,8 +107,11 @@ def _make(
         for index in indices:
             yield make_shard(generator, store, index)
         return
-    with _workers(config, store.header["fingerprint"], count) as workers:
-        yield from _dispatch(workers, indices)
+    try:
+        with _workers(config, store.header["fingerprint"], count) as workers:
+            yield from _dispatch(workers, indices)
+    finally:
+        remove_leftovers(store.folder)  # of those that were ended while they wrote
 
 
 def _dispatch(workers: Sequence[subprocess.Popen[str]], indices: Sequence[int]) -> Iterator[dict[str, float]]:
