@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +22,7 @@ _FLAT = 1e-4
 """As `mrhubo.motion.poses` has them."""
 
 
-@dataclass(frozen=True)
-class Poses:
+class Poses(NamedTuple):
     """Local rotations (T, 21, 3, 3), float32, with the leading axes that they had and what is known of them."""
 
     local_TJ33: np.ndarray

@@ -67,7 +67,7 @@ def train(
     callbacks: Sequence[lightning.Callback] = (),
 ) -> Training:
     """Makes the pairs that are missing, trains on them, and returns the network that is nearest to the person on the
-    validation clips.
+    validation clips, its weights rounded to 16 bits.
 
     Args:
         prepared: the checked config; with `robot.scale: search` a `ScaleFactorSearch` must be among the callbacks.
@@ -105,6 +105,8 @@ def train(
     best = torch.load(checkpoints / BEST, map_location="cpu", weights_only=True)["state_dict"]
     network.to("cpu").load_state_dict({k.removeprefix("network."): v for k, v in best.items()})
     network.requires_grad_(False).eval()
+    if isinstance(network, RetargetNetwork):
+        network.round_weights()
     return Training(
         data.prepared,
         network,

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import gelu
 
+from mrhubo.fast.short_weights import rounded
 from mrhubo.retargeter.features import DirectionFeatures, PoseFeatures
 
 _BLOCK_SCALE = 0.5
@@ -210,6 +211,13 @@ class RetargetNetwork(JointNetwork):
         if self.pre is None:
             raise RuntimeError("a one-stage network predicts no links")
         return self.pre(features_BF)
+
+    def round_weights(self) -> None:
+        """Rounds the weights of all layers to such that take 16 bits (`mrhubo.fast.short_weights`)."""
+        with torch.no_grad():
+            for layer in self.modules():
+                if isinstance(layer, nn.Linear):
+                    layer.weight.copy_(torch.from_numpy(rounded(layer.weight.cpu().numpy())))
 
     def pieces(self) -> list[Piece]:
         """Its branches, each with networks of its own."""

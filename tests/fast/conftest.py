@@ -13,7 +13,7 @@ from mrhubo import rotation
 from mrhubo.body import BodyPrior
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
-from mrhubo.retargeter import Retargeter, build_network
+from mrhubo.retargeter import Retargeter, RetargetNetwork, build_network
 from mrhubo.robot import build_body_map
 
 MODELS = {
@@ -35,6 +35,8 @@ def make(root: Path) -> Callable[[str], Retargeter]:
             body_map = build_body_map(config.robot)
             torch.manual_seed(0)
             network = build_network(config, body_map)
+            if name != "reachy" and isinstance(network, RetargetNetwork):
+                network.round_weights()  # as those of trained ones are
             torch.manual_seed(1)
             prior = BodyPrior(hidden=20).eval()  # small, as compiled functions are no quicker for it, but tests are
             made[name] = Retargeter(network, body_map, prior, config, phi_threshold=0.01)

@@ -9,6 +9,7 @@ pytest.importorskip("numba")
 from numba import njit
 
 from mrhubo.fast.compiled import networks, tables, tile
+from mrhubo.fast.short_weights import rounded, shortened
 
 
 @njit(**tables.COMPILED)
@@ -44,34 +45,34 @@ def test_layers_of_16_bits_are_unpacked_to_what_they_are() -> None:
     assert np.isnan(out[37:]).all()
 
 
-def test_one_frame_and_many_agree_on_layers_of_16_bits() -> None:
-    """They are multiplied as they are for one frame, and unpacked for many."""
+@pytest.mark.parametrize("in_full", [False, True])
+def test_one_frame_and_many_agree_on_layers_of_16_bits(in_full: bool) -> None:
+    """They are multiplied as they are for one frame; for many, unpacked, or in float32, where they are there too."""
     random = np.random.default_rng(1)
-    weight_OI, bias_O = random.normal(size=(300, 250)).astype(np.float32), random.normal(size=300).astype(np.float32)
-    scale_O = np.abs(weight_OI).max(axis=1) / 32_767
-    short_IO = tables.in_columns(np.round(weight_OI / scale_O[:, None]).astype(np.int16))
-    numbers = np.concatenate([tables.in_columns(part[:, None]) for part in (bias_O, scale_O.astype(np.float32))])
-    places = {
-        int(tables.NET_H6): [0, 1, 0, 0, 0, 0],
-        int(tables.LAYER_G5): [250, 300, 0, 0, int(tables.SHORT)],
-        int(tables.NUMBER): [],
-        int(tables.TURNED): [],
-    }
-    integers = np.zeros(2 * len(tables.KEYS) + 11, np.int64)
+    weight_OI = rounded(random.normal(size=(300, 250)).astype(np.float32))
+    bias_O, (short_OI, step_O) = random.normal(size=300).astype(np.float32), shortened(weight_OI)
+    scaled = tables.in_columns(np.stack((bias_O, step_O), axis=1))
+    full = tables.in_columns(np.column_stack((weight_OI, bias_O)))
+    row = [250, 300, len(scaled) if in_full else -1, 0, 0, 0]
+    places = {int(tables.NET_H6): [0, 1, 0, 0, 0, 0], int(tables.LAYER_G6): row}
+    integers = np.zeros(2 * len(tables.KEYS) + 12, np.int64)
     at = 2 * len(tables.KEYS)
     for key, table in places.items():
-        integers[2 * key : 2 * key + 2] = (0 if not table else at), len(table)
+        integers[2 * key : 2 * key + 2] = at, len(table)
         integers[at : at + len(table)], at = table, at + len(table)
-    packed = (integers, np.zeros(0), numbers, short_IO)
+    packed = (integers, np.zeros(0), np.concatenate((scaled, full)), tables.in_columns(short_OI))
     x_BI = random.normal(size=(20, 304)).astype(np.float32)
-    many, alone = layer(packed, x_BI, 20), np.concatenate([layer(packed, x_BI[b : b + 1], 1)[:1] for b in range(20)])
-    wanted = x_BI[:, :250].astype(np.float64) @ weight_OI.T + bias_O
-    np.testing.assert_allclose(many[:20, :300], wanted, atol=2e-2)
-    np.testing.assert_allclose(alone[:, :300], many[:20, :300], atol=1e-4)
+    for adds in (False, True) if in_full else (False,):
+        many = layer(packed, x_BI.copy(), adds, 20)
+        alone = np.concatenate([layer(packed, x_BI[b : b + 1].copy(), adds, 1)[:1] for b in range(20)])
+        wanted = x_BI[:, :250].astype(np.float64) @ weight_OI.T + bias_O + adds
+        np.testing.assert_allclose(many[:20, :300], wanted, atol=1e-4)
+        np.testing.assert_allclose(alone[:, :300], wanted, atol=1e-4)
 
 
 @njit(**tables.COMPILED)
-def layer(t: Any, x_BI: Any, frames: Any) -> Any:
+def layer(t: Any, x_BI: Any, adds: Any, frames: Any) -> Any:
     one_BE, _, _, loose_IC = networks.make_rooms(t, frames, 1)
-    networks.affine(t, 0, x_BI, one_BE, loose_IC, False, frames)
+    one_BE[:] = 1
+    networks.affine(t, 0, x_BI, one_BE, loose_IC, adds, frames)
     return one_BE

@@ -12,6 +12,7 @@ import torch
 
 from mrhubo.config import BaselineConfig, Config, load_config
 from mrhubo.errors import UserError
+from mrhubo.fast.short_weights import are_short
 from mrhubo.fitting import datamodule
 from mrhubo.fitting.datamodule import PairData
 from mrhubo.fitting.fit import fit
@@ -80,6 +81,8 @@ def test_the_training_makes_the_pairs_that_are_missing(home: Path, config: Confi
     validation, _ = make_references(prepared, SILENT)
     training = train(prepared, SILENT, validation, home / "first")
     assert training.pairing.made == 200 and len(training.pairs["phi"]) == 200 and prepared.store.missing() == []
+    weights = [layer.weight for layer in training.network.modules() if isinstance(layer, torch.nn.Linear)]
+    assert weights and all(are_short(weight.numpy()) for weight in weights)
     threads = torch.get_num_threads()
     torch.set_num_threads(3 - min(threads, 2))  # two after one, or one after more: branches side by side in one of them
     again = train(prepared, SILENT, validation, home / "again")

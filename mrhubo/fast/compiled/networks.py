@@ -19,19 +19,23 @@ from mrhubo.fast.compiled.tables import (
     FIRST_STAGE,
     INNER,
     INPUT_I,
-    LAYER_G5,
+    INPUTS,
+    LAYER_G6,
     LIMB_M,
     LINEAR,
+    LONG_AT,
     LOWER_N,
     LOWER_W,
     NET_H6,
     NUMBER,
+    OUTPUTS,
     RESIDUAL,
     SCALE_F,
+    SCALED_AT,
     SECOND_O,
     SEEN_M,
     SEES_DIRECTIONS,
-    SHORT,
+    SHORT_AT,
     STAGES,
     TANH_BOUND,
     TURNED,
@@ -46,15 +50,10 @@ from mrhubo.fast.compiled.tables import (
 from mrhubo.fast.compiled.tile import ROWS, multiply, multiply_row, multiply_short_row, unpack
 from mrhubo.fast.plain.networks import ERF_BOTTOM, ERF_END, ERF_TOP
 
-_ZERO, _ONE, _HALF, _ROOT, _END = (
-    np.float32(0),
-    np.float32(1),
-    np.float32(0.5),
-    np.float32(np.sqrt(0.5)),
-    np.float32(ERF_END),
-)
-_T0, _T1, _T2, _T3, _T4, _T5 = (np.float32(c) for c in ERF_TOP)
-_B1, _B2, _B3, _B4, _B5 = (np.float32(c) for c in ERF_BOTTOM[1:])
+_ONE, _HALF, _END = np.float32(1), np.float32(0.5), np.float32(ERF_END * math.sqrt(2))
+# GELU is x (erf(x / sqrt 2) / 2 + 1 / 2), and its constants stand in those of erf's polynomials, of x^2.
+_T0, _T1, _T2, _T3, _T4, _T5 = (np.float32(c * math.sqrt(0.125) * 0.5**k) for k, c in enumerate(ERF_TOP))
+_B1, _B2, _B3, _B4, _B5 = (np.float32(c * 0.5**k) for k, c in enumerate(ERF_BOTTOM[1:], start=1))
 # SiLU is x (1 + tanh(x / 2)) / 2, and tanh(x) = x P(x^2) / Q(x^2) up to |x| = 9, within 2e-9; found as erf.
 P0, P1, P2 = np.float32(0.999999993874719), np.float32(0.1367634767328113), np.float32(0.0038639344509989746)
 P3, P4, P5 = (
@@ -75,11 +74,11 @@ def activate(kind, x_BE, out_BE, frames, count):
     for b in range(frames):
         if kind == GELU:
             for e in range(count):
-                z = min(max(x_BE[b, e] * _ROOT, -_END), _END)
+                z = min(max(x_BE[b, e], -_END), _END)
                 s = z * z
                 top = ((((_T5 * s + _T4) * s + _T3) * s + _T2) * s + _T1) * s + _T0
                 bottom = ((((_B5 * s + _B4) * s + _B3) * s + _B2) * s + _B1) * s + _ONE
-                out_BE[b, e] = (z * top / bottom + _ONE) * x_BE[b, e] * _HALF
+                out_BE[b, e] = (z * top / bottom + _HALF) * x_BE[b, e]
         elif kind == SILU:
             for e in range(count):
                 z = min(max(x_BE[b, e] * _HALF, -TANH_END), TANH_END)
@@ -96,17 +95,24 @@ def activate(kind, x_BE, out_BE, frames, count):
 
 
 @njit(**INNER)
+def of_layer(t, layer, place):
+    """A number of a layer's row of layer_G6."""
+    return whole(t, LAYER_G6, 6 * layer + place)
+
+
+@njit(**INNER)
 def affine(t, layer, x_BI, out_BO, loose_IC, adds, frames):
     """A layer: weights x + biases, added to what is there where it `adds`. Arrays are as long and as wide as whole
-    tiles are, and `x_BI` a number wider than what comes in. Weights of 16 bits, which add nothing, are unpacked into
-    `loose_IC`, a tile's columns at a time, for all frames.
+    tiles are, and `x_BI` a number wider than what comes in. One frame's sums with weights of 16 bits stand in
+    `loose_IC`; for more frames, of a layer that has no others and adds nothing, weights are unpacked into it, a tile's
+    columns at a time.
     """
-    inputs, outputs = whole(t, LAYER_G5, 5 * layer), whole(t, LAYER_G5, 5 * layer + 1)
+    inputs, outputs = of_layer(t, layer, INPUTS), of_layer(t, layer, OUTPUTS)
     number, begin, begin_turned, wide = t[2], t[0][2 * NUMBER], t[0][2 * TURNED], spaced(outputs)
-    weights = whole(t, LAYER_G5, 5 * layer + 2)
+    long_at, short_at = of_layer(t, layer, LONG_AT), of_layer(t, layer, SHORT_AT)
     # A view tells that places are not negative, without which numba is five times slower.
-    if not whole(t, LAYER_G5, 5 * layer + 4) & SHORT:
-        at = begin_turned + weights
+    if short_at < 0 or (frames > 1 and long_at >= 0):
+        at = begin_turned + long_at
         weight_IO = number[at : at + inputs * wide].reshape(inputs, wide)
         begin_BO, step = number[at + inputs * wide : at + (inputs + 1) * wide].reshape(1, wide), 0
         if adds:  # biases, which stand after the weights, are then those of an input that is 1
@@ -119,15 +125,14 @@ def affine(t, layer, x_BI, out_BO, loose_IC, adds, frames):
         else:
             multiply(x_BI, 0, weight_IO, 0, begin_BO, 0, step, out_BO, 0, frames, outputs, len(weight_IO))
         return
-    short_IO = t[3][weights : weights + inputs * wide].reshape(inputs, wide)
-    at = begin + whole(t, LAYER_G5, 5 * layer + 3)
+    short_IO = t[3][short_at : short_at + inputs * wide].reshape(inputs, wide)
+    at = begin + of_layer(t, layer, SCALED_AT)
     bias_O, scale_O = number[at : at + wide], number[at + wide : at + 2 * wide]
     if frames == 1:
-        for o in range(wide):
-            out_BO[0, o] = 0
-        multiply_short_row(x_BI, short_IO, out_BO, out_BO, outputs)
+        loose_IC[0, :wide] = 0
+        multiply_short_row(x_BI, short_IO, loose_IC, loose_IC, outputs)
         for o in range(outputs):
-            out_BO[0, o] = out_BO[0, o] * scale_O[o] + bias_O[o]
+            out_BO[0, o] = loose_IC[0, o] * scale_O[o] + (bias_O[o] + out_BO[0, o] if adds else bias_O[o])
         return
     for first in range(0, outputs, COLUMNS):
         unpack(short_IO, first, wide, scale_O, first, loose_IC, inputs)
@@ -141,13 +146,13 @@ def mlp(t, net, kind, residual, rooms, frames):
     """
     one_BE, two_BE, three_BE, loose_IC = rooms
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
-    width = whole(t, LAYER_G5, 5 * first + 1)
+    width = of_layer(t, first, OUTPUTS)
     affine(t, first, one_BE, three_BE, loose_IC, False, frames)
     own_BE, other_BE = three_BE, one_BE
     for layer in range(first + 1, first + layers):
-        before, width = width, whole(t, LAYER_G5, 5 * layer + 1)
+        before, width = width, of_layer(t, layer, OUTPUTS)
         given_BE = own_BE
-        if not whole(t, LAYER_G5, 5 * layer + 4) & LINEAR:
+        if not of_layer(t, layer, LINEAR):
             activate(kind, own_BE, two_BE, frames, before)
             given_BE = two_BE
         if residual and layer < first + layers - 1:
@@ -167,14 +172,14 @@ def joint_angles(t, feature_BF, link_BM, rooms, out_BN, first, frames):
     for net in range(whole(t, COUNT_6, STAGES)):
         inputs, outputs = whole(t, NET_H6, 6 * net + 3), whole(t, NET_H6, 6 * net + 5)
         last = net >= first_stage
-        for i in range(inputs):
-            c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 2) + i)
-            for b in range(frames):
+        for b in range(frames):
+            for i in range(inputs):
+                c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 2) + i)
                 one_BE[b, i] = link_BM[b, c] if last and first_stage else feature_BF[b, c]
         mlp(t, net, GELU, whole(t, COUNT_6, RESIDUAL), rooms, frames)
-        for o in range(outputs):
-            c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 4) + o)
-            for b in range(frames):
+        for b in range(frames):
+            for o in range(outputs):
+                c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 4) + o)
                 if last:
                     out_BN[first + b, c] = one_BE[b, o]
                 else:
@@ -229,15 +234,17 @@ def features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k):
 
 @njit(**INNER)
 def make_rooms(t, frames, nets):
-    """Three arrays for numbers between layers of the first networks, and one for weights that are unpacked."""
+    """Three arrays for numbers between layers of the first networks, and one for weights that are unpacked, or for one
+    frame's sums.
+    """
     widest, longest = 1, 1
     for net in range(nets):
         first = whole(t, NET_H6, 6 * net)
         for g in range(first, first + whole(t, NET_H6, 6 * net + 1)):
-            inputs, outputs = whole(t, LAYER_G5, 5 * g), whole(t, LAYER_G5, 5 * g + 1)
-            widest = max(widest, max(inputs, outputs))
-            if frames > 1 and whole(t, LAYER_G5, 5 * g + 4) & SHORT:
+            inputs = of_layer(t, g, INPUTS)
+            widest = max(widest, max(inputs, of_layer(t, g, OUTPUTS)))
+            if frames > 1 and of_layer(t, g, LONG_AT) < 0:
                 longest = max(longest, inputs)
     shape = (frames + -frames % ROWS, spaced(widest + 1))
-    loose_IC = np.empty((longest, COLUMNS), np.float32)
+    loose_IC = np.empty((longest, COLUMNS if frames > 1 else shape[1]), np.float32)
     return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32), loose_IC

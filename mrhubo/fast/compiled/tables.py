@@ -20,6 +20,7 @@ from mrhubo.fast.plain.collision import clearances
 from mrhubo.fast.plain.human import skew
 from mrhubo.fast.plain.soles import moved_points
 from mrhubo.fast.sections import SECTIONS, Part
+from mrhubo.fast.short_weights import are_short, shortened
 
 KEYS = (
     "joint_P", "parent_P", "view_V", "place_D", "seen_D", "bend_Z", "upper_Z", "lower_Z", "rest_D3", "bend_4",
@@ -32,7 +33,7 @@ KEYS = (
     "axis_T33", "limit_T32", "measured", "column_XD", "slot_XT", "weight_25", "scale_4",
     "body_S", "pair_Y2", "end_S23", "radius_S", "reach_S", "clear_Y",
     "first_Z", "capsule_Z", "ball_Z", "reach_Z", "body_G", "centre_G3",
-    "net_H6", "layer_G5", "column", "count_6", "number", "turned",
+    "net_H6", "layer_G6", "column", "count_6", "number", "turned",
     "input_I", "bend_W", "upper_W", "lower_W", "first_O", "second_O", "limb_M", "axis_M", "seen_M", "center_F",
     "scale_F",
     "joint_L", "parent_L", "offset_L3", "start_R", "sole_H", "sole_H3", "carrier_1", "axes_33", "root_3", "body_H",
@@ -48,13 +49,13 @@ their first steps. scale_4: good and excessive angle, shaking [degrees], usual p
 and its radius. clear_Y: distance [m] that a pair is to keep. Pairs stand group by group
 (`mrhubo.fast.plain.broad_phase`). reach_Z: how far [m] a group's capsule and ball must be apart so that no pair is
 nearer than that. net_H6: first and number of layers, place and number of input columns, and of output columns, of each
-network, the prior's coders last; layer_G5: numbers in and out, where weights and then biases begin in `turned`, as
-`in_columns` lays a layer out, 0, and 0; or where weights begin in `shorts`, where biases and then scales begin in
-`number`, and SHORT; and LINEAR where no activation stands before the layer; column: all columns; count_6: networks of
-the first stage, of both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some
-distance. pool_CXU: the pool's directions, block after block, and in each cell after cell; first_CS: where each cell
-begins, and last where all end; pool_CU: which pose of the pool each is; pool_ridge_CU likewise. block_H: the block
-whose joints move a point of a sole, -1: none does. What is of legs is empty for robots without feet.
+network, the prior's coders last; layer_G6: numbers in and out; where weights and then biases begin in `turned`, as
+`in_columns` lays a layer out, or -1; where weights begin in `shorts`, or -1, and where biases and then scales begin in
+`number`; 1 where no activation stands before the layer. column: all columns; count_6: networks of the first stage, of
+both; whether directions are seen, tanh bounds, nets are residual, and every pair is to keep some distance. pool_CXU:
+the pool's directions, block after block, and in each cell after cell; first_CS: where each cell begins, and last where
+all end; pool_CU: which pose of the pool each is; pool_ridge_CU likewise. block_H: the block whose joints move a point
+of a sole, -1: none does. What is of legs is empty for robots without feet.
 """
 (
     JOINT_P, PARENT_P, VIEW_V, PLACE_D, SEEN_D, BEND_Z, UPPER_Z, LOWER_Z, REST_D3, BEND_4,
@@ -67,7 +68,7 @@ whose joints move a point of a sole, -1: none does. What is of legs is empty for
     AXIS_T33, LIMIT_T32, MEASURED, COLUMN_XD, SLOT_XT, WEIGHT_25, SCALE_4,
     BODY_S, PAIR_Y2, END_S23, RADIUS_S, REACH_S, CLEAR_Y,
     FIRST_Z, CAPSULE_Z, BALL_Z, REACH_Z, BODY_G, CENTRE_G3,
-    NET_H6, LAYER_G5, COLUMN, COUNT_6, NUMBER, TURNED,
+    NET_H6, LAYER_G6, COLUMN, COUNT_6, NUMBER, TURNED,
     INPUT_I, BEND_W, UPPER_W, LOWER_W, FIRST_O, SECOND_O, LIMB_M, AXIS_M, SEEN_M, CENTER_F, SCALE_F,
     JOINT_L, PARENT_L, OFFSET_L3, START_R, SOLE_H, SOLE_H3, CARRIER_1, AXES_33, ROOT_3, BODY_H, POINT_H3, BALL_BODY_J,
     BALL_J3, RADIUS_J, NEAR_HJ, SCALE_1, HIP_R3, LIMB_R2, LENGTH_R2, FOOT_R2, BUILT_R23, BLOCK_H,
@@ -83,10 +84,8 @@ FIRST_STAGE, STAGES, SEES_DIRECTIONS, TANH_BOUND, RESIDUAL, APART = np.arange(6)
 
 COLUMNS = 16
 """Of a tile (`mrhubo.fast.compiled.tile`)."""
-SHORT, LINEAR = np.arange(1, 3)
-"""What is added up in layer_G5."""
-_STEPS = 32_767
-"""The largest number of 16 bits."""
+INPUTS, OUTPUTS, LONG_AT, SHORT_AT, SCALED_AT, LINEAR = np.arange(6)
+"""Places in a row of layer_G6."""
 _ROUNDED = 1e-5
 """Distance [m] by which no robot moves where its joint angles are rounded to float32."""
 
@@ -100,8 +99,9 @@ class Packed(NamedTuple):
     singles: np.ndarray
     """float32."""
     shorts: np.ndarray
-    """int16: the body prior's large layers, each row in steps of its own. Reading these weights is most of what a
-    frame's confidence takes; at half of their size it takes two thirds, and phi changes by less than a hundredth."""
+    """int16 (`mrhubo.fast.short_weights`). Reading weights is most of what a frame alone takes; at half of their size
+    it takes two thirds. The networks' layers whose weights are rounded to it are here for that, and in float32 for
+    many frames. The body prior's large layers are here alone: rounding them changes phi by less than a hundredth."""
 
 
 def pack(description: Description) -> Packed:
@@ -179,27 +179,27 @@ def _nets(d: Description, shorts: list[np.ndarray], apart: bool) -> dict[str, np
     def add(part: Part) -> None:
         nets.append([len(layers), len(part.layers), *_append(columns, part.input), *_append(columns, part.output)])
         for weight, bias in part.layers:
-            add_layer(weight, bias, False, False)
+            add_layer(weight, bias, True, are_short(weight), False)
 
-    def add_layer(weight: np.ndarray, bias: np.ndarray, short: bool, linear: bool) -> None:
-        kind = SHORT * short + LINEAR * linear
+    def add_layer(weight: np.ndarray, bias: np.ndarray, in_full: bool, short: bool, linear: bool) -> None:
+        long_at, short_at, scaled_at = -1, -1, -1
+        if in_full:
+            long_at, _ = _append(turned, in_columns(np.column_stack((weight, bias))))
         if short:
-            scale_O = np.abs(weight).max(axis=1).clip(1e-30) / _STEPS
-            place, _ = _append(shorts, in_columns(np.round(weight / scale_O[:, None]).astype(np.int16)))
-            scaled, _ = _append(numbers, in_columns(np.stack((bias, scale_O.astype(np.float32)), axis=1)))
-        else:
-            (place, _), scaled = _append(turned, in_columns(np.column_stack((weight, bias)))), 0
-        layers.append([weight.shape[1], weight.shape[0], place, scaled, kind])
+            steps_OE, step_O = shortened(weight)
+            short_at, _ = _append(shorts, in_columns(steps_OE))
+            scaled_at, _ = _append(numbers, in_columns(np.stack((bias, step_O), axis=1)))
+        layers.append([weight.shape[1], weight.shape[0], long_at, short_at, scaled_at, linear])
 
     for part in (*d.pre, *d.post):
         add(part)
     for coder in (narrowed(d), [(*layer, False) for layer in d.prior.decoder]):
         nets.append([len(layers), len(coder), 0, 0, 0, 0])
         for weight, bias, linear in coder:
-            add_layer(weight, bias, weight.size >= LARGE, linear)
+            add_layer(weight, bias, weight.size < LARGE, weight.size >= LARGE, linear)
     kinds = [d.settings.features == "directions", d.settings.bound == "tanh", d.settings.residual, apart]
     return {
-        "net_H6": np.array(nets, np.int64), "layer_G5": np.array(layers, np.int64), "column": np.concatenate(columns),
+        "net_H6": np.array(nets, np.int64), "layer_G6": np.array(layers, np.int64), "column": np.concatenate(columns),
         "count_6": np.array([len(d.pre), len(d.pre) + len(d.post), *kinds], np.int64),
         "number": np.concatenate(numbers), "turned": np.concatenate(turned),
     }  # fmt: skip

@@ -143,7 +143,7 @@ _low, _tall = _make_tile(ROWS), _make_tile(_TALL)
 
 def _make_row(short: bool) -> Any:
     """`multiply_row`, or `multiply_short_row`."""
-    ten, four, one = (_make_line(parts, short) for parts in (10, 4, 1))
+    ten, four, two, one = (_make_line(parts, short) for parts in (10, 4, 2, 1))
 
     @njit(**INNER)
     def row(x, w, begin, out, columns):
@@ -157,6 +157,9 @@ def _make_row(short: bool) -> Any:
             elif left > 3 * COLUMNS:
                 four(x, w, o, wide, begin, o, out, o, inputs)
                 o += 4 * COLUMNS
+            elif left > COLUMNS:
+                two(x, w, o, wide, begin, o, out, o, inputs)
+                o += 2 * COLUMNS
             else:
                 one(x, w, o, wide, begin, o, out, o, inputs)
                 o += COLUMNS
