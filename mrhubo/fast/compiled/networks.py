@@ -70,7 +70,7 @@ ACTIVATIONS = {"gelu": GELU, "silu": SILU, "leaky_relu": LEAKY, "tanh": TANH}
 
 @njit(**INNER)
 def activate(kind, x_BE, out_BE, frames, count):
-    """An activation of the first numbers of frames. GELU and SiLU are written so that several are done at once."""
+    """An activation of the first numbers of frames, written so that several are done at once."""
     for b in range(frames):
         if kind == GELU:
             for e in range(count):
@@ -91,7 +91,12 @@ def activate(kind, x_BE, out_BE, frames, count):
                 out_BE[b, e] = max(x_BE[b, e], np.float32(0.01) * x_BE[b, e])
         else:
             for e in range(count):
-                out_BE[b, e] = np.float32(math.tanh(x_BE[b, e]))
+                x = x_BE[b, e]
+                z = min(max(x, -TANH_END), TANH_END)
+                s = z * z
+                top = ((((P5 * s + P4) * s + P3) * s + P2) * s + P1) * s + P0
+                bottom = (((Q4 * s + Q3) * s + Q2) * s + Q1) * s + _ONE
+                out_BE[b, e] = z * top / bottom if x == x else x  # NaN stays
 
 
 @njit(**INNER)
@@ -168,27 +173,26 @@ def mlp(t, net, kind, residual, rooms, frames):
 @njit(**INNER)
 def joint_angles(t, feature_BF, link_BM, rooms, out_BN, first, frames):
     """Joint angles [rad], inside the limits, of what the networks see (B, F), from a first frame of the output on."""
-    first_stage, one_BE = whole(t, COUNT_6, FIRST_STAGE), rooms[0]
+    first_stage, one_BE, columns = whole(t, COUNT_6, FIRST_STAGE), rooms[0], t[0][2 * COLUMN]
     for net in range(whole(t, COUNT_6, STAGES)):
-        inputs, outputs = whole(t, NET_H6, 6 * net + 3), whole(t, NET_H6, 6 * net + 5)
-        last = net >= first_stage
+        begin, inputs = columns + whole(t, NET_H6, 6 * net + 2), whole(t, NET_H6, 6 * net + 3)
+        column_I, last = t[0][begin : begin + inputs], net >= first_stage
+        seen_BX = link_BM if last and first_stage else feature_BF
         for b in range(frames):
-            for i in range(inputs):
-                c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 2) + i)
-                one_BE[b, i] = link_BM[b, c] if last and first_stage else feature_BF[b, c]
+            for i, c in enumerate(column_I):
+                one_BE[b, i] = seen_BX[b, c]
         mlp(t, net, GELU, whole(t, COUNT_6, RESIDUAL), rooms, frames)
+        begin, outputs = columns + whole(t, NET_H6, 6 * net + 4), whole(t, NET_H6, 6 * net + 5)
+        column_O = t[0][begin : begin + outputs]
+        if last and whole(t, COUNT_6, TANH_BOUND):
+            activate(TANH, one_BE, one_BE, frames, outputs)
+        given_BX, at = (out_BN, first) if last else (link_BM, 0)
         for b in range(frames):
-            for o in range(outputs):
-                c = whole(t, COLUMN, whole(t, NET_H6, 6 * net + 4) + o)
-                if last:
-                    out_BN[first + b, c] = one_BE[b, o]
-                else:
-                    link_BM[b, c] = one_BE[b, o]
+            for o, c in enumerate(column_O):
+                given_BX[at + b, c] = one_BE[b, o]
     for b in range(first, first + frames):
         for n in range(out_BN.shape[1]):
             low, high, raw = np.float32(real(t, LOWER_N, n)), np.float32(real(t, UPPER_N, n)), out_BN[b, n]
-            if whole(t, COUNT_6, TANH_BOUND):
-                raw = np.float32(math.tanh(raw))
             angle = (high + low) * _HALF + (high - low) * _HALF * raw
             if math.isnan(angle):
                 angle = np.float32(0)
