@@ -238,6 +238,8 @@ def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
     except UserError as error:
         notes.append(f"'betas' is left out: {error}")
         return None
+    if array.ndim == 2:  # a row a frame, or one for all
+        array = array.mean(axis=0)
     if array.ndim != 1 or len(array) > 400 or not (np.abs(array) < LARGEST_BETA).all():
         notes.append(f"'betas' is left out: expected up to 400 finite numbers, found the shape {array.shape}")
         return None

@@ -50,7 +50,7 @@ def is_keypoints(content: Content) -> bool:
     if not content.is_npy:
         return holds_points(content)
     try:
-        points = read_keypoints_file(content.path, ReadOptions())
+        points = read_keypoints_file(content.path)
     except UserError:
         return False
     fits = fitting_sets(_some(points.point_TK3))
@@ -65,7 +65,7 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is damaged, it has no points of a body, which points they are or the rate is not known.
     """
-    return motion_of_points(path, read_keypoints_file(path, options), options)
+    return motion_of_points(path, read_keypoints_file(path), options)
 
 
 def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Motion:

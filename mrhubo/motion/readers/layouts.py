@@ -6,6 +6,7 @@ Where each layout is defined is said at its function.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from mrhubo.files.tree import Tree
@@ -16,6 +17,10 @@ from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.smpl_names import Found, find_inside, search
 from mrhubo.motion.readers.tracks import Kind, Layout
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
+
+_MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
+"""The models of `smplVersion` (https://pypi.org/project/smplcodec, codec.py)."""
+_MODEL = re.compile(r"smpl[xh](?![a-z])")
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -85,10 +90,15 @@ def _kind(source: str, found: Found, tree: Tree) -> Kind:
         return Kind("VIBE or one of its kin", "smpl", CAMERAS)
     said = next((text for node in (found.node, tree) if (text := _said(node))), "")
     keys = {*found.node.keys, *tree.keys}
-    return Kind(source, family_of(said, found.form.joints, keys), ANY_WORLD)
+    return Kind(source, family_of(said, found.form.joints, keys, found.shape()), ANY_WORLD)
 
 
 def _said(node: Tree) -> str:
-    """What a file calls its body model."""
-    model = node.get("surface_model_type", "model_type", "smpl_type", "body_model")
-    return (model.text() or "") if model is not None else ""
+    """What a file calls its body model, or the dictionary in it that has the parameters: `smplx`, `smplh_params`, but
+    not `smpl`, as those of all models are called.
+    """
+    model, version = node.get("surface_model_type", "model_type", "smpl_type", "body_model"), node.get("smplVersion")
+    if version is not None:
+        return _MESHCAPADE.get(int(version.number()), "")
+    called = _MODEL.search(node.where.lower()) if model is None else None
+    return called[0] if called is not None else (model.text() or "") if model is not None else ""
