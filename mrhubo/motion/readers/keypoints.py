@@ -40,7 +40,8 @@ _BESIDE, _NEARLY_ALL = 0.05, 0.9
 """How far beside a picture, in shares of it, points are seen; and which share of them is in it."""
 _CENTRED = 0.01
 """How far [m] from the origin the pelvis stays, in all frames, of points that are centred on it."""
-_NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
+NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
+"""Points without which nothing can be made of the others."""
 
 
 def is_keypoints(content: Content) -> bool:
@@ -80,7 +81,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
         raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
     _refuse_flat(path, found)
     places, what = _which(path, found)
-    missing = [name for name in _NEEDED if name not in places]
+    missing = [name for name in NEEDED if name not in places]
     if missing:
         raise UserError(f"{path}: has no point called {listed(missing)}; shoulders and hips are needed")
     rate, notes = _rate(path, found, options), found.notes

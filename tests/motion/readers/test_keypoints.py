@@ -510,3 +510,97 @@ def test_names_in_npz_may_be_objects_or_bytes(
     np.savez(path, keypoints=array_of(points, tuple(names)), names=np.arange(len(names)))
     with pytest.raises(UserError, match="'names' is an array of shape .*; expected the names of the points"):
         mrhubo.read_motion(path, RATE)
+
+
+def _table(point_TK3: np.ndarray, columns: str, separator: str = ",", point: str = ".") -> str:
+    """A table of points, frame by frame; `columns` says how those of MediaPipe's point 0 are called, x for its axis."""
+    names = [f"other_{place}" if name == "-" else name for place, name in enumerate(SETS["MediaPipe"])]
+    header = [
+        columns.replace("AXIS", axis).replace("NAME", name).replace("NUMBER", str(number))
+        for number, name in enumerate(names)
+        for axis in "xyz"
+    ]
+    rows = [[f"{x:.6f}".replace(".", point) for x in row.ravel()] for row in point_TK3]
+    return "\n".join(separator.join(row) for row in (header, *rows)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("columns", "separator", "point", "how"),
+    [
+        ("NAME_AXIS", ",", ".", "by their names"),
+        ("NAME.AXIS [m]", ";", ",", "by their names"),
+        ("NAME AXIS", "\t", ".", "by their names"),
+        ("AXISNUMBER", ",", ".", "as MediaPipe has them"),
+        ("NUMBER_AXIS", ",", ".", "as MediaPipe has them"),
+    ],
+)
+def test_tables(
+    columns: str,
+    separator: str,
+    point: str,
+    how: str,
+    points: dict[str, np.ndarray],
+    pose: torch.Tensor,
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.csv"
+    text = _table(array_of(points, SETS["MediaPipe"]), columns, separator, point)
+    for ends in ("\n", "\r\n"):
+        path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", ends).encode())
+        found = mrhubo.read_motion(path, RATE)
+        assert len(found) == FRAMES and bone_error(found, pose) < 0.2 and how in found.source
+    with pytest.raises(UserError, match="--rate"):
+        mrhubo.read_motion(path)
+
+
+def test_tables_tell_their_rate_and_their_gaps(
+    points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.csv"
+    header, *rows = _table(array_of(points, SETS["MediaPipe"]), "NAME_AXIS").splitlines()
+    path.write_text("\n".join([f"time [s],{header}", *(f"{t / 30:.4f},{row}" for t, row in enumerate(rows))]))
+    assert mrhubo.read_motion(path).frame_rate == 30
+    path.write_text("\n".join([f"time,{header}", *(f"{t * 33.3:.1f},{row}" for t, row in enumerate(rows))]))
+    with pytest.raises(UserError, match="--rate"):  # milliseconds, or so it seems
+        mrhubo.read_motion(path)
+    kept = [t for t in range(FRAMES) if t not in (4, 5)]
+    path.write_text("\n".join([f"frame,label,{header}", *(f"{100 + t},wave,{rows[t]}" for t in kept)]))
+    found = mrhubo.read_motion(path, RATE)
+    assert len(found) == FRAMES and found.confidence_TJ is not None
+    assert found.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")].nonzero().flatten().tolist() == kept
+    assert bone_error(found.changed(local_TJ33=found.local_TJ33[kept]), pose[kept]) < 0.2
+    elbow = header.split(",").index("left_elbow_x")
+    blank = [",".join(["" if x in range(elbow, elbow + 3) else word for x, word in enumerate(row.split(","))])
+             for row in rows]  # fmt: skip
+    path.write_text("\n".join([header, *blank[:3], *rows[3:]]))
+    assert "left shoulder to left elbow is not seen in 3" in " ".join(mrhubo.read_motion(path, RATE).notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda rows: [rows[0]], "a header and no frames"),
+        (lambda rows: [*rows[:3], rows[3].rpartition(",")[0]], "frame 2 has 98 columns, and the header 99"),
+        (lambda rows: [*rows[:3], rows[3].replace("0.", "O.", 1)], "frame 2 holds 'O"),
+    ],
+)
+def test_tables_that_are_refused(change, words: str, points: dict[str, np.ndarray], tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("\n".join(change(_table(array_of(points, SETS["MediaPipe"]), "NAME_AXIS").splitlines())))
+    with pytest.raises(UserError, match=words):
+        mrhubo.read_motion(path, RATE)
+
+
+@given(steps=accidents)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_damaged_tables_are_read_or_refused_in_a_sentence(
+    points: dict[str, np.ndarray], steps: list[Step], tmp_path: Path
+) -> None:
+    path = tmp_path / "points.csv"
+    path.write_bytes(damaged(_table(array_of(points, SETS["MediaPipe"])[:3], "NAME_AXIS").encode(), steps))
+    try:
+        found = mrhubo.read_motion(path, RATE)
+    except UserError as error:
+        assert "\n" not in str(error) and "points" in str(error)
+        return
+    assert bool(found.local_TJ33.isfinite().all())
