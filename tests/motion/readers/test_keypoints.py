@@ -224,7 +224,7 @@ def test_points_are_read_from_pickles_and_torch_files(
         "people.pkl": lambda path: path.write_bytes(
             pickle.dumps({"a": {"joints3d": coco[:5] * np.nan}, "b": {"joints3d": coco, "fps": 30}})
         ),
-        "results.npy": lambda path: np.save(path, {"motion": samples, "lengths": np.array([FRAMES, 3]), "text": "x"}),
+        "results.npy": lambda path: np.save(path, {"motion": samples, "lengths": np.array([FRAMES, 3]), "text": "x"}),  # type: ignore[arg-type]
     }
     for name, write in made.items():
         write(tmp_path / name)
