@@ -37,7 +37,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.units import find_unit
-from mrhubo.motion.readers.world import AMASS_WORLD, WORLDS
+from mrhubo.motion.readers.world import WORLDS, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
 _MAX_SMALL = 1_000_000
@@ -97,7 +97,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         betas = _read_betas(file, notes)
         contact_T4 = _read_contacts(file, len(local_TJ33), notes)
         family, rest = find_family(file, betas)
-        worlds = AMASS_WORLD if _ITS_OWN & file.keys else WORLDS
+        worlds = Z_UP if _ITS_OWN & file.keys else WORLDS
     name = motion_name(path)
     motion = Motion.of(
         name=name,

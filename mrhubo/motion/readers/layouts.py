@@ -16,7 +16,7 @@ from mrhubo.motion.readers.frame_layouts import read_frame_list, read_phalp, rea
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.smpl_names import Found, find_inside, search
 from mrhubo.motion.readers.tracks import Kind, Layout
-from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
+from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
 _MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
 """The models of `smplVersion` (https://pypi.org/project/smplcodec, codec.py)."""
@@ -57,8 +57,8 @@ def _single(tree: Tree) -> Layout | None:
     TRAM: `np.save` of a dictionary, `pred_rotmat` (T, 24, 3, 3), `pred_trans` (T, 1, 3), `frame`, as the camera sees it
     (https://github.com/yufu-wang/tram/blob/main/scripts/estimate_humans.py). GVHMR: `smpl_params_global` and
     `smpl_params_incam`, of SMPL-X (https://github.com/zju3dv/GVHMR/blob/main/tools/demo/demo.py). GENMO and GEM:
-    `body_params_global` (https://github.com/NVlabs/GENMO). AIST++, EDGE, SLAHMR, EMDB, GRAB, PHC and others: see
-    `mrhubo.motion.readers.smpl_names`.
+    `body_params_global` (https://github.com/NVlabs/GENMO). Their world is what they call `ay`, with y up. AIST++,
+    EDGE, SLAHMR, EMDB, GRAB, PHC and others: see `mrhubo.motion.readers.smpl_names`.
     """
     found = find_inside(tree)
     if found is None:
@@ -66,7 +66,7 @@ def _single(tree: Tree) -> Layout | None:
     keys = set(found.node.keys)
     if "params_global" in found.node.where or "params_incam" in found.node.where:
         name = "GVHMR" if "smpl_params" in found.node.where else "GENMO or GEM"
-        worlds = CAMERAS if "incam" in found.node.where else ANY_WORLD
+        worlds = CAMERAS if "incam" in found.node.where else Y_UP
         return Layout(Kind(name, "smplx", worlds), found.tracks())
     if "pred_rotmat" in keys:
         return Layout(Kind("TRAM", "smpl", CAMERAS), found.tracks(), camera_beside=True)
