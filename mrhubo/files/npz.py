@@ -158,8 +158,8 @@ def open_npz(path: Path) -> Iterator[NpzFile]:
 
 
 def read_member(handle: IO[bytes], stored: int, load: Callable[[BinaryIO], Any]) -> Any:
-    """The array of an .npy file or member, of numbers or text; or, of one that holds pickled objects, what `load` makes
-    of the pickle.
+    """The array of an .npy file or member, of numbers, or of text, in letters or bytes; or, of one that holds pickled
+    objects, what `load` makes of the pickle.
 
     Args:
         handle: opened at its beginning.
@@ -175,7 +175,7 @@ def read_member(handle: IO[bytes], stored: int, load: Callable[[BinaryIO], Any])
         raise UserError("has a header that is not one of an .npy array") from error
     if header.dtype.hasobject:
         return load(io.BytesIO(handle.read(stored)))
-    if header.dtype.kind not in "fiubU":
+    if header.dtype.kind not in "fiubUS":
         raise UserError(f"has type {shortened(header.dtype)}; expected {_TYPES['fiu']}")
     size = math.prod(header.shape) * header.dtype.itemsize
     if size > stored:
@@ -184,6 +184,8 @@ def read_member(handle: IO[bytes], stored: int, load: Callable[[BinaryIO], Any])
     if len(content) < size:
         raise UserError("is truncated")
     flat = np.frombuffer(content, header.dtype) if size else np.zeros(0, header.dtype)
+    if header.dtype.kind == "S":
+        flat = np.char.decode(flat, "utf-8", "replace")
     return flat.reshape(header.shape, order="F" if header.by_column else "C")
 
 

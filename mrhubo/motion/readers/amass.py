@@ -37,12 +37,16 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.units import find_unit
-from mrhubo.motion.readers.world import WORLDS
+from mrhubo.motion.readers.world import WORLDS, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
 _MAX_SMALL = 1_000_000
 """Bytes of an array that holds a number, some, or a text."""
 _POSE_KEYS = ("pose_body", "poses")
+_ITS_OWN = {"dmpls", "markers_latent", "latent_labels"}
+"""Keys of AMASS's own files alone: of the soft tissue beside SMPL-H, or of the markers beside SMPL-X, of which files
+that others wrote with its keys have none.
+"""
 _JOINTS = {
     "pose_body": {21: "body without root"},
     "poses": {22: "body", 24: "SMPL", 52: "SMPL-H", 55: "SMPL-X"},
@@ -76,8 +80,8 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
 
     Joints may have an axis of their own, and be matrices: (T, 21, 3), (T, 52, 3, 3).
 
-    The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up, other files
-    of this kind y.
+    The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up; of other
+    files of this kind, the body tells whether y or z is.
 
     Rotations refer to the rest pose of the body model that the file says it is of; they are told in our skeleton's.
 
@@ -93,6 +97,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         betas = _read_betas(file, notes)
         contact_T4 = _read_contacts(file, len(local_TJ33), notes)
         family, rest = find_family(file, betas)
+        worlds = Z_UP if _ITS_OWN & file.keys else WORLDS
     name = motion_name(path)
     motion = Motion.of(
         name=name,
@@ -107,7 +112,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         family=family,
         notes=tuple(notes),
     )
-    return to_our_rest(_in_metres(upright(motion, WORLDS, rest)))
+    return to_our_rest(_in_metres(upright(motion, worlds, rest)))
 
 
 def _in_metres(motion: Motion) -> Motion:
@@ -238,6 +243,8 @@ def _read_betas(file: NpzFile, notes: list[str]) -> tuple[float, ...] | None:
     except UserError as error:
         notes.append(f"'betas' is left out: {error}")
         return None
+    if array.ndim == 2:  # a row a frame, or one for all
+        array = array.mean(axis=0)
     if array.ndim != 1 or len(array) > 400 or not (np.abs(array) < LARGEST_BETA).all():
         notes.append(f"'betas' is left out: expected up to 400 finite numbers, found the shape {array.shape}")
         return None

@@ -40,6 +40,8 @@ _MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION\b", re.IGNORECASE)
 _FRAMES = re.compile(rb"\s*+Frames\s*+:?\s*+(\d+)", re.IGNORECASE)
 _TIME = re.compile(rb"\s*+Frame\s*+Time\s*+:?[ \t]*+([^\s]*+)", re.IGNORECASE)
 _TOKEN = re.compile(r"[{}]|[^\s{}]+")
+_CUT = re.compile(rb"[-+]?\d*\.?\d*(?:[eE][-+]?)?")
+"""The beginning of a number."""
 
 
 def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
@@ -168,8 +170,12 @@ def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, in
 
 
 def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | None) -> tuple[np.ndarray, list[str]]:
-    """The frames (T, C), float32, block by block; those that the file does not hold whole are left out, with a note."""
-    blocks, total, left = [], 0, b""
+    """The frames (T, C), float32, block by block; those that the file does not hold whole are left out, with a note.
+
+    Raises:
+        UserError: something is no number, or numbers are missing in the middle of the frames, or too many.
+    """
+    blocks, ends, total, left = [], [np.zeros(1, int)], 0, b""
     notes: list[str] = []
     while True:
         block = handle.read(_BLOCK)
@@ -181,6 +187,7 @@ def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | No
             text = text.replace(b",", b".") if b"." not in text else text.replace(b",", b" ")
         after = None
         if text.strip():
+            ends.append(total + _line_ends(text))
             numbers, after = _numbers(text)
             blocks.append(numbers)
             total += len(numbers)
@@ -188,16 +195,21 @@ def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | No
             raise UserError(
                 f"{path}: has more than {min(MAX_FRAMES, _MAX_NUMBERS // columns)} frames of {columns} numbers; cut it"
             )
-        if after is not None and (not promised or total < promised * columns):
-            raise UserError(f"{path}: frame {total // columns} holds '{after}', no number")
+        if after is not None and not block and total % columns and _CUT.fullmatch(after):
+            break
         if after is not None:
-            notes.append(f"what follows the frames is left out: '{after}'")
+            word = shortened(after.split()[0].decode("latin1"), 30)
+            if not promised or total < promised * columns:
+                raise UserError(f"{path}: frame {total // columns} holds '{word}', no number")
+            notes.append(f"what follows the frames is left out: '{word}'")
             break
         if not block:
             break
     frames = total // columns
     if frames == 0:
         raise UserError(f"{path}: holds {total} numbers after 'MOTION', less than one frame of {columns}")
+    if total != (promised or 0) * columns:
+        _check_lines(path, np.concatenate(ends), columns, min(frames, promised or frames))
     value_TC = np.concatenate(blocks)[: frames * columns].reshape(frames, columns)
     if promised and promised < frames:
         notes.append(f"{frames - promised} frames beyond the {promised} that the file promises are left out")
@@ -211,21 +223,54 @@ def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | No
     return value_TC, notes
 
 
-def _numbers(text: bytes) -> tuple[np.ndarray, str | None]:
-    """The numbers, float32, with which a block of text begins, and what follows that is none, if something does."""
+def _line_ends(text: bytes) -> np.ndarray:
+    """How many words of a text stand before the end of each of its lines."""
+    byte_X = np.frombuffer(text, np.uint8)
+    word_X = byte_X > ord(" ")
+    starts = np.flatnonzero(word_X & ~np.concatenate(([False], word_X[:-1])))
+    return np.searchsorted(starts, np.flatnonzero((byte_X == ord("\n")) | (byte_X == ord("\r"))))
+
+
+def _check_lines(path: Path, ends: np.ndarray, columns: int, frames: int) -> None:
+    """Refuses frames that do not end where a line does: a number that is missing, or one too many, moves all that
+    follow to other joints. Frames that stand in one line are not told apart so.
+
+    Args:
+        path: the file.
+        ends: how many numbers stand before the end of each line.
+        columns: C.
+        frames: how many are whole.
+    """
+    ends = np.unique(ends)
+    last = np.arange(1, frames + 1) * columns
+    place = np.searchsorted(ends, last)
+    wrong = np.flatnonzero((place < len(ends)) & (ends[np.minimum(place, len(ends) - 1)] != last))
+    if len(wrong):
+        frame = int(wrong[0])
+        held = ends[[place[frame] - 1, place[frame]]] - frame * columns
+        raise UserError(
+            f"{path}: frame {frame} holds {held[0] if held[0] > 0 else held[1]} numbers, and the joints have {columns}"
+            " channels; numbers are missing, or there are too many"
+        )
+
+
+def _numbers(text: bytes) -> tuple[np.ndarray, bytes | None]:
+    """The numbers, float32, with which a block of text begins, and what follows from a word that is none, if there is
+    one.
+    """
     try:
         with warnings.catch_warnings(action="error"):
             return np.fromstring(text.decode("latin1"), dtype=np.float64, sep=" ").astype(np.float32), None
     except (ValueError, DeprecationWarning, RuntimeWarning):
-        numbers = []
-        for word in text.split():
+        numbers, after, words = [], None, text.split()
+        for place, word in enumerate(words):
             try:
                 numbers.append(float(word))
             except ValueError:
-                with np.errstate(over="ignore"):
-                    return np.array(numbers, np.float64).astype(np.float32), shortened(word.decode("latin1"), 30)
+                after = b" ".join(words[place:])
+                break
         with np.errstate(over="ignore"):
-            return np.array(numbers, np.float64).astype(np.float32), None
+            return np.array(numbers, np.float64).astype(np.float32), after
 
 
 def _number(path: Path, line: str, word: str) -> float:

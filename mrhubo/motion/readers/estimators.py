@@ -65,15 +65,11 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         or read_soma(tree, rate)
         or read_sam3d(tree, options, rate)
     )
-    return found or _read_smpl(path, tree, options)
-
-
-def _read_smpl(path: Path, tree: Tree, options: ReadOptions) -> Motion:
-    layout = find_layout(tree)
-    points = points_in(tree, options) if layout is None else None
+    found = found or smpl_motion(path, tree, options)
+    points = points_in(tree, options) if found is None else None
     if points is not None:
         return motion_of_points(path, checked(path, points), options)
-    if layout is None:
+    if found is None:
         content = Content.open(path)
         what = content.described if content.arrays else f"{content.described} of {tree.described}"
         raise NoMotion(
@@ -81,6 +77,18 @@ def _read_smpl(path: Path, tree: Tree, options: ReadOptions) -> Motion:
             " 4D-Humans, TRAM, ROMP, PyMAF-X, SAM 3D Body or another writes, SMPL's 'poses' (frames, 72), say, or"
             " 'keypoints' (frames, points, 3); docs/formats.md says how each is laid out"
         )
+    return found
+
+
+def smpl_motion(path: Path, tree: Tree, options: ReadOptions) -> Motion | None:
+    """The motion of SMPL parameters, whatever container they were in; None where nobody knows the layout.
+
+    Raises:
+        UserError: what it tells is no motion.
+    """
+    layout = find_layout(tree)
+    if layout is None:
+        return None
     notes = list(layout.notes)
     track = choose(path, layout.tracks, options, notes)
     arrays = track.read()

@@ -12,11 +12,18 @@ from mrhubo.motion.writers.amass import OWN_REST, REST_KEY
 
 _FAMILY_OF_JOINTS = {23: "smpl", 24: "smpl", 52: "smplh", 55: "smplx"}
 """By how many joints a pose has; 23 are SMPL's without the root."""
-_FACE = {"pose_jaw", "pose_eye", "jaw_pose", "leye_pose", "reye_pose", "expression", "smplx_verts", "smplx_params"}
-"""Keys of what SMPL-X alone has."""
+_FACE = {
+    "pose_jaw", "pose_eye", "jaw_pose", "leye_pose", "reye_pose", "expression", "smplx_verts", "smplx_params",
+    "pose_lhand", "pose_rhand",
+}  # fmt: skip
+"""Keys of what SMPL-X alone has: its face, and the hands of Inter-X (https://github.com/liangxuy/Inter-X)."""
 _HANDS = {"pose_hand", "left_hand_pose", "right_hand_pose"}
 _MORE_THAN_BODY = {"poses", "pose_hand", "pose_jaw", "pose_eye"}
 """Poses of which AMASS's files hold at least one beside the body's."""
+_SHAPE_OF_SMPLH = 16
+"""Numbers that tell a body's shape in AMASS's files of SMPL-H, and in what is made of them (HuMoR, SLAHMR, OMOMO);
+those of SMPL-X with as many say that they are.
+"""
 _MAX_TEXT = 1_000
 """Bytes of a name."""
 
@@ -34,17 +41,18 @@ def find_family(file: NpzFile, betas: Sequence[float] | None) -> tuple[str, str]
     shapeless = betas is not None and not any(betas)
     if "description" in file.keys and shapeless and not _MORE_THAN_BODY & file.keys:
         return "", "rotations are taken to refer to mrhubo's own skeleton: a described pose of a body without a shape"
-    family = family_of(_read_text(file, "surface_model_type"), _joints(file), file.keys)
+    family = family_of(_read_text(file, "surface_model_type"), _joints(file), file.keys, betas)
     return family, rest_in_words(family)
 
 
-def family_of(said: str, joints: int, keys: Collection[str]) -> str:
+def family_of(said: str, joints: int, keys: Collection[str], betas: Sequence[float] | None) -> str:
     """The family of body models, a key of `FAMILIES`; empty where nothing tells.
 
     Args:
         said: what the file calls its model.
         joints: how many joints its pose has.
         keys: what else it holds.
+        betas: the body's shape, if it tells one; all zeros tell none.
     """
     bare = "".join(character for character in said.lower() if character.isalnum())
     for name in sorted(FAMILIES, key=len, reverse=True):
@@ -52,7 +60,10 @@ def family_of(said: str, joints: int, keys: Collection[str]) -> str:
             return name
     if joints in _FAMILY_OF_JOINTS:
         return _FAMILY_OF_JOINTS[joints]
-    return "smplx" if _FACE & set(keys) else "smplh" if _HANDS & set(keys) else ""
+    if _FACE & set(keys):
+        return "smplx"
+    shaped = betas is not None and len(betas) == _SHAPE_OF_SMPLH and any(betas)
+    return "smplh" if shaped or _HANDS & set(keys) else ""
 
 
 def rest_in_words(family: str) -> str:

@@ -56,7 +56,9 @@ FORMATS: tuple[Format, ...] = (
     Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
-    Format("keypoints (.json, .npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
+    Format("keypoints and SMPL parameters in JSON", "json_file", "is_json", "read_json", ()),
+    Format("keypoints in tables (.csv)", "keypoint_table", "is_table", "read_table", ()),
+    Format("keypoints (.npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     Format("videos (MP4, MOV, MKV, WebM, AVI)", "video", "is_video", "read_video", ()),
     # the last row: whatever else holds arrays in dictionaries
     Format("what an estimator of human pose writes", "estimators", "is_container", "read_estimated", _PYTHON),

@@ -9,13 +9,13 @@ Legend: T frames, K keypoints.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from mrhubo.errors import listed, shortened
-from mrhubo.files.npz import open_npz
+from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
@@ -23,17 +23,18 @@ from mrhubo.motion.readers.rate import rate_in
 from mrhubo.motion.readers.tracks import Person, choose
 
 POINT_KEYS = (
-    "keypoints", "keypoints_3d", "keypoints3d_optim", "keypoints3d", "kpts", "kpts_3d", "kpts3d", "joints",
-    "joints_3d", "joints3d", "joints3D", "positions", "positions_3d", "points", "world_landmarks",
-    "pose_world_landmarks", "landmarks", "pose_landmarks", "reconstruction", "joint_positions", "jointPositions",
-    "pred_joints", "j3d", "skeleton",
+    "keypoints3d_optim", "keypoints_3d", "kpts_3d", "joints_3d", "positions_3d", "pose_3d", "world_landmarks",
+    "pose_world_landmarks", "pose_world_3d_landmarks", "reconstruction", "joint_positions", "pred_joints", "j3d",
+    "keypoints", "keypoint", "kpts", "joints", "positions", "points", "landmarks", "pose_landmarks", "skeleton",
 )  # fmt: skip
-"""What files call points, the best first."""
+"""What files call points, the best first: those in space go before those that may be in a picture. Capitals and signs
+between words do not matter: `keypoints3D` is `keypoints_3d`, `poseWorldLandmarks` is `pose_world_landmarks`.
+"""
+_PLAIN = {key.replace("_", ""): place for place, key in enumerate(POINT_KEYS)}
 NAME_KEYS = ("names", "joint_names", "keypoint_names", "landmark_names", "keypoints_names")
 CONFIDENCE_KEYS = ("confidence", "confidences", "conf", "scores", "visibility", "keypoint_scores", "presence")
 LIFT = "lift them to three dimensions first, for instance with MMPose or MotionBERT"
 """What to do with points in a picture."""
-_MAX_NAMES = 1_000_000
 _SAMPLES, _LENGTHS = "motion", "lengths"
 
 
@@ -50,14 +51,22 @@ class Keypoints:
     notes: list[str] = field(default_factory=list)
 
 
-def in_npz(path: Path, tree: Tree) -> Keypoints:
+def point_key(keys: Iterable[str]) -> str | None:
+    """The key under which a dictionary has points in space, or else such as may be; None where it has neither."""
+    plain = {"".join(filter(str.isalnum, key.lower())): key for key in keys}
+    return min(((_PLAIN[bare], key) for bare, key in plain.items() if bare in _PLAIN), default=(0, None))[1]
+
+
+def in_npz(tree: Tree) -> Keypoints:
     """The points of an .npz file.
 
     Raises:
         UserError: they are no points of frames, or its names are no text.
     """
-    found = _in_node(path, tree)
-    found.names = _names(path)
+    found = _named_in(tree)
+    named = tree.get(*NAME_KEYS)
+    if named is not None and found.names is None:
+        raise UserError(f"{named.named} is {named.described}; expected the names of the points")
     return found
 
 
@@ -84,9 +93,9 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
     samples = _samples(tree, options)
     if samples is not None:
         return samples
-    if set(POINT_KEYS) & set(tree.keys):
+    if point_key(tree.keys) is not None:
         return _named_in(tree)
-    people = {name: child for name, child in tree.items() if set(POINT_KEYS) & set(child.keys)}
+    people = {name: child for name, child in tree.items() if point_key(child.keys) is not None}
     if not people:
         return None
     shapes = {name: child[_key(child)].shape() for name, child in people.items()}
@@ -130,7 +139,9 @@ def _in_node(path: Path, node: Tree) -> Keypoints:
 
 
 def _key(node: Tree) -> str:
-    return next(key for key in POINT_KEYS if key in node.keys)
+    key = point_key(node.keys)
+    assert key is not None
+    return key
 
 
 def _samples(tree: Tree, options: ReadOptions) -> Keypoints | None:
@@ -147,17 +158,6 @@ def _samples(tree: Tree, options: ReadOptions) -> Keypoints | None:
     point_KXT = tree[_SAMPLES].array()[int(chosen.person), :, :, : chosen.length]
     point_TK3 = point_KXT.transpose(2, 0, 1).astype(np.float64)
     return Keypoints(point_TK3, where=f"'{_SAMPLES}', sample {chosen.person}", notes=notes)
-
-
-def _names(path: Path) -> list[str] | None:
-    """The names in an .npz file, an array of text; None where there are none.
-
-    Raises:
-        UserError: there are some, and they are no text (pickled objects, as NumPy makes of lists of any length).
-    """
-    with open_npz(path) as file:
-        key = next((key for key in NAME_KEYS if key in file.keys), None)
-        return None if key is None else [str(name) for name in file.read(key, kinds="U", max_bytes=_MAX_NAMES).ravel()]
 
 
 def _split(path: Path, array: np.ndarray, where: str) -> tuple[np.ndarray, np.ndarray | None]:

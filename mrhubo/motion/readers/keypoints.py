@@ -40,7 +40,8 @@ _BESIDE, _NEARLY_ALL = 0.05, 0.9
 """How far beside a picture, in shares of it, points are seen; and which share of them is in it."""
 _CENTRED = 0.01
 """How far [m] from the origin the pelvis stays, in all frames, of points that are centred on it."""
-_NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
+NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
+"""Points without which nothing can be made of the others."""
 
 
 def is_keypoints(content: Content) -> bool:
@@ -50,7 +51,7 @@ def is_keypoints(content: Content) -> bool:
     if not content.is_npy:
         return holds_points(content)
     try:
-        points = read_keypoints_file(content.path, ReadOptions())
+        points = read_keypoints_file(content.path)
     except UserError:
         return False
     fits = fitting_sets(_some(points.point_TK3))
@@ -65,7 +66,7 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is damaged, it has no points of a body, which points they are or the rate is not known.
     """
-    return motion_of_points(path, read_keypoints_file(path, options), options)
+    return motion_of_points(path, read_keypoints_file(path), options)
 
 
 def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Motion:
@@ -80,7 +81,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
         raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
     _refuse_flat(path, found)
     places, what = _which(path, found)
-    missing = [name for name in _NEEDED if name not in places]
+    missing = [name for name in NEEDED if name not in places]
     if missing:
         raise UserError(f"{path}: has no point called {listed(missing)}; shoulders and hips are needed")
     rate, notes = _rate(path, found, options), found.notes

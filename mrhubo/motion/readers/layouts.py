@@ -6,6 +6,7 @@ Where each layout is defined is said at its function.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from mrhubo.files.tree import Tree
@@ -15,7 +16,11 @@ from mrhubo.motion.readers.frame_layouts import read_frame_list, read_phalp, rea
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.smpl_names import Found, find_inside, search
 from mrhubo.motion.readers.tracks import Kind, Layout
-from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
+from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
+
+_MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
+"""The models of `smplVersion` (https://pypi.org/project/smplcodec, codec.py)."""
+_MODEL = re.compile(r"smpl[xh](?![a-z])")
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -52,8 +57,8 @@ def _single(tree: Tree) -> Layout | None:
     TRAM: `np.save` of a dictionary, `pred_rotmat` (T, 24, 3, 3), `pred_trans` (T, 1, 3), `frame`, as the camera sees it
     (https://github.com/yufu-wang/tram/blob/main/scripts/estimate_humans.py). GVHMR: `smpl_params_global` and
     `smpl_params_incam`, of SMPL-X (https://github.com/zju3dv/GVHMR/blob/main/tools/demo/demo.py). GENMO and GEM:
-    `body_params_global` (https://github.com/NVlabs/GENMO). AIST++, EDGE, SLAHMR, EMDB, GRAB, PHC and others: see
-    `mrhubo.motion.readers.smpl_names`.
+    `body_params_global` (https://github.com/NVlabs/GENMO). Their world is what they call `ay`, with y up. AIST++,
+    EDGE, SLAHMR, EMDB, GRAB, PHC and others: see `mrhubo.motion.readers.smpl_names`.
     """
     found = find_inside(tree)
     if found is None:
@@ -61,7 +66,7 @@ def _single(tree: Tree) -> Layout | None:
     keys = set(found.node.keys)
     if "params_global" in found.node.where or "params_incam" in found.node.where:
         name = "GVHMR" if "smpl_params" in found.node.where else "GENMO or GEM"
-        worlds = CAMERAS if "incam" in found.node.where else ANY_WORLD
+        worlds = CAMERAS if "incam" in found.node.where else Y_UP
         return Layout(Kind(name, "smplx", worlds), found.tracks())
     if "pred_rotmat" in keys:
         return Layout(Kind("TRAM", "smpl", CAMERAS), found.tracks(), camera_beside=True)
@@ -85,10 +90,15 @@ def _kind(source: str, found: Found, tree: Tree) -> Kind:
         return Kind("VIBE or one of its kin", "smpl", CAMERAS)
     said = next((text for node in (found.node, tree) if (text := _said(node))), "")
     keys = {*found.node.keys, *tree.keys}
-    return Kind(source, family_of(said, found.form.joints, keys), ANY_WORLD)
+    return Kind(source, family_of(said, found.form.joints, keys, found.shape()), ANY_WORLD)
 
 
 def _said(node: Tree) -> str:
-    """What a file calls its body model."""
-    model = node.get("surface_model_type", "model_type", "smpl_type", "body_model")
-    return (model.text() or "") if model is not None else ""
+    """What a file calls its body model, or the dictionary in it that has the parameters: `smplx`, `smplh_params`, but
+    not `smpl`, as those of all models are called.
+    """
+    model, version = node.get("surface_model_type", "model_type", "smpl_type", "body_model"), node.get("smplVersion")
+    if version is not None:
+        return _MESHCAPADE.get(int(version.number()), "")
+    called = _MODEL.search(node.where.lower()) if model is None else None
+    return called[0] if called is not None else (model.text() or "") if model is not None else ""

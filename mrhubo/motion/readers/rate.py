@@ -10,7 +10,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
 
-RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "fps")
+RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "frameRate", "fps")
 """What files call it; the first two are AMASS's."""
 
 

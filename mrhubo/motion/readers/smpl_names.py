@@ -4,8 +4,8 @@ Where a name is from: `pose_world` WHAM, `smpl_poses` AIST++ (https://google.git
 `smpl_thetas` ROMP, `pred_rotmat` TRAM, `pred_thetas` HybrIK (https://github.com/Jeff-sjtu/HybrIK), `body_pose` the
 package smplx (https://github.com/vchoutas/smplx), `pose_body` AMASS, `poses_body` EMDB
 (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC), `fullpose` GRAB
-(https://github.com/otaheri/GRAB), `smpl_pose` GLAMR (https://github.com/NVlabs/GLAMR), `local_rot_mats` Kimodo, `poses`
-and `pose` everybody.
+(https://github.com/otaheri/GRAB), `smpl_pose` GLAMR (https://github.com/NVlabs/GLAMR), `local_rot_mats` Kimodo,
+`bodyPose` Meshcapade's .smpl (https://pypi.org/project/smplcodec), `poses` and `pose` everybody.
 """
 
 from __future__ import annotations
@@ -64,6 +64,7 @@ _NAMES = (
     _Names("pose"),
     _Names("thetas"),
     _Names("rotations"),
+    _Names("bodyPose", position=("bodyTranslation",), betas=("shapeParameters",)),
     _Names("local_rot_mats", position=("root_positions",)),
 )
 
@@ -100,6 +101,13 @@ class Found:
         frames = frames if frames is not None and frames.size == len(array) else None
         first = 1 if self.form.joints in _WITH_ROOT else 0
         return SmplArrays(pose.where, array, self.form, first, root, position, betas, frames)
+
+    def shape(self) -> list[float] | None:
+        """The body's shape, of the first of the people or frames that have one; None where there is none."""
+        betas = self.node.find_array(*self.names.betas)
+        if betas is None or betas.ndim == 0 or not betas.size:
+            return None
+        return betas.reshape(-1, betas.shape[-1])[0].tolist()
 
     def tracks(self, person: str = "") -> list[Track]:
         """One for each of the people; the name is for a single one."""

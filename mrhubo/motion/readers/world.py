@@ -17,6 +17,8 @@ _TO_Y_UP: dict[str, tuple[tuple[float, float, float], ...]] = {
 looks along -z."""
 WORLDS = ("y up", "z up")
 """Of files of motion capture; where both fit alike, the first is taken."""
+Y_UP, Z_UP = ("y up",), ("z up",)
+"""Of files whose writers say so, also of who lies, crawls or stands on the hands from the first frame to the last."""
 CAMERAS = ("y down", "y up")
 """Of estimators: what a camera sees, and what some have turned upright."""
 ANY_WORLD = ("y up", "y down", "z up")

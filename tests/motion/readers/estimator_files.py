@@ -6,6 +6,7 @@ Legend: T frames; a person's pose is axis-angle [rad] of SMPL's first 22 joints 
 
 from __future__ import annotations
 
+import json
 import pickle
 from collections import defaultdict
 from collections.abc import Callable
@@ -342,6 +343,33 @@ class Writer:
     """Where the root of the last frame is, along the x axis [m]."""
 
 
+def meshcapade(path: Path, people: dict[int, np.ndarray]) -> None:
+    ((_, pose),) = people.items()
+    with path.open("wb") as file:
+        np.savez_compressed(
+            file,
+            codecVersion=np.int32(2),
+            smplVersion=np.int32(2),
+            gender=np.int32(0),
+            shapeParameters=np.zeros(10, np.float32),
+            frameCount=np.int32(len(pose)),
+            bodyTranslation=np.ones((len(pose), 3), np.float32),
+            bodyPose=pose,
+        )
+
+
+def fit3d(path: Path, people: dict[int, np.ndarray]) -> None:
+    ((_, pose),) = people.items()
+    content = {
+        "transl": np.ones((len(pose), 3)),
+        "global_orient": matrices(pose[:, :1]),
+        "body_pose": matrices(pose[:, 1:]),
+        "betas": np.zeros((len(pose), 10)),
+        "jaw_pose": matrices(np.zeros((len(pose), 1, 3))),
+    }
+    path.write_text(json.dumps({key: array.tolist() for key, array in content.items()}))
+
+
 WRITERS: dict[str, Writer] = {
     "wham": Writer(wham, ".pkl", "WHAM", "smpl", many=True, position=0.5),
     "vibe": Writer(vibe, ".pkl", "VIBE", "smpl", camera=True, many=True, position=None),
@@ -361,5 +389,7 @@ WRITERS: dict[str, Writer] = {
     "glamr": Writer(glamr, ".pkl", "SMPL parameters of people", "smpl", many=True),
     "cliff": Writer(cliff, ".npz", "CLIFF", "smpl", camera=True, many=True),
     "frame_list": Writer(frame_list, ".pkl", "SMPL parameters, frame by frame", "smpl", camera=True),
+    "meshcapade": Writer(meshcapade, ".smpl", "SMPL parameters", "smplx"),
+    "fit3d": Writer(fit3d, ".json", "SMPL parameters", "smplx"),
     "smplx": Writer(smplx, ".npz", "SMPL parameters", "smplx"),
 }

@@ -519,3 +519,21 @@ def test_what_arms_do_not_need_is_left_out_with_a_note(tmp_path: Path, arrays_: 
 def test_a_file_of_the_body_alone_has_no_root(tmp_path: Path) -> None:
     motion = read_motion(_save(tmp_path / "a.npz", pose_body=POSE_T63, **RATE))
     assert motion.root_rotation_T33 is None and motion.root_position_T3 is None and not motion.notes
+
+
+@pytest.mark.parametrize("own", ["dmpls", "markers_latent", "latent_labels"])
+@pytest.mark.parametrize("turn", [[90, 0, 0], [-90, 0, 0], [0, 90, 0], [180, 0, 0]])
+def test_amass_has_z_up_also_where_nobody_stands(own: str, turn: list[float], tmp_path: Path) -> None:
+    """Who lies with the head along y from the first frame to the last, or stands on the hands, does not say so."""
+    stands = Rotation.from_euler("x", 90, degrees=True)
+    root = (Rotation.from_euler("xyz", turn, degrees=True) * stands).as_rotvec()
+    poses, place = np.zeros((5, 156)), np.tile([1.0, 2.0, 0.15], (5, 1))
+    poses[:, :3] = root
+    path = _save(
+        tmp_path / "a.npz", poses=poses, trans=place, mocap_framerate=np.array(60.0), **{own: np.zeros((5, 8))}
+    )
+    motion = read_motion(path)
+    assert "z up;" in motion.source and motion.root_position_T3 is not None and motion.root_rotation_T33 is not None
+    np.testing.assert_allclose(motion.root_position_T3[0], [1.0, 0.15, -2.0], atol=1e-6)
+    up = Rotation.from_euler("x", -90, degrees=True).apply(Rotation.from_rotvec(root).apply([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(motion.root_rotation_T33[0, :, 1], up, atol=1e-6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -282,6 +283,34 @@ def test_what_is_wrong_is_said(text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
         mrhubo.read_motion(path)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "held"),
+    [(lambda row: row.rpartition(" ")[0], -1), (lambda row: f"{row} 0.0", 1), (lambda row: row.replace(".", ".0,", 1), 1)],
+)  # fmt: skip
+def test_a_number_too_few_or_too_many_is_no_other_joints(
+    change: Callable[[str], str], held: int, motion: Motion, tmp_path: Path
+) -> None:
+    """A line that lacks a number, or has one more, would move all numbers that follow to other joints."""
+    text = write_bvh(motion, Style())
+    channels = sum(int(count) for count in re.findall(r"CHANNELS (\d+)", text))
+    start, *rows = text.rpartition("Frame Time:")[2].splitlines()
+    rows[5] = change(rows[5])
+    path = tmp_path / "damaged.bvh"
+    path.write_text("\n".join([text.rpartition("Frame Time:")[0] + "Frame Time:" + start, *rows]))
+    with pytest.raises(UserError) as caught:
+        mrhubo.read_motion(path)
+    assert f"frame 5 holds {channels + held} numbers, and the joints have {channels} channels" in str(caught.value)
+
+
+@pytest.mark.parametrize("rest", ["", " -", " 1.", " 1e-"])
+def test_a_file_that_was_cut_off_is_read_as_far_as_it_goes(rest: str, motion: Motion, tmp_path: Path) -> None:
+    text = write_bvh(motion, Style())
+    path = tmp_path / "cut.bvh"
+    path.write_text(text.rstrip().rpartition("\n")[0] + "\n1.0 2.0" + rest)
+    found = mrhubo.read_motion(path)
+    assert len(found) == len(motion) - 1 and any("cut off" in note for note in found.notes)
 
 
 def test_the_same_take_in_two_forms(external_dir: Path) -> None:

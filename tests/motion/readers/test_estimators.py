@@ -60,6 +60,20 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
             read_motion(path)
 
 
+@pytest.mark.parametrize("name", ["gvhmr", "genmo"])
+@pytest.mark.parametrize("turn", [[90, 0, 0], [0, 0, 90], [180, 0, 0]])
+def test_who_lies_or_stands_on_the_hands_is_not_set_upright(name: str, turn: list[float], tmp_path: Path) -> None:
+    """Of estimators whose world has y up, whatever somebody does in it."""
+    pose = made_up(FRAMES)
+    root = Rotation.from_euler("xyz", turn, degrees=True) * Rotation.from_rotvec(pose[:, 0])
+    pose[:, 0] = root.as_rotvec()
+    path = tmp_path / "clip.pt"
+    WRITERS[name].write(path, {1: pose})
+    motion = read_motion(path, RATE)
+    assert "y up;" in motion.source and motion.root_rotation_T33 is not None
+    np.testing.assert_allclose(motion.root_rotation_T33, root.as_matrix(), atol=1e-5)
+
+
 def test_people_may_be_the_second_axis(tmp_path: Path) -> None:
     people = [made_up(FRAMES, seed=seed) for seed in range(2)]
     poses = np.stack([padded(pose, 24) for pose in people], axis=1)  # (T, 2, 72)

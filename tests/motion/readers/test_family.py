@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,10 @@ def save(path: Path, **content: np.ndarray) -> Path:
         ({"surface_model_type": np.array("smpl")}, "smpl"),
         ({"pose_hand": np.zeros((6, 90))}, "smplh"),
         ({"pose_hand": np.zeros((6, 90)), "pose_jaw": np.zeros((6, 3))}, "smplx"),
+        ({"pose_lhand": np.zeros((6, 15, 3)), "betas": np.full((1, 10), 0.3)}, "smplx"),
+        ({"betas": np.full(16, 0.3)}, "smplh"),
+        ({"betas": np.zeros(16)}, ""),
+        ({"betas": np.full(10, 0.3)}, ""),
         ({"surface_model_type": np.array(["smplx", "smplh"])}, ""),
         ({"surface_model_type": np.array(3.0)}, ""),
         ({}, ""),
@@ -83,3 +88,21 @@ def test_a_reshared_motion_in_a_drooping_file_is_read_back(root: Path, tmp_path:
         float((again.local_TJ33 - axis_angle_to_matrix(torch.from_numpy(numbers).unflatten(1, (21, 3)))).abs().max())
         > 0.1
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "betas", "family"),
+    [("smplx", 10, "smplx"), ("smplh_params", 10, "smplh"), ("smpl_params", 10, ""), ("person", 16, "smplh")],
+)
+def test_what_the_dictionary_is_called_and_how_long_the_shape_is(
+    tmp_path: Path, name: str, betas: int, family: str
+) -> None:
+    person = {"body_pose": POSE_T63, "global_orient": np.zeros((6, 3)), "betas": np.full((1, betas), 0.3), "fps": 30}
+    with (tmp_path / "a.pkl").open("wb") as file:
+        pickle.dump({name: person}, file)
+    assert read_motion(tmp_path / "a.pkl").family == family
+
+
+def test_a_shape_a_frame_is_the_mean_of_them(tmp_path: Path) -> None:
+    motion = read_motion(save(tmp_path / "a.npz", pose_body=POSE_T63, betas=np.tile([[0.1], [0.3]], (3, 10))))
+    assert motion.betas == pytest.approx([0.2] * 10) and not motion.notes

@@ -224,7 +224,7 @@ def test_points_are_read_from_pickles_and_torch_files(
         "people.pkl": lambda path: path.write_bytes(
             pickle.dumps({"a": {"joints3d": coco[:5] * np.nan}, "b": {"joints3d": coco, "fps": 30}})
         ),
-        "results.npy": lambda path: np.save(path, {"motion": samples, "lengths": np.array([FRAMES, 3]), "text": "x"}),
+        "results.npy": lambda path: np.save(path, {"motion": samples, "lengths": np.array([FRAMES, 3]), "text": "x"}),  # type: ignore[arg-type]
     }
     for name, write in made.items():
         write(tmp_path / name)
@@ -428,3 +428,179 @@ def test_a_confidence_in_json_that_is_left_open_is_none(
         (tmp_path / f"{name}.json").write_text(json.dumps(content | more))
     found, expected = (mrhubo.read_motion(tmp_path / f"{name}.json") for name in ("with", "without"))
     np.testing.assert_array_equal(found.arrays.local_TJ33, expected.arrays.local_TJ33)
+
+
+def _picture(array: np.ndarray) -> np.ndarray:
+    """Points as they are in a picture of 1280 x 720 pixels, with a depth that is guessed."""
+    return array * [200.0, -200.0, 0.3] + [640.0, 700.0, 0.0]
+
+
+def _marked(point_K3: np.ndarray, names: list[str] | None = None) -> list[dict[str, Any]]:
+    points = [dict(zip("xyz", point, strict=True)) | {"visibility": 0.9} for point in point_K3.tolist()]
+    return points if names is None else [point | {"name": name} for point, name in zip(points, names, strict=True)]
+
+
+@pytest.mark.parametrize("form", ["tfjs", "tfjs_alone", "tasks", "solutions", "azure", "numbered", "files", "zed"])
+def test_json_of_programs(form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    """As programs write it; those who have points in a picture beside those in space are taken at the latter."""
+    mediapipe, names = array_of(points, SETS["MediaPipe"]), list(SETS["MediaPipe"])
+    names = [f"other {place}" if name == "-" else name for place, name in enumerate(names)]
+    flat, azure = _picture(mediapipe), 1000 * array_of(points, SETS["Azure Kinect"])
+    both = [
+        {"score": 0.9, "keypoints": _marked(flat[t], names), "keypoints3D": _marked(mediapipe[t], names)}
+        for t in range(FRAMES)
+    ]
+    content: dict[str, Any] = {
+        "tfjs": {"frames": [[one] for one in both]},
+        "tfjs_alone": both,
+        "tasks": [{"landmarks": [_marked(flat[t])], "worldLandmarks": [_marked(mediapipe[t])]} for t in range(FRAMES)],
+        "solutions": {"frames": [{"poseLandmarks": _marked(flat[t]), "poseWorldLandmarks": _marked(mediapipe[t])}
+                                 for t in range(FRAMES)]},
+        "azure": {"frames": [{"bodies": [{"body_id": 7, "joint_positions": row}], "frame_id": t, "num_bodies": 1}
+                             for t, row in enumerate(azure.tolist())],
+                  "joint_names": [name if name != "-" else f"other {n}" for n, name in enumerate(SETS["Azure Kinect"])]},
+        "numbered": {str(10 + t): _marked(mediapipe[t]) for t in range(FRAMES)},
+        "files": {f"img_{t:04}.jpg": {"landmarks": _marked(mediapipe[t])} for t in range(FRAMES)},
+        "zed": {str(t): {"is_new": True, "body_list": [{"id": 3, "keypoint": row}]}
+                for t, row in enumerate(array_of(points, SETS["Human3.6M"]).tolist())},
+    }  # fmt: skip
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(content[form]))
+    found = mrhubo.read_motion(path, RATE)
+    assert len(found) == FRAMES and bone_error(found, pose) < 0.2
+    if isinstance(content[form], dict) and "frames" in content[form]:
+        path.write_text(json.dumps(content[form] | {"frameRate": 25}))
+        assert mrhubo.read_motion(path).frame_rate == 25
+
+
+def test_gaps_in_json_stay_gaps(points: dict[str, np.ndarray], tmp_path: Path) -> None:
+    array, path = array_of(points, SETS["COCO"]), tmp_path / "a.json"
+    kept = [t for t in range(FRAMES) if t not in (4, 5)]
+    listed = [{"frame": t, "keypoints": array[t].tolist()} for t in kept[::-1]]
+    for content in (listed, {f"{t:03}": array[t].tolist() for t in kept}):
+        path.write_text(json.dumps(content))
+        found = mrhubo.read_motion(path, RATE)
+        assert found.confidence_TJ is not None and len(found) == FRAMES
+        elbow_T = found.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")]
+        assert elbow_T.nonzero().flatten().tolist() == kept
+
+
+def test_one_of_several_people_in_json(points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    array, path = array_of(points, SETS["COCO"]), tmp_path / "a.json"
+    frames = [{"bodies": [{"id": "still", "keypoints": array[0].tolist()}, {"id": "b", "keypoints": row}][:: 1 - 2 * (t % 2)]}
+              for t, row in enumerate(array.tolist())]  # fmt: skip
+    path.write_text(json.dumps({"frames": frames}))
+    for person, truth in (("b", pose), ("still", pose[[0] * FRAMES])):
+        assert bone_error(mrhubo.read_motion(path, ReadOptions(rate=30.0, person=person)), truth) < 0.2
+    people = {f"person_{n}": {"keypoints": array.tolist()} for n in range(2)}
+    path.write_text(json.dumps(people))
+    with pytest.raises(UserError, match="as if each were a person"):
+        mrhubo.read_motion(path, RATE)
+
+
+@pytest.mark.parametrize("kind", ["O", "S", "U"])
+def test_names_in_npz_may_be_objects_or_bytes(
+    kind: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    names = [name for name in SETS["COCO"] if name != "-"][::-1]
+    path = tmp_path / "a.npz"
+    np.savez(path, keypoints=array_of(points, tuple(names)), names=np.array(names, dtype=kind))
+    found = mrhubo.read_motion(path, RATE)
+    assert bone_error(found, pose) < 0.2 and "by their names" in found.source
+    np.savez(path, keypoints=array_of(points, tuple(names)), names=np.arange(len(names)))
+    with pytest.raises(UserError, match="'names' is an array of shape .*; expected the names of the points"):
+        mrhubo.read_motion(path, RATE)
+
+
+def _table(point_TK3: np.ndarray, columns: str, separator: str = ",", point: str = ".") -> str:
+    """A table of points, frame by frame; `columns` says how those of MediaPipe's point 0 are called, x for its axis."""
+    names = [f"other_{place}" if name == "-" else name for place, name in enumerate(SETS["MediaPipe"])]
+    header = [
+        columns.replace("AXIS", axis).replace("NAME", name).replace("NUMBER", str(number))
+        for number, name in enumerate(names)
+        for axis in "xyz"
+    ]
+    rows = [[f"{x:.6f}".replace(".", point) for x in row.ravel()] for row in point_TK3]
+    return "\n".join(separator.join(row) for row in (header, *rows)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("columns", "separator", "point", "how"),
+    [
+        ("NAME_AXIS", ",", ".", "by their names"),
+        ("NAME.AXIS [m]", ";", ",", "by their names"),
+        ("NAME AXIS", "\t", ".", "by their names"),
+        ("AXISNUMBER", ",", ".", "as MediaPipe has them"),
+        ("NUMBER_AXIS", ",", ".", "as MediaPipe has them"),
+    ],
+)
+def test_tables(
+    columns: str,
+    separator: str,
+    point: str,
+    how: str,
+    points: dict[str, np.ndarray],
+    pose: torch.Tensor,
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.csv"
+    text = _table(array_of(points, SETS["MediaPipe"]), columns, separator, point)
+    for ends in ("\n", "\r\n"):
+        path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", ends).encode())
+        found = mrhubo.read_motion(path, RATE)
+        assert len(found) == FRAMES and bone_error(found, pose) < 0.2 and how in found.source
+    with pytest.raises(UserError, match="--rate"):
+        mrhubo.read_motion(path)
+
+
+def test_tables_tell_their_rate_and_their_gaps(
+    points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.csv"
+    header, *rows = _table(array_of(points, SETS["MediaPipe"]), "NAME_AXIS").splitlines()
+    path.write_text("\n".join([f"time [s],{header}", *(f"{t / 30:.4f},{row}" for t, row in enumerate(rows))]))
+    assert mrhubo.read_motion(path).frame_rate == 30
+    path.write_text("\n".join([f"time,{header}", *(f"{t * 33.3:.1f},{row}" for t, row in enumerate(rows))]))
+    with pytest.raises(UserError, match="--rate"):  # milliseconds, or so it seems
+        mrhubo.read_motion(path)
+    kept = [t for t in range(FRAMES) if t not in (4, 5)]
+    path.write_text("\n".join([f"frame,label,{header}", *(f"{100 + t},wave,{rows[t]}" for t in kept)]))
+    found = mrhubo.read_motion(path, RATE)
+    assert len(found) == FRAMES and found.confidence_TJ is not None
+    assert found.confidence_TJ[:, POSED_JOINT_NAMES.index("left_elbow")].nonzero().flatten().tolist() == kept
+    assert bone_error(found.changed(local_TJ33=found.local_TJ33[kept]), pose[kept]) < 0.2
+    elbow = header.split(",").index("left_elbow_x")
+    blank = [",".join(["" if x in range(elbow, elbow + 3) else word for x, word in enumerate(row.split(","))])
+             for row in rows]  # fmt: skip
+    path.write_text("\n".join([header, *blank[:3], *rows[3:]]))
+    assert "left shoulder to left elbow is not seen in 3" in " ".join(mrhubo.read_motion(path, RATE).notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda rows: [rows[0]], "a header and no frames"),
+        (lambda rows: [*rows[:3], rows[3].rpartition(",")[0]], "frame 2 has 98 columns, and the header 99"),
+        (lambda rows: [*rows[:3], rows[3].replace("0.", "O.", 1)], "frame 2 holds 'O"),
+    ],
+)
+def test_tables_that_are_refused(change, words: str, points: dict[str, np.ndarray], tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("\n".join(change(_table(array_of(points, SETS["MediaPipe"]), "NAME_AXIS").splitlines())))
+    with pytest.raises(UserError, match=words):
+        mrhubo.read_motion(path, RATE)
+
+
+@given(steps=accidents)
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_damaged_tables_are_read_or_refused_in_a_sentence(
+    points: dict[str, np.ndarray], steps: list[Step], tmp_path: Path
+) -> None:
+    path = tmp_path / "points.csv"
+    path.write_bytes(damaged(_table(array_of(points, SETS["MediaPipe"])[:3], "NAME_AXIS").encode(), steps))
+    try:
+        found = mrhubo.read_motion(path, RATE)
+    except UserError as error:
+        assert "\n" not in str(error) and "points" in str(error)
+        return
+    assert bool(found.local_TJ33.isfinite().all())

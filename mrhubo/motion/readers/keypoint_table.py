@@ -1,0 +1,166 @@
+"""Keypoints in tables of text: a line a frame, under a header with three columns a point.
+
+FreeMoCap's `mediapipe_body_3d_xyz.csv` has `left_shoulder_x`, `left_shoulder_y`, `left_shoulder_z` and so on, in
+millimetres (https://github.com/freemocap/freemocap); who writes landmarks of MediaPipe into a table by hand calls them
+so, or `x1`, `y1`, `z1`, `v1`, or `0_x`. Columns stand between commas, semicolons (numbers then may have decimal commas)
+or tabs.
+
+Legend: T frames, K keypoints.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.errors import UserError, shortened
+from mrhubo.files.regular import read_regular
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.keypoint_arrays import Keypoints
+from mrhubo.motion.readers.keypoint_files import checked
+from mrhubo.motion.readers.keypoint_sets import by_names
+from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
+from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.sightings import check_size
+from mrhubo.robot_motion.clock import find_rate
+
+_KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3}
+"""What stands behind, or before, the name of a point: an axis, or how sure it is."""
+_LAST = re.compile(r"(.+?)[ _.:\-\[(]*(?<![a-z])(" + "|".join(_KINDS) + r")[\])]?(?: *[\[(].*)?", re.IGNORECASE)
+_FIRST = re.compile(r"([xyzv])[ _.]?(\d+)", re.IGNORECASE)
+_FRAMES, _TIMES = (
+    ("frame", "frames", "frameid", "frameindex", "frameidx", "framenumber"),
+    ("time", "timestamp", "times"),
+)
+_NOTHING = ("", "nan", "none", "null", "na")
+_FEWEST = 5
+"""Points that a table has at least."""
+_MAX_BYTES, _MAX_COLUMNS = 2**28, 10_000
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What the columns of a table are."""
+
+    separator: str
+    points: dict[str, list[int | None]]
+    """Columns of x, y, z and the confidence, by the names of points."""
+    columns: list[str]
+
+    def find(self, names: Sequence[str]) -> int | None:
+        """The column that is called so, whatever signs and units are in its name."""
+        plain = [re.sub(r"[\[(].*|[^a-z]", "", column.lower()) for column in self.columns]
+        return next((plain.index(name) for name in names if name in plain), None)
+
+
+def is_table(content: Content) -> bool:
+    """Whether a text begins with a header of points in space."""
+    return content.text is not None and _read_header(_lines(content.text)[0]) is not None
+
+
+def read_table(path: Path, options: ReadOptions) -> Motion:
+    """Reads points of a body.
+
+    Raises:
+        UserError: the file is damaged or too large, or it holds no points of a body.
+    """
+    lines = _lines(read_regular(path, _MAX_BYTES).decode("utf-8-sig", "replace"))
+    header = _read_header(lines[0])
+    if header is None:
+        raise UserError(f"{path}: has no header with x, y and z of shoulders and hips")
+    rows = [line for line in lines[1:] if line.strip(f" \t{header.separator}")]
+    if not rows:
+        raise UserError(f"{path}: has a header and no frames")
+    check_size(path, "the table", len(rows), len(header.points))
+    try:
+        words = csv.reader(rows, delimiter=header.separator)
+        value_TX = np.stack([_numbers(path, header, number, row) for number, row in enumerate(words)])
+    except csv.Error as error:
+        raise UserError(f"{path}: is no table: {shortened(error, 80)}") from error
+    wanted = [column for columns in header.points.values() for column in columns]
+    empty_T1 = np.full((len(value_TX), 1), np.nan)
+    value_TX = np.hstack([value_TX, empty_T1])  # the last column is that of what is not there
+    point_TK4 = value_TX[:, [-1 if column is None else column for column in wanted]].reshape(len(value_TX), -1, 4)
+    numbers, rate = list(range(len(point_TK4))), None
+    frame, time = header.find(_FRAMES), header.find(_TIMES)
+    if frame is not None and np.isfinite(value_TX[:, frame]).all():
+        numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, frame]])
+    if time is not None and numbers == list(range(len(numbers))):
+        rate = _rate(value_TX[:, time])
+    check_size(path, "the table", max(numbers) + 1, len(header.points))
+    placed_TK4 = np.full((max(numbers) + 1, *point_TK4.shape[1:]), np.nan)
+    placed_TK4[numbers] = point_TK4
+    sure_TK = placed_TK4[..., 3] if None not in wanted else None
+    names = list(header.points) if by_names(list(header.points)).keys() >= set(NEEDED) else None
+    found = Keypoints(placed_TK4[..., :3], names, sure_TK, rate, "the table")
+    return motion_of_points(path, checked(path, found), options)
+
+
+def _lines(text: str) -> list[str]:
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _read_header(line: str) -> _Header | None:
+    """The columns of a table of points in space; None of any other line."""
+    separator = max("\t;,", key=line.count)
+    try:
+        columns = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return None
+    if not 3 * _FEWEST <= len(columns) <= _MAX_COLUMNS:
+        return None
+    points: dict[str, list[int | None]] = {}
+    for place, column in enumerate(map(str.strip, columns)):
+        first, last = _FIRST.fullmatch(column), _LAST.fullmatch(column)
+        if first is not None:
+            name, kind = first[2], first[1]
+        elif last is not None:
+            name, kind = last[1], last[2]
+        else:
+            continue
+        points.setdefault(name, [None] * 4)[_KINDS[kind.lower()]] = place
+    points = {name: axes for name, axes in points.items() if None not in axes[:3]}
+    numbered = all(name.isdecimal() for name in points)
+    if numbered:
+        points = dict(sorted(points.items(), key=lambda entry: int(entry[0][:9])))
+    enough = len(points) >= _FEWEST and (numbered or by_names(list(points)).keys() >= set(NEEDED))
+    return _Header(separator, points, columns) if enough else None
+
+
+def _numbers(path: Path, header: _Header, number: int, row: Sequence[str]) -> np.ndarray:
+    """A line of the table; NaN for what is empty, and in columns that are not needed for what is no number."""
+    if len(row) != len(header.columns):
+        raise UserError(f"{path}: frame {number} has {len(row)} columns, and the header {len(header.columns)}")
+    needed = {column for columns in header.points.values() for column in columns}
+    found = np.full(len(row), np.nan)
+    for place, word in enumerate(row):
+        try:
+            found[place] = float(word.replace(",", ".") if header.separator != "," else word)
+        except ValueError:
+            if place in needed and word.strip().lower() not in _NOTHING:
+                column = shortened(header.columns[place], 40)
+                raise UserError(
+                    f"{path}: frame {number} holds '{shortened(word, 30)}' under '{column}', no number"
+                ) from None
+    return found
+
+
+def _rate(time_T: np.ndarray) -> float | None:
+    """Frames per second of times in seconds; None where they are in other units, or not evenly spaced. Of no other unit
+    are steps as long as those of a frame.
+    """
+    low, high = RATES
+    step_T = np.diff(time_T)
+    if not len(step_T) or not np.isfinite(step_T).all() or not 1 / high <= np.median(step_T) <= 1 / low:
+        return None
+    try:
+        return find_rate(time_T, lambda frame_T, rate: frame_T / rate)
+    except UserError:
+        return None
