@@ -137,6 +137,11 @@ def test_masses_are_those_that_the_model_gives(tmp_path: Path) -> None:
     assert description.masses["fore"] == pytest.approx((1.5, *(np.array([0.01, 0.2, 0.3]) - anchor_3)))
 
 
+def test_an_equality_that_is_switched_off_makes_no_joint_mimic_another(tmp_path: Path) -> None:
+    description, notes = converted(tmp_path, MODEL.replace("<joint joint1", '<joint active="false" joint1'))
+    assert description.joints["f"].mimic is None and any("left out: 1" in note for note in notes)
+
+
 def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
     description, _ = converted(

@@ -23,6 +23,8 @@ _ALIKE = 0.6
 """Share of the joints up to which two limbs must be alike: one hand may be another than the other."""
 _FEWEST = 2
 """Joints of a limb."""
+_WIDE = 0.1
+"""How far apart limbs begin, as a share of their size, that tell by that alone where left is."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +104,25 @@ def _pair(bodies: Bodies, body: int, chains: tuple[Chain, Chain]) -> Pair | None
     first = int(np.argmax(lengths_N > 0.02 * bodies.size)) if (lengths_N > 0.02 * bodies.size).any() else 0
     normal_3 = unit(across_N3[first])
     same_N = across_N3 @ normal_3 > 0.97 * lengths_N
-    whole_3 = unit(across_N3[same_N].sum(0))
+    middles_N3 = 0.5 * (nodes[0][:count] + nodes[1][:count])
+    exact_N = same_N & _mirrors(across_N3, middles_N3 - middles_N3[first], normal_3, _LENGTH * size)
+    whole_3 = unit(across_N3[exact_N if lengths_N[first] > _WIDE * size else same_N].sum(0))
     mirrored = float(np.mean(same_N)) * _mirror_share(chains, whole_3, nodes, count)
     return Pair(body, chains, whole_3, mirrored, size)
+
+
+def _mirrors(across_N3: np.ndarray, middles_N3: np.ndarray, normal_3: np.ndarray, most: float) -> np.ndarray:
+    """Which points of one limb lie where the other limb's are mirrored to, to within `most` metres (N,): those of two
+    arms that are one product, not mirrored, stand elsewhere, and say nothing of where left is.
+
+    Args:
+        across_N3: from the second limb's points to the first one's.
+        middles_N3: half-way between them, from a point of the mirror plane.
+        normal_3: across the mirror plane.
+        most: how far off.
+    """
+    aside_N3 = across_N3 - np.outer(across_N3 @ normal_3, normal_3)
+    return np.hypot(np.linalg.norm(aside_N3, axis=-1), 2.0 * (middles_N3 @ normal_3)) < most
 
 
 def _mirror_share(chains: tuple[Chain, Chain], normal_3: np.ndarray, nodes: Sequence[np.ndarray], count: int) -> float:
