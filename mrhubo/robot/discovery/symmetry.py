@@ -105,8 +105,9 @@ def _pair(bodies: Bodies, body: int, chains: tuple[Chain, Chain]) -> Pair | None
     normal_3 = unit(across_N3[first])
     same_N = across_N3 @ normal_3 > 0.97 * lengths_N
     middles_N3 = 0.5 * (nodes[0][:count] + nodes[1][:count])
-    exact_N = same_N & _mirrors(across_N3, middles_N3 - middles_N3[first], normal_3, _LENGTH * size)
-    whole_3 = unit(across_N3[exact_N if lengths_N[first] > _WIDE * size else same_N].sum(0))
+    if lengths_N[first] > _WIDE * size:
+        same_N &= _mirrors(across_N3, middles_N3 - middles_N3[first], normal_3, _LENGTH * size)
+    whole_3 = unit(across_N3[same_N].sum(0))
     mirrored = float(np.mean(same_N)) * _mirror_share(chains, whole_3, nodes, count)
     return Pair(body, chains, whole_3, mirrored, size)
 

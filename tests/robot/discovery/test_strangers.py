@@ -260,6 +260,12 @@ def test_a_second_pair_of_arms_is_asked_about(tmp_path: Path) -> None:
     assert "chest" in about(made.found(tmp_path))
 
 
+def test_a_file_that_begins_at_a_hand_does_not_tell_by_its_frame_where_up_is(tmp_path: Path) -> None:
+    """A robot without legs or neck, up by 90 degrees wrong, which was not asked about."""
+    (tmp_path / "made.urdf").write_text(humanoid(9, "root at a hand").urdf)
+    assert "up" in about(discover(tmp_path / "made.urdf"))
+
+
 @pytest.mark.parametrize("broken", ["0 0 x", "0 0"])
 def test_what_hangs_on_a_joint_that_cannot_be_read_is_no_crash(tmp_path: Path, broken: str) -> None:
     made = Made()
