@@ -21,8 +21,8 @@ _LENGTH = 0.03
 _COSINE = 0.09
 _ALIKE = 0.6
 """Share of the joints up to which two limbs must be alike: one hand may be another than the other."""
-_FEWEST = 2
-"""Joints of a limb."""
+_FEWEST, _ENOUGH = 2, 4
+"""Joints of a limb, and how many that are alike are enough: a shoulder and an elbow, where one arm has no wrist."""
 _WIDE = 0.1
 """How far apart limbs begin, as a share of their size, that tell by that alone where left is."""
 
@@ -69,7 +69,7 @@ def find_pairs(bodies: Bodies) -> list[Pair]:
     for body, steps in enumerate(bodies.steps_from):
         chains = [limb(bodies, step) for step in steps] if len(steps) > 1 else []
         for chain, other in itertools.combinations(chains, 2):
-            least = max(_FEWEST, _ALIKE * max(len(chain), len(other)))
+            least = max(_FEWEST, min(_ENOUGH, _ALIKE * max(len(chain), len(other))))
             if min(len(chain), len(other)) < least:
                 continue
             one, two = measure(lines_of(chain)), measure(lines_of(other))

@@ -260,6 +260,17 @@ def test_a_second_pair_of_arms_is_asked_about(tmp_path: Path) -> None:
     assert "chest" in about(made.found(tmp_path))
 
 
+def test_an_arm_without_a_wrist_beside_a_whole_one_is_an_arm(tmp_path: Path) -> None:
+    made = Made()
+    made.wrist("left", made.forearm("left", made.arm("left")))
+    made.join("right_elbow", made.arm("right"), (0, 0, -0.3), Y, (-2.3, 0.0))
+    for side in SIDES:
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
+    found = made.found(tmp_path)
+    assert (len(found.chains["left_arm"]), len(found.chains["right_arm"])) == (7, 4)
+    assert at(found, "right_elbow") == pytest.approx([0, -0.2, 0.1]) and "right_wrist" in about(found)
+
+
 def test_a_file_that_begins_at_a_hand_does_not_tell_by_its_frame_where_up_is(tmp_path: Path) -> None:
     """A robot without legs or neck, up by 90 degrees wrong, which was not asked about."""
     (tmp_path / "made.urdf").write_text(humanoid(9, "root at a hand").urdf)
