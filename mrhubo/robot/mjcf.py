@@ -98,8 +98,13 @@ def _without_meshes(spec: Any, path: Path, beside: Path, mujoco: Any) -> dict[st
             place = folder / (spec.meshdir or "") / mesh.file
             scale = " ".join(f"{float(factor):.9g}" for factor in mesh.scale)
             found[geom.name] = os.path.relpath(place, beside), scale
-    for geom in spec.geoms:
+    for geom in list(spec.geoms):
         geom.material = ""
+        if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD:  # ground that somebody walks on
+            spec.delete(geom)
+    for equality in list(spec.equalities):
+        if equality.type == mujoco.mjtEq.mjEQ_TENDON:
+            spec.delete(equality)
     for kind in ("skins", "keys", "sensors", "actuators", "tendons", "pairs", "excludes", "hfields", "materials",
                  "meshes", "textures", "cameras", "lights"):  # fmt: skip
         for element in list(getattr(spec, kind, ())):

@@ -177,7 +177,7 @@ class UrdfWriter:
     def _mimics(self) -> None:
         """Joints whose position is a straight line of another's, by an active equality."""
         model, loops = self.model, 0
-        for row in range(model.neq):
+        for row in (row for row in range(model.neq) if model.eq_active0[row]):
             if int(model.eq_type[row]) != _JOINT_EQUALITY:
                 loops += 1
                 continue

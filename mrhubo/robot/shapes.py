@@ -34,8 +34,8 @@ class LinkGeometry:
 
 def read_geometry(urdf: yourdfpy.URDF, default_color: Color = ROBOT_COLOR) -> list[LinkGeometry]:
     """The spheres, cylinders and boxes of every link, for looks: those of its visual elements, or, where these hold
-    none, those of its collision elements. Meshes are skipped, and so is what has no size. URDF has no capsules: a
-    cylinder with a sphere of its radius and colour at either end becomes one.
+    none, those of its collision elements. Meshes are skipped, and so is what has no size. A cylinder with a
+    sphere of its radius and colour at either end is a capsule.
     """
     shapes: list[LinkGeometry] = []
     colors_of = visual_colors(urdf)

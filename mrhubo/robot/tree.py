@@ -172,6 +172,13 @@ def _find_faults(document: Document, name: str, joint: etree._Element, found: Fi
         found.misplaced.add(name)
     if name not in found.faults and (odd := problem(origin, "rpy", 3, _MOST_TURN)) is not None:
         found.doubts[name] = f"{document.line(origin)}: joint '{name}': {odd} rad: are these degrees?"
+    elif name not in found.faults and kind in ("revolute", "prismatic") and limit is not None:
+        lower, upper = (float(limit.get(word, "nan")) for word in ("lower", "upper"))
+        if lower > upper:
+            found.doubts[name] = (
+                f"{document.line(limit)}: joint '{name}' has the limits {lower:g} .. {upper:g}, the wrong way round; "
+                f"taken: {upper:g} .. {lower:g}"
+            )
 
 
 def _zero(axis: etree._Element | None) -> str | None:

@@ -12,7 +12,8 @@ from mrhubo.robot.attributes import MOST_METRES, MOST_RADIANS, problem, read_num
 from mrhubo.robot.document import Document
 
 _SHAPES = {
-    "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}, "box": {"size": 3}, "mesh": {}
+    "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}, "capsule": {"radius": 1, "length": 1},
+    "box": {"size": 3}, "mesh": {},
 }  # fmt: skip
 """Shapes by tag, their attributes and how many numbers each has."""
 _READ: dict[str, dict[str, int]] = {
@@ -83,7 +84,7 @@ def clean_link(document: Document, link: etree._Element, found: Findings) -> etr
             continue
         wrong = _shape_problem(element)
         if wrong is None:
-            clean.append(_shape(document, element, found))
+            clean.extend(_parts(_shape(document, element, found)))
             continue
         found.left_out.append(f"{document.line(element)}: the {element.tag} of link '{name}' {wrong}")
         if element.tag == "collision":
@@ -129,6 +130,37 @@ def _shape(document: Document, element: etree._Element, found: Findings) -> etre
         if any(isinstance(read_numbers(word, 1), str) for word in mesh.get("scale", "").split()):
             del mesh.attrib["scale"]
     return clean
+
+
+def _parts(element: etree._Element) -> list[etree._Element]:
+    """A visual or collision element; of a capsule, which Bullet and others read in a URDF and the parser does not, a
+    cylinder as long as it is without its round ends, and a ball at either end, as `mrhubo.robot.shapes` knows them.
+    """
+    capsule = element.find("geometry/capsule")
+    if capsule is None:
+        return [element]
+    origin = element.find("origin")
+    x, y, z, roll, pitch, yaw = (
+        number
+        for word in ("xyz", "rpy")
+        for number in map(float, ("0 0 0" if origin is None else origin.get(word, "0 0 0")).split())
+    )
+    # The third column of the rotation: where the capsule's axis points.
+    level, side = math.sin(pitch) * math.cos(roll), math.sin(roll)
+    ahead, left = math.cos(yaw), math.sin(yaw)
+    axis_3 = (ahead * level + left * side, left * level - ahead * side, math.cos(pitch) * math.cos(roll))
+    radius, length = str(capsule.get("radius")), str(capsule.get("length"))
+    found = []
+    for kind, along in (("cylinder", 0.0), ("sphere", -0.5), ("sphere", 0.5)):
+        part = copy.deepcopy(element)
+        for old in (*part.findall("origin"), part.find("geometry")):
+            part.remove(old)
+        at_3 = (place + along * float(length) * way for place, way in zip((x, y, z), axis_3, strict=True))
+        etree.SubElement(part, "origin", xyz=" ".join(map(repr, at_3)), rpy=f"{roll!r} {pitch!r} {yaw!r}")
+        sizes = {"radius": radius} if kind == "sphere" else {"radius": radius, "length": length}
+        etree.SubElement(etree.SubElement(part, "geometry"), kind, sizes)
+        found.append(part)
+    return found
 
 
 def clean_material(document: Document, material: etree._Element, found: Findings) -> etree._Element:

@@ -221,6 +221,8 @@ def _joint(element: etree._Element, read: yourdfpy.urdf.Joint | None) -> Joint:
     origin_44 = np.eye(4) if read.origin is None else np.asarray(read.origin, dtype=float)
     limit = read.limit if kind != "continuous" else None
     lower, upper = (None, None) if limit is None else (limit.lower, limit.upper)
+    if lower is not None and upper is not None and lower > upper:
+        lower, upper = upper, lower  # `mrhubo.robot.tree` tells it
     axis_3 = axis_3 / max(np.linalg.norm(axis_3), 1e-9)
     velocity = None if read.limit is None else read.limit.velocity
     joint = Joint(name, kind, parent, child, origin_44, axis_3, lower, upper, _mimic(read), velocity=velocity)

@@ -46,7 +46,7 @@ YAW = 'lower="-1.5" upper="1.5"'
         ('lower="-inf" upper="inf"', r"'l_yaw' has no limits: -inf .. inf mean none"),
         ('lower="-1.5" upper="3.4e38"', r"'l_yaw' has no limits: -1.5 .. 3.4e\+38 mean none"),
         ('upper="1.5"', r"'l_yaw' has no limits; give it a range in robot.ranges"),
-        ('lower="1.5" upper="-1.5"', r"'l_yaw' has the impossible limits 1.5 .. -1.5"),
+        ('lower="1.5" upper="1.5"', r"'l_yaw' has the impossible limits 1.5 .. 1.5"),
     ],
 )  # fmt: skip
 def test_limits_that_cannot_be_meant_ask_for_a_range(pair: Pair, limits: str, message: str) -> None:
@@ -54,6 +54,12 @@ def test_limits_that_cannot_be_meant_ask_for_a_range(pair: Pair, limits: str, me
         build_body_map(pair(within("l_yaw", YAW, limits)))
     if "impossible" not in message:
         assert limits_of(pair(within("l_yaw", YAW, limits), ranges={"l_yaw": [-1.0, 1.25]})) == (-1.0, 1.25)
+
+
+def test_limits_the_wrong_way_round_are_read_the_other_way_and_told(pair: Pair) -> None:
+    """As InMoov's head and left fingers have them, mirrored by hand."""
+    with pytest.warns(InputWarning, match=r"line \d+: joint 'l_yaw' has the limits 1.5 .. -0.5, .*taken: -0.5 .. 1.5"):
+        assert limits_of(pair(within("l_yaw", YAW, 'lower="1.5" upper="-0.5"'))) == (-0.5, 1.5)
 
 
 def test_a_joint_whose_limits_are_in_degrees_is_held_at_zero(pair: Pair) -> None:

@@ -137,6 +137,26 @@ def test_masses_are_those_that_the_model_gives(tmp_path: Path) -> None:
     assert description.masses["fore"] == pytest.approx((1.5, *(np.array([0.01, 0.2, 0.3]) - anchor_3)))
 
 
+def test_an_equality_that_is_switched_off_makes_no_joint_mimic_another(tmp_path: Path) -> None:
+    description, notes = converted(tmp_path, MODEL.replace("<joint joint1", '<joint active="false" joint1'))
+    assert description.joints["f"].mimic is None and any("left out: 1" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("</equality>", '<tendon tendon1="t"/></equality><tendon><fixed name="t"><joint joint="elbow" coef="1"/></fixed></tendon>'),
+        ("</asset>", '<hfield name="hills" file="hills.png" size="1 1 1 1"/></asset>'),
+    ],
+    ids=["tendon", "field of heights"],
+)  # fmt: skip
+def test_what_hangs_on_something_that_is_left_out_is_left_out_too(tmp_path: Path, old: str, new: str) -> None:
+    text = MODEL.replace(old, new)
+    if "hills" in new:
+        text = text.replace('<geom type="plane"', '<geom type="hfield" hfield="hills"/><geom type="plane"')
+    assert converted(tmp_path, text)[0].joints.keys() == converted(tmp_path)[0].joints.keys()
+
+
 def test_a_base_that_turns_hangs_on_the_world(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
     description, _ = converted(

@@ -90,7 +90,8 @@ UNNEEDED = [
       for kind in ("visual", "collision") for inside, message in (
         ("", "has no shape"),
         ("<geometry/>", "has no shape"),
-        ('<geometry><capsule radius="0.1" length="0.2"/></geometry>', "is a <capsule>, which is no shape of URDF"),
+        ('<geometry><cone radius="0.1" length="0.2"/></geometry>', "is a <cone>, which is no shape of URDF"),
+        ('<geometry><capsule radius="0.1"/></geometry>', "is a <capsule> without length"),
         ('<geometry><sphere/></geometry>', "is a <sphere> without radius"),
         ('<geometry><sphere radius="big"/></geometry>', "has <sphere radius=\"big\"> is no number"),
         ('<geometry><box size="1 1"/></geometry>', "has <box size=\"1 1\"> must be three numbers, not 2"),
@@ -138,8 +139,8 @@ def test_a_link_without_a_place_cannot_be_asked_for(pair: Pair) -> None:
 
 
 def test_a_collision_shape_that_cannot_be_read_is_not_looked_at(pair: Pair) -> None:
-    shape = "<collision><geometry><capsule radius='0.1' length='0.2'/></geometry></collision>"
-    with pytest.warns(InputWarning, match="the collision of link 'l_hand' is a <capsule>"):
+    shape = "<collision><geometry><cone radius='0.1' length='0.2'/></geometry></collision>"
+    with pytest.warns(InputWarning, match="the collision of link 'l_hand' is a <cone>"):
         robot = build_body_map(pair(('<link name="l_hand"/>', f'<link name="l_hand">{shape}</link>'))).robot
     assert SelfCollision(robot).uncovered == ("l_hand",)
 

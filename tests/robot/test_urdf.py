@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from mrhubo.config import load_config
 from mrhubo.robot import build_body_map
 from mrhubo.robot.discovery import discover
+from mrhubo.robot.shapes import read_geometry
 from mrhubo.robot.urdf import describe, moved
 
 BOX = (
@@ -72,3 +74,14 @@ def test_rodrigues(seed: int) -> None:
     np.testing.assert_allclose(found_44[:3, :3], sum(terms), atol=1e-12)
     np.testing.assert_array_equal(found_44[3], [0, 0, 0, 1])
     np.testing.assert_array_equal(found_44[:3, 3], 0)
+
+
+@pytest.mark.parametrize("kind", ["visual", "collision"])
+def test_a_capsule_is_one(tmp_path: Path, kind: str) -> None:
+    """As in the URDFs of RB-Y1, and in those that Bullet reads: as long as it is without its round ends."""
+    shape = '<origin xyz="0.1 0 0.2" rpy="0.3 1.2 -0.4"/><geometry><capsule radius="0.05" length="0.3" side="1"/></geometry>'
+    (tmp_path / "one.urdf").write_text(f'<robot name="one"><link name="body"><{kind}>{shape}</{kind}></link></robot>')
+    found = read_geometry(describe(tmp_path / "one.urdf").parsed)
+    assert [(shape.kind, shape.size) for shape in found] == [("capsule", (0.05, 0.3))]
+    turn_33 = Rotation.from_euler("xyz", [0.3, 1.2, -0.4]).as_matrix()
+    np.testing.assert_allclose(found[0].origin_44[:3], np.c_[turn_33, [0.1, 0.0, 0.2]], atol=1e-9)

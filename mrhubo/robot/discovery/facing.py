@@ -167,6 +167,8 @@ def _up(
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]
     against = [what for what, v, w in flat if float(best @ v) < _AGAINST and w >= _HEAVY]
+    if not legs and bodies.body_of[bodies.description.root] in _hanging(bodies, roles):
+        against.append("that the file begins at a hand or a head, so that its frame tells nothing")
     sure, cue = float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"
     if against:
         sure, cue = min(sure, _DOUBTED), f"{cue}; against {' and '.join(against)}"
@@ -175,15 +177,19 @@ def _up(
 
 def _below(bodies: Bodies, roles: Roles) -> Iterator[tuple[str, np.ndarray, float]]:
     """What probably lies below the shoulders: what it is, where (3,), and how much that counts."""
-    limbs: set[int] = set()
-    for step in (chain[0] for chain in (*roles.arms.chains, *roles.necks)):
-        limbs |= bodies.beyond(step)[0]
+    limbs = _hanging(bodies, roles)
     rest = [body for body in range(len(bodies.links_of)) if body not in limbs and body != roles.chest]
     if rest:
         yield "what carries the chest", np.mean([bodies.middle(body) for body in rest], axis=0), 1.5
     else:
         yield "the base", np.zeros(3), 1.0
         yield "the trunk", bodies.corners(roles.chest).mean(0), 0.5
+
+
+def _hanging(bodies: Bodies, roles: Roles) -> set[int]:
+    """The bodies of arms and of all that may be a neck."""
+    more = (chain for pair in roles.more_arms for chain in pair.chains)
+    return set().union(*(bodies.beyond(chain[0])[0] for chain in (*roles.arms.chains, *more, *roles.necks)))
 
 
 def _directions(bodies: Bodies, roles: Roles, normal_3: np.ndarray) -> list[tuple[np.ndarray, float]]:

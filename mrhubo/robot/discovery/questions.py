@@ -83,18 +83,17 @@ def _unread_legs(roles: Roles) -> tuple[str, ...]:
     """First joints of limbs that may be legs, and have no knee."""
     if roles.legs is not None:
         return tuple(chain[0].hinge.name for chain in roles.legs.chains)
-    pairs = [pair for pair in roles.others if pair.size > _LEG * roles.arms.size and len(pair.chains[0]) >= _PARTS]
+    pairs = [
+        pair for pair in roles.others
+        if pair not in roles.more_arms and pair.size > _LEG * roles.arms.size and len(pair.chains[0]) >= _PARTS
+    ]  # fmt: skip
     return tuple(chain[0].hinge.name for pair in pairs for chain in pair.chains)
 
 
 def _more_arms(roles: Roles) -> tuple[str, ...]:
-    """First joints of further pairs of limbs, about as long as the arms and with as many joints, on the same body."""
-    arms = roles.arms
-    pairs = [
-        pair for pair in roles.others
-        if pair.body == arms.body and pair.size > _LEG * arms.size and len(pair.chains[0]) >= len(arms.chains[0])
-    ]  # fmt: skip
-    return tuple(chain[0].hinge.name for pair in (arms, *pairs) for chain in pair.chains) if pairs else ()
+    """First joints of all pairs that may be arms, where there are more than one."""
+    more = roles.more_arms
+    return tuple(chain[0].hinge.name for pair in (roles.arms, *more) for chain in pair.chains) if more else ()
 
 
 def _more_legs(roles: Roles) -> tuple[str, ...]:

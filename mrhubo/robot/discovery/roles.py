@@ -32,6 +32,10 @@ _LEG = 3
 """Joints of a leg at the least: with fewer, it may be a wing."""
 _CASTER = 2
 """Joints of a caster: it swivels and rolls."""
+_LIKE = 0.6
+"""How long a further pair of limbs is at least that may be arms, as a share of the arms."""
+_MANY = 6
+"""Joints of an arm that reaches anywhere in any way; no leg of a four-legged robot has as many."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,15 @@ class Roles:
         """With another neck, or none; what else begins in the middle of a root that is the chest is the waist."""
         below = next((chain for chain in self.necks if chain is not neck), ())
         return replace(self, neck=neck, waist=self.waist or (_reversed(below) if self.legs is None else ()))
+
+    @property
+    def more_arms(self) -> tuple[Pair, ...]:
+        """Further pairs of limbs, about as long as the arms and with as many joints, on the same body."""
+        arms = self.arms
+        return tuple(
+            pair for pair in self.others
+            if pair.body == arms.body and pair.size > _LIKE * arms.size and len(pair.chains[0]) >= len(arms.chains[0])
+        )  # fmt: skip
 
     @property
     def chest(self) -> int:
@@ -89,6 +102,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     # A waist and a neck that are alike, one below the chest and one above, are no limbs.
     armed = [pair for pair in armed if not any(_between(bodies, pair, other) for other in armed)]
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
+    fronts = _fronts(armed)
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
@@ -96,6 +110,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
                 f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found{_following(bodies)}"
             )
         arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
+    elif fronts:
+        arms, legs, sure = fronts[0], None, 1.0
     else:
         options = [
             (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high) + 2.0 * _whole_arm(high), i, j)
@@ -222,6 +238,14 @@ def _same(one: Pair, other: Pair) -> bool:
     measures = [measure(lines_of(pair.chains[0])) for pair in (one, other)]
     count = len(one.chains[0])
     return one.body == other.body and count == len(other.chains[0]) == alike(*measures)
+
+
+def _fronts(armed: Sequence[Pair]) -> list[Pair]:
+    """All pairs, the foremost first by the file's x, where they are alike, and of too many joints for legs: a table or
+    cart with two pairs of arms, of which somebody leads one by hand. None of other robots.
+    """
+    alike = len(armed) > 1 and all(_same(armed[0], pair) and len(pair.chains[0]) >= _MANY for pair in armed)
+    return sorted(armed, key=lambda pair: -float(pair.mounts_23[:, 0].mean())) if alike else []
 
 
 def _hangs_below(low: Pair, high: Pair) -> float:

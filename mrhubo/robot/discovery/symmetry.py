@@ -21,8 +21,10 @@ _LENGTH = 0.03
 _COSINE = 0.09
 _ALIKE = 0.6
 """Share of the joints up to which two limbs must be alike: one hand may be another than the other."""
-_FEWEST = 2
-"""Joints of a limb."""
+_FEWEST, _ENOUGH = 2, 4
+"""Joints of a limb, and how many that are alike are enough: a shoulder and an elbow, where one arm has no wrist."""
+_WIDE = 0.1
+"""How far apart limbs begin, as a share of their size, that tell by that alone where left is."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def find_pairs(bodies: Bodies) -> list[Pair]:
     for body, steps in enumerate(bodies.steps_from):
         chains = [limb(bodies, step) for step in steps] if len(steps) > 1 else []
         for chain, other in itertools.combinations(chains, 2):
-            least = max(_FEWEST, _ALIKE * max(len(chain), len(other)))
+            least = max(_FEWEST, min(_ENOUGH, _ALIKE * max(len(chain), len(other))))
             if min(len(chain), len(other)) < least:
                 continue
             one, two = measure(lines_of(chain)), measure(lines_of(other))
@@ -102,9 +104,26 @@ def _pair(bodies: Bodies, body: int, chains: tuple[Chain, Chain]) -> Pair | None
     first = int(np.argmax(lengths_N > 0.02 * bodies.size)) if (lengths_N > 0.02 * bodies.size).any() else 0
     normal_3 = unit(across_N3[first])
     same_N = across_N3 @ normal_3 > 0.97 * lengths_N
+    middles_N3 = 0.5 * (nodes[0][:count] + nodes[1][:count])
+    if lengths_N[first] > _WIDE * size:
+        same_N &= _mirrors(across_N3, middles_N3 - middles_N3[first], normal_3, _LENGTH * size)
     whole_3 = unit(across_N3[same_N].sum(0))
     mirrored = float(np.mean(same_N)) * _mirror_share(chains, whole_3, nodes, count)
     return Pair(body, chains, whole_3, mirrored, size)
+
+
+def _mirrors(across_N3: np.ndarray, middles_N3: np.ndarray, normal_3: np.ndarray, most: float) -> np.ndarray:
+    """Which points of one limb lie where the other limb's are mirrored to, to within `most` metres (N,): those of two
+    arms that are one product, not mirrored, stand elsewhere, and say nothing of where left is.
+
+    Args:
+        across_N3: from the second limb's points to the first one's.
+        middles_N3: half-way between them, from a point of the mirror plane.
+        normal_3: across the mirror plane.
+        most: how far off.
+    """
+    aside_N3 = across_N3 - np.outer(across_N3 @ normal_3, normal_3)
+    return np.hypot(np.linalg.norm(aside_N3, axis=-1), 2.0 * (middles_N3 @ normal_3)) < most
 
 
 def _mirror_share(chains: tuple[Chain, Chain], normal_3: np.ndarray, nodes: Sequence[np.ndarray], count: int) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,70 +11,10 @@ import pytest
 from mrhubo.describing.run import open_robot
 from mrhubo.errors import UserError
 from mrhubo.robot import BodyMap
-from mrhubo.robot.discovery import Discovery, discover
+from mrhubo.robot.discovery import discover
 from mrhubo.robot.generator import humanoid
 from mrhubo.robot.generator.score import mistakes
-
-X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
-SIDES = {"left": 1, "right": -1}
-
-
-@dataclass
-class Made:
-    """A URDF that is being written: a chest, and what is joined to it."""
-
-    parts: list[str] = field(default_factory=lambda: ["<link name='chest'/>"])
-
-    def join(
-        self, name: str, parent: str, xyz, axis, limits=(-1.5, 1.5), kind="revolute", more: str = "", shape: str = ""
-    ) -> str:  # fmt: skip
-        """A link that weighs something, on a joint with limits, or without."""
-        given = "" if limits is None else f"<limit lower='{limits[0]}' upper='{limits[1]}' effort='1' velocity='1'/>"
-        self.parts.append(
-            f"<link name='{name}'><inertial><origin xyz='0 0 -0.05'/><mass value='1'/></inertial>{shape}</link>"
-            f"<joint name='{name}_joint' type='{kind}'><parent link='{parent}'/><child link='{name}'/>"
-            f"<origin xyz='{xyz[0]} {xyz[1]} {xyz[2]}'/><axis xyz='{axis[0]} {axis[1]} {axis[2]}'/>{given}{more}</joint>"
-        )
-        return name
-
-    def arm(self, side: str, height: float = 0.4, called: str = "") -> str:
-        """Shoulder and upper arm, hanging; its last link."""
-        link = "chest"
-        for word, axis in (("pitch", Y), ("roll", X), ("yaw", Z)):
-            at = (0, 0.2 * SIDES[side], height) if word == "pitch" else (0, 0, 0)
-            limits = (-2.8, 1.2) if word == "pitch" else (-1.5, 1.5)
-            link = self.join(f"{side}_{called}shoulder_{word}", link, at, axis, limits)
-        return link
-
-    def forearm(self, side: str, parent: str, height: float = -0.3, called: str = "") -> str:
-        """Elbow and forearm's twist."""
-        link = self.join(f"{side}_{called}elbow", parent, (0, 0, height), Y, (-2.3, 0.0))
-        return self.join(f"{side}_{called}forearm", link, (0, 0, -0.1), Z)
-
-    def wrist(self, side: str, parent: str, called: str = "") -> str:
-        """The wrist's two swings."""
-        link = self.join(f"{side}_{called}wrist_pitch", parent, (0, 0, -0.15), Y)
-        return self.join(f"{side}_{called}wrist_roll", link, (0, 0, 0), X)
-
-    def leg(self, side: str) -> str:
-        """As far as the shank, which is 0.4 m long."""
-        link = self.join(f"{side}_hip_roll", "chest", (0, 0.1 * SIDES[side], -0.1), X)
-        link = self.join(f"{side}_hip_pitch", link, (0, 0, 0), Y, (-2.0, 0.5))
-        return self.join(f"{side}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2))
-
-    def found(self, folder: Path) -> Discovery:
-        """What is discovered of it."""
-        file = folder / "made.urdf"
-        file.write_text(f"<robot name='made'>{''.join(self.parts)}</robot>")
-        return discover(file, whole_body=True)
-
-
-def at(found: Discovery, point: str) -> list[float]:
-    return list(found.points[point].root_3)
-
-
-def about(found: Discovery) -> set[str]:
-    return {question.about for question in found.questions}
+from tests.robot.discovery.made import SIDES, Made, X, Y, Z, about, at
 
 
 def test_an_elbow_behind_a_gear_is_narrowed_by_its_motors_range(tmp_path: Path) -> None:
@@ -203,10 +142,7 @@ def test_an_ankle_that_no_joint_tells_lies_over_the_foot(tmp_path: Path, pitch: 
         made.wrist(side, made.forearm(side, made.arm(side)))
         link = made.join(f"{side}_hip_roll", "chest", (0, 0.1 * SIDES[side], -0.1), X)
         link = made.join(f"{side}_hip_pitch", link, (0, 0, 0), Y, (-2.0, 0.5))
-        made.join(f"{side}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2), shape=foot)
-        made.parts[-1] = made.parts[-1].replace(
-            "<origin xyz='0 0 -0.4'/><axis", f"<origin xyz='0 0 -0.4' rpy='0 {pitch} 0'/><axis"
-        )
+        made.join(f"{side}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2), shape=foot, rpy=(0, pitch, 0))
     found = made.found(tmp_path)
     knee_3, ankle_3 = np.array(at(found, "left_knee")), np.array(at(found, "left_ankle"))
     turn_33 = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
@@ -322,6 +258,23 @@ def test_a_second_pair_of_arms_is_asked_about(tmp_path: Path) -> None:
     for side in SIDES:
         made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
     assert "chest" in about(made.found(tmp_path))
+
+
+def test_an_arm_without_a_wrist_beside_a_whole_one_is_an_arm(tmp_path: Path) -> None:
+    made = Made()
+    made.wrist("left", made.forearm("left", made.arm("left")))
+    made.join("right_elbow", made.arm("right"), (0, 0, -0.3), Y, (-2.3, 0.0))
+    for side in SIDES:
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
+    found = made.found(tmp_path)
+    assert (len(found.chains["left_arm"]), len(found.chains["right_arm"])) == (7, 4)
+    assert at(found, "right_elbow") == pytest.approx([0, -0.2, 0.1]) and "right_wrist" in about(found)
+
+
+def test_a_file_that_begins_at_a_hand_does_not_tell_by_its_frame_where_up_is(tmp_path: Path) -> None:
+    """A robot without legs or neck, up by 90 degrees wrong, which was not asked about."""
+    (tmp_path / "made.urdf").write_text(humanoid(9, "root at a hand").urdf)
+    assert "up" in about(discover(tmp_path / "made.urdf"))
 
 
 @pytest.mark.parametrize("broken", ["0 0 x", "0 0"])
