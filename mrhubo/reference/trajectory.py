@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from mrhubo.fast.together.motion import AHEAD, BRIDGE_STEPS, BRIDGE_TOLERANCE, JUMP, REACH, WINDOW
+from mrhubo.fast.together.motion import AHEAD, BRIDGE_STEPS, BRIDGE_TOLERANCE, JUMP, REACH, WINDOW, sides
 from mrhubo.reference.avoidance import Avoidance
 from mrhubo.reference.refine import refine
 from mrhubo.reference.solve import DirectionProblem
@@ -132,22 +132,33 @@ def pick(candidates_TSN: Tensor, state_TC: Tensor, joints_NC: Tensor) -> Tensor:
 def _bridge(
     problem: DirectionProblem, path_TN: Tensor, path_cost_TC: Tensor, target_TD3: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """More candidates (T, S, N) near the path's jumps, and their cost (T, S, C); S = 0 if there is no jump.
+    """More candidates (T, S, N) near the path's jumps and between them, and their cost (T, S, C); S = 0 if there is no
+    jump.
 
     Where a path jumps, the solution that it leaves is often only missing for some frames, because it lies at a limit or
     is not the best. It is looked for from the path's angles a few frames before and after; elsewhere the path is
-    repeated.
+    repeated. A joint at the one end of nearly a turn may also jump to the other end and, seconds later, back, which
+    takes it longer than the gain is worth: the solution that a block leaves is looked for until its next jump, and
+    the one that it takes then, back to the last one.
     """
     frames, reach_S = len(path_TN), torch.tensor(REACH, device=path_TN.device)
-    jumps_T = torch.nn.functional.pad((path_TN.diff(dim=0).abs() > JUMP).any(dim=1).cumsum(0), (1, 0))
+    jumped_TN = torch.nn.functional.pad(path_TN.diff(dim=0).abs() > JUMP, (0, 0, 1, 0))
+    jumps_T = jumped_TN.any(dim=1).cumsum(0)
     if not bool(jumps_T[-1]):
         return path_TN.new_empty(frames, 0, path_TN.shape[1]), path_cost_TC.new_empty(frames, 0, path_cost_TC.shape[1])
-    source_TS = (torch.arange(frames, device=path_TN.device)[:, None] + reach_S).clamp(0, frames - 1)
+    frame_T1 = torch.arange(frames, device=path_TN.device)[:, None]
+    source_TS = (frame_T1 + reach_S).clamp(0, frames - 1)
     across_TS = jumps_T[source_TS] != jumps_T[:, None]
-    found_TSN = path_TN[:, None].repeat(1, len(REACH), 1)
-    cost_TSC = path_cost_TC[:, None].repeat(1, len(REACH), 1)
-    frame_X = torch.nonzero(across_TS)[:, 0]
-    found_TSN[across_TS], cost_TSC[across_TS] = problem.minimise(
-        path_TN[source_TS[across_TS]], target_TD3[frame_X], steps=BRIDGE_STEPS, tolerance=BRIDGE_TOLERANCE
+    jumped_TC = jumped_TN.to(path_TN.dtype) @ problem.blocks.joints_NC > 0
+    side_TSC = torch.from_numpy(sides(jumped_TC.cpu().numpy())).to(path_TN.device)
+    sides_TS = (side_TSC != frame_T1[:, None]).any(dim=2)
+    joint_N = torch.arange(path_TN.shape[1], device=path_TN.device)
+    start_TSN = torch.cat((path_TN[source_TS], path_TN[side_TSC[:, :, problem.blocks.block_N], joint_N]), dim=1)
+    asked_TS = torch.cat((across_TS, sides_TS), dim=1)
+    found_TSN = path_TN[:, None].repeat(1, asked_TS.shape[1], 1)
+    cost_TSC = path_cost_TC[:, None].repeat(1, asked_TS.shape[1], 1)
+    frame_X = torch.nonzero(asked_TS)[:, 0]
+    found_TSN[asked_TS], cost_TSC[asked_TS] = problem.minimise(
+        start_TSN[asked_TS], target_TD3[frame_X], steps=BRIDGE_STEPS, tolerance=BRIDGE_TOLERANCE
     )
     return found_TSN, cost_TSC

@@ -25,6 +25,8 @@ JUMP = 0.5
 """Steps of a path [rad] that are jumps."""
 REACH = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
 """How many frames away the other side of a jump is looked for."""
+FAR = 512
+"""Frames over which the side of a jump is looked for that it leaves, or that the next one takes."""
 BRIDGE_STEPS, BRIDGE_TOLERANCE = 12, 1e-2
 
 
@@ -146,14 +148,39 @@ def best_path(candidates_TSN: np.ndarray, cost_TSC: np.ndarray, joints_NC: np.nd
 def _bridge(
     problem: Problem, path_TN: np.ndarray, path_cost_TC: np.ndarray, target_TD3: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """More candidates (T, S, N) near the path's jumps, and their cost (T, S, C); elsewhere the path is repeated."""
-    frames, jumps_T = len(path_TN), np.zeros(len(path_TN), int)
-    jumps_T[1:] = (np.abs(np.diff(path_TN, axis=0)) > JUMP).any(axis=1).cumsum()
+    """More candidates (T, S, N) near the path's jumps and between them, and their cost (T, S, C); elsewhere the path is
+    repeated.
+    """
+    frames, jumped_TN = len(path_TN), np.zeros(path_TN.shape, bool)
+    jumped_TN[1:] = np.abs(np.diff(path_TN, axis=0)) > JUMP
+    jumps_T = jumped_TN.any(axis=1).cumsum()
     source_TS = np.clip(np.arange(frames)[:, None] + np.array(REACH), 0, frames - 1)
     across_TS = jumps_T[source_TS] != jumps_T[:, None]
-    found_TSN, cost_TSC = (np.repeat(value[:, None], len(REACH), axis=1) for value in (path_TN, path_cost_TC))
-    frame_X = np.nonzero(across_TS)[0]
-    found_TSN[across_TS], cost_TSC[across_TS] = problem.minimise(
-        path_TN[source_TS[across_TS]], target_TD3[frame_X], BRIDGE_STEPS, BRIDGE_TOLERANCE
+    joints_NC, block_N = problem.cost.joints_NC, problem.cost.block_N
+    side_TSC = sides(jumped_TN @ joints_NC > 0)
+    sides_TS = (side_TSC != np.arange(frames)[:, None, None]).any(axis=2)
+    start_TSN = path_TN[source_TS], path_TN[side_TSC[:, :, block_N], np.arange(path_TN.shape[1])]
+    start_TSN, asked_TS = np.concatenate(start_TSN, axis=1), np.concatenate((across_TS, sides_TS), axis=1)
+    candidates = asked_TS.shape[1]
+    found_TSN, cost_TSC = (np.repeat(value[:, None], candidates, axis=1) for value in (path_TN, path_cost_TC))
+    frame_X = np.nonzero(asked_TS)[0]
+    found_TSN[asked_TS], cost_TSC[asked_TS] = problem.minimise(
+        start_TSN[asked_TS], target_TD3[frame_X], BRIDGE_STEPS, BRIDGE_TOLERANCE
     )
     return found_TSN, cost_TSC
+
+
+def sides(jumped_TC: np.ndarray) -> np.ndarray:
+    """For each frame and block, the last frame before the block's last jump, and the first after its next one
+    (T, 2, C); the frame itself where there is none that is not far.
+
+    Args:
+        jumped_TC: whether a block jumped to a frame from the one before it.
+    """
+    frames, frame_T1 = len(jumped_TC), np.arange(len(jumped_TC))[:, None]
+    never = frames + FAR + 1
+    before_TC = np.maximum.accumulate(np.where(jumped_TC, frame_T1 - 1, -never))
+    next_TC = np.roll(np.where(jumped_TC, frame_T1, 2 * never), -1, axis=0)  # nothing jumps to the first frame
+    after_TC = np.minimum.accumulate(next_TC[::-1])[::-1]
+    side_T2C = np.stack((before_TC, after_TC), axis=1)
+    return np.where(np.abs(side_T2C - frame_T1[:, None]) <= FAR, side_T2C, frame_T1[:, None])
