@@ -78,7 +78,7 @@ def main(argv: list[str]) -> int:
         fetching.fetch(words, _SETTING_UP)
         return 0
     config, options = parse_arguments(build_parser(), argv)
-    from mrhubo.config.command import Terminated
+    from mrhubo.config.interrupts import Terminated
     from mrhubo.fast.kept import is_kept, numba_is_there
     from mrhubo.live import LiveRobot
     from mrhubo.live.loop import Session, run_session
