@@ -101,7 +101,7 @@ def main(argv: list[str]) -> int:
     if certificate is not None and not plan.has_page:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
     if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
-        print("compiling, which takes a minute, once for all sessions", flush=True)
+        print("the first session on a machine compiles, which takes a minute", flush=True)
     if options.retargeter is None:
         robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body)
     else:
