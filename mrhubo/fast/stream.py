@@ -28,7 +28,7 @@ from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse, t
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.roots import Ways, read_root
 from mrhubo.fast.stream_clock import StreamClock
-from mrhubo.fast.stream_settings import StreamSettings
+from mrhubo.fast.stream_settings import StreamSettings, checked
 from mrhubo.robot_motion import RobotMotion
 
 _REST_J33 = np.tile(np.eye(3, dtype=np.float32), (21, 1, 1))
@@ -53,15 +53,13 @@ class FastStream:
             floor: height of the floor in the person's world [m], for robots with feet; None: it is learned on the way.
 
         Raises:
-            UserError: the rate is not positive, the floor no number, or the retargeter one with PyTorch.
+            UserError: the rate is not positive, floor or settings are none, or the retargeter is one with PyTorch.
         """
         check_frame_rate(rate, needed=True)
         if not isinstance(retargeter, FastRetargeter):
             raise UserError("stream: expected a retargeter of mrhubo.load_fast; the stream of others is mrhubo.Stream")
-        if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
-            raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
-        self.retargeter, self.rate, self.settings = retargeter, float(rate), settings or StreamSettings()
-        self.floor = floor
+        self.settings, self.floor = checked(settings, floor)
+        self.retargeter, self.rate = retargeter, float(rate)
         self._engine, self._cost = retargeter.engine, retargeter.description.cost
         self._longest_step = self.settings.longest_step(self.rate)
         self._limits = Limits.of_cost(self._cost, self.settings.ramp_time)

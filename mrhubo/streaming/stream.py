@@ -11,7 +11,6 @@ Legend: B people, T frames, D directions, N joints, J = 21 human joints.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -25,6 +24,7 @@ from mrhubo.fast.pelvis import Pelvises
 from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.roots import Ways
 from mrhubo.fast.stream_clock import StreamClock
+from mrhubo.fast.stream_settings import checked
 from mrhubo.motion import Motion, MotionLike, read_poses
 from mrhubo.motion.steady import steady_frames
 from mrhubo.reference import OptimizationRetargeter
@@ -78,10 +78,11 @@ class Stream:
             raise UserError("stream: this retargeter is without PyTorch, so its stream is mrhubo.FastStream")
         if isinstance(retargeter, OptimizationRetargeter):
             retargeter = optimised(retargeter.body_map)
+        if not isinstance(retargeter, Retargeter):
+            kind = type(retargeter).__name__
+            raise UserError(f"stream: expected a retargeter of mrhubo.load or for_robot, or an optimiser, found {kind}")
         self.retargeter, self.rate, self.people = retargeter, float(rate), people
-        if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
-            raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
-        self.settings, self.floor = settings or StreamSettings(), floor
+        self.settings, self.floor = checked(settings, floor)
         self._legs = Legs(retargeter.body_map)
         self._reader = FrameReader(retargeter.body_map, self._legs, people)
         self._standing: Standing | None = None

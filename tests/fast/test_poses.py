@@ -120,3 +120,21 @@ def test_what_an_answer_tells_of_the_robot_is_not_the_retargeters_own(
             with pytest.raises(ValueError, match="read-only"):
                 limit_N[:] = 0
     assert not np.shares_memory(make("nao").facts.lower, make("nao").body_map.robot.lower_N.numpy())
+
+
+def test_what_is_no_floor_no_time_and_no_settings_is_refused_in_a_sentence(
+    make: Callable[[str], Retargeter], fast: FastRetargeter, array: np.ndarray
+) -> None:
+    kinds: list[tuple[Any, Any]] = [(Stream, make("nao")), (FastStream, fast)]
+    for of, given in kinds:
+        assert of(given, floor=np.float32(0.5)).floor == 0.5
+        wrong: list[tuple[str, Any]] = [("floor", True), ("floor", 10**400), ("floor", np.nan), ("settings", {"a": 1})]
+        for name, value in wrong:
+            with pytest.raises(UserError, match=f"stream: (the )?{name}('s height)? must be"):
+                of(given, **{name: value})
+        with pytest.raises(UserError, match="stream: expected a retargeter"):
+            of("package")
+        stream = of(given)
+        for time in (10**400, True, "1", np.nan):
+            with pytest.raises(UserError, match="the time of a frame must be a number"):
+                stream(array[0], time=time)
