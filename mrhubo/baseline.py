@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from mrhubo.config import BaselineConfig, CommandParser, parse_arguments, run_command, whole_number
 from mrhubo.runtime.progress import Reporter
 
@@ -31,7 +33,7 @@ def main(argv: list[str]) -> None:
         print(run_baseline(config, report))
         return
     result = search_settings(config, report, options.trials)
-    print(f"\n{result.table}\n\nbest:      python -m mrhubo.baseline --config {result.best}")
+    print(f"\n{result.table}\n\nbest:      python -m mrhubo.baseline --config {shlex.quote(str(result.best))}")
     print(f"dashboard: {result.dashboard}")
 
 

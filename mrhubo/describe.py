@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,7 +67,9 @@ def main(argv: list[str]) -> int:
     answer = ", answer what is not decided" if open_ else ""
     print(f"next:     look at the picture{answer}, then  {next_command(described.found, described.file)}")
     if described.more:
-        print(f"          {' and '.join(described.more)} move too with  mrhubo describe {word} --whole-body")
+        print(
+            f"          {' and '.join(described.more)} move too with  mrhubo describe {shlex.quote(word)} --whole-body"
+        )
     return status
 
 

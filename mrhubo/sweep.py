@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from functools import partial
 
 from mrhubo.config import (
@@ -53,7 +54,7 @@ def main(argv: list[str]) -> None:
         check_fixed(settings.fixed, lambda text: load([*options.overrides, text]))
         sweep = Sweep(load, options.overrides, settings, FitTrials(), report)
     result = sweep.run()
-    print(f"\n{result.table}\n\nbest:      python -m mrhubo.fit --config {result.best}")
+    print(f"\n{result.table}\n\nbest:      python -m mrhubo.fit --config {shlex.quote(str(result.best))}")
     print(f"dashboard: {result.dashboard}")
 
 

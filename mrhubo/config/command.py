@@ -5,31 +5,19 @@ from __future__ import annotations
 import io
 import os
 import select
-import signal
 import sys
-import threading
 import traceback
 from collections.abc import Callable
-from types import FrameType
 from typing import NoReturn
 
 from mrhubo.config.faults import machine_fault
+from mrhubo.config.interrupts import Terminated, settle_signals, take_signals
 from mrhubo.config.notices import show_warnings_plainly
 from mrhubo.config.secrets import redacted
 from mrhubo.errors import UserError, shortened, was_interrupted
 
 _LONGEST = 4_000
 """Letters of the longest sentence that is printed: some name what a stranger's file holds."""
-_ENDED_FROM_OUTSIDE = tuple(
-    getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
-)  # a scheduler, a shutdown, a terminal that was closed
-
-
-class Terminated(KeyboardInterrupt):
-    """The process was asked to end: everything ends as after Ctrl-C."""
-
-    number: int | None = None
-    """Of the signal; None as long as none came. Libraries make errors of their own of an interrupt in their midst."""
 
 
 def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
@@ -82,10 +70,7 @@ def _begin() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a letter that the terminal does not know is no reason to end
             stream.reconfigure(errors="backslashreplace")
-    if threading.current_thread() is threading.main_thread():
-        for number in _ENDED_FROM_OUTSIDE:
-            if signal.getsignal(number) is signal.SIG_DFL:  # else whoever started us wants something else (nohup)
-                signal.signal(number, _terminate)
+    take_signals()
 
 
 def _stand_somewhere() -> None:
@@ -110,14 +95,8 @@ def _wait_briefly() -> None:
         os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
 
 
-def _terminate(number: int, frame: FrameType | None) -> NoReturn:
-    """Ends as after Ctrl-C, so that runs are closed and locks let go; a second signal ends at once."""
-    signal.signal(number, signal.SIG_DFL)
-    Terminated.number = number
-    raise Terminated
-
-
 def _interrupted() -> int:
+    settle_signals()
     number = Terminated.number
     word = "interrupted" if number is None else "terminated"
     return _end(f"{word}; the same command resumes", 130 if number is None else 128 + number)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -43,7 +44,12 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
         picture: where its picture is going to be.
         source: what the user named, for the comment at the top.
     """
-    words = {"source": source, "picture": picture.name, "file": str(file), "next": next_command(found, file)}
+    words = {
+        "source": source,
+        "picture": picture.name,
+        "file": shlex.quote(str(file)),
+        "next": next_command(found, file),
+    }
     words["points"] = "Hips, knees, elbows, ..." if found.whole_body else "Shoulders, elbows and wrists"
     head = _HEAD.format(**{word: printable(text) for word, text in words.items()})
     lines = [*head.splitlines(), *_questions(found), "robot:"]
@@ -62,9 +68,10 @@ def described_yaml(found: Discovery, urdf: Path, file: Path, picture: Path, sour
 
 def next_command(found: Discovery, file: Path) -> str:
     """What makes a robot of this config move: a fit, or, for a whole body, the optimiser, which needs none."""
+    word = shlex.quote(str(file))
     if found.whole_body:
-        return f"mrhubo retarget --robot {file} --motion walk.npz --out robot.npz"
-    return f"mrhubo fit {file}"
+        return f"mrhubo retarget --robot {word} --motion walk.npz --out robot.npz"
+    return f"mrhubo fit {word}"
 
 
 def _table(found: Discovery) -> tuple[BodyPart, ...]:

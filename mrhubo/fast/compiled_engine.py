@@ -60,6 +60,10 @@ class CompiledEngine:
             given = (self._tables, look_up(description, universal), lay_out(universal))
             self._unroll = partial(self._universal_kernel, *given)
 
+    def __reduce__(self) -> tuple[type, tuple[Description]]:
+        """A copy in another process is made of the same arrays."""
+        return type(self), (self.description,)
+
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
         target_BD3, q_BN = self._room(local_BJ33)

@@ -35,6 +35,10 @@ class NumpyEngine:
         self._avoidance = Avoidance(description)
         self._branches = description.universal and universal.Branches(description, description.universal)
 
+    def __reduce__(self) -> tuple[type, tuple[Description]]:
+        """A copy in another process is made of the same arrays."""
+        return type(self), (self.description,)
+
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
         refuse(self.wrong(local_BJ33), shape)

@@ -77,7 +77,7 @@ def to_array(given: Any) -> np.ndarray:
         UserError: NumPy makes no array of it, as of ragged lists.
     """
     if isinstance(given, np.ndarray):
-        return given
+        return plain_array(given)
     with contextlib.suppress(Exception):
         return np.asarray(given)
     try:  # a tensor that takes gradients, lies on a GPU, or has numbers that NumPy does not know
@@ -85,6 +85,13 @@ def to_array(given: Any) -> np.ndarray:
     except Exception as error:
         kind = type(given).__name__
         raise UserError(f"human motion: expected a Motion or an array of numbers, found {kind}") from error
+
+
+def plain_array(array: np.ndarray) -> np.ndarray:
+    """An array of NumPy's own class; numbers that are masked are missing, so they are NaN."""
+    if isinstance(array, np.ma.MaskedArray) and array.dtype.kind in "fiu" and np.ma.is_masked(array):
+        return np.ma.filled(array.astype(np.float64), np.nan)
+    return np.asarray(array)
 
 
 def check_frame_rate(frame_rate: float | None, needed: bool = False) -> None:

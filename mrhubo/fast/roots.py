@@ -16,9 +16,8 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.poses import to_array
+from mrhubo.fast.rotations import are_crooked
 
-CROOKED = 1e-2
-"""How far a rotation's numbers may be from those of one: files round them."""
 FAR_M = 1e5
 """No motion goes so far [m]; in float32, places out there are centimetres apart."""
 
@@ -67,7 +66,7 @@ def read_root(root: Any, contacts: Any, points: Sequence[str]) -> Root | None:
     turn_33, place_3 = turn.astype(np.float64), place.astype(np.float64)
     if not (np.isfinite(turn_33).all() and (np.abs(place_3) < FAR_M).all()):
         return None
-    if np.abs(turn_33.T @ turn_33 - np.eye(3)).max() > CROOKED:
+    if are_crooked(turn_33):
         raise UserError("stream: the root's matrix is no rotation")
     return Root(turn_33, place_3, given_H)
 

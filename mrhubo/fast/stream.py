@@ -18,6 +18,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.answers import Ground
+from mrhubo.fast.pelvis import Pelvises
 from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, one_euro, room
 from mrhubo.fast.plain.ground import Base, Seen, Stance
 from mrhubo.fast.plain.human import orthonormal_columns
@@ -27,7 +28,7 @@ from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse, t
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.roots import Ways, read_root
 from mrhubo.fast.stream_clock import StreamClock
-from mrhubo.fast.stream_settings import StreamSettings
+from mrhubo.fast.stream_settings import StreamSettings, checked
 from mrhubo.robot_motion import RobotMotion
 
 _REST_J33 = np.tile(np.eye(3, dtype=np.float32), (21, 1, 1))
@@ -52,15 +53,13 @@ class FastStream:
             floor: height of the floor in the person's world [m], for robots with feet; None: it is learned on the way.
 
         Raises:
-            UserError: the rate is not positive, the floor no number, or the retargeter one with PyTorch.
+            UserError: the rate is not positive, floor or settings are none, or the retargeter is one with PyTorch.
         """
         check_frame_rate(rate, needed=True)
         if not isinstance(retargeter, FastRetargeter):
             raise UserError("stream: expected a retargeter of mrhubo.load_fast; the stream of others is mrhubo.Stream")
-        if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
-            raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
-        self.retargeter, self.rate, self.settings = retargeter, float(rate), settings or StreamSettings()
-        self.floor = floor
+        self.settings, self.floor = checked(settings, floor)
+        self.retargeter, self.rate = retargeter, float(rate)
         self._engine, self._cost = retargeter.engine, retargeter.description.cost
         self._longest_step = self.settings.longest_step(self.rate)
         self._limits = Limits.of_cost(self._cost, self.settings.ramp_time)
@@ -98,6 +97,7 @@ class FastStream:
         self._unseen, self._placed = math.inf, q is not None
         self._seen_1J33 = _REST_J33[None].copy()
         self._clock, self._ways = StreamClock(self.rate), Ways(1, self.floor is not None)
+        self._pelvis = Pelvises(1)
 
     def __call__(
         self, pose: Any, time: float | None = None, root: tuple[Any, Any] | None = None, contacts: Any = None
@@ -171,13 +171,14 @@ class FastStream:
         passed, time = self._clock.passed(time)
         if root is not None and self.contact_points and self._ground is None:
             self._stand_up()
+        person = None
+        if passed > 0 and stands is not None and seen:
+            one, since_1 = np.array([True]), np.array([self._unseen + passed])
+            way_13 = self._ways.follow(stands.place_3[None], one, since_1)
+            turn_133, local_1J33 = self._pelvis.follow(stands.turn_33[None], local_1J33, one, since_1)
+            person = Seen(local_1J33[0], turn_133[0], way_13[0], stands.given_H)
         target_1D3 = self._engine.directions(local_1J33)
         if passed > 0:
-            person = None
-            if stands is not None and seen:
-                since_1 = np.array([self._unseen + passed])
-                way_3 = self._ways.follow(stands.place_3[None], np.array([True]), since_1)[0]
-                person = Seen(local_1J33[0], *stands._replace(place_3=way_3))
             self._work(local_1J33, target_1D3[0], seen, person, passed)
         self._seen_1J33, self._clock.time = local_1J33, time
         return seen, target_1D3

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
+from mrhubo.fast.stream_settings import is_number
 
 _SAME = 1e-9
 """Times that differ by less [s] are the same: what is divided by less of it has no finite value."""
@@ -32,8 +29,8 @@ class StreamClock:
         """
         if time is None:
             return 1 / self.rate, 0.0 if self.time is None else self.time + 1 / self.rate
-        if isinstance(time, bool) or not isinstance(time, int | float | np.number) or not math.isfinite(time):
-            raise UserError(f"stream: the time of a frame must be a number of seconds, found {time}")
+        if not is_number(time):
+            raise UserError(f"stream: the time of a frame must be a number of seconds, found {shortened(time)}")
         if self.time is None:
             return 1 / self.rate, float(time)
         if time < self.time:

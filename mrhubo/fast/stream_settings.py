@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import Any
 
-from mrhubo.errors import UserError
+import numpy as np
+
+from mrhubo.errors import UserError, shortened
 
 _FRAMES_PER_GAP = 1.5
 
@@ -49,11 +52,33 @@ class StreamSettings:
             if field.name == "avoid_collisions":
                 continue
             value, positive = getattr(self, field.name), field.name in ("half_speed", "longest_gap")
-            number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-            if not number or value < 0 or (positive and value == 0):
+            if not is_number(value) or value < 0 or (positive and value == 0):
                 least = "more than 0" if positive else "0 or more"
-                raise UserError(f"stream settings: {field.name} must be {least}, found {value}")
+                raise UserError(f"stream settings: {field.name} must be {least}, found {shortened(value)}")
 
     def longest_step(self, rate: float) -> float:
         """No more time [s] than this counts as passed when joints move, at a rate of frames per second."""
         return max(self.longest_gap, _FRAMES_PER_GAP / rate)
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite number, Python's or NumPy's, that a float can hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def checked(settings: StreamSettings | None, floor: float | None) -> tuple[StreamSettings, float | None]:
+    """A stream's settings, default: all defaults, and the height of its floor [m], None: it is learned.
+
+    Raises:
+        UserError: they are no settings, or the height is no number.
+    """
+    if settings is not None and not isinstance(settings, StreamSettings):
+        raise UserError(f"stream: settings must be StreamSettings(...), found {type(settings).__name__}")
+    if floor is not None and not is_number(floor):
+        raise UserError(f"stream: the floor's height must be a number of metres, found {shortened(floor)}")
+    return settings or StreamSettings(), None if floor is None else float(floor)

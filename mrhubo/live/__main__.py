@@ -78,7 +78,7 @@ def main(argv: list[str]) -> int:
         fetching.fetch(words, _SETTING_UP)
         return 0
     config, options = parse_arguments(build_parser(), argv)
-    from mrhubo.config.command import Terminated
+    from mrhubo.config.interrupts import Terminated
     from mrhubo.fast.kept import is_kept, numba_is_there
     from mrhubo.live import LiveRobot
     from mrhubo.live.loop import Session, run_session
@@ -101,7 +101,7 @@ def main(argv: list[str]) -> int:
     if certificate is not None and not plan.has_page:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
     if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
-        print("compiling, which takes a minute, once for all sessions", flush=True)
+        print("the first session on a machine compiles, which takes a minute", flush=True)
     if options.retargeter is None:
         robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body)
     else:

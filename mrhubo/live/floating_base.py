@@ -81,7 +81,9 @@ class FloatingBase:
         self._stance: Stance | None = None
         """What was followed last; None: nothing is being followed."""
         self._path_6 = np.zeros(6)
-        """How far the base is still to go and to turn with the stream [m], [rad]."""
+        """How far the base is still to go and to turn with the stream [m], [rad],"""
+        self._due = 0.0
+        """and in what time [s]."""
         self._velocity_6 = np.zeros(6)
         """[m/s], [rad/s]"""
         self._coasted, self._sinking, self._since = 0.0, 0.0, 0.0
@@ -177,10 +179,11 @@ class FloatingBase:
             if _norm(way_3) > FASTEST * self._since or _norm(turned_3) > FASTEST_TURN * self._since:
                 self._begin(stance)
             else:
-                self._path_6 += np.concatenate((way_3, turned_3))
-        # Frames that come less often than steps are shared out among these.
-        now_6 = self._path_6 * min(1.0, self._period / max(self._since, self._period))
-        self._path_6 = self._path_6 - now_6
+                self._path_6, self._due = self._path_6 + np.concatenate((way_3, turned_3)), max(self._due, self._since)
+        # Frames that come less often than steps are shared out among these; after a gap, among as many as it lasted.
+        now_6 = self._path_6 * min(1.0, self._period / max(self._due, self._period))
+        now_6[:3], now_6[3:] = self._at_most(now_6[:3], FASTEST), self._at_most(now_6[3:], FASTEST_TURN)
+        self._path_6, self._due = self._path_6 - now_6, max(self._due - self._period, 0.0)
         if last is not stance:
             self._since = 0.0
         free_33 = rotation_of(share * now_6[3:]) @ self._at.turn_33
@@ -194,7 +197,7 @@ class FloatingBase:
         off_33 = self._at.turn_33 @ stance.base.turn_33.T
         angle = math.atan2(off_33[1, 0] - off_33[0, 1], off_33[0, 0] + off_33[1, 1])
         self._heading_33 = rotation_of(np.array([0.0, 0.0, angle]))
-        self._path_6, self._since, self._begun = np.zeros(6), 0.0, True
+        self._path_6, self._due, self._since, self._begun = np.zeros(6), 0.0, 0.0, True
 
     def _coast(self) -> tuple[np.ndarray, np.ndarray]:
         """The same for a robot that brakes."""
@@ -241,14 +244,17 @@ class FloatingBase:
         for foot in np.flatnonzero(np.minimum(theirs_R, self._flat_R) > 0):
             if goes_on:
                 turned_3 = turn_of(self._theirs_R33[foot] @ last_33[foot].T)
+                turned_3 = self._at_most(turned_3, FASTEST_TURN)  # after a gap it is far
                 self._orient_R33[foot] = rotation_of(share * turned_3) @ self._orient_R33[foot]
             self._orient_R33[foot] = self._toward(self._orient_R33[foot], self._theirs_R33[foot], share)
 
     def _toward(self, turn_33: np.ndarray, other_33: np.ndarray, share: float) -> np.ndarray:
         """A rotation, turned towards another one as far as it may be in a period."""
-        off_3 = turn_of(other_33 @ turn_33.T)
-        most = LEVEL_SPEED * share * self._period
-        return rotation_of(off_3 * min(1.0, most / max(_norm(off_3), 1e-12))) @ turn_33
+        return rotation_of(self._at_most(turn_of(other_33 @ turn_33.T), LEVEL_SPEED * share)) @ turn_33
+
+    def _at_most(self, way_3: np.ndarray, speed: float) -> np.ndarray:
+        """As much of a way as a speed allows in a period."""
+        return way_3 * min(1.0, speed * self._period / max(_norm(way_3), 1e-12))
 
     def _solve(self, soles: Soles, free_33: np.ndarray, planned_3: np.ndarray) -> _Place:
         """The base that planted soles carry, and as far as none is planted, one that moves freely."""

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, Skeleton
 from mrhubo.errors import UserError
-from mrhubo.fast.poses import check_frame_rate
+from mrhubo.fast.poses import check_frame_rate, plain_array
 from mrhubo.fast.rotations import SKEW
 from mrhubo.motion.checks import MAX_TURN, Turns
 from mrhubo.motion.motion import Motion
@@ -99,6 +99,7 @@ def to_tensor(array: MotionLike, skeleton: Skeleton | None = None) -> Tensor:
         with contextlib.suppress(Exception):  # ragged lists, tensors on other devices
             array = np.array(array)
     if isinstance(array, np.ndarray) and array.dtype.kind in "fiu":
+        array = plain_array(array)
         # a copy: torch wants it writable, without negative strides, and in this machine's order of bytes
         exact = array.dtype.kind == "f" and array.dtype.itemsize >= 8
         with np.errstate(over="ignore"):

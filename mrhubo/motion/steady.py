@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from mrhubo.body.joints import PARENTS
+from mrhubo.fast.pelvis import HANGING, Pelvises
 from mrhubo.fast.roots import without_jumps
 from mrhubo.motion.motion import Motion
 
@@ -34,8 +34,6 @@ _ORDER = 3
 grow quicker, cost nothing."""
 _SHORTEST = 8
 """Frames; a shorter motion is left as it is."""
-_HANGING = [joint - 1 for joint, parent in enumerate(PARENTS) if parent == 0]
-"""The posed joints that hang on the pelvis."""
 
 
 def steady_root(motion: Motion) -> Motion:
@@ -55,13 +53,29 @@ def steady_root(motion: Motion) -> Motion:
     smooth_T33 = smooth_rotations(root_T33.astype(np.float64), motion.frame_rate)
     back_T33 = (smooth_T33.swapaxes(1, 2) @ root_T33).astype(np.float32)
     local_TJ33 = motion.arrays.local_TJ33.copy()
-    local_TJ33[:, _HANGING] = back_T33[:, None] @ local_TJ33[:, _HANGING]
+    local_TJ33[:, HANGING] = back_T33[:, None] @ local_TJ33[:, HANGING]
     place_T3 = motion.arrays.root_position_T3
     if place_T3 is not None and np.isfinite(place_T3).all():
         place_T3 = without_spikes(place_T3, motion.frame_rate)
     return motion.changed(
         root_rotation_T33=smooth_T33.astype(np.float32), root_position_T3=place_T3, local_TJ33=local_TJ33
     )
+
+
+def steady_frames(motion: Motion) -> Motion:
+    """The motion as a stream sees it, frame after frame (`mrhubo.fast.pelvis`): without turns that no pelvis makes.
+    Without a root, or with one that is NaN somewhere, it is left as it is.
+    """
+    root_T33, local_TJ33 = motion.arrays.root_rotation_T33, motion.arrays.local_TJ33
+    if root_T33 is None or root_T33.shape != (len(local_TJ33), 3, 3) or not np.isfinite(root_T33).all():
+        return motion
+    pelvis, seen, since = Pelvises(1), np.array([True]), np.array([np.inf])
+    turn_T33, steady_TJ33, changed = root_T33.copy(), local_TJ33.copy(), False
+    for frame in range(len(root_T33)):
+        told = (root_T33[frame, None], local_TJ33[frame, None])
+        (turn_T33[frame],), (steady_TJ33[frame],) = found = pelvis.follow(*told, seen, since)
+        changed, since = changed or found[0] is not told[0], np.array([1 / motion.frame_rate])
+    return motion.changed(root_rotation_T33=turn_T33, local_TJ33=steady_TJ33) if changed else motion
 
 
 def without_spikes(place_T3: np.ndarray, frame_rate: float) -> np.ndarray:

@@ -13,7 +13,7 @@ import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 import torch
 from torch import Tensor, nn
@@ -108,6 +108,17 @@ class Retargeter(nn.Module):
     def facts(self) -> RobotFacts:
         """What files of the robot's motion tell of it."""
         return robot_facts(self.body_map.robot, self.origin, self.checksum)
+
+    def to(self, *args: Any, **kwargs: Any) -> Self:
+        """As `torch.nn.Module.to`: moves it to a device.
+
+        Raises:
+            UserError: this machine, or its PyTorch, has no such device.
+        """
+        try:
+            return super().to(*args, **kwargs)
+        except (RuntimeError, AssertionError) as error:  # PyTorch that was built without CUDA asserts
+            raise UserError(f"the retargeter cannot go there: {str(error).partition('; ')[0]}") from error
 
     if TYPE_CHECKING:
 

@@ -78,11 +78,15 @@ class RobotFacts:
     """The robot's other joints that are not fixed."""
 
     def __post_init__(self) -> None:
-        """Raises a UserError where limits are no numbers."""
+        """Raises a UserError where limits are no numbers. All answers of a retargeter share them, so they are copies
+        that nobody writes into.
+        """
         for name in _LIMITS:
             given = getattr(self, name)
             if given is not None:
-                object.__setattr__(self, name, _array(name, given, np.shape(given), np.float32))
+                limit_N = np.array(_array(name, given, np.shape(given), np.float32))
+                limit_N.setflags(write=False)
+                object.__setattr__(self, name, limit_N)
 
 
 @dataclass(frozen=True, eq=False)

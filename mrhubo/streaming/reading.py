@@ -14,8 +14,10 @@ from torch import Tensor
 
 from mrhubo.body.skeleton import KEYPOINT_NAMES
 from mrhubo.errors import UserError
+from mrhubo.fast.poses import to_array
 from mrhubo.motion import MotionLike, read_poses, to_tensor
-from mrhubo.reference.standing import CROOKED, FAR_M, Legs
+from mrhubo.motion.poses import are_crooked
+from mrhubo.reference.standing import FAR_M, Legs
 from mrhubo.robot import BodyMap
 
 _MOST_PEOPLE = 10_000
@@ -79,15 +81,17 @@ class FrameReader:
             UserError: they have another shape, or a rotation is none.
         """
         people = len(seen_B)
-        turn_B33, place_B3 = (self._of_people(to_tensor(x).to(last_B33)) for x in given)
+        try:
+            turn_B33, place_B3 = (self._of_people(to_tensor(part).to(last_B33)) for part in given)
+        except (TypeError, ValueError, UserError) as error:
+            raise UserError(f"stream: a root is a rotation (3, 3) and a place (3,) [m]: {error}") from error
         if tuple(turn_B33.shape) != (people, 3, 3) or tuple(place_B3.shape) != (people, 3):
             raise UserError(
                 "stream: a root is a rotation (3, 3) and a place (3,), with a leading axis if there are several people;"
                 f" found {tuple(turn_B33.shape)} and {tuple(place_B3.shape)}"
             )
         seen_B = seen_B & turn_B33.flatten(1).isfinite().all(dim=1) & (place_B3.abs() < FAR_M).all(dim=1)
-        crooked_B = (turn_B33.mT @ turn_B33 - torch.eye(3).to(turn_B33)).abs().amax(dim=(1, 2)) > CROOKED
-        if bool((crooked_B & seen_B).any()):
+        if bool((are_crooked(turn_B33) & seen_B).any()):
             raise UserError("stream: the root's matrix is no rotation")
         return (
             torch.where(seen_B[:, None, None], turn_B33, last_B33),
@@ -103,12 +107,12 @@ class FrameReader:
         """
         if given is None:
             return None
-        given_BP = np.asarray(given, dtype=bool).reshape(self.people or 1, -1)
-        if given_BP.shape[1] != len(self.legs.contacts):
+        array, shape = to_array(given), (self.people or 1, len(self.legs.contacts))
+        if array.dtype.kind not in "biu" or array.shape != (shape if self.people else shape[1:]):
             raise UserError(
                 f"stream: expected contacts of {len(self.legs.contacts)} points: {', '.join(self.contact_points)}"
             )
-        return given_BP
+        return array.astype(bool).reshape(shape)
 
     def angles(self, given: MotionLike, like: Tensor) -> Tensor:
         """Joint angles of the robots (B, N) [rad], with the type and on the device of `like`.
@@ -117,7 +121,7 @@ class FrameReader:
             UserError: they have another shape, are no numbers, or lie outside the joints' limits.
         """
         robot = self.body_map.robot
-        q_BN = self._of_people(to_tensor(given).to(like))
+        q_BN = self._of_people(to_tensor(given).to(like)).clone()  # the caller's may be changed before the next frame
         if tuple(q_BN.shape) != (self.people or 1, len(robot.joint_names)):
             raise UserError(f"stream: q must have {len(robot.joint_names)} angles a robot, found {tuple(q_BN.shape)}")
         if not bool(((q_BN >= robot.lower_N) & (q_BN <= robot.upper_N)).all()):  # nor NaN

@@ -11,7 +11,6 @@ Legend: B people, T frames, D directions, N joints, J = 21 human joints.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,10 +20,13 @@ from torch import Tensor
 from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.fast import FastRetargeter, StreamSettings
+from mrhubo.fast.pelvis import Pelvises
 from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.roots import Ways
 from mrhubo.fast.stream_clock import StreamClock
+from mrhubo.fast.stream_settings import checked
 from mrhubo.motion import Motion, MotionLike, read_poses
+from mrhubo.motion.steady import steady_frames
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.standing import (
     Legs,
@@ -38,6 +40,7 @@ from mrhubo.retargeter import Retargeter, RetargetResult, join_results
 from mrhubo.retargeter.without_training import optimised
 from mrhubo.streaming.follow import Follower, StreamState
 from mrhubo.streaming.ground import GroundState, Seen
+from mrhubo.streaming.people import without_confidence
 from mrhubo.streaming.reading import FrameReader, Root
 
 _PART = 8_192
@@ -75,10 +78,11 @@ class Stream:
             raise UserError("stream: this retargeter is without PyTorch, so its stream is mrhubo.FastStream")
         if isinstance(retargeter, OptimizationRetargeter):
             retargeter = optimised(retargeter.body_map)
+        if not isinstance(retargeter, Retargeter):
+            kind = type(retargeter).__name__
+            raise UserError(f"stream: expected a retargeter of mrhubo.load or for_robot, or an optimiser, found {kind}")
         self.retargeter, self.rate, self.people = retargeter, float(rate), people
-        if floor is not None and not (isinstance(floor, int | float) and math.isfinite(floor)):
-            raise UserError(f"stream: the floor's height must be a number of metres, found {floor}")
-        self.settings, self.floor = settings or StreamSettings(), floor
+        self.settings, self.floor = checked(settings, floor)
         self._legs = Legs(retargeter.body_map)
         self._reader = FrameReader(retargeter.body_map, self._legs, people)
         self._standing: Standing | None = None
@@ -99,7 +103,7 @@ class Stream:
         """None: no frame has come, so it is not known whether roots will come with them."""
         self._seen_BJ33 = rest_33.expand(self.people or 1, len(POSED_JOINT_NAMES), 3, 3)
         self._root_B33, self._place_B3 = rest_33.expand(self.people or 1, 3, 3), rest_33.new_zeros(self.people or 1, 3)
-        self._ways = Ways(self.people or 1, self.floor is not None)
+        self._ways, self._pelvis = Ways(self.people or 1, self.floor is not None), Pelvises(self.people or 1)
         self._turn_B4: Tensor | None = None
         self._clock = StreamClock(self.rate)
 
@@ -126,8 +130,8 @@ class Stream:
         """
         seen_B = self._advance(pose, time, root, contacts)
         assert self._state is not None
-        q_BN = self._state.joints.q_BN
-        result = _without_confidence(self.retargeter.judge(q_BN, self._seen_BJ33), ~seen_B)
+        q_BN = self._state.joints.q_BN.clone()  # whoever changes an answer does not move the robot
+        result = without_confidence(self.retargeter.judge(q_BN, self._seen_BJ33), ~seen_B)
         if self._state.ground is not None:
             result = dataclasses.replace(result, **self._stands(self._state.ground, q_BN))
         return result.with_leading(() if self.people is None else (self.people,), None)
@@ -141,7 +145,7 @@ class Stream:
         if self._turn_B4 is not None:  # it goes on from the last one without a change of sign
             turn_B4 = torch.where((turn_B4 * self._turn_B4).sum(-1, keepdim=True) < 0, -turn_B4, turn_B4)
         self._turn_B4 = turn_B4
-        return {**found, "root_quaternion_wxyz": turn_B4}
+        return {**found, "root_quaternion_wxyz": turn_B4.clone()}
 
     def joints(
         self, pose: MotionLike | None, time: float | None = None, root: Root | None = None, contacts: Any = None
@@ -149,7 +153,7 @@ class Stream:
         """The joint angles (N,) or (people, N) [rad] of `__call__` alone, in less time."""
         self._advance(pose, time, root, contacts)
         assert self._state is not None
-        return self._state.joints.q_BN[0] if self.people is None else self._state.joints.q_BN
+        return (self._state.joints.q_BN[0] if self.people is None else self._state.joints.q_BN).clone()
 
     @property
     def contact_points(self) -> tuple[str, ...]:
@@ -174,10 +178,14 @@ class Stream:
             at_BN = self._begin_BN if self._state is None else self._state.joints.q_BN
             self._state = self._follower.begin(self.people or 1, at_BN)
         if passed > 0:
+            way_B3, turn_B33 = place_B3, root_B33
+            if root is not None and self._is_rooted:
+                times = (seen_B.cpu().numpy(), (self._state.unseen_B + passed).double().cpu().numpy())
+                way_B3 = torch.from_numpy(self._ways.follow(place_B3.double().cpu().numpy(), *times)).to(place_B3)
+                found = self._pelvis.follow(root_B33.cpu().numpy(), local_BJ33.cpu().numpy(), *times)
+                turn_B33, local_BJ33 = (torch.from_numpy(part).to(place_B3) for part in found)
             target_BD3 = self.retargeter.body_map.human_directions(local_BJ33)
-            frame = (place_B3.double(), seen_B, (self._state.unseen_B + passed).double())
-            way_B3 = torch.from_numpy(self._ways.follow(*(part.cpu().numpy() for part in frame)))
-            seen = Seen(local_BJ33, root_B33, way_B3.to(place_B3), given_BP)
+            seen = Seen(local_BJ33, turn_B33, way_B3, given_BP)
             self._state = self._follower.advance(self._state, local_BJ33, target_BD3, seen_B, passed, seen)
         self._seen_BJ33, self._clock.time = local_BJ33, time
         self._root_B33, self._place_B3 = root_B33, place_B3
@@ -212,6 +220,7 @@ class Stream:
         root move the base of a robot with feet.
         """
         answers: dict[int, _Answer] = {}
+        motions = [steady_frames(motion) if self._legs.has_feet else motion for motion in motions]
         kinds = [
             (motion.frame_rate, self._legs.has_feet and has_root(motion), motion.contact_T4 is not None)
             for motion in motions
@@ -288,12 +297,3 @@ class _Answer:
     q_TN: Tensor
     stands: dict[str, Any]
     """What is told of the floor: fields of a result."""
-
-
-def _without_confidence(result: RetargetResult, chosen_B: Tensor) -> RetargetResult:
-    """No confidence in those who are not seen."""
-    return dataclasses.replace(
-        result,
-        confidence=torch.where(chosen_B, 0.0, result.confidence),
-        branch_confidence=torch.where(chosen_B[:, None], 0.0, result.branch_confidence),
-    )

@@ -172,3 +172,24 @@ def test_waiting_threads_spin_briefly_unless_the_user_wants_something_else():
     assert run(body, env=without).stdout == "3000 None False\n"
     assert run(body, env={**without, "OMP_WAIT_POLICY": "ACTIVE"}).stdout == "None ACTIVE False\n"
     assert run(body, env={**without, "GOMP_SPINCOUNT": "7"}).stdout == "7 None False\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_library_that_catches_everything_while_it_is_imported_loses_no_signal(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    """As trimesh does with what it may go without."""
+    library = "import time\ntry:\n    print('go', flush=True)\n    time.sleep(0.3)\nexcept BaseException:\n    pass\n"
+    (tmp_path / "careless.py").write_text(library)
+    process = subprocess.Popen(
+        [sys.executable, "-c", script("import careless\nprint('imported', flush=True)\ntime.sleep(60)")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert process.stdout is not None and process.stdout.readline() == "go\n"
+    for _ in range(2):  # who is impatient presses twice
+        process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    word = "interrupted" if number == signal.SIGINT else "terminated"
+    assert (process.returncode, err) == (128 + number, f"{word}; the same command resumes\n")

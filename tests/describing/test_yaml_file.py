@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ import torch
 import yaml
 
 from mrhubo.config import load_config
-from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, relative, unsure
+from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, next_command, relative, unsure
 from mrhubo.robot import build_body_map, read_keypoints
 from mrhubo.robot.discovery import Candidate, Discovery, FoundRange, Question, discover
 from tests.robot.two_arms import PAIR
@@ -117,3 +118,13 @@ def test_a_text_from_a_file_stays_in_its_comment(tmp_path: Path) -> None:
 def test_the_urdf_is_named_from_the_config_unless_they_are_far_apart(tmp_path: Path) -> None:
     assert relative(tmp_path / "a" / "x.urdf", tmp_path / "conf" / "x.yaml") == "../a/x.urdf"
     assert relative(Path("/opt/x.urdf"), Path("/home/me/x.yaml")) == "/opt/x.urdf"
+
+
+def test_commands_that_are_told_can_be_pasted_whatever_a_folder_is_called(tmp_path: Path) -> None:
+    discovery, folder = found(tmp_path), tmp_path / "my robot's"
+    folder.mkdir()
+    for body in (False, True):
+        words = shlex.split(next_command(dataclasses.replace(discovery, whole_body=body), folder / "x.yaml"))
+        assert str(folder / "x.yaml") in words
+    head = described_yaml(discovery, tmp_path / "x.urdf", folder / "x.yaml", folder / "x.png", "x.urdf")
+    assert f"#   mrhubo describe {shlex.quote(str(folder / 'x.yaml'))}  # draws" in head

@@ -12,7 +12,7 @@ from mrhubo.fast.plain.ground import Base, Stance
 from mrhubo.fast.plain.robot import place
 from mrhubo.fast.plain.soles import turned_points
 from mrhubo.fast.rotations import axis_angle_to_matrix
-from mrhubo.live.floating_base import SINK_SPEED, FloatingBase
+from mrhubo.live.floating_base import FASTEST_TURN, LEVEL_SPEED, SINK_SPEED, FloatingBase
 from tests.live.walkers import make_legged
 from tests.reference.walkers import ROOTS
 
@@ -140,3 +140,29 @@ def test_another_place_of_the_streams_world_is_not_gone_to(legged: FastRetargete
         base.step(q_N, q_N, Stance(theirs, NONE if step % 3 else ALL, q_N), 1.0)
         np.testing.assert_allclose(base.base.place_3, start.place_3, atol=1e-6)
         np.testing.assert_allclose(base.base.turn_33, start.turn_33, atol=1e-6)
+
+
+@pytest.mark.parametrize("frames_every", [1, 3])
+def test_what_the_stream_has_gone_and_turned_in_a_gap_takes_as_long_again(
+    legged: FastRetargeter, frames_every: int
+) -> None:
+    """No more than people's fastest, whenever frames come, in the air and on a foot that the stream has turned."""
+    for weight_H in (NONE, LEFT):
+        q_N = home(legged)
+        base = FloatingBase(legged.description, q_N, PERIOD, BRAKE)
+        start = last = base.base
+        stance = Stance(start, weight_H, q_N)
+        for step in range(60):
+            if step % frames_every == 0 and not 20 <= step < 32:  # a fifth of a second without a frame
+                gone = float(step >= 32)
+                turn_33 = axis_angle_to_matrix(np.array([0.0, 0.0, 2.5 * gone])) @ start.turn_33
+                stance = Stance(Base(start.place_3 + [1.0 * gone, 0, 0.1], turn_33), weight_H, q_N)
+            base.step(q_N, q_N, stance, 1.0)
+            turned = np.arccos(np.clip((np.sum(base.base.turn_33 * last.turn_33) - 1) / 2, -1, 1))
+            assert turned <= (FASTEST_TURN + LEVEL_SPEED) * PERIOD + 1e-6
+            if weight_H is NONE:
+                assert np.linalg.norm(base.base.place_3 - last.place_3) < 1.5 * 1.0 / 12
+            last = base.base
+        if weight_H is NONE:
+            np.testing.assert_allclose(last.turn_33, turn_33, atol=1e-6)
+            np.testing.assert_allclose(last.place_3[:2], start.place_3[:2] + [1.0, 0.0], atol=1e-6)

@@ -386,3 +386,10 @@ def test_weights_are_counted_right(root: Path, stages: int, branches: str, monke
     monkeypatch.setattr(architecture, "_MAX_WEIGHTS", count - 1)
     with pytest.raises(UserError, match=f"make {count:,} weights"):
         build_network(config, body_map)
+
+
+@pytest.mark.parametrize("device", ["nowhere", "cuda:99"])
+def test_a_device_that_is_not_there_is_named_in_a_sentence(made: Retargeter, device: str) -> None:
+    with pytest.raises(UserError, match="the retargeter cannot go there: "):
+        made.to(device)
+    assert made.to("cpu") is made and made.device.type == "cpu"

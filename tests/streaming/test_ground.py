@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -199,3 +200,61 @@ def test_people_may_come_later_than_the_stream_and_than_each_other(biped: Retarg
     # The second one has come four frames later and stands as high as the first did.
     assert found.root_position is not None and abs(float(found.root_position[1, 2] - first[2])) < 0.1
     assert bool(found.contact is not None and found.contact.all())
+
+
+def test_a_pelvis_that_is_lost_for_a_frame_does_not_throw_the_base(biped: Retargeter) -> None:
+    motion = squat(24, 60.0)
+    assert motion.root_rotation_T33 is not None
+    glitch_33 = rotation.axis_angle_to_matrix(torch.tensor([0.3, -0.4, 0.2]))
+    turn_T33, local_TJ33 = motion.root_rotation_T33.clone(), motion.local_TJ33.clone()
+    turn_T33[12] = turn_T33[12] @ glitch_33
+    local_TJ33[12, :3] = glitch_33.mT @ local_TJ33[12, :3]  # limbs stay where they are
+    _, wanted_T3, _ = followed(biped, motion)
+    found = followed(biped, motion.changed(root_rotation_T33=turn_T33.numpy(), local_TJ33=local_TJ33.numpy()))
+    assert float((found[1] - wanted_T3).norm(dim=-1).max()) < 0.01
+    stream = Stream(biped, 60.0, settings=SETTINGS)
+    assert motion.root_position_T3 is not None
+    for t, (pose, turn_33, place_3) in enumerate(zip(local_TJ33, turn_T33, motion.root_position_T3, strict=True)):
+        answer = stream(pose, root=(turn_33, place_3))
+        torch.testing.assert_close(answer.q, found[0][t], atol=1e-5, rtol=0)
+
+
+def test_neither_answers_nor_arrays_that_were_given_are_remembered(biped: Retargeter) -> None:
+    """Who changes an answer, or fills the same arrays anew, changes nothing of what comes."""
+    motion = squat(6, 60.0)
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    one, other = Stream(biped, settings=SETTINGS), Stream(biped, settings=SETTINGS)
+    begin = biped.body_map.robot.home().clone()
+    for stream in (one, other):
+        stream.reset(begin if stream is one else begin.clone())
+    begin.fill_(9.0)
+    pose, turn_33, place_3, contacts = torch.empty(21, 3, 3), torch.empty(3, 3), torch.empty(3), np.zeros(4, bool)
+    for t in range(6):
+        frame = (motion.local_TJ33[t], motion.root_rotation_T33[t], motion.root_position_T3[t])
+        for place, value in zip((pose, turn_33, place_3), frame, strict=True):
+            place.copy_(value)
+        contacts[:] = t < 3
+        found = one(pose, root=(turn_33, place_3), contacts=contacts)
+        expected = other(frame[0], root=(frame[1], frame[2]), contacts=[t < 3] * 4)
+        for name in ("q", "root_position", "root_quaternion_wxyz", "contact", "phi"):
+            torch.testing.assert_close(getattr(found, name), getattr(expected, name), atol=0, rtol=0)
+            getattr(found, name).zero_()
+        one.joints(None).zero_()
+        other.joints(None)
+        contacts[:] = False
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"root": (torch.diag(torch.tensor([1.0, 1.0, -1.0])), torch.zeros(3))}, "no rotation"),
+        ({"root": (torch.eye(3),)}, r"a root is a rotation \(3, 3\) and a place"),
+        ({"root": 5}, r"a root is a rotation \(3, 3\) and a place"),
+        ({"root": (torch.eye(3), torch.zeros(3)), "contacts": [0.2] * 4}, "expected contacts of 4 points"),
+        ({"root": (torch.eye(3), torch.zeros(3)), "contacts": [[True] * 2] * 2}, "expected contacts of 4 points"),
+    ],
+)
+def test_what_is_no_root_and_no_contact_is_refused(biped: Retargeter, options: dict[str, Any], message: str) -> None:
+    """A mirror is orthonormal, and no rotation."""
+    with pytest.raises(UserError, match=message):
+        Stream(biped, settings=SETTINGS)(torch.eye(3).expand(21, 3, 3), **options)

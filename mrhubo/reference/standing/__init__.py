@@ -1,7 +1,6 @@
 """Where a robot with feet stands and goes: its root, and legs that keep planted feet where they are."""
 
 from mrhubo.reference.standing.human import (
-    CROOKED,
     FAR_M,
     HumanSteps,
     flatten,
@@ -15,7 +14,6 @@ from mrhubo.reference.standing.legs import Legs
 from mrhubo.reference.standing.stand import PLANTED, UNDER_M, Stand, Standing, continuous, standing_fields
 
 __all__ = [
-    "CROOKED",
     "FAR_M",
     "PLANTED",
     "UNDER_M",

@@ -17,10 +17,10 @@ from torch.nn.functional import normalize
 
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.fast.plain.contacts import LIES, STANDS
-from mrhubo.fast.roots import CROOKED, FAR_M, without_jumps
+from mrhubo.fast.roots import FAR_M, without_jumps
 from mrhubo.motion.contacts import FootContacts, find_contacts, root_scale
 from mrhubo.motion.motion import SOLE_POINTS, Motion
-from mrhubo.motion.poses import NOT_FINITE, refuse_frames
+from mrhubo.motion.poses import NOT_FINITE, are_crooked, refuse_frames
 from mrhubo.reference.standing.legs import Legs
 from mrhubo.robot.bending import smooth_share
 
@@ -110,10 +110,9 @@ def motion_root(motion: Motion, local_TJ33: Tensor, legs: Legs, keep_height: boo
         raise UserError(
             f"{motion.name}: its root must be a rotation ({frames}, 3, 3) and a place ({frames}, 3) [m], found {found}"
         )
-    crooked_T = (root_T33.mT @ root_T33 - torch.eye(3)).abs().amax(dim=(1, 2)) > CROOKED
     for wrong_T, what in (
         (~(root_T33.flatten(1).isfinite().all(dim=1) & root_T3.isfinite().all(dim=1)), f"a root of {NOT_FINITE}"),
-        (crooked_T, "a root whose matrix is no rotation"),
+        (are_crooked(root_T33), "a root whose matrix is no rotation"),
         (root_T3.abs().amax(dim=1) > FAR_M, f"a root farther than {FAR_M / 1000:.0f} km from the origin"),
     ):
         refuse_frames(wrong_T, what)
