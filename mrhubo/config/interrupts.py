@@ -6,6 +6,7 @@ hundred places, torch and networkx in dozens. A signal that comes in such a mome
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import signal
 import sys
@@ -92,7 +93,10 @@ def _come_again(number: int) -> None:
         time.sleep(_AGAIN_S)
         if number in _again and main is not None:
             _repeated.add(number)
-            signal.pthread_kill(main, number)  # which lets a call return in which that thread waits
+            if hasattr(signal, "pthread_kill"):
+                signal.pthread_kill(main, number)  # which lets a call return in which that thread waits
+            else:  # Windows
+                _thread.interrupt_main(number)
 
     with contextlib.suppress(RuntimeError):  # no thread is to be had: the process is ending
         threading.Thread(target=wait, daemon=True).start()
