@@ -63,16 +63,19 @@ def test_one_frame_and_many_agree_on_layers_of_16_bits(in_full: bool) -> None:
     packed = (integers, np.zeros(0), np.concatenate((scaled, full)), tables.in_columns(short_OI))
     x_BI = random.normal(size=(20, 304)).astype(np.float32)
     for adds in (False, True) if in_full else (False,):
-        many = layer(packed, x_BI.copy(), adds, 20)
-        alone = np.concatenate([layer(packed, x_BI[b : b + 1].copy(), adds, 1)[:1] for b in range(20)])
         wanted = x_BI[:, :250].astype(np.float64) @ weight_OI.T + bias_O + adds
+        many, _ = layer(packed, x_BI.copy(), adds, 20, 20)
+        for most in (1, 20):  # the last of many frames may be alone, in rooms for more
+            ones = [layer(packed, x_BI[b : b + 1].copy(), adds, 1, most) for b in range(20)]
+            assert all(loose >= one_BE.shape[1] for one_BE, loose in ones)  # nothing else tells of sums beside it
+            alone = np.concatenate([one_BE[:1] for one_BE, _ in ones])
+            np.testing.assert_allclose(alone[:, :300], wanted, atol=1e-4)
         np.testing.assert_allclose(many[:20, :300], wanted, atol=1e-4)
-        np.testing.assert_allclose(alone[:, :300], wanted, atol=1e-4)
 
 
 @njit(**tables.COMPILED)
-def layer(t: Any, x_BI: Any, adds: Any, frames: Any) -> Any:
-    one_BE, _, _, loose_IC = networks.make_rooms(t, frames, 1)
+def layer(t: Any, x_BI: Any, adds: Any, frames: Any, most: Any) -> Any:
+    one_BE, _, _, loose_X = networks.make_rooms(t, most, 1)
     one_BE[:] = 1
-    networks.affine(t, 0, x_BI, one_BE, loose_IC, adds, frames)
-    return one_BE
+    networks.affine(t, 0, x_BI, one_BE, loose_X, adds, frames)
+    return one_BE, len(loose_X)

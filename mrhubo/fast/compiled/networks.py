@@ -106,11 +106,11 @@ def of_layer(t, layer, place):
 
 
 @njit(**INNER)
-def affine(t, layer, x_BI, out_BO, loose_IC, adds, frames):
+def affine(t, layer, x_BI, out_BO, loose_X, adds, frames):
     """A layer: weights x + biases, added to what is there where it `adds`. Arrays are as long and as wide as whole
-    tiles are, and `x_BI` a number wider than what comes in. One frame's sums with weights of 16 bits stand in
-    `loose_IC`; for more frames, of a layer that has no others and adds nothing, weights are unpacked into it, a tile's
-    columns at a time.
+    tiles are, and `x_BI` a number wider than what comes in. In `loose_X` stand one frame's sums with weights of 16
+    bits; for more frames, of a layer that has no others and adds nothing, they are unpacked into it, a tile's columns
+    at a time.
     """
     inputs, outputs = of_layer(t, layer, INPUTS), of_layer(t, layer, OUTPUTS)
     number, begin, begin_turned, wide = t[2], t[0][2 * NUMBER], t[0][2 * TURNED], spaced(outputs)
@@ -134,11 +134,13 @@ def affine(t, layer, x_BI, out_BO, loose_IC, adds, frames):
     at = begin + of_layer(t, layer, SCALED_AT)
     bias_O, scale_O = number[at : at + wide], number[at + wide : at + 2 * wide]
     if frames == 1:
-        loose_IC[0, :wide] = 0
-        multiply_short_row(x_BI, short_IO, loose_IC, loose_IC, outputs)
+        sum_BO = loose_X[:wide].reshape(1, wide)
+        sum_BO[:] = 0
+        multiply_short_row(x_BI, short_IO, sum_BO, sum_BO, outputs)
         for o in range(outputs):
-            out_BO[0, o] = loose_IC[0, o] * scale_O[o] + (bias_O[o] + out_BO[0, o] if adds else bias_O[o])
+            out_BO[0, o] = sum_BO[0, o] * scale_O[o] + (bias_O[o] + out_BO[0, o] if adds else bias_O[o])
         return
+    loose_IC = loose_X[: inputs * COLUMNS].reshape(inputs, COLUMNS)
     for first in range(0, outputs, COLUMNS):
         unpack(short_IO, first, wide, scale_O, first, loose_IC, inputs)
         multiply(x_BI, 0, loose_IC, 0, bias_O, first, 0, out_BO, first, frames, COLUMNS, inputs)
@@ -149,10 +151,10 @@ def mlp(t, net, kind, residual, rooms, frames):
     """A network of what stands in the first of `make_rooms`, with these activations; the output stands there again.
     Hidden layers after the first are added to what came in where it is residual.
     """
-    one_BE, two_BE, three_BE, loose_IC = rooms
+    one_BE, two_BE, three_BE, loose_X = rooms
     first, layers = whole(t, NET_H6, 6 * net), whole(t, NET_H6, 6 * net + 1)
     width = of_layer(t, first, OUTPUTS)
-    affine(t, first, one_BE, three_BE, loose_IC, False, frames)
+    affine(t, first, one_BE, three_BE, loose_X, False, frames)
     own_BE, other_BE = three_BE, one_BE
     for layer in range(first + 1, first + layers):
         before, width = width, of_layer(t, layer, OUTPUTS)
@@ -161,9 +163,9 @@ def mlp(t, net, kind, residual, rooms, frames):
             activate(kind, own_BE, two_BE, frames, before)
             given_BE = two_BE
         if residual and layer < first + layers - 1:
-            affine(t, layer, given_BE, own_BE, loose_IC, True, frames)
+            affine(t, layer, given_BE, own_BE, loose_X, True, frames)
         else:
-            affine(t, layer, given_BE, other_BE, loose_IC, False, frames)
+            affine(t, layer, given_BE, other_BE, loose_X, False, frames)
             own_BE, other_BE = other_BE, own_BE
     for b in range(frames):
         for e in range(width):
@@ -238,8 +240,8 @@ def features(t, local_BJ33, target_BD3, b, unit_I3, feature_BF, k):
 
 @njit(**INNER)
 def make_rooms(t, frames, nets):
-    """Three arrays for numbers between layers of the first networks, and one for weights that are unpacked, or for one
-    frame's sums.
+    """Three arrays for numbers between layers of the first networks, and one for weights that are unpacked, or for
+    sums, of so many frames or fewer.
     """
     widest, longest = 1, 1
     for net in range(nets):
@@ -250,5 +252,5 @@ def make_rooms(t, frames, nets):
             if frames > 1 and of_layer(t, g, LONG_AT) < 0:
                 longest = max(longest, inputs)
     shape = (frames + -frames % ROWS, spaced(widest + 1))
-    loose_IC = np.empty((longest, COLUMNS if frames > 1 else shape[1]), np.float32)
-    return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32), loose_IC
+    loose_X = np.empty(max(longest * COLUMNS, shape[1]), np.float32)
+    return np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32), loose_X
