@@ -96,7 +96,7 @@ def _come_again(number: int) -> None:
             if hasattr(signal, "pthread_kill"):
                 signal.pthread_kill(main, number)  # which lets a call return in which that thread waits
             else:  # Windows
-                _thread.interrupt_main(number)
+                _thread.interrupt_main(signal.Signals(number))
 
     with contextlib.suppress(RuntimeError):  # no thread is to be had: the process is ending
         threading.Thread(target=wait, daemon=True).start()

@@ -89,6 +89,8 @@ def to_array(given: Any) -> np.ndarray:
 
 def plain_array(array: np.ndarray) -> np.ndarray:
     """An array of NumPy's own class; numbers that are masked are missing, so they are NaN."""
+    if type(array) is np.ndarray:
+        return array
     if isinstance(array, np.ma.MaskedArray) and array.dtype.kind in "fiu" and np.ma.is_masked(array):
         return np.ma.filled(array.astype(np.float64), np.nan)
     return np.asarray(array)
