@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mrhubo.fast.rotations import angles_between
+
 SPEED = 9.0
 """No pelvis turns faster [rad/s] under a trunk that stays."""
 LEAST_RAD = 0.15
@@ -52,9 +54,9 @@ class Pelvises:
         """
         trunk_B33 = turn_B33 @ local_BJ33[:, _TRUNK]
         ago_B = np.where(np.isinf(since_B), np.inf, self._ago_B + since_B)
-        turned_B = _angles(self._turn_B33, turn_B33)
+        turned_B = angles_between(self._turn_B33, turn_B33)
         too_fast_B = turned_B > np.maximum(LEAST_RAD, SPEED * ago_B)
-        lost_B = seen_B & too_fast_B & (_angles(self._trunk_B33, trunk_B33) < _STAYS * turned_B)
+        lost_B = seen_B & too_fast_B & (angles_between(self._trunk_B33, trunk_B33) < _STAYS * turned_B)
         believed_B11 = (seen_B & ~lost_B)[:, None, None]
         self._ago_B = np.where(lost_B, ago_B, np.where(seen_B, 0.0, self._ago_B))
         self._trunk_B33 = np.where(believed_B11, trunk_B33, self._trunk_B33)
@@ -66,8 +68,3 @@ class Pelvises:
             back_33 = self._turn_B33[person].T @ turn_B33[person]
             local_BJ33[person, HANGING] = back_33 @ local_BJ33[person, HANGING]
         return np.where(lost_B[:, None, None], self._turn_B33, turn_B33), local_BJ33
-
-
-def _angles(one_B33: np.ndarray, other_B33: np.ndarray) -> np.ndarray:
-    """Between rotations (B,) [rad]."""
-    return np.arccos(np.clip(0.5 * (np.einsum("bij,bij->b", one_B33, other_B33) - 1), -1, 1))

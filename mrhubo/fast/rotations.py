@@ -67,6 +67,12 @@ def shortest_turn(start_X3: np.ndarray, end_X3: np.ndarray) -> np.ndarray:
     return axis_angle_to_matrix(axis_X3 * (angle_X1 / np.maximum(sine_X1, 1e-9)))
 
 
+def angles_between(one_B33: np.ndarray, other_B33: np.ndarray) -> np.ndarray:
+    """Between rotations (B,) [rad], each given as (3, 3) or its nine numbers; within 3e-8 of 0 and pi in float64."""
+    one_B9, other_B9 = one_B33.reshape(-1, 9), other_B33.reshape(-1, 9)
+    return np.arccos(np.clip(0.5 * (np.einsum("bi,bi->b", one_B9, other_B9) - 1), -1, 1))
+
+
 def are_crooked(matrix_X33: np.ndarray) -> np.ndarray:
     """Which (...) of some matrices (..., 3, 3) are no rotations: not orthonormal, mirrors, or not finite."""
     with np.errstate(all="ignore"):

@@ -17,6 +17,7 @@ from scipy.linalg import solveh_banded
 
 from mrhubo.fast.pelvis import HANGING, Pelvises
 from mrhubo.fast.roots import without_jumps
+from mrhubo.fast.rotations import angles_between
 from mrhubo.motion.motion import Motion
 
 CUTOFF_HZ = 8.0
@@ -94,7 +95,9 @@ def smooth_rotations(rotation_T33: np.ndarray, frame_rate: float) -> np.ndarray:
     """Rotations (T, 3, 3) without what is faster than `CUTOFF_HZ`, and without frames that are nothing like the others
     around; float64, `_SHORTEST` frames or more.
     """
-    return _smooth(rotation_T33.reshape(-1, 9), frame_rate, DOUBT_RAD, _nearest_rotations, _angles)[0].reshape(-1, 3, 3)
+    return _smooth(rotation_T33.reshape(-1, 9), frame_rate, DOUBT_RAD, _nearest_rotations, angles_between)[0].reshape(
+        -1, 3, 3
+    )
 
 
 def _smooth(
@@ -119,10 +122,6 @@ def _smooth(
 
 def _distances(one_TX: np.ndarray, other_TX: np.ndarray) -> np.ndarray:
     return np.linalg.norm(one_TX - other_TX, axis=1)
-
-
-def _angles(one_T9: np.ndarray, other_T9: np.ndarray) -> np.ndarray:
-    return np.arccos(np.clip(0.5 * (np.einsum("ti,ti->t", one_T9, other_T9) - 1), -1, 1))
 
 
 def _penalty(count: int) -> np.ndarray:

@@ -55,17 +55,25 @@ _ONE, _HALF, _END = np.float32(1), np.float32(0.5), np.float32(ERF_END * math.sq
 _T0, _T1, _T2, _T3, _T4, _T5 = (np.float32(c * math.sqrt(0.125) * 0.5**k) for k, c in enumerate(ERF_TOP))
 _B1, _B2, _B3, _B4, _B5 = (np.float32(c * 0.5**k) for k, c in enumerate(ERF_BOTTOM[1:], start=1))
 # SiLU is x (1 + tanh(x / 2)) / 2, and tanh(x) = x P(x^2) / Q(x^2) up to |x| = 9, within 2e-9; found as erf.
-P0, P1, P2 = np.float32(0.999999993874719), np.float32(0.1367634767328113), np.float32(0.0038639344509989746)
-P3, P4, P5 = (
+_P0, _P1, _P2 = np.float32(0.999999993874719), np.float32(0.1367634767328113), np.float32(0.0038639344509989746)
+_P3, _P4, _P5 = (
     np.float32(2.7923397012698077e-05),
     np.float32(3.040097713206052e-08),
     np.float32(-1.2083086259850131e-11),
 )
-Q1, Q2 = np.float32(0.4700967835194308), np.float32(0.0272295624610154)
-Q3, Q4 = np.float32(0.00039310490211471395), np.float32(1.2817356684709363e-06)
+_Q1, _Q2 = np.float32(0.4700967835194308), np.float32(0.0272295624610154)
+_Q3, _Q4 = np.float32(0.00039310490211471395), np.float32(1.2817356684709363e-06)
 TANH_END = np.float32(9)
 GELU, SILU, LEAKY, TANH = range(4)
 ACTIVATIONS = {"gelu": GELU, "silu": SILU, "leaky_relu": LEAKY, "tanh": TANH}
+
+
+@njit(**INNER)
+def tangent(z):
+    """The hyperbolic tangent of z, from -TANH_END to TANH_END: top and bottom of the fraction that it is."""
+    s = z * z
+    top = (((((_P5 * s + _P4) * s + _P3) * s + _P2) * s + _P1) * s + _P0) * z
+    return top, (((_Q4 * s + _Q3) * s + _Q2) * s + _Q1) * s + _ONE
 
 
 @njit(**INNER)
@@ -81,22 +89,16 @@ def activate(kind, x_BE, out_BE, frames, count):
                 out_BE[b, e] = (z * top / bottom + _HALF) * x_BE[b, e]
         elif kind == SILU:
             for e in range(count):
-                z = min(max(x_BE[b, e] * _HALF, -TANH_END), TANH_END)
-                s = z * z
-                top = ((((P5 * s + P4) * s + P3) * s + P2) * s + P1) * s + P0
-                bottom = (((Q4 * s + Q3) * s + Q2) * s + Q1) * s + _ONE
-                out_BE[b, e] = (z * top / bottom + _ONE) * x_BE[b, e] * _HALF
+                top, bottom = tangent(min(max(x_BE[b, e] * _HALF, -TANH_END), TANH_END))
+                out_BE[b, e] = (top / bottom + _ONE) * x_BE[b, e] * _HALF
         elif kind == LEAKY:
             for e in range(count):
                 out_BE[b, e] = max(x_BE[b, e], np.float32(0.01) * x_BE[b, e])
         else:
             for e in range(count):
                 x = x_BE[b, e]
-                z = min(max(x, -TANH_END), TANH_END)
-                s = z * z
-                top = ((((P5 * s + P4) * s + P3) * s + P2) * s + P1) * s + P0
-                bottom = (((Q4 * s + Q3) * s + Q2) * s + Q1) * s + _ONE
-                out_BE[b, e] = z * top / bottom if x == x else x  # NaN stays
+                top, bottom = tangent(min(max(x, -TANH_END), TANH_END))
+                out_BE[b, e] = top / bottom if x == x else x  # NaN stays
 
 
 @njit(**INNER)

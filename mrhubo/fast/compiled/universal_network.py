@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.lanes import LANES
-from mrhubo.fast.compiled.networks import P0, P1, P2, P3, P4, P5, Q1, Q2, Q3, Q4, SILU, TANH_END, activate
+from mrhubo.fast.compiled.networks import SILU, TANH_END, activate, tangent
 from mrhubo.fast.compiled.tables import COLUMNS, FIRST_C, INNER, size, whole
 from mrhubo.fast.compiled.tile import ROWS, multiply, whole_tiles
 from mrhubo.fast.sections import Universal
@@ -140,10 +140,7 @@ def exponential(x):
     """exp(x) of a number that is not positive, float32: (1 + tanh(x / 2)) / (1 - tanh(x / 2)), within 1e-7 (and not
     within so small a share of itself, which sums of such numbers do not need).
     """
-    z = max(x * _HALF, -TANH_END)
-    s = z * z
-    top = (((((P5 * s + P4) * s + P3) * s + P2) * s + P1) * s + P0) * z
-    bottom = (((Q4 * s + Q3) * s + Q2) * s + Q1) * s + _ONE
+    top, bottom = tangent(max(x * _HALF, -TANH_END))
     return max((bottom + top) / (bottom - top), _ZERO)
 
 

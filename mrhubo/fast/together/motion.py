@@ -151,18 +151,17 @@ def _bridge(
     """More candidates (T, S, N) near the path's jumps and between them, and their cost (T, S, C); elsewhere the path is
     repeated.
     """
-    frames, jumped_TN = len(path_TN), np.zeros(path_TN.shape, bool)
+    frame_T1, jumped_TN = np.arange(len(path_TN))[:, None], np.zeros(path_TN.shape, bool)
     jumped_TN[1:] = np.abs(np.diff(path_TN, axis=0)) > JUMP
     jumps_T = jumped_TN.any(axis=1).cumsum()
-    source_TS = np.clip(np.arange(frames)[:, None] + np.array(REACH), 0, frames - 1)
+    source_TS = np.clip(frame_T1 + np.array(REACH), 0, len(path_TN) - 1)
     across_TS = jumps_T[source_TS] != jumps_T[:, None]
     joints_NC, block_N = problem.cost.joints_NC, problem.cost.block_N
     side_TSC = sides(jumped_TN @ joints_NC > 0)
-    sides_TS = (side_TSC != np.arange(frames)[:, None, None]).any(axis=2)
-    start_TSN = path_TN[source_TS], path_TN[side_TSC[:, :, block_N], np.arange(path_TN.shape[1])]
-    start_TSN, asked_TS = np.concatenate(start_TSN, axis=1), np.concatenate((across_TS, sides_TS), axis=1)
-    candidates = asked_TS.shape[1]
-    found_TSN, cost_TSC = (np.repeat(value[:, None], candidates, axis=1) for value in (path_TN, path_cost_TC))
+    sides_TS = (side_TSC != frame_T1[..., None]).any(axis=2)
+    starts = path_TN[source_TS], path_TN[side_TSC[:, :, block_N], np.arange(path_TN.shape[1])]
+    start_TSN, asked_TS = np.concatenate(starts, axis=1), np.concatenate((across_TS, sides_TS), axis=1)
+    found_TSN, cost_TSC = (np.repeat(value[:, None], asked_TS.shape[1], axis=1) for value in (path_TN, path_cost_TC))
     frame_X = np.nonzero(asked_TS)[0]
     found_TSN[asked_TS], cost_TSC[asked_TS] = problem.minimise(
         start_TSN[asked_TS], target_TD3[frame_X], BRIDGE_STEPS, BRIDGE_TOLERANCE

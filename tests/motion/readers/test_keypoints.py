@@ -19,7 +19,7 @@ from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES,
 from mrhubo.motion.orientations import rest_points
 from mrhubo.motion.readers.keypoint_sets import SETS, our_name
 from mrhubo.motion.readers.options import ReadOptions
-from tests.motion.damage import Step, accidents, damaged
+from tests.motion.damage import Step, accidents, damaged, read_or_refused
 
 RATE = ReadOptions(rate=30.0)
 FRAMES = 20
@@ -202,12 +202,7 @@ def test_damaged_files_are_read_or_refused_in_a_sentence(
     path = tmp_path / "points.json"
     path.write_text(json.dumps({"names": SETS["COCO"], "fps": 30, "keypoints": array.tolist()}))
     path.write_bytes(damaged(path.read_bytes(), steps))
-    try:
-        found = mrhubo.read_motion(path, RATE)
-    except UserError as error:
-        assert "\n" not in str(error) and "points" in str(error)
-        return
-    assert bool(found.local_TJ33.isfinite().all())
+    read_or_refused(path)
 
 
 def test_points_are_read_from_pickles_and_torch_files(
@@ -598,9 +593,4 @@ def test_damaged_tables_are_read_or_refused_in_a_sentence(
 ) -> None:
     path = tmp_path / "points.csv"
     path.write_bytes(damaged(_table(array_of(points, SETS["MediaPipe"])[:3], "NAME_AXIS").encode(), steps))
-    try:
-        found = mrhubo.read_motion(path, RATE)
-    except UserError as error:
-        assert "\n" not in str(error) and "points" in str(error)
-        return
-    assert bool(found.local_TJ33.isfinite().all())
+    read_or_refused(path)
