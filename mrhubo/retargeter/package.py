@@ -13,10 +13,10 @@ import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
@@ -37,21 +37,18 @@ from mrhubo.retargeter.floor import stand, standing_of
 from mrhubo.retargeter.judging import judge
 from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.retargeter.parts import checked_parts
+from mrhubo.retargeter.precision import Float32Module, in_float32
 from mrhubo.retargeter.result import RetargetResult, join_results
 from mrhubo.retargeter.saving import package_checksum, read_package, write_package
 from mrhubo.robot import BodyMap, SelfCollision, robot_facts
 from mrhubo.robot_motion import RobotFacts
 
 
-class Retargeter(nn.Module):
+class Retargeter(Float32Module):
     """A trained network with its robot, on the CPU unless `to`, `cuda` or `cpu` moves it.
 
     Not made for training: its weights take no gradients, and its answers have none.
     """
-
-    network: JointNetwork
-    prior: BodyPrior
-    body_map: BodyMap
 
     def __init__(
         self,
@@ -109,26 +106,7 @@ class Retargeter(nn.Module):
         """What files of the robot's motion tell of it."""
         return robot_facts(self.body_map.robot, self.origin, self.checksum)
 
-    def to(self, *args: Any, **kwargs: Any) -> Self:
-        """As `torch.nn.Module.to`: moves it to a device.
-
-        Raises:
-            UserError: this machine, or its PyTorch, has no such device.
-        """
-        try:
-            return super().to(*args, **kwargs)
-        except (RuntimeError, AssertionError) as error:  # PyTorch that was built without CUDA asserts
-            raise UserError(f"the retargeter cannot go there: {str(error).partition('; ')[0]}") from error
-
-    if TYPE_CHECKING:
-
-        def __call__(
-            self, motion: MotionLike, polish: int = POLISH, frame_rate: float | None = None,
-            together: bool | None = None, avoid_collisions: bool = True,
-        ) -> RetargetResult:  # fmt: skip
-            """`forward`."""
-            ...
-
+    @in_float32
     def forward(
         self,
         motion: MotionLike,
@@ -162,7 +140,10 @@ class Retargeter(nn.Module):
         told = (motion.name, motion.source) if isinstance(motion, Motion) else ()
         return join_results(answers).with_leading(poses.shape, poses.frame_rate, *told)
 
-    @torch.no_grad()
+    if TYPE_CHECKING:
+        __call__ = forward
+
+    @in_float32
     def predict(
         self,
         local_TJ33: MotionLike,
@@ -207,7 +188,7 @@ class Retargeter(nn.Module):
             return join_frames(self.directions, q_TN, torch.cat(known), frame_rate, avoidance)
         return q_TN if avoidance is None else avoidance(q_TN, torch.cat(known))
 
-    @torch.no_grad()
+    @in_float32
     def retarget(
         self,
         local_TJ33: MotionLike,
@@ -250,7 +231,7 @@ class Retargeter(nn.Module):
         judged = [judge(self, *part) for part in zip(q_TN.split(sizes), targets, shakes, strict=True)]
         return dataclasses.replace(join_results(judged), **told)
 
-    @torch.no_grad()
+    @in_float32
     def judge(self, q_TN: Tensor, local_TJ33: Tensor, frame_rate: float | None = None) -> RetargetResult:
         """What `retarget` tells about its own answers, for any joint angles (T, N) [rad] and human poses (T, 21, 3, 3),
         both on the retargeter's device, float32; with frames per second, if they are one motion.
@@ -258,7 +239,7 @@ class Retargeter(nn.Module):
         target_TD3 = self.body_map.human_directions(local_TJ33)
         return judge(self, q_TN, target_TD3, None if frame_rate is None else shake(target_TD3, frame_rate))
 
-    @torch.no_grad()
+    @in_float32
     def answer(self, local_TJ33: Tensor, target_TD3: Tensor | None, polish: int = 0) -> Tensor:
         """Joint angles (T, N) [rad] for poses that are known to be good, on the retargeter's device, float32.
 
@@ -304,6 +285,7 @@ class Retargeter(nn.Module):
         return None if isinstance(self.prior, VPoser) else write_description(self.describe(), folder / FILE)
 
     @classmethod
+    @in_float32
     def load(cls, folder: Path | str) -> Retargeter:
         """Reads a package.
 

@@ -388,6 +388,23 @@ def test_weights_are_counted_right(root: Path, stages: int, branches: str, monke
         build_network(config, body_map)
 
 
+def test_the_precision_of_the_program_around_it_changes_no_answer(made: Retargeter) -> None:
+    pose = human(2)
+    expected = made.retarget(pose)
+    with torch.autocast("cpu", torch.bfloat16):
+        torch.testing.assert_close(made.retarget(pose).q, expected.q, rtol=0, atol=0)
+    for convert in (made.double, made.half, lambda: made.to(torch.bfloat16)):
+        with pytest.raises(UserError, match="work in float32 alone"):
+            convert()
+    torch.set_default_dtype(torch.float64)
+    try:
+        with pytest.raises(UserError, match="PyTorch's default is torch.float64: call torch.set_default_dtype"):
+            made.retarget(pose)
+    finally:
+        torch.set_default_dtype(torch.float32)
+    torch.testing.assert_close(made.retarget(pose).q, expected.q, rtol=0, atol=0)
+
+
 @pytest.mark.parametrize("device", ["nowhere", "cuda:99"])
 def test_a_device_that_is_not_there_is_named_in_a_sentence(made: Retargeter, device: str) -> None:
     with pytest.raises(UserError, match="the retargeter cannot go there: "):
