@@ -42,13 +42,14 @@ CLEAR = 5000.0
 """Weight [1/m^2] with which a swinging point is kept above the floor besides, by its height alone."""
 SWEEPS, TOLERANCE = 10, 3e-4
 """How long legs give way, as for `refine`."""
-ROUNDS = 2
-"""How often the legs give way: once more where feet that stand were lifted, as others would be under the floor."""
-LIFTED_M, LIFT_S, FREE_S = 0.003, 0.1, 0.3
+ROUNDS = 4
+"""How often the legs give way: again where soles would still be under the floor, by turns with a root that is lifted
+out of it, so that feet stand on what is lowest of them, and with one that both carry, so that their legs meet half-way."""
+LIFTED_M, LIFT_S, FREE_S = 0.001, 0.1, 0.3
 """From how far [m] on that is; and the times [s] around in which the root is lifted too, and legs are free to move."""
 _RISE = 0.25
-"""Of how much a point is planted, the power that counts for the root's height: as long as a sole is planted at all, it
-is to touch the floor, while a place on the floor may be left gradually."""
+"""Of how much a point is planted, the power that counts for heights: as long as a sole is planted at all, it is to
+touch the floor, while a place on the floor may be left gradually."""
 _FLAT, _UP = [0, 2], 1
 """The horizontal axes of the world, and the upright one."""
 
@@ -133,7 +134,7 @@ class Standing(nn.Module):
                 free_T = widen(lifted_T, round(FREE_S * steps.frame_rate))
                 if not bool(free_T.any()):
                     break
-                carried = _lifted(carried, steps.frame_rate)
+                carried = _lifted(carried, steps.frame_rate) if again % 2 else carried
                 wanted = self._reached(carried, steps, wanted[1])
             elif self.balance is not None:
                 off_TP3, poses = wanted[0] - carried.point_TP3, self.robot.forward(q_TN)
@@ -206,9 +207,7 @@ class Standing(nn.Module):
         weight_TP3 = torch.zeros_like(seen_TP3)
         weight_TP3[..., 0] = SWINGING + (PLANTED - SWINGING) * torch.from_numpy(counts_TP).to(seen_TP3)
         planted_TP = steps.contacts.weight_TP
-        high_TP = np.where(
-            steps.contacts.phase_TP >= 0, PLANTED * (np.sqrt(planted_TP) - planted_TP), CLEAR * counts_TP
-        )
+        high_TP = np.where(steps.contacts.phase_TP >= 0, PLANTED * (planted_TP**_RISE - planted_TP), CLEAR * counts_TP)
         up_T3 = steps.turn_T33[:, _UP].to(seen_TP3)
         high_TP3 = torch.from_numpy(high_TP).to(seen_TP3).sqrt()[..., None] * up_T3[:, None]
         return torch.cat((target_TD3, seen_TP3 @ steps.turn_T33.to(seen_TP3), weight_TP3, high_TP3), dim=1)
@@ -232,9 +231,10 @@ class Standing(nn.Module):
             fixed_X = torch.arange(len(motion_XN), device=q_TN.device) < len(before_LN)
             fixed_X |= ~free_T[part]
             near = smoothness.at(torch.arange(len(q_TN), device=q_TN.device)[part])
-            motion_XN = self._refine(motion_XN, target_TX3[part], near, step_N, fixed_X)
-            if avoid_collisions:
-                motion_XN = self._apart(motion_XN, target_TX3[part], near, step_N, around, fixed_X)
+            if not bool(fixed_X.all()):
+                motion_XN = self._refine(motion_XN, target_TX3[part], near, step_N, fixed_X)
+                apart = (motion_XN, target_TX3[part], near, step_N, around, fixed_X)
+                motion_XN = self._apart(*apart) if avoid_collisions else motion_XN
             used = WINDOW - AHEAD if settled + WINDOW < len(q_TN) else WINDOW
             found.append(motion_XN[len(before_LN) :][:used])
             settled += used
