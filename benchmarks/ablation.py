@@ -57,7 +57,7 @@ PARTS: dict[str, list[tuple[Any, str, Any]]] = {
     "3. the person's size": [(human, "root_scale", lambda *_: 1.0)],
     "4. planted feet carry the root": [(stand, "carry", _on_path)],
     "5. legs give way": [(stand, "ROUNDS", 0)],
-    "6. legs give way a second time": [(stand, "ROUNDS", 1)],
+    "6. legs give way again": [(stand, "ROUNDS", 1)],
     "6. no sole under the floor": [(stand, "_lift", lambda carried: np.zeros(len(carried.low_TP)))],
 }
 """What stands for a part that is switched off: names of modules and their values."""
