@@ -1,4 +1,4 @@
-"""Pieces of work that do not need each other, side by side in threads, one a core.
+"""Pieces of work that do not need each other, side by side in threads, one a core if OMP_NUM_THREADS says nothing.
 
 It gains where most of the work lets other threads run meanwhile, as compiled functions and NumPy's on long arrays do.
 """
@@ -24,6 +24,18 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def wanted_threads() -> int:
+    """What OMP_NUM_THREADS says, as of every library that works in threads; else one a core.
+
+    torchrun sets it to 1 for its processes unless the user has set it, so that there 1 counts as not set.
+    """
+    text = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0].strip()  # a list has a number for each level
+    number = int(text) if text.isdecimal() else 0
+    if number == 1 and "TORCHELASTIC_RUN_ID" in os.environ:
+        number = 0
+    return number or available_cores()
+
+
 def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     """The results of work on each item, in their order. Threads take one item after the other, and the caller's is one
     of them; so work may itself be done side by side, and is, where threads are idle.
@@ -40,7 +52,7 @@ def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[
             numbers = itertools.count(len(items))  # the others need not go on
             raise
 
-    others = min(len(items), available_cores()) - 1
+    others = min(len(items), wanted_threads()) - 1
     helpers = [_pool().submit(run) for _ in range(others)]
     try:
         run()
@@ -57,10 +69,10 @@ def in_parts(frames: int, work: Callable[[slice], Result]) -> list[Result]:
     """Work on all of some frames, side by side where they are many; each thread takes one part after the other, as some
     frames take ten times as long as others.
     """
-    cores = 1 if frames <= FEW else available_cores()
-    if cores == 1:
+    threads = 1 if frames <= FEW else wanted_threads()
+    if threads == 1:
         return [work(slice(0, frames))]
-    length = max(FEW, -(-frames // (_PARTS * cores)))
+    length = max(FEW, -(-frames // (_PARTS * threads)))
     return side_by_side(work, [slice(first, first + length) for first in range(0, frames, length)])
 
 
@@ -72,4 +84,4 @@ def _pool() -> ThreadPoolExecutor:
     process = os.getpid()
     pool = _pools.get(process)
     # Of two threads that come first, one's pool is taken; the other's has begun no thread.
-    return pool or _pools.setdefault(process, ThreadPoolExecutor(max(1, available_cores() - 1), "mrhubo"))
+    return pool or _pools.setdefault(process, ThreadPoolExecutor(max(1, wanted_threads() - 1), "mrhubo"))

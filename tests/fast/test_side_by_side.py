@@ -8,7 +8,18 @@ import time
 
 import pytest
 
-from mrhubo.fast.side_by_side import available_cores, side_by_side
+from mrhubo.fast.side_by_side import available_cores, in_parts, side_by_side
+
+
+@pytest.fixture(autouse=True)
+def _a_thread_a_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)  # which tests that run side by side set to 1
+
+
+def test_the_users_number_of_threads_is_kept_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert set(side_by_side(lambda _: threading.get_ident(), range(50))) == {threading.get_ident()}
+    assert in_parts(1000, lambda part: part) == [slice(0, 1000)]
 
 
 def test_results_are_in_the_order_of_the_items() -> None:

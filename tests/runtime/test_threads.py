@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from mrhubo.fast.side_by_side import available_cores
-from mrhubo.runtime.threads import use_threads, wanted_threads
+from mrhubo.fast.side_by_side import available_cores, wanted_threads
+from mrhubo.runtime.threads import use_threads
 
 
 @pytest.mark.parametrize(
