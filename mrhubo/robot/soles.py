@@ -16,6 +16,7 @@ import numpy as np
 
 from mrhubo.robot.entries import End
 from mrhubo.robot.hulls import extremes
+from mrhubo.robot.joint import stuck
 from mrhubo.robot.meshes import read_meshes
 from mrhubo.robot.parts import OrientedPart
 from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
@@ -99,7 +100,7 @@ def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
 
 def _fixed_to(link: str, description: Description) -> set[str]:
     """A link and all below it that never move against it."""
-    found, joints = {link}, [joint for joint in description.joints.values() if joint.kind == "fixed"]
+    found, joints = {link}, [joint for joint in description.joints.values() if joint.kind == "fixed" or stuck(joint)]
     while more := {joint.child for joint in joints if joint.parent in found} - found:
         found |= more
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Hinge, Step
 from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
-from mrhubo.robot.joint import ROTARY, Joint, drive
+from mrhubo.robot.joint import ROTARY, Joint, drive, stuck
 from mrhubo.robot.limits import in_degrees
 from mrhubo.robot.urdf import Description
 
@@ -90,7 +90,7 @@ def _read(
                 joint.kind not in (*ROTARY, "prismatic")
                 or name in description.faults
                 or name in fixed
-                or stuck(joint.lower, joint.upper)
+                or stuck(joint, degrees)
             ):
                 body_of[joint.child] = body_of[link]
                 continue
@@ -116,11 +116,6 @@ def _limits(description: Description, joint: Joint) -> tuple[float | None, float
 
 def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else math.radians(degrees)
-
-
-def stuck(lower: float | None, upper: float | None) -> bool:
-    """Whether limits leave a joint no way to move."""
-    return lower is not None and upper is not None and upper - lower < 1e-3
 
 
 def _sources(description: Description, fixed: Collection[str]) -> set[str]:
