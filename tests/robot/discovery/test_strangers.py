@@ -33,6 +33,25 @@ def test_an_elbow_behind_a_gear_is_narrowed_by_its_motors_range(tmp_path: Path) 
         assert f"{side}_motor_joint" in found.joints and f"{side}_elbow_joint" not in found.ranges
 
 
+def test_a_joint_that_its_limits_hold_is_fixed_where_they_hold_it(tmp_path: Path) -> None:
+    """A mount that stands at 0.6 rad, and cannot be at 0, is that turn of the arm's own frame."""
+    found = []
+    for held in (True, False):
+        made = Made()
+        for side, sign in SIDES.items():
+            limits, rpy, kind = ((0.59, 0.6), (0, 0, 0), "revolute") if held else (None, (0.59, 0, 0), "fixed")
+            mount = made.join(
+                f"{side}_mount", "chest", (0, 0.2 * sign, 0.4), (sign, 0, 0), limits, kind, rpy=np.multiply(rpy, sign)
+            )
+            link = made.join(f"{side}_shoulder", mount, (0, 0, 0), Y, (-2.8, 1.2))
+            link = made.join(f"{side}_twist", made.join(f"{side}_roll", link, (0, 0, 0), X), (0, 0, 0), Z)
+            made.wrist(side, made.forearm(side, link))
+        found.append(made.found(tmp_path))
+    for point in ("left_elbow", "right_wrist"):
+        assert at(found[0], point) == pytest.approx(at(found[1], point), abs=1e-5)
+    assert found[0].joints == found[1].joints
+
+
 def test_a_forearm_that_telescopes_has_elbow_and_wrist(tmp_path: Path) -> None:
     made = Made()
     for side in SIDES:
