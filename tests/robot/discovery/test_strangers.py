@@ -52,6 +52,30 @@ def test_a_joint_that_its_limits_hold_is_fixed_where_they_hold_it(tmp_path: Path
     assert found[0].joints == found[1].joints
 
 
+@pytest.mark.parametrize("right", [(-0.3, 1.5), (-1.5, 0.3), (-1.4, 1.4)])
+def test_limits_that_were_copied_to_the_other_side_are_told(right: tuple[float, float], tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        link = made.join(f"{side}_pitch", "chest", (0, 0.2 * SIDES[side], 0.4), Y, (-2.8, 1.2))
+        link = made.join(f"{side}_roll", link, (0, 0, 0), X, (-0.3, 1.5) if side == "left" else right)
+        made.wrist(side, made.forearm(side, made.join(f"{side}_yaw", link, (0, 0, 0), Z)))
+    told = [note for note in made.found(tmp_path).notes if "not mirrored" in note]
+    assert len(told) == (right == (-0.3, 1.5)) and all("'left_roll_joint' and 'right_roll_joint'" in n for n in told)
+
+
+def test_elbows_that_bend_both_ways_with_arms_spread_bend_alike(tmp_path: Path) -> None:
+    """Nothing tells which way is a human's there; as Galbot One's and TOCABI's."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_pitch", "chest", (0, 0.2 * sign, 0.4), Y)
+        link = made.join(f"{side}_twist", made.join(f"{side}_roll", link, (0, 0, 0), X), (0, 0.1 * sign, 0), Y)
+        link = made.join(f"{side}_elbow", link, (0, 0.2 * sign, 0), X, (-2.1, 2.1))
+        made.join(f"{side}_wrist", made.join(f"{side}_forearm", link, (0, 0.1 * sign, 0), Y), (0, 0.2 * sign, 0), X)
+    found = made.found(tmp_path)
+    ends = [(found.ranges[f"{side}_elbow_joint"].lower, found.ranges[f"{side}_elbow_joint"].upper) for side in SIDES]
+    assert ends == [pytest.approx((0, 2.1)), pytest.approx((-2.1, 0))] and {"left_elbow", "right_elbow"} <= about(found)
+
+
 def test_a_forearm_that_telescopes_has_elbow_and_wrist(tmp_path: Path) -> None:
     made = Made()
     for side in SIDES:
