@@ -169,8 +169,8 @@ def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
 
 
 def _following(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, which hides its own, or on joints whose limits
-    leave them no way to move; else nothing.
+    """The end of a sentence on a joint that mimics one of another limb, which hides its own, on joints whose limits
+    leave them no way to move, or on fixed ones that have limits; else nothing.
     """
     root = bodies.body_of[bodies.description.root]
     for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
@@ -184,10 +184,23 @@ def _following(bodies: Bodies) -> str:
             )
     still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint)]
     if not still:
-        return ""
+        return _fixed_with_limits(bodies)
     first, more = still[0], f" and {len(still) - 1} more" * (len(still) > 1)
     ends = f"{first.lower:g} .. {first.upper:g}"
     return f"; '{first.name}'{more} cannot move, by limits as {ends}: correct them if it can"
+
+
+def _fixed_with_limits(bodies: Bodies) -> str:
+    joints = bodies.description.joints.values()
+    named = [
+        j.name
+        for j in joints
+        if j.kind == "fixed" and j.lower is not None and j.upper is not None and j.lower < j.upper
+    ]
+    more = f" and {len(named) - 1} more" * (len(named) > 1)
+    return (
+        f"; '{named[0]}'{more} are fixed, though they have limits: make them revolute if they can move" if named else ""
+    )
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:
