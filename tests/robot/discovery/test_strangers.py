@@ -63,6 +63,29 @@ def test_limits_that_were_copied_to_the_other_side_are_told(right: tuple[float, 
     assert len(told) == (right == (-0.3, 1.5)) and all("'left_roll_joint' and 'right_roll_joint'" in n for n in told)
 
 
+@pytest.mark.parametrize(("joints", "found"), [(("pan", "nod"), 2), (("head_pan",), 1), (("pan",), 0)])
+def test_a_head_that_turns_all_the_way_round_is_no_lidar(joints: tuple[str, ...], found: int, tmp_path: Path) -> None:
+    """A lidar carries no other joint, and is not called so."""
+    made, link = Made(), "chest"
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    for name, axis, limits in zip(joints, (Z, Y), (None, (-0.5, 0.5)), strict=False):
+        kind = "continuous" if limits is None else "revolute"
+        link = made.join(name, link, (0, 0, 0.55 if link == "chest" else 0), axis, limits, kind)
+    assert made.found(tmp_path).chains["neck"] == tuple(f"{name}_joint" for name in joints[:found])
+
+
+def test_a_box_of_a_millimetre_tells_no_sole(tmp_path: Path) -> None:
+    """It marks a frame, as in X Square's and other files."""
+    for size, known in (("0.001 0.001 0.001", False), ("0.2 0.1 0.03", True)):
+        made, shape = Made(), f"<visual><geometry><box size='{size}'/></geometry></visual>"
+        for side in SIDES:
+            made.wrist(side, made.forearm(side, made.arm(side)))
+            made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y, (-0.8, 0.8), shape=shape)
+        found = made.found(tmp_path)
+        assert ("left_foot" in about(found)) != known and (found.ends["left_foot"].confidence >= 0.9) == known
+
+
 def test_elbows_that_bend_both_ways_with_arms_spread_bend_alike(tmp_path: Path) -> None:
     """Nothing tells which way is a human's there; as Galbot One's and TOCABI's."""
     made = Made()
