@@ -15,7 +15,7 @@ ROBOT_COLOR: Color = (0.80, 0.83, 0.87)
 """Colour of shapes whose URDF names none."""
 
 _MARKER = 0.003
-"""Size under which a shape is no part of a robot, as a share of the robot's: 5 mm on a human's. Contacts of feet have 10."""
+"""Size under which a shape is no part of a robot, as a share of it: 5 mm on a human's. Contacts of feet have 10."""
 
 Kind = Literal["sphere", "cylinder", "capsule", "box"]
 

@@ -86,6 +86,16 @@ def test_a_box_of_a_millimetre_tells_no_sole(tmp_path: Path) -> None:
         assert ("left_foot" in about(found)) != known and (found.ends["left_foot"].confidence >= 0.9) == known
 
 
+def test_a_wrist_whose_joints_are_fixed_is_where_they_are(tmp_path: Path) -> None:
+    """As G1's with its wrists locked, and COMAN's; a hand's link, which lies farther on, is no wrist."""
+    made = Made()
+    for side in SIDES:
+        link = made.join(f"{side}_elbow", made.arm(side), (0, 0, -0.3), Y, (-2.3, 0.0))
+        for name, down in (("wrist_roll", -0.15), ("wrist_pitch", -0.05), ("wrist_yaw", -0.05), ("rubber_hand", -0.1)):
+            link = made.join(f"{side}_{name}", link, (0, 0, down), Z, None, "fixed")
+    assert at(made.found(tmp_path), "left_wrist") == pytest.approx([0, 0.2, -0.1])
+
+
 def test_elbows_that_bend_both_ways_with_arms_spread_bend_alike(tmp_path: Path) -> None:
     """Nothing tells which way is a human's there; as Galbot One's and TOCABI's."""
     made = Made()
