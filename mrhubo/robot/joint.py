@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,6 +11,9 @@ import numpy as np
 from mrhubo.errors import UserError
 
 ROTARY = ("revolute", "continuous")
+_STILL, _PLAY = 1e-3, 0.06
+"""Range under which a joint cannot move [m, rad], and under which a rotary one moves nothing: a gear's play, which some
+files model as a joint of its own behind each motor's."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,14 @@ class Joint:
     def rotary(self) -> bool:
         """Revolute or continuous."""
         return self.kind in ROTARY
+
+
+def stuck(joint: Joint, degrees: bool = False) -> bool:
+    """Whether limits leave a joint no way to move, or none but a gear's play. `degrees` tells their unit."""
+    if joint.lower is None or joint.upper is None:
+        return False
+    most = _STILL if not joint.rotary else math.degrees(_PLAY) if degrees else _PLAY
+    return joint.upper - joint.lower < most
 
 
 def drive(joints: Mapping[str, Joint], joint: str) -> Mimic:

@@ -1,7 +1,7 @@
 """MuJoCo's models (MJCF) as URDF: links, joints, limits, and the shapes of links; MuJoCo itself reads them.
 
-What has no meaning for a robot's kinematics is left out: actuators, sensors, tendons, contacts, lights, the floor.
-Meshes are named by their files and not loaded. Reference for elements and attributes:
+What has no meaning for a robot's kinematics is left out: actuators but for the ranges of positions, sensors, tendons,
+contacts, lights, the floor. Meshes are named by their files and not loaded. Reference for elements and attributes:
 https://mujoco.readthedocs.io/en/stable/XMLreference.html
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
-from mrhubo.errors import UserError, first_line, shortened
+from mrhubo.errors import UserError, first_line, listed, shortened
 from mrhubo.lazy import import_optional
 from mrhubo.robot.mjcf_bodies import Converted, UrdfWriter
 
@@ -22,6 +22,8 @@ _TINY = 1e-3
 """Size [m] of the sphere that stands for a mesh until its place is known."""
 _HEAD = 1 << 20
 """Bytes in which the root element begins."""
+_TURN, _FEWEST = 6.5, 4
+"""A turn [rad], with some room, and how many joints a model must limit to tell the unit by it."""
 _GROWING = ("replicate", "composite", "flexcomp", "flex", "plugin")
 """Elements that make many of one, or run somebody's library."""
 
@@ -56,6 +58,11 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
     mujoco.set_mju_user_warning(lambda _: None)  # else it writes a log file where the user happens to be
     try:
         spec = mujoco.MjSpec.from_file(str(path))
+        ranges, notes = _commanded(spec, mujoco), []
+        if spec.compiler.degree and _in_radians(spec, mujoco):
+            spec.compiler.degree = False
+            notes.append("limits are taken for radians, as no joint could move by as many degrees; "
+                         'say so in the model: <compiler angle="radian"/>')  # fmt: skip
         meshes = _without_meshes(spec, path, beside, mujoco)
         model = spec.compile()
     except UserError:
@@ -65,7 +72,30 @@ def urdf_of_mjcf(path: Path, beside: Path) -> Converted:
     finally:
         mujoco.set_mju_user_warning(None)
     weighed = {body.id for body in spec.bodies if body.explicitinertial}
-    return UrdfWriter(path, model, meshes, weighed).converted()
+    open_ended = {model.joint(joint).name for joint in range(model.njnt) if not model.jnt_limited[joint]}
+    ranges = {joint: limits for joint, limits in ranges.items() if joint in open_ended}
+    if ranges:
+        notes.append(f"joints without limits have their position actuators' ranges: {listed(ranges)}")
+    return UrdfWriter(path, model, meshes, weighed, ranges, notes).converted()
+
+
+def _in_radians(spec: Any, mujoco: Any) -> bool:
+    """Whether all limits of joints that turn are within a turn in radians, where a model is read in degrees."""
+    limits = [joint.range for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE and any(joint.range)]
+    return len(limits) >= _FEWEST and max(float(abs(end)) for range_2 in limits for end in range_2) < _TURN
+
+
+def _commanded(spec: Any, mujoco: Any) -> dict[str, tuple[float, float]]:
+    """The positions [rad, m] to which actuators can send joints, by joint: many models limit these alone."""
+    found: dict[str, tuple[float, float]] = {}
+    for actuator in spec.actuators:
+        gain, (offset, back, *_) = float(actuator.gainprm[0]), actuator.biasprm
+        servo = actuator.biastype == mujoco.mjtBias.mjBIAS_AFFINE and gain > 0 and back == -gain and offset == 0
+        low, high = sorted(float(end) / (actuator.gear[0] or 1.0) for end in actuator.ctrlrange)
+        limited = actuator.ctrllimited != mujoco.mjtLimited.mjLIMITED_FALSE and low < high
+        if servo and limited and actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT:
+            found[actuator.target] = (low, high)
+    return found
 
 
 def _refuse_growing(path: Path) -> None:

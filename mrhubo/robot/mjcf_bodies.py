@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -47,14 +47,18 @@ class _Frame:
 
 class UrdfWriter:
     """A compiled model -> URDF. Body by body, from the root outwards; a body with several joints becomes as many links,
-    each at its joint's anchor, since a URDF's link hangs on one joint, about its own origin.
+    each at its joint's anchor, since a URDF's link hangs on one joint, about its own origin. `ranges` are limits of
+    joints to which the model gives none.
     """
 
-    def __init__(self, path: Path, model: Any, meshes: dict[str, tuple[str, str]], weighed: Collection[int]) -> None:
-        self.path, self.model, self.meshes, self.weighed = path, model, meshes, weighed
+    def __init__(
+        self, path: Path, model: Any, meshes: dict[str, tuple[str, str]], weighed: Collection[int],
+        ranges: Mapping[str, tuple[float, float]], notes: Collection[str] = (),
+    ) -> None:  # fmt: skip
+        self.path, self.model, self.meshes, self.weighed, self.ranges = path, model, meshes, weighed, ranges
         name = model.names[: model.names.index(b"\0")].decode(errors="replace")
         self.robot = etree.Element("robot", name=path.stem if name in ("", "MuJoCo Model") else name)
-        self.notes: list[str] = []
+        self.notes: list[str] = list(notes)
         self.links: dict[str, etree._Element] = {}
         self.joints: dict[str, etree._Element] = {}
         self.names: dict[int, str] = {}
@@ -151,6 +155,7 @@ class UrdfWriter:
                 yield _Turn(f"{name}_{letter}", "revolute", anchor_3, axis_3, (-reach, reach))
             return
         self.names[joint] = name
+        limits = limits or self.ranges.get(name)
         axis_3, zero = np.array(model.jnt_axis[joint]), float(model.qpos0[model.jnt_qposadr[joint]])
         back_44 = np.eye(4)
         if kind == _SLIDE:

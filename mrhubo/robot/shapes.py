@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -12,6 +13,9 @@ Color = tuple[float, float, float]
 """RGB, 0..1."""
 ROBOT_COLOR: Color = (0.80, 0.83, 0.87)
 """Colour of shapes whose URDF names none."""
+
+_MARKER = 0.003
+"""Size under which a shape is no part of a robot, as a share of it: 5 mm on a human's. Contacts of feet have 10."""
 
 Kind = Literal["sphere", "cylinder", "capsule", "box"]
 
@@ -67,6 +71,24 @@ def read_collision_geometry(urdf: yourdfpy.URDF) -> list[LinkGeometry]:
         found = [_shape(link.name, element, ROBOT_COLOR) for element in link.collisions]
         shapes += _with_capsules([shape for shape in found if shape is not None])
     return shapes
+
+
+def without_markers(shapes: Iterable[LinkGeometry], size: float) -> list[LinkGeometry]:
+    """The shapes without those that only mark a place, as a box of a millimetre at a frame does.
+
+    Args:
+        shapes: of a robot.
+        size: about the robot's own [m].
+    """
+    return [shape for shape in shapes if _extent(shape) > _MARKER * size]
+
+
+def _extent(shape: LinkGeometry) -> float:
+    """About the longest side of the box around a shape [m]."""
+    if shape.kind == "box":
+        return max(shape.size)
+    radius, *length = shape.size
+    return max(2 * radius, *(length or (0.0,)))
 
 
 def _with_capsules(shapes: list[LinkGeometry]) -> list[LinkGeometry]:

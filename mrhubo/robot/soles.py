@@ -16,9 +16,10 @@ import numpy as np
 
 from mrhubo.robot.entries import End
 from mrhubo.robot.hulls import extremes
+from mrhubo.robot.joint import stuck
 from mrhubo.robot.meshes import read_meshes
 from mrhubo.robot.parts import OrientedPart
-from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
+from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry, without_markers
 from mrhubo.robot.standing import StandingRobot
 
 if TYPE_CHECKING:
@@ -85,7 +86,9 @@ def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
     links, parsed = _fixed_to(link, description), description.parsed
     poses = StandingRobot(description, {}).poses
     from_44 = {name: np.linalg.inv(poses[link]) @ poses[name] for name in links}
-    for shapes in (read_collision_geometry(parsed), read_geometry(parsed)):
+    size = float(np.linalg.norm(np.ptp([pose_44[:3, 3] for pose_44 in poses.values()], axis=0)))
+    for read in (read_collision_geometry, read_geometry):
+        shapes = without_markers(read(parsed), size)
         found = [_placed(_of_shape(s), from_44[s.link] @ s.origin_44) for s in shapes if s.link in links]
         if found:
             return np.concatenate(found), True
@@ -99,7 +102,7 @@ def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
 
 def _fixed_to(link: str, description: Description) -> set[str]:
     """A link and all below it that never move against it."""
-    found, joints = {link}, [joint for joint in description.joints.values() if joint.kind == "fixed"]
+    found, joints = {link}, [joint for joint in description.joints.values() if joint.kind == "fixed" or stuck(joint)]
     while more := {joint.child for joint in joints if joint.parent in found} - found:
         found |= more
     return found

@@ -19,7 +19,8 @@ import torch
 
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.robot.ancestry import Ancestry
-from mrhubo.robot.joint import Joint
+from mrhubo.robot.discovery.lines import PARALLEL, sine
+from mrhubo.robot.joint import Joint, stuck
 from mrhubo.robot.keypoints import Keypoints, Limb
 from mrhubo.robot.standing import StandingRobot
 from mrhubo.robot.suggestions import quoted
@@ -27,6 +28,7 @@ from mrhubo.robot.urdf import Description
 
 if TYPE_CHECKING:
     from mrhubo.robot.body_map import BodyMap
+    from mrhubo.robot.model import Robot
 
 _POSES = 16
 _STANDING = 2
@@ -36,6 +38,8 @@ _TURN, _TURNED = 0.5, 0.1
 axis of the forearm's twist."""
 _MOST_NAMED = 24
 """Joints that a sentence names: all of two arms, a neck and a waist, and not a thousand."""
+_ASIDE_M = 1e-3
+"""How far the axis of a gear's play may be from the motor's."""
 _NOTHING = 1e-4
 """Change of a unit direction that counts as none."""
 
@@ -113,16 +117,38 @@ def name_unlisted(body_map: BodyMap) -> None:
     joints, driven = robot.description.joints, {*robot.driven_joints, *robot.joint_names, *robot.hold}
     between = dict.fromkeys(name for link in links for name in reversed(tree.movable(link)) if name not in carrying)
     free = [joints[name] for name in between if name not in driven and joints[name].rotary and not joints[name].mimic]
-    missing = list(itertools.islice((joint for joint in free if _turns(body_map, joint)), _MOST_NAMED + 1))
-    if missing:
+    still = [joint for joint in free if stuck(joint) and not _is_play(body_map, joint) and _turns(body_map, joint)]
+    if still:
+        ends, which = f"{still[0].lower:g} .. {still[0].upper:g}", "it" if len(still) == 1 else "them"
+        _warn(
+            f"robot.joints: {quoted([joint.name for joint in still[:_MOST_NAMED]])} would turn body parts of "
+            f"robot.keypoints, but limits as {ends} leave {which} no way to move; correct these in the URDF if they "
+            f"are wrong, or say that this is meant: hold: {{{_angles(robot, still[:_MOST_NAMED])}}}"
+        )
+    missing = (joint for joint in free if not stuck(joint) and _turns(body_map, joint))
+    if missing := list(itertools.islice(missing, _MOST_NAMED + 1)):
         names = [joint.name for joint in missing[:_MOST_NAMED]]
-        angles = ", ".join(f"{name}: {robot.held[name]:g}" for name in names)
+        angles = _angles(robot, missing[:_MOST_NAMED])
         more = " and more" if len(missing) > len(names) else ""
         angles += ", ..." if more else ""
         _warn(
             f"robot.joints: {quoted(names)}{more} would turn body parts of robot.keypoints, and are not listed, so "
             f"they never move; list them, or say that this is meant: hold: {{{angles}}}"
         )
+
+
+def _angles(robot: Robot, joints: Sequence[Joint]) -> str:
+    """Where joints are held, as an entry."""
+    return ", ".join(f"{joint.name}: {robot.held[joint.name]:g}" for joint in joints)
+
+
+def _is_play(body_map: BodyMap, joint: Joint) -> bool:
+    """Whether a joint that cannot move is the play of the gear of a listed one next to it, about the same axis."""
+    robot, standing = body_map.robot, StandingRobot(body_map.robot.description, {})
+    axis = standing.line(joint)
+    beside = (robot.description.joints[name] for name in robot.joint_names)
+    lines = (standing.line(other) for other in beside if other.child == joint.parent or other.parent == joint.child)
+    return any(sine(line.axis_3, axis.axis_3) < PARALLEL and line.distance(axis.point_3) < _ASIDE_M for line in lines)
 
 
 def _turns(body_map: BodyMap, joint: Joint) -> bool:

@@ -118,6 +118,24 @@ def test_limits_and_shapes_are_kept(tmp_path: Path) -> None:
     assert looks.origin[:3, 3] == pytest.approx([0, 0, 0.1])
 
 
+def test_a_joint_without_limits_has_the_range_of_its_position_actuator(tmp_path: Path) -> None:
+    servo = '<position joint="elbow" kp="20" gear="2" ctrlrange="-3 4"/><position joint="waist_z" ctrlrange="-1 1"/>'
+    description, notes = converted(tmp_path, MODEL.replace('<motor joint="elbow"/>', servo))
+    elbow, waist = (description.joints[name] for name in ("elbow", "waist_z"))
+    assert (elbow.lower, elbow.upper, waist.lower) == pytest.approx((-1.5, 2.0, np.radians(-30)))
+    assert any("actuators' ranges: elbow" in note for note in notes)
+
+
+def test_limits_that_no_joint_could_have_in_degrees_are_radians(tmp_path: Path) -> None:
+    """As in models that are made to be put into another one, which says radians."""
+    body, end = "<body><joint range='-1.2 {}'/><geom size='1'/>", "</body>" * 4
+    for most, degrees in ((2.5, 1.0), (7.0, 180 / np.pi)):
+        text = "".join(body.format(upper) for upper in (1, 2, 1, most))
+        description, notes = converted(tmp_path, f"<mujoco><worldbody>{text}{end}</worldbody></mujoco>")
+        lower = [joint.lower for joint in description.joints.values() if joint.kind == "revolute"]
+        assert lower == pytest.approx([-1.2 / degrees] * 4) and (degrees == 1.0) == any("radians" in n for n in notes)
+
+
 def test_masses_are_those_that_the_model_gives(tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo, of the extra mjcf, is not installed")
     given = '<inertial pos="0.01 0.2 0.3" quat="0.7 0 0.7 0.1" mass="1.5" diaginertia="0.1 0.2 0.25"/>'

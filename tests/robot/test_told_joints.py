@@ -70,6 +70,20 @@ def test_what_is_no_waist_is_refused(pair: Pair, joints: list[str]) -> None:
         build_body_map(pair(WAIST, joints=joints))
 
 
+def test_what_limits_hold_is_named_as_such_and_a_gears_play_is_not(
+    pair: Pair, recwarn: pytest.WarningsRecorder
+) -> None:
+    elbow, (fixed, turning) = joint_of("l_elbow"), wrist("l")
+    behind = elbow.replace("l_elbow", "l_play").replace('"l_fore"', '"l_mid"')
+    behind = behind.replace("-2.3", "-0.01").replace('upper="0"', 'upper="0.01"')
+    build_body_map(pair((elbow, elbow.replace('"l_lower"', '"l_mid"') + '<link name="l_mid"/>' + behind), joints=ARMS))
+    assert not [str(warning.message) for warning in recwarn.list]
+    stuck = turning.replace('"-1"', '"0.2"').replace('upper="1"', 'upper="0.2"')
+    message = r"'l_wrist' would turn .* limits as 0.2 .. 0.2 leave it no way .* hold: {l_wrist: 0.2}"
+    with pytest.warns(InputWarning, match=message):
+        build_body_map(pair((fixed, stuck), joints=ARMS, keypoints=HANDS))
+
+
 @pytest.mark.parametrize(
     ("changes", "named"),
     [

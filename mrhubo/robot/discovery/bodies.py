@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from mrhubo.robot.discovery.lines import Line
-from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry
+from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry, without_markers
 from mrhubo.robot.urdf import Description
 
 FULL_TURN = 6.2
@@ -142,7 +142,7 @@ class Bodies:
         found: list[list[LinkGeometry]] = [[] for _ in self.links_of]
         for read in (read_collision_geometry, read_geometry):
             solid = {shape.link for shapes in found for shape in shapes}
-            for shape in read(self.description.parsed):
+            for shape in without_markers(read(self.description.parsed), self.size):
                 if shape.link not in solid:
                     found[self.body_of[shape.link]].append(shape)
         return found

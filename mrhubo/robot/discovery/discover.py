@@ -82,7 +82,7 @@ class _Finder:
         limbs = Limbs(self.bodies, self.roles, self.heading, self.arms, self.legs, self.hands, whole_body)
         spots = list(self._spots())
         legs = self.legs if limbs.whole_body else {}
-        ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading.forward_3)
+        ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading)
         joints = limbs.moved
         ranges = {name: found for name, found in ranges.items() if name in joints}
         held = dict(limbs.held(joints))

@@ -13,6 +13,8 @@ from mrhubo.robot.discovery.names import speaks_of
 
 OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
+_WRIST = 3
+"""Joints of a wrist at most."""
 _ROLLS = 0.02
 """How far along its axis a hand reaches at least that rolls, as a share of the robot's size."""
 
@@ -42,6 +44,8 @@ def limb_end(
         called: what the end is called.
     """
     inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
+    if (held := _held_wrist(bodies, last, start_3, OUT * usual)) is not None and called == "wrist":
+        return held
     if len(onward) > 1:  # where a single finger begins is no middle
         bases = [bodies.position(on.outer_link) for on in onward]
         if float(np.linalg.norm(np.mean(bases, axis=0) - start_3)) > OUT * usual:
@@ -81,6 +85,21 @@ def limb_end(
         f"a guess: as long as the limb before it, and straight, as nothing tells the {called}",
         0.1,
     )
+
+
+def _held_wrist(bodies: Bodies, last: Step, start_3: np.ndarray, least: float) -> tuple[np.ndarray, str, float] | None:
+    """The middle one of two or three fixed joints whose names are those of a wrist, as where its motors are locked."""
+    joints = bodies.description.parent_joint
+    wrist = [
+        joints[link] for link in bodies.links_of[last.end]
+        if link in joints and link != last.outer_link and speaks_of(joints[link].name, "wrist")
+        and float(np.linalg.norm(bodies.position(link) - start_3)) > least
+    ]  # fmt: skip
+    if not 1 < len(wrist) <= _WRIST:
+        return None
+    wrist.sort(key=lambda joint: float(np.linalg.norm(bodies.position(joint.child) - start_3)))
+    middle = wrist[len(wrist) // 2]
+    return bodies.position(middle.child), f"where '{middle.name}' is, a wrist's joint that does not move", 0.6
 
 
 def carried_along(bodies: Bodies, last: Step, start_3: np.ndarray) -> np.ndarray | None:

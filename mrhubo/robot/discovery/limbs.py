@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, key_of
-from mrhubo.robot.discovery.lines import PARALLEL, sine
+from mrhubo.robot.discovery.lines import ON, PARALLEL, feet, sine
 from mrhubo.robot.discovery.names import speaks_of
 
 _DOMINANT = 2.5
 """How many times longer than any other branch the one must be in which a limb goes on; else it ends, as a hand."""
 _NO_FARTHER = 1.1
 """How much farther out than the joint that it drives a linkage may begin."""
+_BALL = 3
+"""Axes of a ball joint."""
 
 
 def limb(bodies: Bodies, step: Step) -> Chain:
@@ -72,11 +74,28 @@ def _drives(bodies: Bodies, rod: Step, other: Step, before: Step) -> bool:
     """
     if not other.hinge.rotary:
         return False
+    if _is_ball_rod(bodies, rod):
+        return not _is_ball_rod(bodies, other)
     if all(speaks_of(hinge.name, "rod") or speaks_of(hinge.links[1], "rod") for hinge in bodies.beyond(rod)[1]):
         return not any(speaks_of(hinge.links[1], "rod") for hinge in bodies.beyond(other)[1])
     axis_3, start_3 = other.hinge.line.axis_3, before.hinge.line.point_3
     far = [float(np.linalg.norm(step.hinge.line.point_3 - start_3)) for step in (rod, other)]
     return far[0] < _NO_FARTHER * far[1] and _in_plane(bodies, rod, axis_3) and not _in_plane(bodies, other, axis_3)
+
+
+def _is_ball_rod(bodies: Bodies, step: Step) -> bool:
+    """Whether a branch is one chain, of a crank at most, and then a ball joint that nothing limits: a rod whose far end
+    a loop held.
+    """
+    chain, on = [step], bodies.onward(step)
+    while len(on) == 1 and len(chain) <= _BALL + 1:
+        chain, on = [*chain, on[0]], bodies.onward(on[0])
+    if on or len(chain) not in (_BALL, _BALL + 1) or any(not last.hinge.rotary for last in chain):
+        return False
+    ball = [last.hinge for last in chain[-_BALL:]]
+    middle_3 = feet(ball[0].line, ball[1].line)[0]
+    far = max(hinge.line.distance(middle_3) for hinge in ball)
+    return not any(hinge.limited for hinge in ball) and far < ON * bodies.size
 
 
 def _in_plane(bodies: Bodies, step: Step, axis_3: np.ndarray) -> bool:

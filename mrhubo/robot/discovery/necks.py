@@ -110,8 +110,13 @@ def _is_face(step: Step) -> bool:
 
 
 def _is_sensor(bodies: Bodies, step: Step) -> bool:
-    """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all."""
-    if any(names.speaks_of(name, "sensor") for name in (step.hinge.name, step.outer_link)):
+    """A joint without limits above a chest turns a lidar, not a head, if the file gives limits at all; but for one that
+    is called so, or carries another joint.
+    """
+    called = (step.hinge.name, step.outer_link)
+    if any(names.speaks_of(name, "sensor") for name in called):
         return True
+    if any(names.speaks_of(name, "head") for name in called) or len(bodies.beyond(step)[1]) > 1:
+        return False
     limited = any(hinge.limited for hinge in bodies.hinges if hinge.rotary)
     return limited and not step.hinge.limited and step.hinge.lower is None

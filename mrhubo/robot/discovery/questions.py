@@ -9,6 +9,7 @@ from mrhubo.robot.discovery.bodies import Chain
 from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
 from mrhubo.robot.discovery.necks import is_named
+from mrhubo.robot.discovery.other_side import copied_limits
 from mrhubo.robot.discovery.ranges import driver
 from mrhubo.robot.discovery.result import Candidate, FoundRange, Question
 from mrhubo.robot.discovery.roles import Roles
@@ -148,6 +149,13 @@ def notes(limbs: Limbs, ranges: Mapping[str, FoundRange]) -> Iterator[str]:
             f"the limits of most joints, as {joint.lower:g} .. {joint.upper:g} of '{joint.name}', can only be "
             "degrees, where a URDF has radians; robot.ranges holds them in radians, and nothing else need be done "
             "here, but other programs need a URDF with every limit times 0.0174533"
+        )
+    sides = [limbs.arms, limbs.legs] if limbs.whole_body else [limbs.arms]
+    pairs = [(found["left"].chain, found["right"].chain) for found in sides if len(found) == 2]
+    for one, other in copied_limits(pairs, limbs.heading.left_3):
+        yield (
+            f"the limits of '{one}' and '{other}' are not mirrored as their axes are, so that of one of them may be "
+            "wrong in the file; if it is, correct it there, or give what is right in robot.ranges"
         )
     for what in limbs.heading.contradicted:
         yield f"against where the robot was found to face speaks: {what}"

@@ -11,6 +11,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.arm import Arm
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Hinge, Step
+from mrhubo.robot.discovery.facing import Heading
 from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, straight_angle
@@ -48,6 +49,8 @@ class _Bend:
     lower_3: np.ndarray
     human_3: np.ndarray
     """Where a human's lower limb goes as it bends, with the limb hanging."""
+    else_33: np.ndarray
+    """Where it rather goes than the other way, row by row, where it goes neither there nor away from there."""
     least: float
     """How far it must bend the other way."""
 
@@ -58,7 +61,7 @@ class _Bend:
 
 
 def find_ranges(
-    bodies: Bodies, arms: Mapping[str, Arm], legs: Mapping[str, Leg], chains: Iterable[Chain], forward_3: np.ndarray
+    bodies: Bodies, arms: Mapping[str, Arm], legs: Mapping[str, Leg], chains: Iterable[Chain], heading: Heading
 ) -> tuple[dict[str, FoundRange], list[Question]]:
     """Ranges by joint where the URDF gives none, or degrees, or lets an elbow or a knee bend backwards; and what they
     leave open.
@@ -68,7 +71,7 @@ def find_ranges(
         arms: by side.
         legs: by side, if they move.
         chains: what moves, arms among it.
-        forward_3: where it faces.
+        heading: where it faces.
     """
     found: dict[str, FoundRange] = {}
     asked: list[Question] = []
@@ -93,7 +96,7 @@ def find_ranges(
             found[hinge.name] = FoundRange(-turn, turn, why, guessed)
         elif hinge is step.hinge and (turn := _turn_of(hinge, hinge in wide)) is not None:
             found[hinge.name] = turn
-    for bend in _bends(arms, legs, forward_3):
+    for bend in _bends(arms, legs, heading):
         gear = _gear(bodies, bend.step, {step.hinge.name for step in steps})
         if gear is None:
             continue
@@ -171,15 +174,19 @@ def _turns_round(hinge: Hinge) -> bool:
     return not given or _WIDE < float(hinge.upper or 0.0) - float(hinge.lower or 0.0) < math.tau + _SLACK
 
 
-def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], forward_3: np.ndarray) -> Iterator[_Bend]:
+def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], heading: Heading) -> Iterator[_Bend]:
+    forward_3 = heading.forward_3
     for side, arm in arms.items():
         ends = [spot.point_3 for spot in (arm.shoulder, arm.elbow, arm.wrist)]
+        inward_3 = -heading.left_3 if side == "left" else heading.left_3
+        ways_33 = np.stack((heading.up_3, inward_3, forward_3))
         yield _Bend(
-            f"{side}_elbow", arm.chain[arm.elbow_at], ends[1] - ends[0], ends[2] - ends[1], forward_3, _ELBOW
+            f"{side}_elbow", arm.chain[arm.elbow_at], ends[1] - ends[0], ends[2] - ends[1], forward_3, ways_33, _ELBOW
         )  # fmt: skip
     for side, leg in legs.items():
         ends = [spot.point_3 for spot in (leg.hip, leg.knee, leg.ankle)]
-        yield _Bend(f"{side}_knee", leg.chain[leg.knee_at], ends[1] - ends[0], ends[2] - ends[1], -forward_3, _KNEE)
+        step, back_3 = leg.chain[leg.knee_at], -forward_3
+        yield _Bend(f"{side}_knee", step, ends[1] - ends[0], ends[2] - ends[1], back_3, back_3[None], _KNEE)
 
 
 def _gear(bodies: Bodies, step: Step, moving: Collection[str]) -> Mimic | None:
@@ -217,7 +224,8 @@ def _human_range(
     straight = straight_angle(axis_3, bend.lower_3, upper_3) / bodies.gains.get(name, 1.0)
     straight = min((straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper))
     share = bend_side(lower, upper, straight)
-    ahead = float(cross(axis_3, upper_3) @ bend.human_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
+    goes_3 = cross(axis_3, upper_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
+    ahead = float(goes_3 @ bend.human_3)
     if bend.what == "knee" and share * ahead < 0 and min(abs(share), abs(ahead)) > _CLEAR:
         return None, Question(
             bend.about, f"'{name}' bends further forwards than backwards, as no human knee does: either its limits are "
@@ -230,6 +238,8 @@ def _human_range(
     if abs(share) < _TIED:
         above = ahead > 0
         if abs(ahead) < _CLEAR:
+            # Both sides alike, at least.
+            above = next((way > 0 for way in bend.else_33 @ goes_3 if abs(way) > _CLEAR), above)
             limb = "arm" if bend.what == "elbow" else "leg"
             question = Question(
                 bend.about,

@@ -11,9 +11,9 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Hinge, Step
 from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
-from mrhubo.robot.joint import ROTARY, Joint, drive
+from mrhubo.robot.joint import ROTARY, Joint, drive, stuck
 from mrhubo.robot.limits import in_degrees
-from mrhubo.robot.urdf import Description
+from mrhubo.robot.urdf import Description, moved
 
 _LIMB = 0.1
 """How far a limb reaches beyond the second of two hinges that turn as one, as a share of the robot; no finger does."""
@@ -86,13 +86,12 @@ def _read(
             child_44 = pose_44[link] @ joint.origin_44
             pose_44[joint.child] = child_44
             order.append(joint.child)
-            if (
-                joint.kind not in (*ROTARY, "prismatic")
-                or name in description.faults
-                or name in fixed
-                or stuck(joint.lower, joint.upper)
-            ):
+            if joint.kind not in (*ROTARY, "prismatic") or name in description.faults or name in fixed:
                 body_of[joint.child] = body_of[link]
+                continue
+            if stuck(joint, degrees):
+                body_of[joint.child] = body_of[link]
+                pose_44[joint.child] = child_44 @ _held(joint, degrees)
                 continue
             body_of[joint.child] = max(body_of.values()) + 1
             line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
@@ -114,13 +113,14 @@ def _limits(description: Description, joint: Joint) -> tuple[float | None, float
     return (given.lower, given.upper) if 0.0 < given.upper - given.lower < FULL_TURN else (None, None)
 
 
+def _held(joint: Joint, degrees: bool) -> np.ndarray:
+    """How far (4, 4) limits turn a joint that does not move from its 0, which may lie outside them."""
+    at = min(max(0.0, joint.lower or 0.0), joint.upper or 0.0)
+    return moved(joint.axis_3, math.radians(at) if degrees and joint.rotary else at, not joint.rotary)
+
+
 def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else math.radians(degrees)
-
-
-def stuck(lower: float | None, upper: float | None) -> bool:
-    """Whether limits leave a joint no way to move."""
-    return lower is not None and upper is not None and upper - lower < 1e-3
 
 
 def _sources(description: Description, fixed: Collection[str]) -> set[str]:

@@ -16,8 +16,8 @@ from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
 from mrhubo.robot.discovery.necks import find_necks
-from mrhubo.robot.discovery.reading import stuck
 from mrhubo.robot.discovery.symmetry import Pair, alike
+from mrhubo.robot.joint import stuck
 
 _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
@@ -89,9 +89,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
     large = [pair for pair in pairs if pair.size > least]
     armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
-    # Casters have two joints too, but none of them has limits; nor has any joint of some files.
-    limited = [pair for pair in armed if any(step.hinge.limited for step in pair.chains[0])]
-    armed = limited or [pair for pair in armed if len(pair.chains[0]) > _CASTER]
+    # Casters have two joints too, but none of them has limits; nor has any joint of some files, or of some legs.
+    armed = [
+        pair for pair in armed
+        if len(pair.chains[0]) > _CASTER or any(step.hinge.limited for step in pair.chains[0])
+    ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
         raise UserError(
@@ -167,8 +169,8 @@ def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
 
 
 def _following(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, which hides its own, or on joints whose limits
-    leave them no way to move; else nothing.
+    """The end of a sentence on a joint that mimics one of another limb, which hides its own, on joints whose limits
+    leave them no way to move, or on fixed ones that have limits; else nothing.
     """
     root = bodies.body_of[bodies.description.root]
     for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
@@ -180,12 +182,25 @@ def _following(bodies: Bodies) -> str:
                 f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
                 "take the <mimic> elements of such joints out of the URDF"
             )
-    still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint.lower, joint.upper)]
+    still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint)]
     if not still:
-        return ""
+        return _fixed_with_limits(bodies)
     first, more = still[0], f" and {len(still) - 1} more" * (len(still) > 1)
     ends = f"{first.lower:g} .. {first.upper:g}"
     return f"; '{first.name}'{more} cannot move, by limits as {ends}: correct them if it can"
+
+
+def _fixed_with_limits(bodies: Bodies) -> str:
+    joints = bodies.description.joints.values()
+    named = [
+        j.name
+        for j in joints
+        if j.kind == "fixed" and j.lower is not None and j.upper is not None and j.lower < j.upper
+    ]
+    more = f" and {len(named) - 1} more" * (len(named) > 1)
+    return (
+        f"; '{named[0]}'{more} are fixed, though they have limits: make them revolute if they can move" if named else ""
+    )
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:

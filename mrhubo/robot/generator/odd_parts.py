@@ -32,84 +32,12 @@ def nothing(chance: Chance, plan: Plan, places: Places) -> Angles:
     return {}
 
 
-def rods(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Beside elbows and ankles a crank and a rod, the loop of which is cut where the rod meets the forearm or foot."""
-    for name in SIDES:
-        for hinge in ("elbow", "ankle_pitch"):
-            joint = _joint(plan, f"{name}_{hinge}")
-            if joint is None:
-                continue
-            carrier = joint.parent
-            before = joint
-            while (length := 0.9 * float(np.linalg.norm(joint.point_3 - before.point_3))) < 0.05 * places.scale:
-                carrier, before = before.parent, next(j for j in plan.joints if j.child == before.parent)
-            aside_3 = 0.04 * places.scale * X
-            start_3 = joint.point_3 + length * Z
-            crank = plan.join(f"{name}_{hinge[:1]}_crank", carrier, start_3, joint.axis_3, (-1.5, 1.5))
-            rod = plan.join(f"{name}_{hinge[:1]}_rod", crank, start_3 + aside_3, joint.axis_3, (-1.5, 1.5))
-            plan.fix(f"{name}_{hinge[:1]}_rod_end", rod, joint.point_3 + aside_3)
-    return {}
-
-
-def pistons(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Beside each elbow a piston: a joint that turns, one that slides, and a second one that turns."""
-    for name in SIDES:
-        joint = plan.joint(f"{name}_elbow")
-        aside_3 = joint.point_3 + 0.05 * places.scale * X
-        high_3 = aside_3 + 0.15 * places.scale * Z
-        cylinder = plan.join(f"{name}_cylinder", joint.parent, high_3, Y, (-1.0, 1.0))
-        piston = plan.join(f"{name}_piston", cylinder, high_3 - 0.07 * places.scale * Z, Z, (-0.1, 0.1), "prismatic")
-        plan.join(f"{name}_piston_eye", piston, aside_3 - 0.05 * places.scale * Z, Y, (-1.0, 1.0))
-    return {}
-
-
-def two_hinges(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """An elbow of two parallel hinges, the second of which follows the first."""
-    for name in SIDES:
-        joint = plan.joint(f"{name}_elbow")
-        half_3 = 0.012 * places.scale * Z
-        role = f"{name}_second_hinge"
-        plan.insert_after(f"{name}_elbow", role, joint.point_3 - half_3, joint.axis_3, (joint.lower, joint.upper))
-        plan.change(f"{name}_elbow", point_3=joint.point_3 + half_3)
-        plan.change(role, mimics=(f"{name}_elbow", 1.0))
-    return {}
-
-
-def gears(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Elbows that follow a motor in the upper arm."""
-    for name in SIDES:
-        joint = plan.joint(f"{name}_elbow")
-        at_3 = joint.point_3 + 0.08 * places.scale * Z
-        plan.join(f"{name}_motor", joint.parent, at_3, joint.axis_3, (joint.lower, joint.upper))
-        plan.change(f"{name}_elbow", mimics=(f"{name}_motor", 1.0))
-    return {}
-
-
-def geared_twists(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Twists, wrists and a neck's first joint that follow motors drawn beside them, on the link before or behind."""
-    roles = ["neck_yaw"]
-    for name in SIDES:
-        roles += [f"{name}_{role}" for role in ("shoulder_twist", "forearm_twist", "wrist_pitch", "hip_yaw")]
-    behind, ratio = chance.maybe(0.5), chance.either(-1.0, -0.9, 1.0)
-    for number, role in enumerate(roles):
-        joint = _joint(plan, role)
-        if joint is None or joint.lower is None or joint.upper is None:
-            continue
-        at_3 = joint.point_3 + 0.02 * places.scale * (X if abs(joint.axis_3[0]) < 0.5 else Y)
-        limits = sorted((joint.lower / ratio, joint.upper / ratio))
-        start = joint.child if behind else joint.parent
-        motor = f"motor_{number}"
-        plan.join(motor, start, at_3, joint.axis_3, (limits[0], limits[1]))
-        plan.change(role, mimics=(motor, ratio))
-    return {}
-
-
 def mimicking_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
     """A right arm that follows the left one, joint by joint."""
     first, second = (f"{name}_" for name in SIDES)
     for joint in list(plan.joints):
         other = joint.role.replace(second, first, 1)
-        if joint.role.startswith(second) and joint.mimics is None and _joint(plan, other) is not None:
+        if joint.role.startswith(second) and joint.mimics is None and joint_of(plan, other) is not None:
             factor = 1.0 if abs(joint.axis_3[1]) > 0.9 else -1.0
             plan.change(joint.role, mimics=(other, factor))
     return {}
@@ -141,7 +69,7 @@ def tilted_shoulders(chance: Chance, plan: Plan, places: Places) -> Angles:
     """First axes of the arms that are tilted by 15 to 30 degrees."""
     tilt = chance.between(0.25, 0.55) * chance.either(-1.0, 1.0)
     for name, side in SIDES.items():
-        joint = _joint(plan, f"{name}_shoulder_pitch")
+        joint = joint_of(plan, f"{name}_shoulder_pitch")
         if joint is not None:
             plan.change(joint.role, axis_3=np.array([0.0, np.cos(tilt), side * np.sin(tilt)]))
     return {}
@@ -266,7 +194,8 @@ def _in_arm(role: str) -> bool:
     return any(word in role for word in ("clavicle", "shoulder"))
 
 
-def _joint(plan: Plan, role: str):  # noqa: ANN202
+def joint_of(plan: Plan, role: str):  # noqa: ANN202
+    """The joint with a role, if there is one."""
     return next((joint for joint in plan.joints if joint.role == role), None)
 
 

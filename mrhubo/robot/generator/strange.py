@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mrhubo.robot.generator import odd_legs, odd_parts
+from mrhubo.robot.generator import odd_drives, odd_legs, odd_parts
 from mrhubo.robot.generator.hands import HandShape
 from mrhubo.robot.generator.limbs import ArmShape, Chance
 from mrhubo.robot.generator.odd_parts import Angles, Places
@@ -81,12 +81,14 @@ STRANGE: dict[str, Strange] = {
     "shoulders tilted": Strange(build=odd_parts.tilted_shoulders),
     "arms mounted askew": Strange(build=odd_parts.mounts, finish=odd_parts.with_fixed_mounts),
     "arms on lifts": Strange(build=odd_parts.slides),
-    "rods": Strange(build=odd_parts.rods),
-    "rods, names of noise": Strange(build=odd_parts.rods, names=("noise",)),
-    "pistons": Strange(build=odd_parts.pistons),
-    "elbows of two hinges": Strange(build=odd_parts.two_hinges),
-    "elbows behind gears": Strange(build=odd_parts.gears),
-    "twists behind gears": Strange(build=odd_parts.geared_twists),
+    "rods": Strange(build=odd_drives.rods),
+    "rods, names of noise": Strange(build=odd_drives.rods, names=("noise",)),
+    "rods on balls, names of noise": Strange(build=odd_drives.ball_rods, names=("noise",)),
+    "play of gears": Strange(build=odd_drives.play),
+    "pistons": Strange(build=odd_drives.pistons),
+    "elbows of two hinges": Strange(build=odd_drives.two_hinges),
+    "elbows behind gears": Strange(build=odd_drives.gears),
+    "twists behind gears": Strange(build=odd_drives.geared_twists),
     "one arm mimics the other": Strange(build=odd_parts.mimicking_arm, mappable=False),
     "a face": Strange(build=odd_parts.face),
     "a tail": Strange(build=odd_parts.tail),

@@ -53,6 +53,11 @@ def test_limits_that_leave_no_way_to_move_are_named_where_they_hide_the_arms(roo
     (tmp_path / "robot.urdf").write_text(text.replace(joint[0], _LIMIT.sub('<limit lower="0" upper="0"', joint[0])))
     with pytest.raises(UserError, match=r"no arms were found; 'LShSag' cannot move, by limits as 0 .. 0: correct them"):
         discover(tmp_path / "robot.urdf")
+    (tmp_path / "fixed.urdf").write_text(
+        re.sub(r'(name="[LR](?:Sh|Elb|Fore|Wrj)\w*" type=)"revolute"', r'\1"fixed"', text)
+    )
+    with pytest.raises(UserError, match=r"no arms were found; 'LShSag' and 13 more are fixed, though they have limits"):
+        discover(tmp_path / "fixed.urdf")
 
 
 def test_a_joint_that_turns_all_the_way_round_on_an_arm_with_limits_still_does(root: Path, tmp_path: Path) -> None:

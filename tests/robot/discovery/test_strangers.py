@@ -33,6 +33,82 @@ def test_an_elbow_behind_a_gear_is_narrowed_by_its_motors_range(tmp_path: Path) 
         assert f"{side}_motor_joint" in found.joints and f"{side}_elbow_joint" not in found.ranges
 
 
+def test_a_joint_that_its_limits_hold_is_fixed_where_they_hold_it(tmp_path: Path) -> None:
+    """A mount that stands at 0.6 rad, and cannot be at 0, is that turn of the arm's own frame."""
+    found = []
+    for held in (True, False):
+        made = Made()
+        for side, sign in SIDES.items():
+            limits, rpy, kind = ((0.59, 0.6), (0, 0, 0), "revolute") if held else (None, (0.59, 0, 0), "fixed")
+            mount = made.join(
+                f"{side}_mount", "chest", (0, 0.2 * sign, 0.4), (sign, 0, 0), limits, kind, rpy=np.multiply(rpy, sign)
+            )
+            link = made.join(f"{side}_shoulder", mount, (0, 0, 0), Y, (-2.8, 1.2))
+            link = made.join(f"{side}_twist", made.join(f"{side}_roll", link, (0, 0, 0), X), (0, 0, 0), Z)
+            made.wrist(side, made.forearm(side, link))
+        found.append(made.found(tmp_path))
+    for point in ("left_elbow", "right_wrist"):
+        assert at(found[0], point) == pytest.approx(at(found[1], point), abs=1e-5)
+    assert found[0].joints == found[1].joints
+
+
+@pytest.mark.parametrize("right", [(-0.3, 1.5), (-1.5, 0.3), (-1.4, 1.4)])
+def test_limits_that_were_copied_to_the_other_side_are_told(right: tuple[float, float], tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        link = made.join(f"{side}_pitch", "chest", (0, 0.2 * SIDES[side], 0.4), Y, (-2.8, 1.2))
+        link = made.join(f"{side}_roll", link, (0, 0, 0), X, (-0.3, 1.5) if side == "left" else right)
+        made.wrist(side, made.forearm(side, made.join(f"{side}_yaw", link, (0, 0, 0), Z)))
+    told = [note for note in made.found(tmp_path).notes if "not mirrored" in note]
+    assert len(told) == (right == (-0.3, 1.5)) and all("'left_roll_joint' and 'right_roll_joint'" in n for n in told)
+
+
+@pytest.mark.parametrize(("joints", "found"), [(("pan", "nod"), 2), (("head_pan",), 1), (("pan",), 0)])
+def test_a_head_that_turns_all_the_way_round_is_no_lidar(joints: tuple[str, ...], found: int, tmp_path: Path) -> None:
+    """A lidar carries no other joint, and is not called so."""
+    made, link = Made(), "chest"
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    for name, axis, limits in zip(joints, (Z, Y), (None, (-0.5, 0.5)), strict=False):
+        kind = "continuous" if limits is None else "revolute"
+        link = made.join(name, link, (0, 0, 0.55 if link == "chest" else 0), axis, limits, kind)
+    assert made.found(tmp_path).chains["neck"] == tuple(f"{name}_joint" for name in joints[:found])
+
+
+def test_a_box_of_a_millimetre_tells_no_sole(tmp_path: Path) -> None:
+    """It marks a frame, as in X Square's and other files."""
+    for size, known in (("0.001 0.001 0.001", False), ("0.2 0.1 0.03", True)):
+        made, shape = Made(), f"<visual><geometry><box size='{size}'/></geometry></visual>"
+        for side in SIDES:
+            made.wrist(side, made.forearm(side, made.arm(side)))
+            made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y, (-0.8, 0.8), shape=shape)
+        found = made.found(tmp_path)
+        assert ("left_foot" in about(found)) != known and (found.ends["left_foot"].confidence >= 0.9) == known
+
+
+def test_a_wrist_whose_joints_are_fixed_is_where_they_are(tmp_path: Path) -> None:
+    """As G1's with its wrists locked, and COMAN's; a hand's link, which lies farther on, is no wrist."""
+    made = Made()
+    for side in SIDES:
+        link = made.join(f"{side}_elbow", made.arm(side), (0, 0, -0.3), Y, (-2.3, 0.0))
+        for name, down in (("wrist_roll", -0.15), ("wrist_pitch", -0.05), ("wrist_yaw", -0.05), ("rubber_hand", -0.1)):
+            link = made.join(f"{side}_{name}", link, (0, 0, down), Z, None, "fixed")
+    assert at(made.found(tmp_path), "left_wrist") == pytest.approx([0, 0.2, -0.1])
+
+
+def test_elbows_that_bend_both_ways_with_arms_spread_bend_alike(tmp_path: Path) -> None:
+    """Nothing tells which way is a human's there; as Galbot One's and TOCABI's."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_pitch", "chest", (0, 0.2 * sign, 0.4), Y)
+        link = made.join(f"{side}_twist", made.join(f"{side}_roll", link, (0, 0, 0), X), (0, 0.1 * sign, 0), Y)
+        link = made.join(f"{side}_elbow", link, (0, 0.2 * sign, 0), X, (-2.1, 2.1))
+        made.join(f"{side}_wrist", made.join(f"{side}_forearm", link, (0, 0.1 * sign, 0), Y), (0, 0.2 * sign, 0), X)
+    found = made.found(tmp_path)
+    ends = [(found.ranges[f"{side}_elbow_joint"].lower, found.ranges[f"{side}_elbow_joint"].upper) for side in SIDES]
+    assert ends == [pytest.approx((0, 2.1)), pytest.approx((-2.1, 0))] and {"left_elbow", "right_elbow"} <= about(found)
+
+
 def test_a_forearm_that_telescopes_has_elbow_and_wrist(tmp_path: Path) -> None:
     made = Made()
     for side in SIDES:
