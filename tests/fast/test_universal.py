@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.universal.robots import RobotBranch, UnfitBranch
+from tests.fast.exact import in_double
 from tests.fast.untrained import SIZES, random_network
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -47,7 +47,7 @@ def made() -> Callable[[str], Retargeter]:
 def compared(retargeter: Retargeter, form: str, array: np.ndarray, poses: Tensor) -> tuple[np.ndarray, np.ndarray]:
     """Distance of angles (B,) [rad] from PyTorch in float64, and how much more blocks cost (B, C)."""
     found = torch.from_numpy(FastRetargeter(retargeter.describe(), form).predict(array)).double()
-    exact = copy.deepcopy(retargeter).double()
+    exact = in_double(retargeter)
     with torch.no_grad():
         target = exact.body_map.human_directions(poses.double())
         wanted = exact.network.of_directions(target)
