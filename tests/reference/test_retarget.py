@@ -67,7 +67,7 @@ def test_frame_rate_changes_little(
 def test_recorded_motion_stays_near_the_best_of_each_frame(
     retargeters: dict[str, OptimizationRetargeter], cmu_poses: dict[str, Tensor]
 ) -> None:
-    local_TJ33 = cmu_poses["13_21"][:200]
+    local_TJ33 = cmu_poses["13_21"][:100]
     for name, most_jumps in (("nao", 0), ("reachy", 0)):
         retargeter = retargeters[name]
         result = retargeter.retarget(local_TJ33, 24.0)

@@ -55,7 +55,7 @@ def test_the_root_may_do_what_the_waist_cannot(tmp_path: Path, waist: bool, most
     """The chest is then turned in the world as the person's, and feet stand as they do otherwise; arms see nothing of it."""
     found = {}
     for follows in ("pelvis", "between", "chest"):
-        retargeter, motion = OptimizationRetargeter(walker(tmp_path, waist=waist, follows=follows)), bow(24, 12.0)
+        retargeter, motion = OptimizationRetargeter(walker(tmp_path, waist=waist, follows=follows)), bow(16, 8.0)
         result = retargeter(motion)
         score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))
         assert score.slide_cm_s < 0.5 and score.sunk_max_cm < 0.05 and score.floating_max_cm < 1.5
