@@ -85,9 +85,9 @@ def test_steps_away_from_self_collision_are_those_of_pytorch(
 def test_what_is_told_of_an_answer(
     fast: FastRetargeter, retargeter: Retargeter, array: np.ndarray, poses: Tensor
 ) -> None:
-    for rate in (None, 30.0):
-        found = fast(array, frame_rate=rate)
-        wanted = retargeter.judge(torch.from_numpy(found.q), poses, rate)
+    for rate, some in ((None, slice(None)), (30.0, slice(15, 25))):
+        found = fast(array[some], frame_rate=rate)
+        wanted = retargeter.judge(torch.from_numpy(found.q), poses[some], rate)
         for name, most in zip(FIELDS, (1e-4, 1e-4, 2e-3, 1e-4, 0), strict=True):
             assert largest(getattr(found, name).astype(float), getattr(wanted, name).double()) <= most, name
         assert (found.joint_names, found.branch_names) == (wanted.joint_names, wanted.branch_names)

@@ -88,10 +88,10 @@ def frames_of(motion: Motion) -> Frames:
 
 def striding() -> Frames:
     """Somebody who comes late, walks, is not seen for a while, at last for long, and goes on."""
-    found = frames_of(walk(44))
+    found = frames_of(walk(36))
     for t in (0, 1, 20, 21):
         found[t] = (None, *found[t][1:])
-    for t in range(30, 44):
+    for t in range(26, 36):
         pose, time, root = found[t]
         found[t] = pose, time + 2.5, root
     return found
