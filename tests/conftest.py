@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import sqlite3
@@ -86,6 +87,14 @@ def root() -> Path:
     return ROOT
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_power_cut() -> Iterator[None]:
+    """Files that tests write in their own process do not wait until the disk has them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda handle: None)
+        yield
+
+
 @pytest.fixture(scope="session")
 def external_dir() -> Path:
     """`data/external`; tests that need it skip where it is missing, unless MRHUBO_REQUIRE_EXTERNAL=1 (as in CI)."""
@@ -160,6 +169,19 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def few_poses() -> Iterator[None]:
+    """Robots that nothing was trained for get their confidence of few poses, and it is not kept: to find it takes
+    seconds, and anew whenever the program changes.
+    """
+    from mrhubo.retargeter import without_training
+    from mrhubo.retargeter.calibration import calibrate
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(without_training, "calibrated", functools.partial(calibrate, poses=100))
+        yield
 
 
 @pytest.fixture(scope="session")
