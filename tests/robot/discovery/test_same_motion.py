@@ -56,7 +56,7 @@ ALL = {"all at once": {"rename": True, "reorder": True, "negate": True, "turn": 
 
 
 @pytest.mark.parametrize(
-    ("robot", "forms"), [("nao", FORMS), ("coman", ALL), ("reachy", ALL)], ids=lambda p: str(p)[:6]
+    ("robot", "forms"), [("nao", FORMS), ("coman", ALL), ("reachy", ALL)], ids=["nao", "coman", "reachy"]
 )
 def test_same_motion_however_the_file_is_written(
     robot: str, forms: Mapping[str, Mapping[str, Any]], tmp_path: Path
