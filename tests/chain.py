@@ -126,13 +126,13 @@ def optimise(config: Path, motions: Iterable[Motion], smoothness: Iterable[float
     return found
 
 
-def new_package(config: Path, folder: Path, *overrides: str) -> Path:
-    """A package with random weights: what holds for them holds for trained ones."""
+def new_package(config: Path, folder: Path, *overrides: str, prior: BodyPrior | None = None) -> Path:
+    """A package with random weights: what holds for them holds for trained ones; with the prior that ships or another."""
     settings = load_config(config, overrides)
     body_map = build_body_map(settings.robot)
     torch.manual_seed(0)
     network = build_network(settings, body_map)
-    return Retargeter(network, body_map, BodyPrior.open(), settings, phi_threshold=0.01).save(folder, {})
+    return Retargeter(network, body_map, prior or BodyPrior.open(), settings, phi_threshold=0.01).save(folder, {})
 
 
 def cut_motion(name: str, folder: Path, seconds: tuple[float, float] = (0, 1e9), every: int = 1) -> Path:

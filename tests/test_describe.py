@@ -131,6 +131,7 @@ def test_fit_takes_a_model_in_place_of_a_config(
         dispatch(["fit"])
 
 
+@pytest.mark.usefixtures("few_poses")
 def test_the_page_about_a_robot_of_ones_own_is_done_as_it_stands(
     root: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,6 +17,7 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
+from tests.chain import cut_motion
 
 TRAINING_ONLY = {"lightning", "mlflow", "matplotlib", "optuna", "cmaes", "omegaconf", "pandas", "torchmetrics"}
 POSIX_ONLY = {"fcntl", "resource", "termios", "pwd", "grp"}
@@ -71,14 +72,15 @@ def test_the_version_stands_in_one_place(root: Path) -> None:
         assert f'"{stated}"' not in file.read_text(), file
 
 
-def test_a_package_answers_without_what_training_needs(root: Path, package: Path, tmp_path: Path) -> None:
+def test_a_package_answers_without_what_training_needs(package: Path, tmp_path: Path) -> None:
+    wave = str(cut_motion("wave", tmp_path / "short", (0, 0.3)))
     loaded = run(f"""
 import mrhubo
-result = mrhubo.load({str(package)!r})(mrhubo.read_motion({str(root / "data" / "motions" / "wave.npz")!r}))
+result = mrhubo.load({str(package)!r})(mrhubo.read_motion({wave!r}))
 assert result.q.shape == (len(result.confidence), 8)
 result.save({str(tmp_path / "wave.csv")!r})
 from mrhubo.retarget import main
-main(["--retargeter", {str(package)!r}, "--motion", {str(root / "data" / "motions" / "wave.npz")!r}, "--to", "0.2",
+main(["--retargeter", {str(package)!r}, "--motion", {wave!r}, "--to", "0.2",
       "--out", {str(tmp_path / "wave.json")!r}])
 """)
     assert {"torch", "pytorch_kinematics"} <= loaded

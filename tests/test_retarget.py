@@ -19,6 +19,8 @@ from tests.chain import cut_motion, new_package
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.reference.standing.steppers import squat
 
+pytestmark = pytest.mark.usefixtures("few_poses")
+
 
 @pytest.fixture(scope="module")
 def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,17 +31,23 @@ def modules() -> dict[str, Path]:
     return found
 
 
-def imports(name: str, path: Path, known: set[str]) -> Iterator[tuple[int, str]]:
-    """Line and module of each import of a module of the package; those for type checkers alone are left out."""
-    tree = ast.parse(path.read_text())
+@functools.cache
+def statements(text: str) -> list[ast.Import | ast.ImportFrom]:
+    """The imports in a module's text; those for type checkers alone are left out."""
+    tree = ast.parse(text)
     ignored = {id(node) for test in ast.walk(tree) if _for_type_checkers(test) for node in ast.walk(test)}
+    return [
+        node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in ignored
+    ]
+
+
+def imports(name: str, path: Path, known: set[str]) -> Iterator[tuple[int, str]]:
+    """Line and module of each import of a module of the package."""
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-    for node in ast.walk(tree):
-        if id(node) in ignored:
-            continue
+    for node in statements(path.read_text()):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             module = ".".join([*above, *([node.module] if node.module else [])])
             for alias in node.names:

@@ -19,6 +19,7 @@ from mrhubo.show import main
 from mrhubo.viewer import Stage, live
 from tests.chain import cut_motion, new_package
 
+pytestmark = pytest.mark.usefixtures("few_poses")
 SHORT = ["--to", "0.3"]
 
 

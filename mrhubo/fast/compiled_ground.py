@@ -56,7 +56,8 @@ class CompiledGround:
         """As `PlainGround.look`."""
         directions = len(aim_D3)
         wanted_X3 = np.concatenate((aim_D3, np.zeros((2 * self._points, 3))))
-        root_43 = np.concatenate((seen.place_3[None], seen.turn_33))
+        # In one order of memory, which of a rotation that was turned over would be another: numba would compile anew.
+        root_43 = np.ascontiguousarray(np.concatenate((seen.place_3[None], seen.turn_33)))
         self._f.turn_133[0] = turn_33
         given_H = self._nothing if seen.given_H is None else seen.given_H
         self._kernels.look(

@@ -19,7 +19,7 @@ from mrhubo.errors import InputWarning
 from mrhubo.robot.ancestry import Ancestry
 from mrhubo.robot.bending import BendAxis
 from mrhubo.robot.capsules import SHORT
-from mrhubo.robot.discovery.lines import unit
+from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.entries import Point
 from mrhubo.robot.joint import Joint
 from mrhubo.robot.keypoints import Limb
@@ -122,7 +122,7 @@ def _turn(poses: Sequence[StandingRobot], limb: Limb, joint: Joint, tree: Ancest
     for pose in poses:
         line, start_3, end_3 = pose.line(joint), pose.position(limb.start), pose.position(limb.end)
         lever_3 = end_3 - start_3 if moves_start else end_3 - line.nearest(end_3)
-        found.append(float(np.linalg.norm(np.cross(line.axis_3, lever_3))) / max(_length(pose, limb), SHORT))
+        found.append(float(np.linalg.norm(cross(line.axis_3, lever_3))) / max(_length(pose, limb), SHORT))
     return float(np.median(found))
 
 
@@ -136,7 +136,7 @@ def _aside(poses: Sequence[StandingRobot], limb: Limb, start: Point, end: Point)
     for pose in poses:
         here, there = ([pose.position(point) for point in ends] for ends in ((limb.start, limb.end), (start, end)))
         written_3, between_3 = unit(here[1] - here[0]), unit(there[1] - there[0])
-        sine = np.linalg.norm(np.cross(written_3, between_3))
+        sine = np.linalg.norm(cross(written_3, between_3))
         angles.append(float(np.degrees(np.arctan2(sine, written_3 @ between_3))))
         moved.append([float(np.linalg.norm(a - b)) for a, b in zip(here, there, strict=True)])
     if float(np.median(angles)) <= _ASIDE:

@@ -18,15 +18,16 @@ from mrhubo.exporting import onnx_universal, write_onnx
 from mrhubo.fast import FastRetargeter
 from mrhubo.retargeter import Retargeter, UniversalJoints, build_network
 from mrhubo.robot import BodyMap, Robot, build_body_map
-from tests.fast.untrained import SIZES, random_network
+from tests.fast.untrained import random_network
 
 pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
+pytestmark = pytest.mark.usefixtures("few_poses")
 SAME_RAD = 1e-5
 
 
-@pytest.fixture(scope="module", params=SIZES)
+@pytest.fixture(scope="module")
 def retargeter(request: pytest.FixtureRequest) -> Retargeter:
     network = random_network(request.param)
     body_map, prior = BodyMap.of(Robot.from_config(request.param)), BodyPrior(hidden=8).eval()
@@ -42,7 +43,11 @@ def poses() -> np.ndarray:
     return rotation.axis_angle_to_matrix(turns).numpy()
 
 
-@pytest.mark.parametrize("given", ["poses", "directions"])
+@pytest.mark.parametrize(
+    ("retargeter", "given"),
+    [("nao", "poses"), ("nao", "directions"), ("coman", "poses"), ("reachy", "poses"), ("reachy", "directions")],
+    indirect=["retargeter"],
+)
 def test_it_answers_as_the_plain_form(retargeter: Retargeter, poses: np.ndarray, given: str, tmp_path: Path) -> None:
     path, plain = tmp_path / "robot.onnx", FastRetargeter(retargeter.describe(), "numpy")
     assert write_onnx(retargeter, path, given) < 1e-3
@@ -85,6 +90,7 @@ def test_a_robot_without_a_package(tmp_path: Path, capsys: pytest.CaptureFixture
     assert found_BN.shape == (len(poses), 8) and np.isfinite(found_BN).all()
 
 
+@pytest.mark.parametrize("retargeter", ["nao"], indirect=True)
 def test_a_wrong_file_is_not_written(retargeter: Retargeter, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(onnx_universal, "silu", lambda x: x)
     with pytest.raises(UserError, match="from mrhubo's"):

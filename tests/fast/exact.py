@@ -7,14 +7,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import torch
+from torch import nn
 
 from mrhubo.retargeter import Retargeter
+
+
+class _Exact(Retargeter):
+    """A retargeter that may be in float64, which is for tests alone."""
+
+    _apply = nn.Module._apply
+    predict, judge, answer = (
+        torch.no_grad()(method.__wrapped__)  # pyright: ignore[reportFunctionMemberAccess]
+        for method in (Retargeter.predict, Retargeter.judge, Retargeter.answer)
+    )
 
 
 def in_double(retargeter: Retargeter) -> Retargeter:
     """The same in float64; collision shapes are read in float32 before."""
     assert retargeter.avoidance.collision is retargeter.collision
-    return copy.deepcopy(retargeter).double()
+    exact = copy.deepcopy(retargeter)
+    exact.__class__ = _Exact
+    return exact.double()
 
 
 @contextmanager

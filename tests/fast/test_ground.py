@@ -28,6 +28,7 @@ from mrhubo.robot import BodyMap, Robot
 from mrhubo.robot_motion import RobotMotion
 from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.streaming import Stream
+from tests.fast.altered import Altered
 from tests.fast.exact import double, in_double
 from tests.reference.standing.steppers import bow, jump, kneel, lie, moved, squat, walk
 from tests.reference.walkers import walker, write_urdf
@@ -88,10 +89,10 @@ def frames_of(motion: Motion) -> Frames:
 
 def striding() -> Frames:
     """Somebody who comes late, walks, is not seen for a while, at last for long, and goes on."""
-    found = frames_of(walk(44))
+    found = frames_of(walk(36))
     for t in (0, 1, 20, 21):
         found[t] = (None, *found[t][1:])
-    for t in range(30, 44):
+    for t in range(26, 36):
         pose, time, root = found[t]
         found[t] = pose, time + 2.5, root
     return found
@@ -235,6 +236,11 @@ def test_what_stands_stays_and_who_is_gone_leaves_the_robot_standing(
     limits = fast.facts
     assert ((q_TN >= limits.lower) & (q_TN <= limits.upper)).all()
     assert (np.abs(np.diff(q_TN, axis=0)) * 30 <= limits.velocity).all()
+    turned = [(pose, time, (turn_33.mT.contiguous().mT, place_3)) for pose, time, (turn_33, place_3) in frames[:2]]
+    for one, other in zip(found, quickly(fast, turned, StreamSettings()), strict=False):
+        np.testing.assert_array_equal(one.root_position, other.root_position)
+    if form == "compiled":  # of roots in another order of memory it would take seconds, in the midst of a session
+        assert len(fast.engine._ground_kernels.look.signatures) == 1
 
 
 @FORM
@@ -304,17 +310,12 @@ def test_one_file_stands(made: Callable[[str], Retargeter], tmp_path: Path) -> N
     write_tensors(tmp_path / "changed.safetensors", cells, metadata)
     with pytest.raises(UserError, match="a start without a pose"):
         Description.read(tmp_path / "changed.safetensors")
-    names = [name for name in tensors if name.startswith(("legs.", "root."))]
+    altered = Altered(file)
+    names = [name for name in altered.arrays if name.startswith(("legs.", "root."))]
     assert len(names) > 25
     for name in names:
-        wrongs = [tensors[name][:-1].contiguous()]
-        if not tensors[name].is_floating_point():
-            wrongs.append(tensors[name].double())
+        altered.refused(name, altered.arrays[name][:-1])
+        if altered.arrays[name].dtype.kind != "f":
+            altered.refused(name, altered.arrays[name].astype(np.float64))
             for value in (-7, 10**6):
-                changed = tensors[name].clone()
-                changed.flatten()[-1] = value
-                wrongs.append(changed)
-        for wrong in wrongs:
-            write_tensors(tmp_path / "changed.safetensors", {**tensors, name: wrong}, metadata)
-            with pytest.raises(UserError, match="no description"):
-                Description.read(tmp_path / "changed.safetensors")
+                altered.refused_with(name, value)

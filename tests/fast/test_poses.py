@@ -63,8 +63,8 @@ def test_a_rate_with_which_nobody_can_reckon_is_refused(
 def test_the_rates_at_the_ends_have_answers(
     make: Callable[[str], Retargeter], fast: FastRetargeter, array: np.ndarray, rate: float
 ) -> None:
-    assert torch.isfinite(make("nao")(array, frame_rate=rate).q).all()
-    assert np.isfinite(fast(array, frame_rate=rate).q).all()
+    assert torch.isfinite(make("nao")(array[:6], frame_rate=rate).q).all()
+    assert np.isfinite(fast(array[:6], frame_rate=rate).q).all()
 
 
 def test_a_number_of_steps_may_be_numpys(

@@ -37,7 +37,7 @@ def _one_thread(one_thread: None) -> None:
 @pytest.fixture(scope="module")
 def motion(poses: Tensor) -> Motion:
     """From one pose to the next in a fifth of a second: faster than robots are, and out of their reach in part."""
-    return resample(Motion("some", poses[19:25], 5.0, source="nowhere"), RATE)
+    return resample(Motion("some", poses[20:23], 5.0, source="nowhere"), RATE)
 
 
 @pytest.fixture(scope="module", params=FORMS)
@@ -99,7 +99,7 @@ def test_each_frame_on_its_own(fast: FastRetargeter, answered: RobotMotion, moti
 
 def test_motions_side_by_side_are_motions_of_their_own(make: Callable[[str], Retargeter], motion: Motion) -> None:
     fast = FastRetargeter(make("nao").describe(), "numpy")
-    several = motion.local_TJ33[:40].numpy().reshape(2, 20, 21, 3, 3)
+    several = motion.local_TJ33[:16].numpy().reshape(2, 8, 21, 3, 3)
     found = fast(several, frame_rate=RATE).q
     for one, q_TN in zip(several, found, strict=True):
         np.testing.assert_allclose(fast(one, frame_rate=RATE).q, q_TN, atol=SAME_RAD)
@@ -116,8 +116,8 @@ def test_windows(make: Callable[[str], Retargeter], motion: Motion, monkeypatch:
     nao = make("nao")
     fast, whole = FastRetargeter(nao.describe(), "numpy"), FastRetargeter(nao.describe(), "numpy")(motion).q
     for module in (trajectory, together):
-        monkeypatch.setattr(module, "WINDOW", 24)
-        monkeypatch.setattr(module, "AHEAD", 9)
+        monkeypatch.setattr(module, "WINDOW", 12)
+        monkeypatch.setattr(module, "AHEAD", 4)
     found = fast(motion).q
     assert np.abs(found - wanted(nao, fast, motion)).max() < SAME_RAD
     assert np.abs(found - whole).max() > 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,16 +12,16 @@ from torch import Tensor
 
 import mrhubo
 from mrhubo.body import BodyPrior
-from mrhubo.errors import UserError
 from mrhubo.fast import FastRetargeter
-from mrhubo.fast.description import FILE, Description
+from mrhubo.fast.description import FILE
 from mrhubo.fast.engines import FORMS
 from mrhubo.fast.plain.universal import _softmax
-from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.universal.robots import RobotBranch, UnfitBranch
+from tests.fast.altered import Altered
+from tests.fast.exact import in_double
 from tests.fast.untrained import SIZES, random_network
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -47,7 +46,7 @@ def made() -> Callable[[str], Retargeter]:
 def compared(retargeter: Retargeter, form: str, array: np.ndarray, poses: Tensor) -> tuple[np.ndarray, np.ndarray]:
     """Distance of angles (B,) [rad] from PyTorch in float64, and how much more blocks cost (B, C)."""
     found = torch.from_numpy(FastRetargeter(retargeter.describe(), form).predict(array)).double()
-    exact = copy.deepcopy(retargeter).double()
+    exact = in_double(retargeter)
     with torch.no_grad():
         target = exact.body_map.human_directions(poses.double())
         wanted = exact.network.of_directions(target)
@@ -124,18 +123,13 @@ def test_a_damaged_file_is_refused(made: Callable[[str], Retargeter], tmp_path: 
     """Compiled functions would read what is not theirs."""
     file = made("nao").save_description(tmp_path)
     assert file is not None
-    tensors, metadata = read_tensors(file)
-    own = [name for name in tensors if name.startswith("universal.")]
+    altered = Altered(file)
+    own = [name for name in altered.arrays if name.startswith("universal.")]
     for name in own:
-        wrongs = [tensors[name][:-1].contiguous()] if tensors[name].shape[0] > 1 else []
+        if len(altered.arrays[name]) > 1:
+            altered.refused(name, altered.arrays[name][:-1])
         for value in () if "weights" in name else (-7, 10**6):
-            changed = tensors[name].clone()
-            changed.flatten()[-1] = value
-            wrongs.append(changed)
-        for wrong in wrongs:
-            write_tensors(tmp_path / "changed.safetensors", {**tensors, name: wrong}, metadata)
-            with pytest.raises(UserError, match="no description"):
-                Description.read(tmp_path / "changed.safetensors")
+            altered.refused_with(name, value)
     assert len(own) > 30
 
 

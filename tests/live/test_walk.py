@@ -222,10 +222,10 @@ def points(frames: list[SeenPose], in_world: bool, without: tuple[str, ...] = ()
 
 
 def test_points_in_the_world_lead_where_the_person_goes(legged: FastRetargeter) -> None:
-    frames = poses_of(walk(80))
+    frames = poses_of(walk(50))
     one, other = (drive(legged, found, QUICK)[1] for found in (frames, points(frames, True)))
     np.testing.assert_allclose(other.place_T3, one.place_T3, atol=0.03)
-    assert one.place_T3[-1, 0] > 0.3
+    assert one.place_T3[-1, 0] > 0.2
 
 
 def test_points_from_the_hips_bend_the_knees_and_go_nowhere(legged: FastRetargeter) -> None:

@@ -47,10 +47,10 @@ def test_wrong_valleys_are_left(
 
 @pytest.mark.parametrize("steps", [1, 10])
 def test_a_frame_has_the_same_answer_in_any_batch(polish: Polish, posed: tuple[Tensor, Tensor], steps: int) -> None:
-    target, start = (tensor[:40] for tensor in posed)
+    target, start = (tensor[:14] for tensor in posed)
     whole = polish(start, target, steps)
     assert torch.equal(polish(start, target, steps), whole)
-    for size in (1, 7):
+    for size in (1, 5):
         parts = zip(start.split(size), target.split(size), strict=True)
         assert torch.equal(torch.cat([polish(*part, steps) for part in parts]), whole)
 

@@ -95,7 +95,7 @@ def scipy_cost(problem: DirectionProblem, target_D3: Tensor, start_N: np.ndarray
     return float(2 * result.cost)
 
 
-@pytest.mark.parametrize(("name", "frames", "most"), [("nao", 48, 1), ("coman", 16, 2), ("reachy", 12, 3)])
+@pytest.mark.parametrize(("name", "frames", "most"), [("nao", 24, 1), ("coman", 10, 2), ("reachy", 8, 3)])
 def test_never_worse_than_scipy(
     name: str, frames: int, most: int, retargeters: dict[str, OptimizationRetargeter], cmu_poses: dict[str, Tensor]
 ) -> None:

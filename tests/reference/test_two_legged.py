@@ -6,8 +6,6 @@ has none: then pelvis and chest are held against each other.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 import torch
 from torch import Tensor
@@ -23,10 +21,12 @@ from tests.reference.walkers import ROOTS, entries, walker
 FORWARD = (0.0, 0.0, 1.0)
 
 
-@pytest.fixture(params=[(root, waist) for root in ROOTS for waist in (True, False)], ids=lambda p: f"{p[0]}-{p[1]}")
-def body_map(request: pytest.FixtureRequest, tmp_path: Path) -> BodyMap:
+@pytest.fixture(
+    scope="module", params=[(root, waist) for root in ROOTS for waist in (True, False)], ids=lambda p: f"{p[0]}-{p[1]}"
+)
+def body_map(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> BodyMap:
     root, waist = request.param
-    return walker(tmp_path, root, waist)
+    return walker(tmp_path_factory.mktemp("walker"), root, waist)
 
 
 def robot_directions(body_map: BodyMap, q_BN: Tensor) -> Tensor:

@@ -51,18 +51,18 @@ def test_the_same_seed_gives_the_same_weights(retargeter: Retargeter) -> None:
 
 def test_good_frames_are_told_from_bad_ones(root: Path, retargeter: Retargeter) -> None:
     motion = read_motion(root / "data" / "motions" / "conversation.npz")
-    local_TJ33, parts = motion.local_TJ33[100:220], retargeter.body_map.keypoints.parts
+    local_TJ33, parts = motion.local_TJ33[100:180], retargeter.body_map.keypoints.parts
     generator = torch.Generator().manual_seed(0)
     given = {
         "clean": local_TJ33,
-        "re-shared": reshare(motion, 1).local_TJ33[100:220],
+        "re-shared": reshare(motion, 1).local_TJ33[100:180],
         "backwards": bent_backwards(local_TJ33, torch.linspace(30, 90, len(local_TJ33)), parts),
         "noisy": shaken(local_TJ33, 25.0, generator),
     }
     found = {name: retargeter(pose, polish=10, frame_rate=60.0) for name, pose in given.items()}
     confidence = {name: result.confidence for name, result in found.items()}
     good = found["clean"].direction_error_deg.amax(dim=1) < 5
-    assert int(good.sum()) > 60
+    assert int(good.sum()) > 40
     assert float(confidence["clean"][good].min()) > 0.85
     torch.testing.assert_close(confidence["re-shared"][good], confidence["clean"][good], atol=0.05, rtol=0)
     assert float(confidence["backwards"].quantile(0.9)) < 0.5

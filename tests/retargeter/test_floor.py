@@ -28,10 +28,10 @@ def biped(tmp_path_factory: pytest.TempPathFactory) -> Retargeter:
 
 
 def test_planted_feet_stay_and_the_robot_goes_where_the_person_goes(biped: Retargeter, one_thread: None) -> None:
-    motion = walk(90)
+    motion = walk(60)
     found = biped(motion, avoid_collisions=False)
     assert found.root_position is not None and found.root_quaternion_wxyz is not None and found.contact is not None
-    assert found.root_position.shape == (90, 3) and found.contact.shape == (90, 2)
+    assert found.root_position.shape == (60, 3) and found.contact.shape == (60, 2)
     assert found.contact_names == ("left_foot", "right_foot") and found.frame_rate == motion.frame_rate
     turn_T33 = rotation.wxyz_to_matrix(found.root_quaternion_wxyz)
     score = score_whole_body(biped.body_map, motion, found.q, found.root_position, turn_T33)

@@ -13,6 +13,7 @@ import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from mrhubo.body import BodyPrior
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import checksum_file
 from mrhubo.files.storage import read_tensors, write_tensors
@@ -28,7 +29,8 @@ WEIGHTS, OTHERS = (
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return new_package(ROOT / "conf" / "nao.yaml", tmp_path_factory.mktemp("made") / "package", "model.hidden=8")
+    folder = tmp_path_factory.mktemp("made") / "package"
+    return new_package(ROOT / "conf" / "nao.yaml", folder, "model.hidden=8", prior=BodyPrior(hidden=8).eval())
 
 
 @pytest.fixture(scope="module")

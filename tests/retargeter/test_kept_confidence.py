@@ -12,7 +12,7 @@ from mrhubo.config import load_config
 from mrhubo.retargeter import Retargeter, kept_confidence, optimised
 from mrhubo.retargeter.calibration import calibrate
 from mrhubo.retargeter.kept_confidence import calibrated
-from mrhubo.robot import build_body_map
+from mrhubo.robot import BodyMap, build_body_map
 from tests.reference.walkers import walker
 
 
@@ -21,17 +21,18 @@ def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The `id` of those whose confidence was found anew, on few poses; the user's cache is an empty folder."""
     asked: list[int] = []
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    few = functools.partial(calibrate, poses=60)
+    few = functools.partial(calibrate, poses=30)
     monkeypatch.setattr(kept_confidence, "calibrate", lambda made: (asked.append(id(made)), few(made))[1])
     return asked
 
 
 @pytest.fixture(scope="module")
 def make(root: Path) -> Callable[..., Retargeter]:
-    def made(*settings: str) -> Retargeter:
-        return optimised(build_body_map(load_config(root / "conf" / "nao.yaml", list(settings)).robot))
+    @functools.cache
+    def body_map(*settings: str) -> BodyMap:
+        return build_body_map(load_config(root / "conf" / "nao.yaml", list(settings)).robot)
 
-    return made
+    return lambda *settings: optimised(body_map(*settings))
 
 
 def test_a_robot_that_is_known_is_not_asked_again(found: list[int], make: Callable[..., Retargeter]) -> None:

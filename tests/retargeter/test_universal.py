@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 
 import pytest
@@ -13,10 +12,9 @@ from mrhubo.body import BodyPrior
 from mrhubo.config import load_config
 from mrhubo.describing.run import open_robot
 from mrhubo.errors import UserError
-from mrhubo.motion import read_motion
+from mrhubo.motion import read_motion, trim
 from mrhubo.reference import OptimizationRetargeter, angle_between
-from mrhubo.retargeter import Retargeter, build_network, without_training
-from mrhubo.retargeter.calibration import calibrate
+from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
 from tests.poses import prior_poses
 
@@ -29,7 +27,7 @@ def reachy() -> Retargeter:
 
 
 def test_a_motion_is_near_the_optimum_smooth_and_trusted(reachy: Retargeter, root: Path) -> None:
-    motion = read_motion(root / "data" / "motions" / "wave.npz")
+    motion = trim(read_motion(root / "data" / "motions" / "wave.npz"), 1.0, 4.0)
     result, body_map = reachy(motion), reachy.body_map
     robot = body_map.robot
     q_TN = torch.as_tensor(result.q)
@@ -54,8 +52,8 @@ def test_a_stream_follows(reachy: Retargeter, root: Path) -> None:
     assert all(bool(torch.isfinite(torch.as_tensor(q)).all()) for q in first)
 
 
-def test_legs_of_a_urdf_move_when_they_are_asked_for(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(without_training, "calibrated", functools.partial(calibrate, poses=100))
+@pytest.mark.usefixtures("few_poses")
+def test_legs_of_a_urdf_move_when_they_are_asked_for(root: Path) -> None:
     file = root / "data" / "robots" / "nao" / "nao.urdf"
     arms, whole = mrhubo.for_robot(file), mrhubo.for_robot(file, whole_body=True)
     by_command = open_robot(str(file), whole_body=True)

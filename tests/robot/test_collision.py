@@ -82,18 +82,16 @@ def test_derivatives_equal_differences(root: Path, name: str) -> None:
     q_BN = robot.sample(300, torch.Generator().manual_seed(1))
     near = shapes.near(q_BN, 0.02)
     assert len(near.row_X) > 20
-    step = 1e-3
+    step, joints = 1e-3, q_BN.shape[1]
+    steps_BN = step * torch.cat((-torch.eye(joints), torch.eye(joints)))
     for x in range(0, len(near.row_X), max(1, len(near.row_X) // 15)):
-        row, pair = int(near.row_X[x]), int(near.pair_X[x])
-        for joint in range(q_BN.shape[1]):
-            ends = []
-            for sign in (-1, 1):
-                moved = q_BN[row : row + 1].clone()
-                moved[0, joint] += sign * step
-                close = shapes.near(moved, 1.0)
-                ends.append(float(close.distance_X[close.pair_X == pair]))
-            difference = (ends[1] - ends[0]) / (2 * step)
-            assert float(near.jacobian_XN[x, joint]) == pytest.approx(difference, abs=2e-3)
+        close = shapes.near(q_BN[near.row_X[x]] + steps_BN, 1.0)
+        own_X = close.pair_X == near.pair_X[x]
+        assert close.row_X[own_X].sort().values.tolist() == list(range(2 * joints))
+        distance_B = torch.empty(2 * joints)
+        distance_B[close.row_X[own_X]] = close.distance_X[own_X]
+        difference_N = distance_B.reshape(2, joints).diff(dim=0)[0] / (2 * step)
+        torch.testing.assert_close(near.jacobian_XN[x], difference_N, atol=2e-3, rtol=0)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -249,7 +247,7 @@ def test_many_shapes_are_looked_at_few_poses_at_a_time(
     robot = build_body_map(pair(*edits)).robot
     shapes = SelfCollision(robot)
     assert len(shapes.pairs) > 20_000
-    shapes.collides(robot.sample(200, torch.Generator().manual_seed(0)))
+    shapes.collides(robot.sample(90, torch.Generator().manual_seed(0)))
     assert max(largest) <= 2**24
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ def people(frames: int = 60) -> Tensor:
     return rotation.axis_angle_to_matrix(turns)
 
 
+@functools.cache
 def shipped(root: Path, name: str, follows: str) -> BodyMap:
     return build_body_map(load_config(root / "conf" / f"{name}.yaml", [f"robot.root_follows={follows}"]).robot)
 

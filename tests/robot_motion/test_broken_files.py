@@ -47,7 +47,7 @@ def good(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return path
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=16, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=accidents)
 @example(steps=[("repeat", 81, b"")])  # a bag whose field names claim more bytes than the file has
 def test_damage_is_noticed_or_does_not_matter(good: Path, steps: list[Step]) -> None:

@@ -112,12 +112,12 @@ def test_a_person_elsewhere_who_looks_elsewhere_is_followed_there(biped: Retarge
 
 
 def test_a_walk_goes_as_far_as_the_person_and_its_feet_keep_still(biped: Retargeter) -> None:
-    motion = walk(150)
+    motion = walk(80)
     answer = followed(biped, motion)
     score = score_whole_body(biped.body_map, motion, *answer)
     assert motion.root_position_T3 is not None
     gone = float((answer[1][-1] - answer[1][0])[0])
-    assert gone == pytest.approx(1.49 * Stream(biped)._legs.scale, rel=0.06)
+    assert gone == pytest.approx(0.79 * Stream(biped)._legs.scale, rel=0.06)
     assert score.path_cm_m < 5 and score.slide_cm_s < max(2.0, score.human_slide_cm_s) and score.sunk == 0
 
 
@@ -203,12 +203,12 @@ def test_people_may_come_later_than_the_stream_and_than_each_other(biped: Retarg
 
 
 def test_a_pelvis_that_is_lost_for_a_frame_does_not_throw_the_base(biped: Retargeter) -> None:
-    motion = squat(24, 60.0)
+    motion = squat(14, 60.0)
     assert motion.root_rotation_T33 is not None
     glitch_33 = rotation.axis_angle_to_matrix(torch.tensor([0.3, -0.4, 0.2]))
     turn_T33, local_TJ33 = motion.root_rotation_T33.clone(), motion.local_TJ33.clone()
-    turn_T33[12] = turn_T33[12] @ glitch_33
-    local_TJ33[12, :3] = glitch_33.mT @ local_TJ33[12, :3]  # limbs stay where they are
+    turn_T33[7] = turn_T33[7] @ glitch_33
+    local_TJ33[7, :3] = glitch_33.mT @ local_TJ33[7, :3]  # limbs stay where they are
     _, wanted_T3, _ = followed(biped, motion)
     found = followed(biped, motion.changed(root_rotation_T33=turn_T33.numpy(), local_TJ33=local_TJ33.numpy()))
     assert float((found[1] - wanted_T3).norm(dim=-1).max()) < 0.01

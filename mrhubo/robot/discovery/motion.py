@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Chain, Hinge
+from mrhubo.robot.discovery.lines import cross
 
 _FREE = math.pi / 2
 """How far either way a joint without limits is taken to turn."""
@@ -54,7 +55,7 @@ def straight_angle(axis_3: np.ndarray, lower_3: np.ndarray, upper_3: np.ndarray)
     seen along the axis [rad].
     """
     lower_3, upper_3 = (vector_3 - axis_3 * (axis_3 @ vector_3) for vector_3 in (lower_3, upper_3))
-    return math.atan2(float(axis_3 @ np.cross(lower_3, upper_3)), float(lower_3 @ upper_3))
+    return math.atan2(float(axis_3 @ cross(lower_3, upper_3)), float(lower_3 @ upper_3))
 
 
 def bend_side(lower: float, upper: float, straight: float) -> float:

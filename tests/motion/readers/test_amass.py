@@ -392,7 +392,7 @@ def test_truncated_files(compressed: bool, share: float) -> None:
     st.booleans(),
     st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.binary(min_size=1, max_size=6)), min_size=1, max_size=4),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_altered_files(compressed: bool, changes: list[tuple[float, bytes]]) -> None:
     altered = bytearray(_whole(compressed))
     for share, new in changes:

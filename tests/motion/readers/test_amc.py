@@ -134,7 +134,7 @@ def test_what_is_wrong_is_said(old: str, new: str, words: str, files: Path) -> N
 
 
 @given(steps=accidents)
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damaged_motions_are_read_or_refused_in_a_sentence(files: Path, steps: list[Step]) -> None:
     path = files.with_name("07_02.amc")
     path.write_bytes(damaged("\n".join(files.read_text().split("\n")[:60]).encode(), steps))
@@ -142,7 +142,7 @@ def test_damaged_motions_are_read_or_refused_in_a_sentence(files: Path, steps: l
 
 
 @given(steps=accidents)
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damaged_skeletons_are_read_or_refused_in_a_sentence(tmp_path: Path, steps: list[Step]) -> None:
     path = tmp_path / "07.asf"
     path.write_bytes(damaged(asf().encode(), steps))

@@ -252,7 +252,7 @@ def test_map_names_joints(motion: Motion, tmp_path: Path) -> None:
 
 
 @given(steps=accidents)
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=16, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damaged_files_are_read_or_refused_in_a_sentence(motion: Motion, steps: list[Step], tmp_path: Path) -> None:
     assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
     short = dataclasses.replace(motion, local_TJ33=motion.local_TJ33[:3], root_rotation_T33=motion.root_rotation_T33[:3],

@@ -325,7 +325,7 @@ def good_file(name: str, folder: Path) -> bytes:
 
 
 @pytest.mark.parametrize("name", WRITERS)
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_damaged_files_are_read_or_refused_by_name(
     tmp_path_factory: pytest.TempPathFactory, name: str, data: st.DataObject

@@ -194,7 +194,7 @@ def test_names(name: str, ours: str | None) -> None:
 
 
 @given(steps=accidents)
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=16, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damaged_files_are_read_or_refused_in_a_sentence(
     points: dict[str, np.ndarray], steps: list[Step], tmp_path: Path
 ) -> None:

@@ -52,8 +52,15 @@ def make_pose(**axis_angles: Tensor) -> Tensor:
     return rotation.axis_angle_to_matrix(whole)
 
 
-@pytest.mark.parametrize("robot", ["nao", "coman", "reachy"])
-def test_same_motion_however_the_file_is_written(robot: str, tmp_path: Path) -> None:
+ALL = {"all at once": {"rename": True, "reorder": True, "negate": True, "turn": (0.4, 2.0, -1.0), "scale": 3.0}}
+
+
+@pytest.mark.parametrize(
+    ("robot", "forms"), [("nao", FORMS), ("coman", ALL), ("reachy", ALL)], ids=["nao", "coman", "reachy"]
+)
+def test_same_motion_however_the_file_is_written(
+    robot: str, forms: Mapping[str, Mapping[str, Any]], tmp_path: Path
+) -> None:
     bend_T = torch.linspace(0.3, 1.2, 4)
     zero_T = torch.zeros(4)
     poses_TJ33 = make_pose(
@@ -62,10 +69,7 @@ def test_same_motion_however_the_file_is_written(robot: str, tmp_path: Path) -> 
         right_shoulder=torch.stack((zero_T, -0.4 * bend_T, 1.2 - bend_T), 1),
         right_elbow=torch.stack((zero_T, 0.8 * bend_T, zero_T), 1),
     )
-    check_forms(robot, FORMS, poses_TJ33, tmp_path)
-
-
-ALL = {"all at once": {"rename": True, "reorder": True, "negate": True, "turn": (0.4, 2.0, -1.0), "scale": 3.0}}
+    check_forms(robot, forms, poses_TJ33, tmp_path)
 
 
 @pytest.mark.parametrize("robot", ["nao", "coman", "g1"])
