@@ -145,6 +145,16 @@ def light_records(copied_database: Callable[[Engine], None]) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def light_pairs() -> Iterator[None]:
+    """Pairs are made as ever, but for a solver that learns from few poses (`lighten_pairs`)."""
+    from tests.light import lighten_pairs
+
+    with pytest.MonkeyPatch.context() as patch:
+        lighten_pairs(patch)
+        yield
+
+
 @pytest.fixture(scope="session")
 def server() -> ForkServerContext:
     """Starts processes that have imported everything already."""

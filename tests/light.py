@@ -16,7 +16,7 @@ def _leave_to_the_disk(connection: Any, _: object) -> None:
 
 def lighten(patch: pytest.MonkeyPatch) -> None:
     """Confidence is calibrated on few poses, a frame's time is taken once and of few frames at a time, figures in
-    pictures and pictures of studies are blank, pages show a moment, MLflow does not compare the installed versions with those that it has just
+    pictures, pictures of studies and of pairs' errors are blank, pages show a moment, MLflow does not compare the installed versions with those that it has just
     been told, and databases, from now on, do not wait until the disk has what they have written, which a killed process
     leaves whole.
     """
@@ -27,7 +27,7 @@ def lighten(patch: pytest.MonkeyPatch) -> None:
 
     from mrhubo.evaluation import latency
     from mrhubo.fitting import fit, measurement
-    from mrhubo.fitting.record import moving
+    from mrhubo.fitting.record import moving, pairs
     from mrhubo.search import plots
     from mrhubo.view import figures, pictures
 
@@ -39,5 +39,16 @@ def lighten(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(moving, "PAGE_SECONDS", 0.1)
     patch.setattr(figures, "render", lambda solids, size, *_, **__: Image.new("RGB", size))
     patch.setattr(plots, "_image", lambda axes, width=8.0: (plots.close(axes), Image.new("RGB", (80, 45)))[1])
+    patch.setattr(pairs, "phi_histogram", lambda phi, threshold: Image.new("RGB", (72, 42)))
     if not event.contains(Engine, "connect", _leave_to_the_disk):
         event.listen(Engine, "connect", _leave_to_the_disk)
+
+
+def lighten_pairs(patch: pytest.MonkeyPatch) -> None:
+    """The amortised solver learns from few robot poses: in tests it takes ten steps, and what it needs besides them
+    took most of their time. Processes whose pairs are compared all need this.
+    """
+    from mrhubo.pairing import amortiser
+
+    for name, value in {"_BATCH": 32, "_BLOCK": 8, "_CONDITIONED_ON": 256, "_MEASURED_ON": 32}.items():
+        patch.setattr(amortiser, name, value)

@@ -20,7 +20,7 @@ from mrhubo.errors import UserError
 from mrhubo.sweep import main
 from tests.chain import as_command, cut_motion
 
-pytestmark = pytest.mark.usefixtures("light_records")
+pytestmark = pytest.mark.usefixtures("light_records", "light_pairs")
 
 SMALL = [
     "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "trainer.max_steps=60",
@@ -34,7 +34,7 @@ SPACE = (
 @pytest.fixture()
 def arguments(root: Path, tmp_path: Path) -> list[str]:
     for name in ("drinking", "wave"):
-        cut_motion(name, tmp_path / "motions", (1, 2.5), every=3)
+        cut_motion(name, tmp_path / "motions", (1, 2), every=4)
     (tmp_path / "sweep.yaml").write_text(SPACE)
     return [
         "--config", str(root / "conf" / "nao.yaml"), "--sweep", str(tmp_path / "sweep.yaml"), "--quiet", *SMALL,
