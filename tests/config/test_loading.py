@@ -478,7 +478,7 @@ def test_wrong_comes_before_missing(tmp_path):
         (b"name: \xff\xfe", "test.yaml is not a YAML file: byte 6 is not UTF-8 text"),
         (b"name: \x00\x01", "test.yaml: not a text file: character 6 is not printable"),
         (b"a: " + b"x" * 1_000_000, "test.yaml is larger than 1 MB, which no config is"),
-        (b"loose: " + b"[" * 2000, "test.yaml: nested more than 50 levels deep"),
+        (b"loose: " + b"[" * 1000, "test.yaml: nested more than 50 levels deep"),
         (b"loose: " + b"[" * 60 + b"]" * 60, "test.yaml, line 1: nested more than 50 levels deep"),
         (b"loose: &a [*a]", "test.yaml, line 1: nested more than 50 levels deep"),
         (b'name: "\\UFFFFFFFF"', "test.yaml: not valid YAML: "),
