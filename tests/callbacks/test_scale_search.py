@@ -12,6 +12,7 @@ from typing import Any
 
 import lightning
 import mlflow
+import optuna
 import pytest
 import torch
 
@@ -160,6 +161,9 @@ def test_it_goes_on_where_it_stopped(
         stopped.search()  # without MLflow
     assert sum(measured) == 14 and measured[0] < 14, "stopped on the way"
     assert stopped.search(*runs).values == whole.values
+    databases = (f"sqlite:///{tmp_path / folder / 'studies.db'}" for folder in ("whole", "stopped"))
+    one, other = (optuna.load_study(study_name=stopped.name, storage=storage).trials for storage in databases)
+    assert [trial.params for trial in one] == [trial.params for trial in other] and len(one) == 14
     assert whole.distance_rad < 0.02  # it starts from the numbers that made the poses
 
 
