@@ -41,11 +41,10 @@ _TOGETHER = (
 )
 _LONGEST = (
     "tests/fast/", "tests/test_fit.py", "tests/benchmarks/test_benchmarks.py", "tests/golden/test_golden.py",
-    "tests/pairing/test_generate.py", "tests/callbacks/test_scale_search.py", "tests/universal/learning/test_training.py",
-    "tests/invariance/test_invariance.py", "tests/fitting/test_steps.py", "tests/streaming/test_stream.py",
-    "tests/test_examples.py", "tests/baselines/s3le/test_s3le.py", "tests/fitting/test_fit.py",
-    "tests/body/test_quasi_newton.py", "tests/retargeter/test_package.py",
-    "tests/paper/test_tables.py",
+    "tests/callbacks/test_scale_search.py", "tests/invariance/test_invariance.py", "tests/streaming/test_stream.py",
+    "tests/test_examples.py", "tests/body/test_quasi_newton.py", "tests/search/test_studies.py",
+    "tests/fitting/test_steps.py", "tests/retargeter/test_package.py", "tests/pairing/test_generate.py",
+    "tests/baselines/s3le/test_s3le.py", "tests/fitting/test_fit.py",
 )  # fmt: skip
 """Begun first: of several processes that share the files, none is left alone with a long one at the end."""
 

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from PIL.Image import Image, new
 
-from mrhubo.view import phi_histogram
-
 
 def _leave_to_the_disk(connection: Any, _: object) -> None:
     if isinstance(connection, sqlite3.Connection):
@@ -22,6 +20,8 @@ _drawn: list[Image] = []
 
 
 def _first_histogram(phi: np.ndarray, threshold: float) -> Image:
+    from mrhubo.view import phi_histogram
+
     if not _drawn:
         _drawn.append(phi_histogram(phi, threshold))
     return _drawn[0]
