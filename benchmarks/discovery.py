@@ -2,6 +2,7 @@
 random humanoids, and on other URDF files.
 
     python benchmarks/discovery.py [--seeds 0-1000] [--strange 0-100] [--urdfs FOLDER]
+        [--robots nao-whole-body,coman-whole-body,reachy]
 
 The shipped robots' hand-written configs, with legs and waist where they have them, are the measure of theirs. A random
 humanoid counts as right when its joints, points (2 cm on an arm of half a metre), up, forward, hands and feet are;
@@ -44,16 +45,17 @@ FORMS = {
     },
 }  # fmt: skip
 
+SHIPPED = "nao-whole-body,coman-whole-body,reachy"
 _MOST_TOLD = 200
 
 
 def main(argv: list[str]) -> None:
     """Prints the tables."""
-    options, argv = read_options(argv, seeds="0-1000", strange="0-100", urdfs="")
+    options, argv = read_options(argv, seeds="0-1000", strange="0-100", urdfs="", robots=SHIPPED)
     if argv:
         sys.exit(f"{argv[0]}: is unknown")
     print_header()
-    shipped()
+    shipped(options["robots"].split(","))
     made("random humanoids", [(seed, None) for seed in _range(options["seeds"])])
     made("strange humanoids", [(seed, kind) for kind in STRANGE for seed in _range(options["strange"])])
     if options["urdfs"]:
@@ -65,10 +67,10 @@ def _range(text: str) -> range:
     return range(int(first), int(last))
 
 
-def shipped() -> None:
+def shipped(robots: list[str]) -> None:
     """The shipped robots in every form."""
     rows = []
-    for robot in ("nao-whole-body", "coman-whole-body", "reachy"):
+    for robot in robots:
         config = load_config(project_root() / f"conf/{robot}.yaml").robot
         points = read_keypoints(config.keypoints).points
         description = describe(config.urdf)

@@ -51,7 +51,7 @@ def main(argv: list[str]) -> None:
         body_map = BodyMap.of(Robot.from_config(name) if name in SHIPPED else open_robot(name))
         retargeter = Retargeter(UniversalJoints(body_map, open_network()), body_map, prior, None, 0.0)
         target_TD3 = body_map.human_directions(local_TJ33)
-        exact = copy.deepcopy(retargeter).double().network.of_directions(target_TD3.double()).numpy()
+        exact = copy.deepcopy(retargeter.network).double().of_directions(target_TD3.double()).numpy()
         for form, answer in forms(retargeter).items():
             off_T = np.abs(answer(target_TD3.double().numpy()) - exact).max(axis=1)
             figures = measured(answer, target_TD3.double().numpy(), int(options["rounds"]))

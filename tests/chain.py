@@ -27,7 +27,7 @@ from mrhubo.fit import main as fit
 from mrhubo.pair import main as pair
 from mrhubo.retargeter import build_network
 from mrhubo.robot import build_body_map
-from tests.light import lighten
+from tests.light import lighten, lighten_pairs
 
 ROOT = Path(__file__).resolve().parent.parent
 __all__ = [
@@ -47,9 +47,10 @@ def as_command(
     name: str, arguments: Sequence[str], output: Path, environment: Mapping[str, str], largest: int | None = None
 ) -> None:
     """In a process of its own: what `python -m mrhubo.<name>` does, in a session of its own, its output in a file, but
-    for what `lighten` says; no file can be larger than `largest` bytes.
+    for what `lighten` and `lighten_pairs` say; no file can be larger than `largest` bytes.
     """
-    lighten(pytest.MonkeyPatch())
+    lighten(patch := pytest.MonkeyPatch())
+    lighten_pairs(patch)
     if largest is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
     _go_apart(output, environment)
@@ -92,8 +93,9 @@ def _go_apart(output: Path, environment: Mapping[str, str]) -> None:
 
 def killed_at(event: int, folder: Path, command: Callable[[list[str]], object], arguments: list[str]) -> None:
     """In a process of its own: a command that is killed as it is about to touch a folder for the n-th time (files and
-    folders opened, made, renamed, removed), if it ever does.
+    folders opened, made, renamed, removed), if it ever does; as `lighten_pairs` says.
     """
+    lighten_pairs(pytest.MonkeyPatch())
     left = [event]
 
     def count(name: str, given: tuple[object, ...]) -> None:

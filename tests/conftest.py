@@ -46,7 +46,7 @@ _LONGEST = (
     "tests/body/test_quasi_newton.py", "tests/baselines/s3le/test_s3le.py", "tests/fitting/test_fit.py",
     "tests/benchmarks/test_benchmarks.py", "tests/test_examples.py", "tests/invariance/test_invariance.py",
     "tests/streaming/test_ground.py", "tests/retargeter/test_package.py", "tests/exporting/test_onnx_universal.py",
-    "tests/paper/test_tables.py",
+    "tests/paper/test_tables.py", "tests/search/test_studies.py",
 )  # fmt: skip
 """Begun first: of several processes that share the files, none is left alone with a long one at the end. The first one
 compiles for minutes in a clean clone; what uses that too (benchmarks, examples) comes late, or would compile it again.
@@ -153,6 +153,16 @@ def light_records(copied_database: Callable[[Engine], None]) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(databases, "_initialize_tables", copied_database)
         lighten(patch)
+        yield
+
+
+@pytest.fixture(scope="module")
+def light_pairs() -> Iterator[None]:
+    """Pairs are made as ever, but for a solver that learns from few poses (`lighten_pairs`)."""
+    from tests.light import lighten_pairs
+
+    with pytest.MonkeyPatch.context() as patch:
+        lighten_pairs(patch)
         yield
 
 

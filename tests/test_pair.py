@@ -24,6 +24,8 @@ from mrhubo.pairing import PairStore, workers
 from mrhubo.pairing.verify import check_shard
 from tests.chain import as_command, as_torchrun, killed_at
 
+pytestmark = pytest.mark.usefixtures("light_pairs")
+
 SMALL = [
     "pairs.solver=fine", "pairs.count=900", "pairs.reverse_share=0.5", "pairs.shard_size=150", "pairs.amortiser_steps=10", "pairs.fine_steps=4",
 ]  # fmt: skip
@@ -198,7 +200,7 @@ def test_killed_at_many_moments_it_ends_with_the_same_bytes(
         event = draw.randrange(1, 16) if at_files else 10**9
         process = server.Process(target=killed_at, args=(event, tmp_path, main, given))
         process.start()
-        process.join(60 if at_files else draw.uniform(0.0, 1.0))
+        process.join(60 if at_files else draw.uniform(0.0, 0.5))
         process.kill()
         process.join()
         assert process.exitcode in (0, -signal.SIGKILL)
@@ -217,13 +219,14 @@ def test_killed_at_many_moments_it_ends_with_the_same_bytes(
 def test_two_processes_on_one_folder_do_not_disturb_each_other(
     root: Path, tmp_path: Path, undisturbed: Path, server: ForkServerContext
 ) -> None:
-    both = [server.Process(target=main, args=(arguments(root, tmp_path),)) for _ in range(2)]
+    given, folder = arguments(root, tmp_path / "pairs"), tmp_path / "pairs"
+    both = [server.Process(target=as_command, args=("pair", given, tmp_path / f"{i}", {})) for i in range(2)]
     for process in both:
         process.start()
     for process in both:
         process.join(120)
     assert [process.exitcode for process in both] == [0, 0]
-    assert contents(tmp_path) == contents(undisturbed)
+    assert contents(folder) == contents(undisturbed)
 
 
 def test_a_full_disk_ends_in_one_sentence_and_no_broken_file(

@@ -20,21 +20,21 @@ from mrhubo.errors import UserError
 from mrhubo.sweep import main
 from tests.chain import as_command, cut_motion
 
-pytestmark = pytest.mark.usefixtures("light_records")
+pytestmark = pytest.mark.usefixtures("light_records", "light_pairs")
 
 SMALL = [
-    "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "trainer.max_steps=60",
-    "trainer.batch_size=64", "trainer.validate_every=20", "trainer.accelerator=cpu",
+    "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "trainer.max_steps=30",
+    "trainer.batch_size=64", "trainer.validate_every=10", "trainer.accelerator=cpu",
 ]  # fmt: skip
 SPACE = (
-    "name: tiny\ntrials: 4\nspace:\n  model.hidden: [8, 16, 32]\n  trainer.lr: {low: 0.001, high: 0.01, log: true}\n"
+    "name: tiny\ntrials: 3\nspace:\n  model.hidden: [8, 16, 32]\n  trainer.lr: {low: 0.001, high: 0.01, log: true}\n"
 )
 
 
 @pytest.fixture()
 def arguments(root: Path, tmp_path: Path) -> list[str]:
     for name in ("drinking", "wave"):
-        cut_motion(name, tmp_path / "motions", (1, 2.5), every=3)
+        cut_motion(name, tmp_path / "motions", (1, 2), every=4)
     (tmp_path / "sweep.yaml").write_text(SPACE)
     return [
         "--config", str(root / "conf" / "nao.yaml"), "--sweep", str(tmp_path / "sweep.yaml"), "--quiet", *SMALL,
@@ -88,7 +88,7 @@ def test_one_of_two_processes_dies(
     output = capfd.readouterr().out
     (study,) = studies_of(tmp_path / "runs")
     states = [trial.state.name for trial in study.trials]
-    assert states.count("COMPLETE") + states.count("PRUNED") == 4 and states.count("FAIL") == 1
+    assert states.count("COMPLETE") + states.count("PRUNED") == 3 and states.count("FAIL") == 1
     dead = next(trial for trial in study.trials if trial.state.name == "FAIL")
     later = [trial.params.items() for trial in study.trials if trial.number > dead.number]
     assert any(dead.params.items() <= params for params in later)  # it may have died before it had drawn all
@@ -118,7 +118,7 @@ def test_a_known_config_is_not_trained_again(arguments: list[str], tmp_path: Pat
     values = {(trial.params["model.hidden"], trial.value) for trial in study.trials}
     assert len(study.trials) == 4 and len(values) <= 2
     (best,) = (tmp_path / "runs" / "sweeps").glob("*.yaml")
-    assert load_config(best).trainer.max_steps == 60  # the command line's, not the file's
+    assert load_config(best).trainer.max_steps == 30  # the command line's, not the file's
 
 
 @pytest.mark.parametrize(

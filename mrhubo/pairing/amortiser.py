@@ -24,6 +24,8 @@ from mrhubo.runtime.trainer import cosine_schedule
 _BATCH = 256
 _BLOCK = 32
 """Steps whose robot poses are drawn at once: kinematics of a few poses take nearly as long as those of many."""
+_CONDITIONED_ON, _MEASURED_ON = 4096, 1024
+"""Robot poses that tell how the inputs spread, and how the cost bends where the answers lie."""
 _LR = 2e-3
 _CHECKPOINT_EVERY = 250
 
@@ -100,7 +102,7 @@ def train_amortiser(
         network = Amortiser(len(problem.keypoints), problem.latent)
     if _restore(path, header, network=network):
         return network.to(device).requires_grad_(False).eval()
-    network.condition(draw(4096, torch.Generator().manual_seed(seed)).cpu(), problem.metric.cpu())
+    network.condition(draw(_CONDITIONED_ON, torch.Generator().manual_seed(seed)).cpu(), problem.metric.cpu())
     network = network.to(device)
     optimizer = torch.optim.Adam(network.parameters(), _LR, fused=True)
     checkpoint = path.with_suffix(".checkpoint")
@@ -129,7 +131,8 @@ def train_amortiser(
             if (step + 1) % _CHECKPOINT_EVERY == 0 and step + 1 < steps:
                 write_tensors(checkpoint, _state(network, optimizer, step + 1), header)
     with torch.no_grad():
-        network.metric_ZZ.copy_(problem.metric_of(network(draw(1024, torch.Generator().manual_seed(seed)))))
+        sample = draw(_MEASURED_ON, torch.Generator().manual_seed(seed))
+        network.metric_ZZ.copy_(problem.metric_of(network(sample)))
     write_tensors(path, _state(network), header)
     checkpoint.unlink(missing_ok=True)
     return network.requires_grad_(False).eval()

@@ -17,9 +17,9 @@ MakeProblem = Callable[..., tuple[LatentProblem, Tensor]]
 def test_the_optimum_near_the_start_is_found(latent_problem: MakeProblem) -> None:
     problem, _ = latent_problem("nao")
     generator = torch.Generator().manual_seed(0)
-    truth = 0.6 * torch.randn(100, problem.latent, generator=generator)
+    truth = 0.6 * torch.randn(40, problem.latent, generator=generator)
     target = problem.keypoints_of(truth)
-    start = truth + 0.2 * torch.randn(100, problem.latent, generator=generator)
+    start = truth + 0.2 * torch.randn(40, problem.latent, generator=generator)
     found = solve_levenberg_marquardt(problem, start, target, 200, tolerance=1e-7)
     before, after = problem.cost(start, target), problem.cost(found, target)
     assert bool((after <= before).all()), "no pose gets worse"
@@ -38,7 +38,7 @@ def test_an_impossible_target_gives_a_finite_answer(latent_problem: MakeProblem)
 
 def test_with_a_weak_prior_quasi_newton_ends_lower_than_levenberg_marquardt(latent_problem: MakeProblem) -> None:
     problem, target = latent_problem("coman", w_prior=0.001)
-    target = target[:100]
+    target = target[:30]
     start = nearest_samples(problem, target)
     ours = problem.cost(solve_quasi_newton(problem, start, target, 200, tolerance=1e-4), target)
     other = problem.cost(solve_levenberg_marquardt(problem, start, target, 200, tolerance=1e-6), target)

@@ -58,7 +58,7 @@ def test_mirrored_poses_are_as_plausible(prior: BodyPrior, external_dir: Path) -
 def test_it_is_as_good_on_the_evaluation_clips_as_the_card_says(prior: BodyPrior, external_dir: Path) -> None:
     motions = read_folder(external_dir / "cmu" / "evaluation")
     means = {
-        m.name: float(reconstruction(prior, Skeleton(), rotation.matrix_to_sixd(m.local_TJ33))[0].mean())
+        m.name: float(reconstruction(prior, Skeleton(), rotation.matrix_to_sixd(m.local_TJ33[::5]))[0].mean())
         for m in motions
     }
     assert sum(means.values()) / len(means) < 4

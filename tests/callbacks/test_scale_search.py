@@ -12,11 +12,13 @@ from typing import Any
 
 import lightning
 import mlflow
+import optuna
 import pytest
 import torch
 
 from mrhubo import rotation
 from mrhubo.body import BodyPrior
+from mrhubo.callbacks import scale_search
 from mrhubo.callbacks.scale_search import ScaleFactorSearch, ScaleResult
 from mrhubo.config import Config, load_config
 from mrhubo.errors import UserError
@@ -34,9 +36,9 @@ from mrhubo.runtime.tracking import open_client
 from mrhubo.runtime.trainer import quiet_lightning
 from tests.chain import cut_motion
 
-pytestmark = pytest.mark.usefixtures("light_records")
+pytestmark = pytest.mark.usefixtures("light_records", "light_pairs")
 
-RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 24, poses: 12}"
+RANGES = "robot.search={ranges: {factor: [1.0, 3.0], upper_arm: [0.0, 0.8], shoulder.y: [-0.05, 0.05]}, trials: 14, poses: 12}"
 
 
 @pytest.fixture(scope="module")
@@ -124,11 +126,11 @@ def test_it_comes_near_the_numbers_that_made_the_poses(
     manual = found.config.robot.manual
     assert manual is not None and manual.factor == found.values["factor"] and 1.0 <= manual.factor <= 3.0
     assert set(found.pictures) >= {"history", "poses"}
-    assert stream.getvalue().splitlines()[-1].startswith("scale factor: 24 of 24 trials")
+    assert stream.getvalue().splitlines()[-1].startswith("scale factor: 14 of 14 trials")
     nested = runs[0].search_runs(
         [runs[0].get_experiment_by_name("mrhubo").experiment_id], f"tags.`mlflow.parentRunId` = '{runs[1]}'"
     )
-    assert len(nested) == 24 and all(run.info.status == "FINISHED" for run in nested)
+    assert len(nested) == 14 and all(run.info.status == "FINISHED" for run in nested)
     best = min(run.data.metrics["scale/distance_rad"] for run in nested)
     assert best == pytest.approx(found.distance_rad)
     assert start.robot.manual.factor == 2.7  # the config that was given stays as it was
@@ -143,21 +145,25 @@ def test_it_goes_on_where_it_stopped(
     runs: tuple[Any, str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(scale_search, "_AT_ONCE", 11)  # the sampler learns from the eleventh trial on
     whole = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "whole").search()
     stopped = ScaleFactorSearch(config, body_map, prior, [clip], tmp_path / "stopped")
     measured = []
 
     def measure(manuals: list[Any]) -> torch.Tensor:
         measured.append(len(manuals))
-        if sum(measured) > 20:
+        if sum(measured) > 11:
             raise KeyboardInterrupt
         return ScaleFactorObjective.measure(stopped.objective, manuals)
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(stopped.objective, "measure", measure)
         stopped.search()  # without MLflow
-    assert sum(measured) == 24 and measured[0] < 24, "stopped on the way"
+    assert sum(measured) == 14 and measured[0] < 14, "stopped on the way"
     assert stopped.search(*runs).values == whole.values
+    databases = (f"sqlite:///{tmp_path / folder / 'studies.db'}" for folder in ("whole", "stopped"))
+    one, other = (optuna.load_study(study_name=stopped.name, storage=storage).trials for storage in databases)
+    assert [trial.params for trial in one] == [trial.params for trial in other] and len(one) == 14
     assert whole.distance_rad < 0.02  # it starts from the numbers that made the poses
 
 
@@ -219,9 +225,9 @@ def test_as_a_callback_it_hands_what_it_finds_to_the_data_module(
 
 def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
     for name in ("drinking", "wave"):
-        cut_motion(name, tmp_path / "motions", (1, 4), every=3)
+        cut_motion(name, tmp_path / "motions", (1, 2), every=4)
     arguments = [
-        "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("24", "8"),
+        "--config", str(root / "conf" / "paper" / "nao.yaml"), "--quiet", "robot.scale=search", RANGES.replace("14", "4"),
         "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=10", "pairs.fine_steps=5", "pairs.solver=fine",
         "model.hidden=16", "trainer.max_steps=20", "trainer.batch_size=64", "trainer.accelerator=cpu",
         f"evaluation.motions=[{tmp_path / 'motions'}]", f"pairs.dir={tmp_path / 'pairs'}", f"tracking.dir={tmp_path / 'runs'}",
@@ -233,7 +239,7 @@ def test_a_fit_goes_on_with_what_was_found(root: Path, tmp_path: Path) -> None:
     assert experiment is not None
     found = client.search_runs([experiment.experiment_id])
     (run,) = [run for run in found if "mlflow.parentRunId" not in run.data.tags]
-    assert len(found) == 1 + 8 and run.info.status == "FINISHED"
+    assert len(found) == 1 + 4 and run.info.status == "FINISHED"
     found, start = (run.data.metrics[f"scale/{name}"] for name in ("distance_rad", "start_distance_rad"))
     assert 0 < found < start + 1e-6 < math.pi  # where nothing better is found, both are the same but for rounding
     artifacts = tmp_path / "runs" / "artifacts" / run.info.run_id / "artifacts"

@@ -168,7 +168,7 @@ def test_the_command_measures_a_package_and_refuses_another_robots(
     made = Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
     package = made.save(tmp_path / "package", {})
     for name in ("drinking", "wave"):
-        cut_motion(name, tmp_path, (1, 3), every=4)
+        cut_motion(name, tmp_path, (1, 2), every=4)
     given = ["--retargeter", str(package), "--quiet", f"pairs.dir={tmp_path}", f"evaluation.motions=[{tmp_path}]"]
     plain = ""
     for flags, clip in (([], "wave"), (["--validation", "--polish", "0"], "drinking")):

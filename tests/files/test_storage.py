@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import pytest
 import torch
@@ -111,20 +112,23 @@ def test_a_folder_in_the_way_is_a_clear_error(tmp_path: Path) -> None:
 
 HOLD = (
     "import sys, time; from pathlib import Path; from mrhubo.files.storage import locked\n"
-    "with locked(Path(sys.argv[1]), wait=True):\n"
-    "    print('held', flush=True)\n"
-    "    time.sleep(float(sys.argv[2]))\n"
-    "print('given back', flush=True)\n"
+    "for seconds in (0.5, 60):\n"
+    "    with locked(Path(sys.argv[1]), wait=True):\n"
+    "        print('held', flush=True)\n"
+    "        time.sleep(seconds)\n"
+    "        print('given back', flush=True)\n"
+    "    sys.stdin.readline()\n"
 )
 
 
 @contextmanager
-def holder(lock: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
-    """Another process that holds a lock, until it ends or for some seconds."""
-    process = subprocess.Popen([sys.executable, "-c", HOLD, str(lock), str(seconds)], stdout=subprocess.PIPE, text=True)
+def holder(lock: Path) -> Iterator[tuple[IO[str], IO[str], subprocess.Popen[str]]]:
+    """Another process that holds a lock for half a second, and when it is told to, until it ends."""
+    command = [sys.executable, "-c", HOLD, str(lock)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
     try:
-        assert process.stdout and process.stdout.readline() == "held\n"
-        yield process
+        assert process.stdin and process.stdout and process.stdout.readline() == "held\n"
+        yield process.stdin, process.stdout, process
     finally:
         process.kill()
         process.communicate()
@@ -136,9 +140,13 @@ def test_a_path_without_a_name_is_a_clear_error(path: str) -> None:
         pass
 
 
-def test_a_lock_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
+def test_who_waits_gets_the_lock_after_the_other_and_it_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
     lock = tmp_path / "work" / "lock"
-    with holder(lock, 60) as process:
+    with holder(lock) as (told, says, process):
+        with locked(lock, wait=True):
+            assert says.readline() == "given back\n"
+        told.write("go on\n")
+        assert says.readline() == "held\n"
         with (
             pytest.raises(Locked, match=r"work: another process is at work there; wait for it or stop it"),
             locked(lock),
@@ -148,12 +156,6 @@ def test_a_lock_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
         process.wait()
         with locked(lock):
             pass
-
-
-def test_who_waits_gets_the_lock_after_the_other(tmp_path: Path) -> None:
-    lock = tmp_path / "lock"
-    with holder(lock, 0.5) as process, locked(lock, wait=True):
-        assert process.stdout and process.stdout.readline() == "given back\n"
 
 
 def test_a_lock_is_given_back_when_its_block_fails(tmp_path: Path) -> None:

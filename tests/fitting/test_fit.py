@@ -24,6 +24,9 @@ from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.runtime import client as clients
 from mrhubo.runtime.database import database_uri
 from mrhubo.runtime.tracking import open_client
+from tests.chain import cut_motion
+
+pytestmark = pytest.mark.usefixtures("light_records")
 
 SERVER = ("log_batch", "log_text", "log_artifact", "log_artifacts", "log_inputs", "set_tag", "set_terminated", "get_run",
           "search_runs", "search_model_versions", "create_logged_model", "create_run", "update_run")  # fmt: skip
@@ -39,9 +42,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def config(root: Path, tmp_path: Path, empty_tracking: Path) -> Config:
     shutil.copytree(empty_tracking, tmp_path / "mlruns")
-    (tmp_path / "motions").mkdir()
     for name in ("drinking", "wave"):
-        shutil.copy(root / "data" / "motions" / f"{name}.npz", tmp_path / "motions")
+        cut_motion(name, tmp_path / "motions", (1, 2), every=4)
     changes = [
         f"tracking.dir={tmp_path / 'mlruns'}", f"pairs.dir={tmp_path / 'pairs'}", "model.hidden=8",
         f"evaluation.motions=[{tmp_path / 'motions'}]", "trainer.accelerator=cpu",

@@ -27,7 +27,7 @@ from mrhubo.runtime.progress import SILENT
 from mrhubo.runtime.tracking import open_client
 from tests.chain import cut_motion
 
-pytestmark = pytest.mark.usefixtures("light_records")
+pytestmark = pytest.mark.usefixtures("light_records", "light_pairs")
 
 SMALL = [
     "pairs.count=200", "pairs.shard_size=100", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "model.hidden=16",
@@ -39,7 +39,7 @@ SMALL = [
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in which everything lies that no config places."""
     for name in ("drinking", "wave"):
-        cut_motion(name, tmp_path / "data" / "motions", (1, 3), every=2)
+        cut_motion(name, tmp_path / "data" / "motions", (1, 2), every=4)
     monkeypatch.setattr(locations, "project_root", lambda: tmp_path)
     monkeypatch.setattr(locations, "shipped_root", lambda: tmp_path)
     return tmp_path
@@ -119,27 +119,24 @@ def test_pairs_wait_for_the_scale_factor(root: Path, home: Path) -> None:
     assert data.prepared.store.missing() == [] and prepared.store.missing() == [0, 1]
 
 
-@pytest.mark.parametrize(
-    ("error", "status"), [(KeyboardInterrupt(), "KILLED"), (UserError("the disk is full"), "FAILED")]
-)
-def test_stopped_while_pairs_are_made_it_goes_on(
-    home: Path, config: Config, monkeypatch: pytest.MonkeyPatch, error: BaseException, status: str
-) -> None:
+def test_stopped_while_pairs_are_made_it_goes_on(home: Path, config: Config, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are made inside Lightning's trainer, which has ways of its own to end."""
+    handler, runs = signal.getsignal(signal.SIGINT), set()
+    for error, status in ((UserError("the disk is full"), "FAILED"), (KeyboardInterrupt(), "KILLED")):
 
-    def stop(*_: object) -> None:
-        raise error
+        def stop(*_: object, error: BaseException = error) -> None:
+            raise error
 
-    handler = signal.getsignal(signal.SIGINT)
-    with monkeypatch.context() as patch, pytest.raises(type(error)):
-        patch.setattr(datamodule, "make_pairs", stop)
-        fit(config, SILENT)
-    assert signal.getsignal(signal.SIGINT) is handler
-    client = open_client(home / "mlruns", "mrhubo")
-    experiment = client.get_experiment_by_name("mrhubo")
-    assert experiment is not None
-    (stopped,) = client.search_runs([experiment.experiment_id])
-    assert stopped.info.status == status and "ended_by" in stopped.data.tags
+        with monkeypatch.context() as patch, pytest.raises(type(error)):
+            patch.setattr(datamodule, "make_pairs", stop)
+            fit(config, SILENT)
+        assert signal.getsignal(signal.SIGINT) is handler
+        client = open_client(home / "mlruns", "mrhubo")
+        experiment = client.get_experiment_by_name("mrhubo")
+        assert experiment is not None
+        (stopped,) = client.search_runs([experiment.experiment_id])
+        assert stopped.info.status == status and "ended_by" in stopped.data.tags
+        runs.add(stopped.info.run_id)
     result = fit(config, SILENT)
-    assert result is not None and result.run_id == stopped.info.run_id
+    assert result is not None and {result.run_id} == runs
     assert client.get_run(result.run_id).info.status == "FINISHED"

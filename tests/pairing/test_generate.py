@@ -19,12 +19,14 @@ from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import build_body_map
 from mrhubo.robot.plausibility import read_phi
 
+pytestmark = pytest.mark.usefixtures("light_pairs")
+
 SMALL = [
     "pairs.count=250",
     "pairs.reverse_share=0.4",
     "pairs.shard_size=100",
     "pairs.solver=fine",
-    "pairs.amortiser_steps=30",
+    "pairs.amortiser_steps=40",
     "pairs.fine_steps=3",
 ]
 

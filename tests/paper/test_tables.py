@@ -18,7 +18,7 @@ from mrhubo.runtime.database import database_uri
 from mrhubo.runtime.progress import Reporter
 from tests.chain import cut_motion
 
-pytestmark = pytest.mark.usefixtures("light_records")
+pytestmark = pytest.mark.usefixtures("light_records", "light_pairs")
 
 SMALL = [
     "pairs.count=400", "pairs.shard_size=200", "pairs.amortiser_steps=10", "pairs.fine_steps=3", "model.hidden=16",
@@ -97,7 +97,7 @@ def test_the_command_trains_once_and_finds_what_is_done(
     methods = ("one stage", "our default")
     motions = tmp_path / "motions"
     for name in ("drinking", "wave"):
-        cut_motion(name, motions, (1, 3), every=2)
+        cut_motion(name, motions, (1, 2), every=4)
     given = ["--robots", "nao", "--methods", ", ".join(methods), "--seeds", "1", "--quiet", *SMALL]
     given += [f"pairs.dir={tmp_path / 'pairs'}"]
     given += [f"tracking.dir={tmp_path / 'mlruns'}", f"evaluation.motions=[{motions}]", "trainer.accelerator=cpu"]

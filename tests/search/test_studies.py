@@ -45,17 +45,30 @@ def test_an_interrupted_trial_is_drawn_again(tmp_path: Path) -> None:
     assert [trial.state.name for trial in study.trials] == ["COMPLETE", "COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
 
 
-@pytest.mark.parametrize("drawn", [["x", "n"], ["x"], []], ids=len)
-def test_a_dead_process_trial_is_drawn_again_at_once(tmp_path: Path, drawn: list[str]) -> None:
-    draws = {"x": "trial.suggest_float('x', -1, 1)", "n": "trial.suggest_int('n', 0, 3)"}
+@pytest.fixture(scope="module")
+def deaths(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folders whose names are how many parameters a process had drawn when it was killed: of one interpreter, which
+    takes seconds to start, there is a process for each.
+    """
+    folder = tmp_path_factory.mktemp("deaths")
     code = (
         "import os, sys; from pathlib import Path; from mrhubo.search import open_study, work_on\n"
-        f"def die(trial): {'; '.join([*(draws[name] for name in drawn), 'os.kill(os.getpid(), 9)'])}\n"
-        "work_on(open_study(Path(sys.argv[1]), None, 's', 'random', 0), die, 2)"
+        "def die(trial):\n"
+        "    draws = lambda: trial.suggest_float('x', -1, 1), lambda: trial.suggest_int('n', 0, 3)\n"
+        "    [draw() for draw in draws[:drawn]]\n"
+        "    os.kill(os.getpid(), 9)\n"
+        "for drawn in range(3):\n"
+        "    if not (child := os.fork()):\n"
+        "        work_on(open_study(Path(sys.argv[1]) / str(drawn), None, 's', 'random', 0), die, 2)\n"
+        "    assert os.waitpid(child, 0)[1] == 9, 'killed'"
     )
-    ended = subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=120)
-    assert ended.returncode == -9
-    study = open_study(tmp_path, None, "s", "random", 0)
+    subprocess.run([sys.executable, "-c", code, str(folder)], timeout=120, check=True)
+    return folder
+
+
+@pytest.mark.parametrize("drawn", [["x", "n"], ["x"], []], ids=len)
+def test_a_dead_process_trial_is_drawn_again_at_once(deaths: Path, drawn: list[str]) -> None:
+    study = open_study(deaths / str(len(drawn)), None, "s", "random", 0)
     assert len(open_trials(study)) == 1
     work_on(study, objective, 2)
     assert [trial.state.name for trial in study.trials] == ["FAIL", "COMPLETE", "COMPLETE"] and not open_trials(study)

@@ -26,7 +26,7 @@ from tests.chain import cut_motion
 
 pytestmark = pytest.mark.usefixtures("light_records")
 
-SMALL = S3LEConfig(glue=400, random_poses=3000, self_made=500, latent=8, hidden=64, steps=250, batch_size=128)
+SMALL = S3LEConfig(glue=400, random_poses=3000, self_made=500, latent=8, hidden=64, steps=120, batch_size=128)
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_the_command_measures_searches_and_resumes(
 ) -> None:
     motions = tmp_path / "motions"
     for name in ("drinking", "wave"):
-        cut_motion(name, motions, (1, 4), every=3)
+        cut_motion(name, motions, (1, 2), every=4)
     axis_angle = matrix_to_axis_angle(poses).flatten(1)
     whole = torch.cat((torch.zeros(len(poses), 3), axis_angle), dim=1).numpy()
     np.savez(tmp_path / "poses.npz", poses=whole, clip_starts=np.array([0, 600]), clip_ids=np.array(["a"]))
