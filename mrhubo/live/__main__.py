@@ -100,6 +100,7 @@ def main(argv: list[str]) -> int:
     plan.refuse_inputs([options.robot, options.retargeter, options.certificate])
     if certificate is not None and not plan.has_page:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
+    plan.check_addresses()
     if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
         print("the first session on a machine compiles, which takes a minute", flush=True)
     if options.retargeter is None:

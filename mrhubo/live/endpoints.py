@@ -57,6 +57,22 @@ class Endpoint:
         """Whether only this machine reaches it."""
         return is_loopback(self.host)
 
+    def bound(self, kind: int = socket.SOCK_DGRAM) -> socket.socket:
+        """A socket that is bound to the address.
+
+        Raises:
+            UserError: the address is used, or not ours.
+        """
+        bound, address = self.socket(kind)
+        try:
+            if kind == socket.SOCK_STREAM and os.name == "posix":  # as asyncio does: a port that was just left is free
+                bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.bind(address)
+        except OSError as error:
+            bound.close()
+            raise UserError(f"{self.shown}: cannot listen there: {error.strerror or error}") from error
+        return bound
+
     def socket(self, kind: int = socket.SOCK_DGRAM) -> tuple[socket.socket, tuple]:
         """A socket of the right family that is not bound yet, and the address.
 

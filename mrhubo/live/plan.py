@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
@@ -94,6 +96,24 @@ class Plan:
             path = getattr(sink, "path", None)
             if isinstance(path, Path):
                 refuse_input("--sink", path, inputs)
+
+    def check_addresses(self) -> None:
+        """Binds all addresses and leaves them again: one that cannot be had is told before anything is compiled.
+
+        Raises:
+            UserError: one is used, by another program or by two sources of this session, is not ours, or is unknown.
+        """
+        with contextlib.ExitStack() as bound:
+            for server in self._servers.values():
+                bound.enter_context(server.endpoint.bound(socket.SOCK_STREAM))
+            for source in self.sources:
+                endpoint = getattr(source, "endpoint", None)
+                if isinstance(endpoint, Endpoint):
+                    bound.enter_context(endpoint.bound())
+            for sink in self.sinks:
+                endpoint = getattr(sink, "endpoint", None)
+                if isinstance(endpoint, Endpoint):
+                    bound.enter_context(endpoint.socket()[0])
 
     def _server(self, where: str, text: str) -> Server:
         endpoint = Endpoint.read(where, text, PORT, self._host)

@@ -327,6 +327,21 @@ def test_what_is_replayed_or_read_is_not_written_over(
         plan.refuse_inputs([None, "nao", "my.yaml"])
 
 
+def test_addresses_that_cannot_be_had_are_refused_before_anything_is_compiled() -> None:
+    with Endpoint("127.0.0.1", 0).bound() as used:
+        port = used.getsockname()[1]
+        plan = Plan()
+        for part in ("ws:0", f"udp:{port}"):
+            plan.add_source(part)
+        with pytest.raises(UserError, match=f"127.0.0.1:{port}: cannot listen there"):
+            plan.check_addresses()
+    plan.check_addresses()
+    plan.check_addresses()  # nothing is kept
+    plan.add_source(f"udp:{port}")
+    with pytest.raises(UserError, match="cannot listen there"):
+        plan.check_addresses()
+
+
 def test_source_and_sink_on_one_port_share_a_server() -> None:
     plan = Plan()
     plan.add_source("ws:8111")

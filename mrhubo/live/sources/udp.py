@@ -6,7 +6,6 @@ import json
 import socket
 from collections.abc import Callable
 
-from mrhubo.errors import UserError
 from mrhubo.live.endpoints import Endpoint, find_token, token_fits
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
@@ -30,14 +29,9 @@ class Datagrams:
         Raises:
             UserError: the address is used, or not ours.
         """
-        self._socket, address = self.endpoint.socket()
-        try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-            self._socket.setblocking(False)
-            self._socket.bind(address)
-        except OSError as error:
-            self.close()
-            raise UserError(f"{self.endpoint.shown}: cannot listen there: {error.strerror or error}") from error
+        self._socket = self.endpoint.bound()
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._socket.setblocking(False)
         self.endpoint = Endpoint(self.endpoint.host, self._socket.getsockname()[1])
         return self.endpoint
 
