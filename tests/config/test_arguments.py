@@ -109,6 +109,7 @@ def test_values() -> None:
         (["--confg", "x"], "command line: flag '--confg' does not exist; nearest: '--config'"),
         (["--confg=x"], "command line: flag '--confg' does not exist; nearest: '--config'"),
         (["--hlep"], "command line: flag '--hlep' does not exist; nearest: '--help'"),
+        (["-"], "command line: '-' is no file: standard input and output are not used; name a file"),
         (["--verbosity"], "command line: flag '--verbosity' does not exist; available: --config, --count, "),
         (["--qui"], "command line: flag '--qui' does not exist; nearest: '--quiet'"),
         (["--out"], "command line: --out needs a value: --out FILE"),
