@@ -63,7 +63,8 @@ def main(argv: list[str]) -> None:
         return
     if options.polish is not None or options.validation:
         raise UserError("command line: --polish and --validation are for a package; predictions stay as they are")
-    print(measure_predictions(prepare(config), report, [Path(name) for name in options.predictions]))
+    prepared = prepare(config, split=False)
+    print(measure_predictions(prepared, report, [Path(name) for name in options.predictions]))
 
 
 if __name__ == "__main__":

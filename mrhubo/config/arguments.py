@@ -143,6 +143,8 @@ class CommandParser(argparse.ArgumentParser, Generic[T]):
         name = argument.partition("=")[0]
         if not name.startswith("-") or name in self._option_string_actions or re.fullmatch(r"-[0-9.]+", name):
             return
+        if name == "-":
+            raise UserError("command line: '-' is no file: standard input and output are not used; name a file")
         key = name.lstrip("-")
         if self.schema is not None and key in keys_of(self.schema):
             raise UserError(f"command line: '{argument}' is a key, not a flag: write {key}=VALUE")

@@ -60,9 +60,9 @@ class Motions:
         return [*self.validation, *self.test]
 
 
-def load_motions(config: Config, skeleton: Skeleton | None = None) -> Motions:
+def load_motions(config: Config, skeleton: Skeleton | None = None, split: bool = True) -> Motions:
     """Reads and splits the motions of `evaluation`, or those that lie where motions lie by default; their rotations are
-    for a skeleton (`Motion.for_skeleton`), by default ours.
+    for a skeleton (`Motion.for_skeleton`), by default ours. Unless `split`, either part may be empty.
 
     Raises:
         UserError: no folder exists, a file cannot be used, a clip for validation is not there, or the split leaves
@@ -81,12 +81,14 @@ def load_motions(config: Config, skeleton: Skeleton | None = None) -> Motions:
         ) from error
     names = set(config.evaluation.validation)
     missing = sorted(names.difference(m.name for m in motions))
-    if missing and config.evaluation.validation != EvaluationConfig().validation:  # which names clips of two folders
+    if (
+        split and missing and config.evaluation.validation != EvaluationConfig().validation
+    ):  # which names clips of two folders
         known = unknown_name("clip", missing[0], [m.name for m in motions], str(folder))
         raise UserError(f"evaluation.validation: {known}")
     validation = [m for m in motions if m.name in names]
     test = [m for m in motions if m.name not in names]
-    if not validation or not test:
+    if split and not (validation and test):
         found = ", ".join(m.name for m in motions)
         which = "validation" if not validation else "the test"
         raise UserError(f"evaluation.validation: leaves no clip for {which}; {folder} holds {found}")

@@ -34,7 +34,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
         _sync_folder(path.parent)
     except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
+        in_file = os.path.exists(path.parent) and not os.path.isdir(path.parent)
+        why = f"{path.parent} is no folder" if in_file else error.strerror or error
+        raise UserError(f"{path}: cannot be written: {why}") from error
     finally:
         with contextlib.suppress(OSError):  # it was never made, nor perhaps its folder
             temporary.unlink(missing_ok=True)

@@ -68,8 +68,9 @@ def prepare_pairs(config: Config, search: bool = False) -> PairSetup:
 
 
 @with_places
-def prepare(config: Config, search: bool = False) -> Prepared:
-    """Opens everything that a fit will need; the config stays as it is. `search` as for `prepare_pairs`.
+def prepare(config: Config, search: bool = False, split: bool = True) -> Prepared:
+    """Opens everything that a fit will need; the config stays as it is. `search` as for `prepare_pairs`, `split` as for
+    `load_motions`.
 
     Raises:
         UserError: anything in the config, the URDF, the prior or the motions is wrong.
@@ -77,7 +78,7 @@ def prepare(config: Config, search: bool = False) -> Prepared:
     setup = prepare_pairs(config, search)
     config, body_map = setup.config, setup.body_map
     build_network(config, body_map)
-    motions = load_motions(config, body_map.skeleton)
+    motions = load_motions(config, body_map.skeleton, split)
     return Prepared(config, body_map, setup.prior, setup.store, motions, tracking_dir(config))
 
 

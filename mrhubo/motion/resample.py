@@ -14,7 +14,10 @@ from mrhubo.fast.poses import check_frame_rate
 from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
 from mrhubo.motion.motion import Motion
 
-_MOST_FRAMES = 10_000_000
+_MOST_FRAMES = 2_000_000
+"""As many as are read of a file."""
+_BLOCK = 2**14
+"""Frames whose rotations are worked on at a time, as what they pass through takes several times their memory."""
 
 
 def resample(motion: Motion, frame_rate: float) -> Motion:
@@ -24,7 +27,7 @@ def resample(motion: Motion, frame_rate: float) -> Motion:
     with quaternion curves", SIGGRAPH 1985), places on the straight line. Frames that both rates share stay as they are.
 
     Raises:
-        UserError: the frame rate is not positive, or would make more than ten million frames.
+        UserError: the frame rate is not positive, or would make more than two million frames.
     """
     check_frame_rate(frame_rate, needed=True)
     if frame_rate == motion.frame_rate or not len(motion):
@@ -32,7 +35,10 @@ def resample(motion: Motion, frame_rate: float) -> Motion:
     # a hair more, so that a last frame that both have is not lost to rounding
     count = (len(motion) - 1) * frame_rate / motion.frame_rate * (1 + 1e-12)
     if count > _MOST_FRAMES:
-        raise UserError(f"{motion.name}: {frame_rate:g} frames a second would be {count:.3g} frames")
+        raise UserError(
+            f"{motion.name}: {frame_rate:g} frames a second would be {count:,.0f} frames; "
+            f"at most {_MOST_FRAMES:,} are made"
+        )
     place_S = np.arange(math.floor(count) + 1) * (motion.frame_rate / frame_rate)
     before_S = np.minimum(place_S.astype(np.int64), len(motion) - 1)
     after_S = np.minimum(before_S + 1, len(motion) - 1)
@@ -57,7 +63,11 @@ def resample(motion: Motion, frame_rate: float) -> Motion:
 
 
 def _slerp(rotation_TX33: np.ndarray, before_S: np.ndarray, after_S: np.ndarray, share_S: np.ndarray) -> np.ndarray:
-    first = rotation_TX33[before_S]
-    turn = matrix_to_axis_angle(first.mT @ rotation_TX33[after_S])
-    share = share_S.astype(turn.dtype).reshape(-1, *[1] * (turn.ndim - 1))
-    return np.where(share[..., None] == 0, first, first @ axis_angle_to_matrix(share * turn))
+    found_SX33 = np.empty((len(share_S), *rotation_TX33.shape[1:]), rotation_TX33.dtype)
+    for start in range(0, len(share_S), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        first = rotation_TX33[before_S[block]]
+        turn = matrix_to_axis_angle(first.mT @ rotation_TX33[after_S[block]])
+        share = share_S[block].astype(turn.dtype).reshape(-1, *[1] * (turn.ndim - 1))
+        found_SX33[block] = np.where(share[..., None] == 0, first, first @ axis_angle_to_matrix(share * turn))
+    return found_SX33

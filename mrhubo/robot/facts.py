@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mrhubo.errors import UserError
 from mrhubo.robot.joint import drive
@@ -26,7 +30,22 @@ def robot_facts(robot: Robot, made_by: str, checksum: str) -> RobotFacts:
         upper=robot.upper_N.cpu().numpy(),
         velocity=robot.velocity_N.cpu().numpy(),
         others=tuple(_others(robot)),
+        on_base=_on_base(robot),
     )
+
+
+def _on_base(robot: Robot) -> dict[str, tuple[float, ...]]:
+    """Links that fixed joints hang on the root link, by name, as `RobotFacts.on_base` has them."""
+    place_of = {robot.description.root: np.eye(4)}
+    for link in robot.description.links:
+        above = robot.description.joints_above(link)
+        if all(joint.kind == "fixed" for joint in above):
+            place_of[link] = functools.reduce(np.matmul, [joint.origin_44 for joint in reversed(above)], np.eye(4))
+    turns = {link: Rotation.from_matrix(place_44[:3, :3]) for link, place_44 in place_of.items()}
+    return {
+        link: (*place_44[:3, 3].tolist(), *turns[link].as_quat(canonical=True, scalar_first=True).tolist())
+        for link, place_44 in place_of.items()
+    }
 
 
 def _others(robot: Robot) -> Iterator[FollowingJoint]:

@@ -58,7 +58,7 @@ FORMATS: dict[str, Format] = {
     "unitree": Format(".csv", "no header, base and quaternion w last before the joints: Unitree, BeyondMimic",
                       write_unitree, preset=True),
     "mcap": Format(".mcap", "ROS 2 bag with a JointTrajectory", _plain(write_mcap), library=import_mcap),
-    "yaml": Format(".yaml", "ROS 2 JointTrajectory as YAML", _plain(write_yaml)),
+    "yaml": Format(".yaml", "ROS 2 JointTrajectory as YAML", write_yaml),
     "lerobot": Format("", "LeRobot dataset 3.0, a folder, an episode a motion",
                       _plain(lambda motion, path: write_lerobot([motion], path)), preset=True, library=import_pyarrow),
 }  # fmt: skip

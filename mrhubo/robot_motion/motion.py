@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -76,6 +76,9 @@ class RobotFacts:
     """How fast they may turn (N,) [rad/s]."""
     others: tuple[FollowingJoint, ...] = ()
     """The robot's other joints that are not fixed."""
+    on_base: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """Links that are fixed to the base, itself the first, each with its place [m] and its quaternion, w first, in the
+    base's frame; empty where they are not known, as in files."""
 
     def __post_init__(self) -> None:
         """Raises a UserError where limits are no numbers. All answers of a retargeter share them, so they are copies

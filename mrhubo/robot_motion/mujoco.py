@@ -15,9 +15,10 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.npz import open_npz
+from mrhubo.robot_motion.base import base_of
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.npz import write_arrays
-from mrhubo.robot_motion.order import JointOrder, base_of
+from mrhubo.robot_motion.order import JointOrder
 from mrhubo.robot_motion.plain import build
 
 QPOS = "qpos"

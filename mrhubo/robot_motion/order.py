@@ -29,7 +29,7 @@ _FREE = "free"
 _ONE_NUMBER = ("hinge", "slide")
 _OTHER_TURNS = ("axisangle", "xyaxes", "zaxis", "euler")
 """What says how a body is turned besides `quat`."""
-_ORIGIN, _UPRIGHT = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+ORIGIN, UPRIGHT = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,12 @@ class JointOrder:
     """The file, for messages."""
     free_joint: str | None = None
     """Name of the base's free joint; None: there is none."""
-    position: tuple[float, float, float] = _ORIGIN
+    position: tuple[float, float, float] = ORIGIN
     """Where the model has its base [m], x forward, y left, z up."""
-    quaternion_wxyz: tuple[float, float, float, float] = _UPRIGHT
+    quaternion_wxyz: tuple[float, float, float, float] = UPRIGHT
     """How it is turned there."""
+    free_body: str = ""
+    """Name of the body that the free joint moves."""
 
 
 def read_joint_order(path: Path) -> JointOrder:
@@ -128,21 +130,6 @@ def in_order(motion: RobotMotion, order: JointOrder) -> tuple[RobotMotion, tuple
     return dataclasses.replace(motion, q=q, joint_names=order.names, robot=robot), tuple(notes)
 
 
-def base_of(motion: RobotMotion, order: JointOrder | None) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Place (T, 3) [m] and rotation (T, 4), w first, of the base of a motion with one leading axis; where it has none,
-    those of the model or the origin, with a sentence that says so.
-    """
-    if motion.root_position is not None and motion.root_quaternion_wxyz is not None:
-        return motion.root_position, motion.root_quaternion_wxyz, ()
-    order = order or JointOrder(())
-    place, turn = (np.array(given, np.float32) for given in (order.position, order.quaternion_wxyz))
-    where = "at the origin, upright" if (order.position, order.quaternion_wxyz) == (_ORIGIN, _UPRIGHT) else (
-        f"where {order.source} has it"
-    )  # fmt: skip
-    note = f"the motion tells nothing of the base, which stays {where}"
-    return np.tile(place, (motion.frames, 1)), np.tile(turn, (motion.frames, 1)), (note,)
-
-
 def _lines(text: str) -> Iterator[str]:
     """Names that stand one a line, or with commas between; after # is a comment, and a list's dashes are no names."""
     for line in text.splitlines():
@@ -188,8 +175,8 @@ class _Model:
         name, body = self.free
         if other := next((key for key in _OTHER_TURNS if body.get(key)), None):
             raise UserError(f"{self.path}, line {body.sourceline}: the base is turned by '{other}'; write it as 'quat'")
-        place, turn = self._numbers(body, "pos", _ORIGIN), self._numbers(body, "quat", _UPRIGHT)
-        return JointOrder(tuple(self.names), str(self.path), name, place, turn)
+        place, turn = self._numbers(body, "pos", ORIGIN), self._numbers(body, "quat", UPRIGHT)
+        return JointOrder(tuple(self.names), str(self.path), name, place, turn, body.get("name") or "")
 
     def _inside(self, element: etree._Element) -> Iterator[etree._Element]:
         """What is in an element, with what it includes in its place."""

@@ -25,14 +25,16 @@ SECOND = 1_000_000_000
 """In nanoseconds."""
 
 
-def write_yaml(motion: RobotMotion, path: Path) -> None:
-    """Writes the message as YAML, atomically.
+def write_yaml(motion: RobotMotion, path: Path, _: object = None) -> tuple[str, ...]:
+    """Writes the message as YAML, atomically; returns what such a file cannot tell, a sentence each.
 
     Raises:
         UserError: the frame rate is not known.
     """
     with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
         file.writelines(_yaml(motion, path))
+    lost = motion.root_position is not None
+    return ("a JointTrajectory does not tell where the base goes: left out; a bag (mcap) does",) if lost else ()
 
 
 def _yaml(motion: RobotMotion, path: Path) -> Iterator[str]:

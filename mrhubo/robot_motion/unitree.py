@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
+from mrhubo.robot_motion.base import base_of
 from mrhubo.robot_motion.clock import in_full
 from mrhubo.robot_motion.motion import RobotMotion
-from mrhubo.robot_motion.order import JointOrder, base_of
+from mrhubo.robot_motion.order import JointOrder
 from mrhubo.robot_motion.plain import build
 from mrhubo.robot_motion.tables import read_rows, read_text, write_rows
 

@@ -131,7 +131,7 @@ def test_values() -> None:
         (["--steps=3"], "command line: '--steps=3' is a key, not a flag: write steps=VALUE"),
         (["--steps", "3"], "command line: '--steps' is a key, not a flag: write steps=VALUE"),
         (["--"], "command line: flag '--' does not exist"),
-        (["-"], "command line: flag '-' does not exist"),
+        (["-"], "command line: '-' is no file: standard input and output are not used; name a file"),
         (["--config"], "command line: --config needs a value: --config CONFIG"),
         (["--config="], "command line: --config needs a value: --config CONFIG"),
         (["--config", "--quiet"], "command line: --config needs a value: --config CONFIG"),

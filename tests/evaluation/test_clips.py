@@ -38,6 +38,10 @@ def test_a_clip_that_is_not_there_is_named_with_the_nearest(root: Path, folder: 
 
 def test_the_default_names_clips_of_two_folders(root: Path, folder: Path) -> None:
     assert [m.name for m in load(root, f"evaluation.motions=[{folder}]").validation] == ["drinking"]
+    config = load_config(
+        root / "conf" / "nao.yaml", [f"evaluation.motions=[{folder}]", "evaluation.validation=[other]"]
+    )
+    assert len(load_motions(config, split=False).all) == 3  # who measures answers to them needs no split
 
 
 def test_a_file_in_place_of_a_folder_is_named_with_the_key_and_its_place(root: Path, folder: Path) -> None:

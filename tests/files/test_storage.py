@@ -108,6 +108,9 @@ def test_a_folder_in_the_way_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "taken").mkdir()
     with pytest.raises(UserError, match="taken: cannot be written"), atomic_path(tmp_path / "taken") as temporary:
         temporary.write_bytes(b"x")
+    (tmp_path / "file").touch()
+    with pytest.raises(UserError, match="file is no folder"), atomic_path(tmp_path / "file" / "a"):
+        pass
 
 
 HOLD = (

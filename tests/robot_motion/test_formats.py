@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
+from scipy.spatial.transform import Rotation
 
 from mrhubo.errors import UserError
 from mrhubo.robot_motion import (
@@ -182,6 +183,30 @@ def test_qpos_has_the_models_free_joint(tmp_path: Path) -> None:
         np.testing.assert_array_equal(file["qpos"][:, 8], motion.q[:, 1])
     assert notes[0] == "held at 0 rad, as the motion does not turn them: knee"
     assert notes[-1] == "the motion tells nothing of the base, which stays where model.xml has it"
+
+
+def test_a_free_joint_may_move_another_link_than_the_urdfs_base(tmp_path: Path) -> None:
+    still, path = standing(), tmp_path / "a.npz"
+    turned = Rotation.from_euler("xyz", [20, -30, 50], degrees=True)
+    on_base = {"floor": (0.0, 0, 0, 1, 0, 0, 0), "torso": (0.1, 0.2, 0.3, *turned.as_quat(scalar_first=True).tolist())}
+    motion = dataclasses.replace(still, robot=dataclasses.replace(still.robot, on_base=on_base))
+    assert still.root_position is not None and still.root_quaternion_wxyz is not None
+    base = (still.root_position, turn := quaternions(still.root_quaternion_wxyz))
+    torso = (still.root_position + turn.apply([0.1, 0.2, 0.3]), turn * turned)
+    for body, (place, way), words in (
+        ("torso", torso, "moves 'torso', 0.374 m from"), ("floor", base, ""), ("other", base, "'other', which is not fixed"),
+    ):  # fmt: skip
+        order = JointOrder(motion.joint_names, "model.xml", "free", free_body=body)
+        assert words in " ".join(write_robot_motion(motion, path, "mujoco", order))
+        assert "does not tell where the base goes" in write_robot_motion(motion, tmp_path / "a.yaml")[-1]
+        found = read_robot_motion(path)
+        assert found.root_position is not None and found.root_quaternion_wxyz is not None
+        np.testing.assert_allclose(found.root_position, place, atol=1e-6)
+        assert (quaternions(found.root_quaternion_wxyz) * way.inv()).magnitude().max() < 1e-5
+
+
+def quaternions(wxyz_T4: np.ndarray) -> Rotation:
+    return Rotation.from_quat(wxyz_T4, scalar_first=True)
 
 
 def test_an_order_turns_what_follows_and_holds_what_is_held(tmp_path: Path) -> None:

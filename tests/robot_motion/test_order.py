@@ -35,6 +35,7 @@ def test_a_models_joints_are_in_the_order_of_qpos(tmp_path: Path) -> None:
     order = read_joint_order(tmp_path / "robot.xml")
     assert order.names == ("hip", "knee", "waist", "turn")
     assert (order.free_joint, order.position, order.quaternion_wxyz) == ("base", (0.0, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0))
+    assert order.free_body == "pelvis"
 
 
 def test_it_is_what_mujoco_has(tmp_path: Path) -> None:

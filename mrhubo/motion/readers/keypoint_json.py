@@ -91,7 +91,10 @@ def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
     if isinstance(value, dict) and value:
         if not all(_DIGIT.search(str(key)) and isinstance(one, dict | list | None) for key, one in value.items()):
             keys = shortened(", ".join(map(str, list(value)[:10])), 120)
-            raise NoMotion(f"{path}: is JSON with {keys}; expected 'keypoints'")
+            raise NoMotion(
+                f"{path}: is JSON with {keys}; expected 'keypoints' (frames, points, 3) or SMPL's parameters;"
+                " docs/formats.md says how each is laid out"
+            )
         check_size(path, where, len(value), 1)
         numbered = in_order(path, [(str(key), one) for key, one in value.items()])
         return [number for number, _ in numbered], [frame for _, frame in numbered]

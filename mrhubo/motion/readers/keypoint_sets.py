@@ -86,10 +86,26 @@ _CENTRAL = {
 }  # fmt: skip
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _LEFT, _RIGHT = ("left", "l", "lft"), ("right", "r", "rgt")
-_PROPORTIONS = (("knee", "hip", 1.0), ("elbow", "shoulder", 0.83), ("shoulder", "hip", 0.75))
+_PROPORTIONS = (
+    ("knee", "hip", 1.0), ("elbow", "shoulder", 0.83), ("shoulder", "hip", 0.75), ("trunk", "hip", 1.2),
+    ("slant", "hip", 1.25),
+)  # fmt: skip
 """Bones, by where they start, other bones, and their ratio (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
+_BONES = tuple(
+    (side, start, f"{side}_{start}", f"{side}_{end}")
+    for side in SIDES
+    for start, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+)
+_TRUNK = (
+    *((side, "trunk", f"{side}_shoulder", f"{side}_hip") for side in SIDES),
+    *((side, "slant", f"{side}_shoulder", f"{other}_hip") for side, other in (SIDES, SIDES[::-1])),
+    *(("", width, f"left_{width}", f"right_{width}") for width in ("shoulder", "hip")),
+)
+"""Ways between points that hardly change while people move: side, name, and the points."""
 
 
+_DEVIATIONS = 1.4826
+"""Standard deviations in a median distance from the median, which single wild frames do not change."""
 _FLABBY = 0.2
 """Half of the frames are farther from a bone's usual length than this share of it: of points drawn by chance."""
 
@@ -145,22 +161,22 @@ def misfit(points: Mapping[str, np.ndarray]) -> float:
     """
     found: list[float] = []
     with np.errstate(all="ignore"):
-        bone = {
-            (side, start): np.linalg.norm(points[f"{side}_{end}"] - points[f"{side}_{start}"], axis=-1)
-            for side in SIDES
-            for start, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+        way = {
+            (side, name): np.linalg.norm(points[start] - points[end], axis=-1)
+            for side, name, start, end in (*_BONES, *_TRUNK)
         }
-        seen = {key: length_F[np.isfinite(length_F) & (length_F > 0)] for key, length_F in bone.items()}
+        seen = {key: length_F[np.isfinite(length_F) & (length_F > 0)] for key, length_F in way.items()}
         mean = {key: float(np.median(length_F)) for key, length_F in seen.items() if len(length_F)}
-        found += [float(np.std(seen[key]) / mean[key]) for key in mean]
-        spread = [float(np.median(np.abs(seen[key] - mean[key])) / mean[key]) for key in mean]
-        if spread and np.mean(spread) > _FLABBY:
+        spread = {key: float(np.median(np.abs(seen[key] - mean[key])) / mean[key]) for key in mean}
+        bones = [spread[side, name] for side, name, *_ in _BONES if (side, name) in spread]
+        if not bones or np.mean(bones) > _FLABBY:
             return np.inf
-        for start in ("shoulder", "elbow", "hip", "knee"):
-            if ("left", start) in mean and ("right", start) in mean:
-                found.append(abs(float(np.log(mean["left", start] / mean["right", start]))))
+        found += [_DEVIATIONS * part for part in spread.values()]
+        for name in ("shoulder", "elbow", "hip", "knee", "trunk", "slant"):
+            if ("left", name) in mean and ("right", name) in mean:
+                found.append(abs(float(np.log(mean["left", name] / mean["right", name]))))
         for side in SIDES:
-            for start, other, ratio in _PROPORTIONS:
-                if (side, start) in mean and (side, other) in mean:
-                    found.append(abs(float(np.log(mean[side, start] / mean[side, other] / ratio))))
-    return float(np.mean(np.minimum(found, 2.0))) if found else np.inf
+            for name, other, ratio in _PROPORTIONS:
+                if (side, name) in mean and (side, other) in mean:
+                    found.append(abs(float(np.log(mean[side, name] / mean[side, other] / ratio))))
+    return float(np.mean(np.minimum(found, 2.0)))

@@ -178,7 +178,13 @@ def test_head_and_hands_are_turned_as_in_the_file(axes: str, motion: Motion, tmp
         assert float(torch.rad2deg(error).max()) < 0.1, joint
 
 
-def test_toes_and_knees_are_believed_rather_than_names(motion: Motion, tmp_path: Path) -> None:
+@pytest.mark.parametrize("pointed_deg", [0.0, 60.0])  # toes of a dancer tell nothing, but knees do
+def test_toes_and_knees_are_believed_rather_than_names(pointed_deg: float, motion: Motion, tmp_path: Path) -> None:
+    local = motion.local_TJ33.clone()
+    turn = mrhubo.rotation.axis_angle_to_matrix(torch.tensor([np.radians(pointed_deg), 0.0, 0.0], dtype=local.dtype))
+    for ankle in ("left_ankle", "right_ankle"):
+        local[:, JOINT_NAMES.index(ankle) - 1] = local[:, JOINT_NAMES.index(ankle) - 1] @ turn
+    motion = motion.changed(local_TJ33=local)
     found = read(motion, Style(swapped_names=True), tmp_path)
     assert float(limb_error(found.local_TJ33, motion.local_TJ33).max()) < 0.1
     assert "toes and knees are believed" in " ".join(found.notes)
@@ -333,4 +339,7 @@ def test_a_tpose_that_is_not_quite_one(external_dir: Path) -> None:
     if not path.is_file():
         pytest.skip("data/external/cmu/formats is not here")
     found = mrhubo.read_motion(path)
-    assert len(found) == 400 and "centimetres" in found.source
+    assert len(found) == 399 and "centimetres" in found.source and "first frame" in found.notes[0]
+    assert found.root_rotation_T33 is not None  # in whose frame 0 the body faces the other way
+    turn = mrhubo.rotation.geodesic_distance(found.root_rotation_T33[1:], found.root_rotation_T33[:-1])
+    assert float(torch.rad2deg(turn).max()) < 15.0

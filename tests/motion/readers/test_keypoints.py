@@ -146,7 +146,7 @@ def test_missing_points_are_held_and_said(points: dict[str, np.ndarray], pose: t
     array = array_of(points, SETS["COCO"])
     sure = np.ones(array.shape[:2])
     wrist = SETS["COCO"].index("left_wrist")
-    array[5:9, wrist] = np.nan
+    array[5:9, wrist] = [[np.nan] * 3, [0.0] * 3, [0.0] * 3, [np.nan] * 3]  # at the origin, alone
     sure[12:, wrist] = 0.1
     path = tmp_path / "points.npz"
     np.savez(path, keypoints=array, confidence=sure, fps=30.0)
@@ -172,6 +172,9 @@ def test_what_cannot_be_told_is_asked_for(points: dict[str, np.ndarray], tmp_pat
         mrhubo.read_motion(path)
     path = tmp_path / "points.npz"
     np.savez(path, keypoints=np.random.default_rng(0).normal(size=(FRAMES, 17, 3)))
+    with pytest.raises(UserError, match="'names'"):
+        mrhubo.read_motion(path, RATE)
+    np.savez(path, keypoints=array_of(points, SETS["SMPL's body"])[:, ::-1])  # an order that nobody knows
     with pytest.raises(UserError, match="'names'"):
         mrhubo.read_motion(path, RATE)
     np.savez(path, keypoints=array_of(points, SETS["COCO"])[:, :9], names=np.array(SETS["COCO"][:9]))

@@ -27,10 +27,12 @@ share of how they move in the carrier's."""
 _MOVES = 0.02
 """Shoulders and hips that move by less, of their distance, do not tell."""
 _SURE, _PLAIN, _HINT = 0.3, 0.6, 0.1
-"""How clear toes and knees must be, of 1, to be sure together which side is left; how clear toes by themselves; and how
-clear either must be to be asked where names do not say."""
+"""How clear toes and knees must be, of 1, to be sure together which side is left; how clear either by itself; and how
+clear they must be to be asked where names do not say."""
 _BENT = np.sin(np.radians(15.0))
 """Sine of the bend from which a knee tells where forward is."""
+_OFTEN = 0.05
+"""Share of the frames in which a knee must be bent so much to be believed by itself."""
 
 _LEG, _ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 NEEDED = ("pelvis", "spine3", *(f"{side}_{name}" for side in ("left", "right") for name in (*_LEG, *_ARM)))
@@ -168,7 +170,7 @@ def _sides(shape: Shape, limbs: Limbs, notes: list[str], what: str) -> tuple[tup
     up_F3 = _unit((shoulders[0] + shoulders[1]) - (hips[0] + hips[1]))
     line_F3 = _unit(hips[0] - hips[1])
     forward_F3 = _unit(np.cross(line_F3, up_F3))  # were the first leg the left one
-    toes, knees, weight = [], 0.0, 0.0
+    toes, knees, weight, often = [], 0.0, 0.0, 0.0
     for leg, triple in enumerate(limbs.legs):
         hip_F3, knee_F3, ankle_F3 = (point[place] for place in triple)
         toe = _toes(shape, limbs, leg)
@@ -179,12 +181,14 @@ def _sides(shape: Shape, limbs: Limbs, notes: list[str], what: str) -> tuple[tup
         bent_F = bend_F > _BENT
         knees += float((((thigh_F3 - shin_F3) * forward_F3).sum(-1) * bent_F).sum())
         weight += float((bend_F * bent_F).sum())
+        often += float(bent_F.mean()) / 2
     toe_says = float(np.mean(toes)) if toes else 0.0
     knee_says = knees / weight if weight else 0.0
     # Leg and arm are compared with their partners; arms' names need not begin where legs' do.
     called = _called(limbs.chains["leg"], names)
     sure = min(abs(toe_says), abs(knee_says)) > _SURE and toe_says * knee_says > 0
     sure |= abs(toe_says) > _PLAIN and knee_says * np.sign(toe_says) > -_HINT
+    sure |= abs(knee_says) > _PLAIN and often > _OFTEN and toe_says * np.sign(knee_says) > -_HINT
     geometry = toe_says + knee_says
     if sure:
         says = geometry
@@ -195,6 +199,11 @@ def _sides(shape: Shape, limbs: Limbs, notes: list[str], what: str) -> tuple[tup
             )
     elif called:
         says = called
+        if called * geometry < 0 and abs(geometry) > _HINT:
+            notes.append(
+                "the names of its joints say left where toes and knees hint at right; names are believed "
+                "(--bvh-map overrides)"
+            )
     elif abs(geometry) > _HINT:
         says = geometry
     else:

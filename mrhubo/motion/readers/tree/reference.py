@@ -83,11 +83,16 @@ def first_frame_jumps(tree: JointTree, place: Mapping[str, int]) -> bool:
         return False
     pose = tree.pose(slice(0, _STEPS + 2), list(place.values()))
     back_F33, hips_F3 = pose.matrix[place["pelvis"]].mT, pose.point[place["pelvis"]]
-    seen = [turned(back_F33, pose.point[p] - hips_F3) for p in place.values()]
-    step_F = np.linalg.norm(np.diff(np.stack(seen), axis=1), axis=-1).max(0)
     ends = [pose.point[place[f"left_{name}"]][0] for name in ("hip", "knee", "ankle")]
     leg = np.linalg.norm(np.diff(ends, axis=0), axis=-1).sum()
-    return bool(step_F[0] > max(_JUMP * step_F[1:].max(), _JUMP_LEAST * leg))
+    for seen in (  # from the hips; and in the world, where the body may turn round or be moved as a whole
+        [turned(back_F33, pose.point[p] - hips_F3) for p in place.values()],
+        [pose.point[p] for p in place.values()],
+    ):
+        step_F = np.linalg.norm(np.diff(np.stack(seen), axis=1), axis=-1).max(0)
+        if step_F[0] > max(_JUMP * step_F[1:].max(), _JUMP_LEAST * leg):
+            return True
+    return False
 
 
 def _read(pose: Pose, place: Mapping[str, int], what: str, strict: bool) -> Reference | None:
