@@ -79,9 +79,10 @@ class FastRetargeter:
         """What files of the robot's motion tell of it."""
         settings, cost = self.description.settings, self.description.cost
         others = tuple(FollowingJoint(**other) for other in settings.facts["others"])
-        limits = {"lower": cost.lower_N, "upper": cost.upper_N, "velocity": cost.velocity_N}
+        on_base = {link: tuple(place) for link, place in settings.facts.get("on_base", {}).items()}
+        limits = (cost.lower_N, cost.upper_N, cost.velocity_N)
         return RobotFacts(
-            settings.robot, settings.facts["made_by"], settings.facts["checksum"], others=others, **limits
+            settings.robot, settings.facts["made_by"], settings.facts["checksum"], *limits, others, on_base
         )
 
     def __call__(

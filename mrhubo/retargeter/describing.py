@@ -106,6 +106,7 @@ def describe(retargeter: Retargeter) -> Description:
                 "made_by": retargeter.facts.made_by,
                 "checksum": retargeter.facts.checksum,
                 "others": [asdict(other) for other in retargeter.facts.others],
+                "on_base": {link: list(place) for link, place in retargeter.facts.on_base.items()},
                 **names_of_legs,
             },
             body_map.collision.known,

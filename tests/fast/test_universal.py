@@ -112,6 +112,7 @@ def test_one_file_answers_without_training_and_pytorch(
     assert file == tmp_path / "robot" / FILE
     fast = mrhubo.load_fast(file, "numpy")
     assert fast.facts.made_by == retargeter.facts.made_by
+    assert fast.facts.on_base == retargeter.facts.on_base != {}
     np.testing.assert_array_equal(fast(array).q, FastRetargeter(retargeter.describe(), "numpy")(array).q)
     found = fast.imitate(fast.directions(array))
     np.testing.assert_array_equal(found.q, fast(array).q)
