@@ -45,7 +45,7 @@ SWEEPS, TOLERANCE = 10, 3e-4
 ROUNDS = 4
 """How often the legs give way: again where soles would still be under the floor, by turns with a root that is lifted
 out of it, so that feet stand on what is lowest of them, and with one that both carry, so that legs meet half-way."""
-LIFTED_M, LIFT_S, FREE_S = 0.001, 0.1, 0.3
+LIFTED_M, LIFT_S, FREE_S = 0.002, 0.1, 0.3
 """From how far [m] on that is; and the times [s] around in which the root is lifted too, and legs are free to move."""
 _RISE = 0.25
 """Of how much a point is planted, the power that counts for heights: as long as a sole is planted at all, it is to
