@@ -81,9 +81,8 @@ def load_motions(config: Config, skeleton: Skeleton | None = None, split: bool =
         ) from error
     names = set(config.evaluation.validation)
     missing = sorted(names.difference(m.name for m in motions))
-    if (
-        split and missing and config.evaluation.validation != EvaluationConfig().validation
-    ):  # which names clips of two folders
+    asked = config.evaluation.validation != EvaluationConfig().validation  # which names clips of two folders
+    if split and missing and asked:
         known = unknown_name("clip", missing[0], [m.name for m in motions], str(folder))
         raise UserError(f"evaluation.validation: {known}")
     validation = [m for m in motions if m.name in names]

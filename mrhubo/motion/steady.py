@@ -95,9 +95,8 @@ def smooth_rotations(rotation_T33: np.ndarray, frame_rate: float) -> np.ndarray:
     """Rotations (T, 3, 3) without what is faster than `CUTOFF_HZ`, and without frames that are nothing like the others
     around; float64, `_SHORTEST` frames or more.
     """
-    return _smooth(rotation_T33.reshape(-1, 9), frame_rate, DOUBT_RAD, _nearest_rotations, angles_between)[0].reshape(
-        -1, 3, 3
-    )
+    smooth_T9, _ = _smooth(rotation_T33.reshape(-1, 9), frame_rate, DOUBT_RAD, _nearest_rotations, angles_between)
+    return smooth_T9.reshape(-1, 3, 3)
 
 
 def _smooth(

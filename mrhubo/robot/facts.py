@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 
-import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mrhubo.errors import UserError
 from mrhubo.robot.joint import drive
 from mrhubo.robot.model import Robot
+from mrhubo.robot.standing import StandingRobot
 from mrhubo.robot_motion import FollowingJoint, RobotFacts
 
 
@@ -36,16 +35,13 @@ def robot_facts(robot: Robot, made_by: str, checksum: str) -> RobotFacts:
 
 def _on_base(robot: Robot) -> dict[str, tuple[float, ...]]:
     """Links that fixed joints hang on the root link, by name, as `RobotFacts.on_base` has them."""
-    place_of = {robot.description.root: np.eye(4)}
-    for link in robot.description.links:
-        above = robot.description.joints_above(link)
-        if all(joint.kind == "fixed" for joint in above):
-            place_of[link] = functools.reduce(np.matmul, [joint.origin_44 for joint in reversed(above)], np.eye(4))
-    turns = {link: Rotation.from_matrix(place_44[:3, :3]) for link, place_44 in place_of.items()}
-    return {
-        link: (*place_44[:3, 3].tolist(), *turns[link].as_quat(canonical=True, scalar_first=True).tolist())
-        for link, place_44 in place_of.items()
-    }
+    description, found = robot.description, {}
+    poses = StandingRobot(description, {}).poses
+    for link in dict.fromkeys((description.root, *description.links)):
+        if all(joint.kind == "fixed" for joint in description.joints_above(link)):
+            turn_4 = Rotation.from_matrix(poses[link][:3, :3]).as_quat(canonical=True, scalar_first=True)
+            found[link] = (*poses[link][:3, 3].tolist(), *turn_4.tolist())
+    return found
 
 
 def _others(robot: Robot) -> Iterator[FollowingJoint]:

@@ -43,20 +43,21 @@ def check_mirrored(body_map: BodyMap) -> None:
         if isinstance(one, Point) and isinstance(other, Point):
             places = [standing.position(point) for point in (one, other)]
             apart = float(np.linalg.norm(mirror.image(places[0]) - places[1]))
-            entries = [point_entry(name, standing.on_link(point.link, mirror.image(place_3)))
-                       for name, point, place_3 in ((right, other, places[0]), (left, one, places[1]))]  # fmt: skip
             if apart > _UNLIKE_M:
+                entries = [point_entry(name, standing.on_link(point.link, mirror.image(place_3)))
+                           for name, point, place_3 in ((right, other, places[0]), (left, one, places[1]))]  # fmt: skip
                 _warn(left, right, f"{1000 * apart:.0f} mm from it", entries)
         elif isinstance(one, End) and isinstance(other, End):
             axes = [standing.poses[end.link][:3, :3] @ end.axes_23.numpy().astype(float).T for end in (one, other)]
             cosine_2 = (mirror.image(axes[0].T, False) * axes[1].T).sum(axis=1)
             off = float(np.degrees(np.arccos(np.clip(cosine_2, -1, 1))).max())
+            if off <= _UNLIKE_DEG:
+                continue
             entries = []
             for name, end, turned_32 in ((right, other, axes[0]), (left, one, axes[1])):
                 local_23 = mirror.image(turned_32.T, False) @ standing.poses[end.link][:3, :3]
                 entries.append(axes_entry(name, end.link, dict(zip(words[name], local_23.tolist(), strict=True))))
-            if off > _UNLIKE_DEG:
-                _warn(left, right, f"{off:.0f} degrees from it", entries)
+            _warn(left, right, f"{off:.0f} degrees from it", entries)
 
 
 def _warn(left: str, right: str, how: str, entries: list[str]) -> None:

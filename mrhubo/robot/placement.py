@@ -111,14 +111,14 @@ class _Starts:
     def _check_two(self, i: int, j: int, one: Limb, other: Limb) -> bool:
         line_3 = self.start_E3[i] - self.start_E3[j]
         off = _degrees(line_3, self.human_E3[i] - self.human_E3[j])
-        line = f"the line from '{other.part.start}' to '{one.part.start}'"
-        sentence = (
-            f"robot.keypoints.{self.name}: {line} points {off:.0f} degrees away from a human's, seen from "
-            f"'{self.end.link}'; {self._remedies(one, other, off)}"
-        )
-        if off > _WRONG_LINE:
-            raise UserError(sentence)
         if off > _ODD_LINE:
+            line = f"the line from '{other.part.start}' to '{one.part.start}'"
+            sentence = (
+                f"robot.keypoints.{self.name}: {line} points {off:.0f} degrees away from a human's, seen from "
+                f"'{self.end.link}'; {self._remedies(one, other, off)}"
+            )
+            if off > _WRONG_LINE:
+                raise UserError(sentence)
             warn(sentence)
             return True
         middle_3 = (self.human_E3[i] + self.human_E3[j]) / 2

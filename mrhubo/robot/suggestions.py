@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,17 +15,11 @@ _NEAR = 5e-4
 """Metres, and cosine, that an entry need not tell."""
 
 
-@functools.lru_cache(1_000)
-def _link(name: str) -> str:
-    """A link's name as YAML; most entries are for a fault that is not there, those of a robot again and again."""
-    return flow_yaml(name)
-
-
 def point_entry(name: str, point: Point) -> str:
     """``left_wrist: {link: l_lower, offset: [0, 0, -0.22]}``, or the link alone where that says the same."""
     if max(map(abs, point.offset_3)) < _NEAR:
-        return f"{name}: {_link(point.link)}"
-    return f"{name}: {{link: {_link(point.link)}, offset: {numbers(point.offset_3)}}}"
+        return f"{name}: {flow_yaml(point.link)}"
+    return f"{name}: {{link: {flow_yaml(point.link)}, offset: {numbers(point.offset_3)}}}"
 
 
 def end_entry(name: str, end: End, words: tuple[str, str]) -> str:
@@ -39,9 +32,9 @@ def axes_entry(name: str, link: str, axes: Mapping[str, Sequence[float]]) -> str
     if all(
         word in DEFAULT_AXES and np.allclose(axis_3, DEFAULT_AXES[word], atol=_NEAR) for word, axis_3 in axes.items()
     ):
-        return f"{name}: {_link(link)}"
+        return f"{name}: {flow_yaml(link)}"
     directions = ", ".join(f"{word}: {numbers(axis_3)}" for word, axis_3 in axes.items())
-    return f"{name}: {{link: {_link(link)}, {directions}}}"
+    return f"{name}: {{link: {flow_yaml(link)}, {directions}}}"
 
 
 def entry(keypoints: Keypoints, name: str, like: str) -> str:

@@ -230,11 +230,11 @@ class Standing(nn.Module):
             motion_XN = torch.cat((before_LN, q_TN[settled : settled + WINDOW]))
             fixed_X = torch.arange(len(motion_XN), device=q_TN.device) < len(before_LN)
             fixed_X |= ~free_T[part]
-            near = smoothness.at(torch.arange(len(q_TN), device=q_TN.device)[part])
             if not bool(fixed_X.all()):
+                near = smoothness.at(torch.arange(len(q_TN), device=q_TN.device)[part])
                 motion_XN = self._refine(motion_XN, target_TX3[part], near, step_N, fixed_X)
-                apart = (motion_XN, target_TX3[part], near, step_N, around, fixed_X)
-                motion_XN = self._apart(*apart) if avoid_collisions else motion_XN
+                if avoid_collisions:
+                    motion_XN = self._apart(motion_XN, target_TX3[part], near, step_N, around, fixed_X)
             used = WINDOW - AHEAD if settled + WINDOW < len(q_TN) else WINDOW
             found.append(motion_XN[len(before_LN) :][:used])
             settled += used

@@ -44,7 +44,7 @@ def limb_end(
         called: what the end is called.
     """
     inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
-    if (held := _held_wrist(bodies, last, start_3, OUT * usual)) is not None and called == "wrist":
+    if called == "wrist" and (held := _held_wrist(bodies, last, start_3, OUT * usual)) is not None:
         return held
     if len(onward) > 1:  # where a single finger begins is no middle
         bases = [bodies.position(on.outer_link) for on in onward]

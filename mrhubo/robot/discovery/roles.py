@@ -191,16 +191,12 @@ def _following(bodies: Bodies) -> str:
 
 
 def _fixed_with_limits(bodies: Bodies) -> str:
-    joints = bodies.description.joints.values()
-    named = [
-        j.name
-        for j in joints
-        if j.kind == "fixed" and j.lower is not None and j.upper is not None and j.lower < j.upper
-    ]
+    joints = [joint for joint in bodies.description.joints.values() if joint.kind == "fixed"]
+    named = [j.name for j in joints if j.lower is not None and j.upper is not None and j.lower < j.upper]
+    if not named:
+        return ""
     more = f" and {len(named) - 1} more" * (len(named) > 1)
-    return (
-        f"; '{named[0]}'{more} are fixed, though they have limits: make them revolute if they can move" if named else ""
-    )
+    return f"; '{named[0]}'{more} are fixed, though they have limits: make them revolute if they can move"
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:
