@@ -3,8 +3,9 @@
     cost(q)  +  weight * sum_p max(0, clearance_p - distance_p(q))^2
 
 over the pairs of collision shapes (`SelfCollision`). Where no pair is nearer than its clearance, an answer stays as it
-is, to the bit. Elsewhere damped Gauss-Newton steps go on from it, in all joints together. The second term begins at
-zero where a pair comes near, so an answer that follows the human into a touch gives way gradually and does not leap.
+is, to the bit. Elsewhere damped Gauss-Newton steps go on from it, in all joints together, which foresee what pairs
+will be near after them (`mrhubo.fast.plain.contact_steps`). The second term begins at zero where a pair comes near, so
+an answer that follows the human into a touch gives way gradually and does not leap.
 
 Who needs every frame free, at any price, asks `collision_free`; who needs it within the limits of joints' speeds, or at
 once, asks here: nearly all frames become free (docs/results.md), and who is not is still told so.
@@ -19,12 +20,16 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from mrhubo.fast.plain.avoidance import CLEARANCE, STEPS, WEIGHT
+from mrhubo.fast.plain.avoidance import CLEARANCE, STEPS, WEIGHT, WORTH
+from mrhubo.fast.plain.contact_steps import REACH
+from mrhubo.fast.plain.steps import DAMPING, EASIER, HARDER, LEAST, MOST, STUCK
+from mrhubo.fast.plain.steps import TOLERANCE as STILL
 from mrhubo.fast.together.avoiding import SWEEPS, TOLERANCE
+from mrhubo.reference.contact_steps import Contacts, foreseeing_step
 from mrhubo.reference.refine import refine_around, widen
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed
-from mrhubo.reference.terms import SelfCollisionTerm, Smoothness, Term
+from mrhubo.reference.terms import Quadratic, SelfCollisionTerm, Smoothness, Term
 from mrhubo.robot import BodyMap
 
 
@@ -55,7 +60,48 @@ class Avoidance(nn.Module):
         row_X = torch.nonzero(self.close(q_BN))[:, 0]
         if not len(row_X):
             return q_BN
-        return q_BN.index_copy(0, row_X, self.problem.minimise(q_BN[row_X], target_BD3[row_X], STEPS)[0])
+        chunks = (self._give_way(q_BN[x], target_BD3[x]) for x in row_X.split(self.problem.chunk))
+        return q_BN.index_copy(0, row_X, torch.cat(list(chunks)))
+
+    def _give_way(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
+        bounds = self.problem.lower_N, self.problem.upper_N
+        found_BN, row_B = q_BN.clone(), torch.arange(len(q_BN), device=q_BN.device)
+        damping_B = q_BN.new_full((len(q_BN),), DAMPING)
+        cost_B, model, touching = self._look(q_BN, target_BD3)
+        for _ in range(STEPS):
+            trial_BN, won_B = foreseeing_step(bounds, q_BN, model, damping_B, touching)
+            worth_B = won_B > WORTH
+            if not bool(worth_B.any()):
+                break
+            row_B, q_BN, trial_BN, target_BD3, cost_B, damping_B = (
+                own_B[worth_B] for own_B in (row_B, q_BN, trial_BN, target_BD3, cost_B, damping_B)
+            )
+            trial_cost_B, model, touching = self._look(trial_BN, target_BD3)
+            better_B, moved_B = trial_cost_B < cost_B, (trial_BN - q_BN).abs().amax(dim=1)
+            found_BN[row_B[better_B]] = trial_BN[better_B]
+            going_B = ~((moved_B < STILL) | (~better_B & (damping_B > STUCK)))
+            if not bool(going_B.any()):
+                break
+            q_BN, cost_B = torch.where(better_B[:, None], trial_BN, q_BN), torch.where(better_B, trial_cost_B, cost_B)
+            damping_B = (damping_B * torch.where(better_B, EASIER, HARDER)).clamp(LEAST, MOST)
+            row_B, q_BN, target_BD3, cost_B, damping_B = (
+                own_B[going_B] for own_B in (row_B, q_BN, target_BD3, cost_B, damping_B)
+            )
+            if bool(better_B[going_B].all()):
+                model, touching = model.rows(going_B), touching.rows(going_B)
+            else:  # some are where they were
+                _, model, touching = self._look(q_BN, target_BD3)
+        return found_BN
+
+    def _look(self, q_BN: Tensor, target_BD3: Tensor) -> tuple[Tensor, Quadratic, Contacts]:
+        """What frames cost (B,), the model of that without contacts, and the contacts."""
+        state = self.problem.state(q_BN, target_BD3)
+        model, scale = self.problem.quadratic_at(state, self.contact), self.contact.weight**0.5
+        near = self.collision.near(q_BN, CLEARANCE + REACH, state.poses)
+        short_X = self.contact.lack(near)
+        x = torch.nonzero(short_X > -REACH)[:, 0]
+        touching = Contacts(near.row_X[x], scale * short_X[x], -scale * near.jacobian_XN[x])
+        return model.cost_BC[:, 0] + touching.costs(touching.short_X, len(q_BN)), model, touching
 
     def in_motion(
         self,

@@ -68,12 +68,13 @@ class DirectionProblem(nn.Module):
         poses = self.robot.forward(q_BN)
         return State(q_BN, poses, target_BD3, *self.kinematics.at(poses))
 
-    def quadratic_at(self, state: State) -> Quadratic:
-        """As `quadratic`."""
+    def quadratic_at(self, state: State, without: Term | None = None) -> Quadratic:
+        """As `quadratic`, of all terms, or all but one."""
         model: Quadratic | None = None
         for term in self.terms:
             assert isinstance(term, Term)
-            model = term.add_to(model, state, self.blocks)
+            if term is not without:
+                model = term.add_to(model, state, self.blocks)
         assert model is not None
         return model
 

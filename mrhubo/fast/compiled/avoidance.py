@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.collision import apart, distance_gradient, far, far_apart, place_capsules, touches
+from mrhubo.fast.compiled.contact_steps import foreseeing_step, look
 from mrhubo.fast.compiled.cost import quadratic
 from mrhubo.fast.compiled.human import dot
 from mrhubo.fast.compiled.lanes import alike, choose, no, some
 from mrhubo.fast.compiled.robot import place
-from mrhubo.fast.compiled.steps import solve
 from mrhubo.fast.compiled.tables import BALL_Z, CLEAR_Y, FIRST_Z, INNER, real, size, whole
-from mrhubo.fast.plain.avoidance import STEPS, WEIGHT
+from mrhubo.fast.plain.avoidance import STEPS, WEIGHT, WORTH
 from mrhubo.fast.plain.collision import SHORT
 from mrhubo.fast.plain.steps import DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, TOLERANCE
+
+_ROOT = math.sqrt(WEIGHT)
 
 
 @njit(**INNER)
@@ -25,7 +26,7 @@ def add_contacts(t, work, gradient_N, hessian_NN):
     place_capsules(t, work)
     cost = alike(work.lower_N[0], 0.0)
     for z in range(size(t, BALL_Z)):
-        if far(t, work, z):
+        if far(t, work, z, 0.0):
             continue
         for y in range(whole(t, FIRST_Z, z), whole(t, FIRST_Z, z + 1)):
             margin = real(t, CLEAR_Y, y)
@@ -75,27 +76,22 @@ def avoid(t, work, q_N):
     if not some(near):
         return no(near)
     joints, live = len(q_N), choose(near, alike(work.lower_N[0], 1.0), 0.0)
-    cost, damping = alike(live, np.inf), alike(live, DAMPING)
-    for n in range(joints):
-        work.trial_N[n] = q_N[n]
-    for number in range(STEPS + 1):  # the first looks at where it begins
-        found = whole_model(t, work, work.trial_N, work.next_cost_C, work.next_gradient_N, work.next_hessian_NN)
-        better, moved = (live > 0) & ((found < cost) | (number == 0)), alike(live, 0.0)
+    damping = alike(live, DAMPING)
+    cost, count = look(t, work, q_N, _ROOT)
+    for _ in range(STEPS):
+        live = choose(foreseeing_step(t, work, q_N, damping, count) > WORTH, live, 0.0)
+        if not some(live > 0):
+            break
+        found, count = look(t, work, work.trial_N, _ROOT)
+        better, moved, back = (live > 0) & (found < cost), alike(live, 0.0), no(found < cost)
         for n in range(joints):
             moved = max(moved, abs(work.trial_N[n] - q_N[n]))
-        done = (moved < TOLERANCE) | (no(better) & (damping > STUCK))
-        cost = choose(better, found, cost)
-        for n in range(joints):
             q_N[n] = choose(better, work.trial_N[n], q_N[n])
-            work.gradient_N[n] = choose(better, work.next_gradient_N[n], work.gradient_N[n])
-            for m in range(joints):
-                work.hessian_NN[n, m] = choose(better, work.next_hessian_NN[n, m], work.hessian_NN[n, m])
-        if number:
-            damping = min(max(damping * choose(better, EASIER, HARDER), LEAST), MOST)
-            live = choose(done, alike(live, 0.0), live)
-        if not some(live > 0) or number == STEPS:
+        live = choose((moved < TOLERANCE) | (back & (damping > STUCK)), 0.0, live)
+        if not some(live > 0):
             break
-        solve(t, work, q_N, 0, joints, damping, 0.0)
-        for n in range(joints):
-            work.trial_N[n] = min(max(q_N[n] + work.step_N[n], work.lower_N[n]), work.upper_N[n])
+        cost = choose(better, found, cost)
+        damping = min(max(damping * choose(better, EASIER, HARDER), LEAST), MOST)
+        if some(back & (live > 0)):  # some are where they were
+            _, count = look(t, work, q_N, _ROOT)
     return no(near)

@@ -56,10 +56,12 @@ def place_capsules(t, work):
 
 
 @njit(**INNER)
-def far(t, work, z):
-    """Whether no pair of a group can be nearer than its clearance, nor overlap, where capsules are placed."""
+def far(t, work, z, more):
+    """Whether no pair of a group can be nearer than its clearance and so much more [m], nor overlap, where capsules are
+    placed.
+    """
     middle, g = 2 * size(t, BODY_S) + whole(t, CAPSULE_Z, z), whole(t, BALL_Z, z)
-    between, reach = add(row(work.ends_S3, middle), row(work.centre_G3, g), -2.0), 2 * real(t, REACH_Z, z)
+    between, reach = add(row(work.ends_S3, middle), row(work.centre_G3, g), -2.0), 2 * (real(t, REACH_Z, z) + more)
     return not some(dot(between, between) < reach * reach)
 
 
@@ -113,7 +115,7 @@ def touches(t, work, clear):
     place_capsules(t, work)
     found = alike(work.lower_N[0], 0.0) > 0
     for z in range(size(t, BALL_Z)):
-        if far(t, work, z):
+        if far(t, work, z, 0.0):
             continue
         for y in range(whole(t, FIRST_Z, z), whole(t, FIRST_Z, z + 1)):
             margin = real(t, CLEAR_Y, y) if clear else 0.0

@@ -10,7 +10,7 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.functions import sine_cosine
 from mrhubo.fast.compiled.human import add, cross, dot, identity, put, put3, row, row3, turn
-from mrhubo.fast.compiled.lane_arrays import zeros
+from mrhubo.fast.compiled.lane_arrays import room, zeros
 from mrhubo.fast.compiled.lanes import alike, filled
 from mrhubo.fast.compiled.tables import (
     ACROSS_A33,
@@ -19,6 +19,7 @@ from mrhubo.fast.compiled.tables import (
     BODY_G,
     BODY_H,
     BODY_S,
+    CLEAR_Y,
     COLUMN_A,
     COLUMN_Q,
     DIRECTION_Q,
@@ -101,6 +102,20 @@ class Work(NamedTuple):
     """Right side and solution of a block's system, in its order;"""
     free_N: np.ndarray
     """1 for its joints that move, 0 for those that are held."""
+    short_Y: np.ndarray
+    """Pairs within reach (`mrhubo.fast.compiled.contact_steps`): the root of what each costs,"""
+    rows_YN: np.ndarray
+    """how that changes with the joints [1/rad],"""
+    along_Y: np.ndarray
+    """how it changes with a turn,"""
+    lack_Y: np.ndarray
+    """and what it is after the turns before."""
+    slope_N: np.ndarray
+    """Of what has no bend there;"""
+    extra_N: np.ndarray
+    """what damping adds to the Hessian's diagonal;"""
+    bent_N: np.ndarray
+    """and how the slope changes with a turn."""
 
 
 @njit(**INNER)
@@ -118,7 +133,7 @@ def make_lane_work(t):
 @njit(**INNER)
 def _make_work(t, kind):
     bodies, joints, directions = size(t, PARENT_A) + 1, size(t, BLOCK_N), size(t, LIMB_D)
-    blocks, soles = size(t, FIRST_C) - 1, size(t, BODY_H)
+    blocks, soles, pairs = size(t, FIRST_C) - 1, size(t, BODY_H), size(t, CLEAR_Y)
     rotation_L33 = zeros(kind, (bodies, 3, 3))
     identity(rotation_L33, 0)
     lower_N, upper_N = zeros(kind, (joints,)), zeros(kind, (joints,))
@@ -161,6 +176,13 @@ def _make_work(t, kind):
         zeros(kind, (joints, 3)),
         zeros(kind, (1, 3, 3)),
         np.empty(size(t, POOL_CU) // blocks, np.float32),
+        zeros(kind, (joints,)),
+        zeros(kind, (joints,)),
+        room(kind, (pairs,)),
+        room(kind, (pairs, joints)),
+        room(kind, (pairs,)),
+        room(kind, (pairs,)),
+        zeros(kind, (joints,)),
         zeros(kind, (joints,)),
         zeros(kind, (joints,)),
     )
