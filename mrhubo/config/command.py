@@ -100,7 +100,8 @@ def _interrupted(resumes: bool) -> int:
     settle_signals()
     number = Terminated.number
     word = "interrupted" if number is None else "terminated"
-    return _end(f"{word}; the same command {'resumes' if resumes else 'begins anew'}", 130 if number is None else 128 + number)
+    then = "resumes" if resumes else "begins anew"
+    return _end(f"{word}; the same command {then}", 130 if number is None else 128 + number)
 
 
 def _bug() -> int:

@@ -100,13 +100,17 @@ def main(argv: list[str]) -> int:
     plan.refuse_inputs([options.robot, options.retargeter, options.certificate])
     if certificate is not None and not plan.has_page:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
-    plan.check_addresses()
-    if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
-        print("the first session on a machine compiles, which takes a minute", flush=True)
+    plan.check()
+
+    def known(joint_names: Sequence[str], urdf: Path | None) -> None:
+        plan.check_robot(joint_names, urdf)
+        if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
+            print("the first session on a machine compiles, which takes a minute", flush=True)
+
     if options.retargeter is None:
-        robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body)
+        robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body, known)
     else:
-        robot = LiveRobot.of_package(options.retargeter, config, options.form)
+        robot = LiveRobot.of_package(options.retargeter, config, options.form, known)
     print(f"robot '{robot.facts.name}', {len(robot.joint_names)} joints; {config.rate:g} joint angles a second")
 
     def started() -> None:

@@ -24,6 +24,7 @@ from mrhubo.live.certificate import ServerCertificate
 from mrhubo.live.endpoints import Endpoint, find_token
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
+from mrhubo.live.named import NamedSink, NamedSource
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.visitors import ROBOT_PATH, SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
@@ -233,7 +234,7 @@ def _response(status: int, body: bytes, kind: str) -> Any:
     return Response(status, HTTPStatus(status).phrase, Headers(headers), body)
 
 
-class PageSource:
+class PageSource(NamedSource):
     """Frames and heartbeats of those who are connected."""
 
     has_heartbeat = True
@@ -255,7 +256,7 @@ class PageSource:
         self.server.close()
 
 
-class PageSink:
+class PageSink(NamedSink):
     """Tells outputs to those who are connected, thirty times a second at most, with the session's counts."""
 
     def __init__(self, server: Server) -> None:

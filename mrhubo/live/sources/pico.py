@@ -16,6 +16,7 @@ from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Message, Nobody, Refused
+from mrhubo.live.named import NamedSource
 from mrhubo.live.point_sets import POINT_SETS
 
 _JOINTS, _NUMBERS = 24, 7
@@ -44,7 +45,7 @@ def to_landmarks(poses: Any) -> Landmarks:
     return Landmarks(points, {}, in_world=True)
 
 
-class PicoSource:
+class PicoSource(NamedSource):
     """Asks the SDK once a period."""
 
     has_heartbeat = False

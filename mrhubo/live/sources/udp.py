@@ -9,6 +9,7 @@ from collections.abc import Callable
 from mrhubo.live.endpoints import Endpoint, find_token, token_fits
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
+from mrhubo.live.named import NamedSource
 
 _BUFFER = 2**17
 """Bytes that the system keeps for us between two periods: more are lost, and none gets old."""
@@ -55,8 +56,11 @@ class Datagrams:
             self._socket = None
 
 
-class DatagramSource:
+class DatagramSource(NamedSource):
     """What sources that come by UDP share."""
+
+    token: str | None = None
+    """What messages need that come from elsewhere; None: none come."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._datagrams = Datagrams(endpoint)
@@ -65,6 +69,10 @@ class DatagramSource:
     def endpoint(self) -> Endpoint:
         """Where it listens."""
         return self._datagrams.endpoint
+
+    def notes(self) -> list[str]:
+        """The address, and the token."""
+        return [f"listening: udp {self.endpoint.shown}" + ("" if self.token is None else f", token {self.token}")]
 
     def open(self) -> None:
         """Binds."""
