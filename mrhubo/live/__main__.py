@@ -81,6 +81,7 @@ def main(argv: list[str]) -> int:
     from mrhubo.config.interrupts import Terminated
     from mrhubo.fast.kept import is_kept, numba_is_there
     from mrhubo.live import LiveRobot
+    from mrhubo.live.governor import brake_steps
     from mrhubo.live.loop import Session, run_session
     from mrhubo.live.plan import Plan
 
@@ -88,6 +89,7 @@ def main(argv: list[str]) -> int:
     if options.certificate is not None and not options.https:
         raise UserError("--certificate goes with --https")
     check_whole_body(options)
+    brake_steps(config)
     if options.https:
         from mrhubo.live.certificate import open_certificate
 

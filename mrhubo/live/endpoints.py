@@ -57,6 +57,23 @@ class Endpoint:
         """Whether only this machine reaches it."""
         return is_loopback(self.host)
 
+    def destination(self) -> tuple[socket.socket, tuple]:
+        """A socket that may send datagrams to the address, and the address.
+
+        Raises:
+            UserError: the host has no address, or is a whole network (broadcast), to which the system sends nothing.
+        """
+        unbound, address = self.socket()
+        try:
+            with socket.socket(unbound.family, socket.SOCK_DGRAM) as probe:
+                probe.connect(address)  # sends nothing
+        except PermissionError as error:
+            unbound.close()
+            raise UserError(f"{self.shown}: cannot be sent to: it is a broadcast address; name one receiver") from error
+        except OSError:  # a network that is not there now may be later
+            pass
+        return unbound, address
+
     def reaches(self, other: Endpoint) -> bool:
         """Whether a datagram that is sent here comes to a socket that is bound to another endpoint.
 

@@ -107,6 +107,7 @@ class Plan:
                 taken.enter_context(endpoint.bound())
             for sink in self.sinks:
                 if sink.endpoint is not None:
+                    taken.enter_context(sink.endpoint.destination()[0])
                     _refuse_loop(sink.endpoint, listening)
                 for path in sink.writes:
                     taken.enter_context(tried(path))

@@ -17,6 +17,8 @@ from mrhubo.live.__main__ import main
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.plan import Plan
 from mrhubo.live.robot import LiveRobot
+from mrhubo.live.sinks.udp import UdpSink
+from tests.live.robots import make_robot
 
 
 def test_a_file_without_a_rate_is_replayed_at_the_one_that_is_told(tmp_path: Path) -> None:
@@ -136,17 +138,29 @@ def test_another_machine_may_have_the_same_port() -> None:
     assert not Endpoint("127.0.0.2", 9000).reaches(Endpoint("127.0.0.1", 9000))
 
 
+def test_nothing_is_sent_to_a_whole_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "broadcast address" in refused_at_once(monkeypatch, "udp:255.255.255.255:9000")
+    assert "nobody listens at port 0" in refused_at_once(monkeypatch, "udp:127.0.0.1:0")
+    with pytest.raises(UserError, match="broadcast address"):
+        UdpSink(Endpoint("255.255.255.255", 9000)).open(make_robot(), LiveConfig())
+
+
+def test_settings_that_leave_no_time_to_brake_are_told_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = refused_at_once(monkeypatch, "udp:127.0.0.1:1", settings=("stop_time=0.1", "heartbeat_timeout=0.19"))
+    assert said.startswith("stop_time: 0.1 s leaves no time to brake")
+
+
 def no_robot(*_: object) -> LiveRobot:
     pytest.fail("something slow was done")
 
 
-def refused_at_once(monkeypatch: pytest.MonkeyPatch, *sinks: str) -> str:
+def refused_at_once(monkeypatch: pytest.MonkeyPatch, *sinks: str, settings: Sequence[str] = ()) -> str:
     """What the command says of some sinks."""
     monkeypatch.setattr(LiveRobot, "of_robot", no_robot)
     monkeypatch.setattr(LiveRobot, "of_package", no_robot)
     words = [word for sink in sinks for word in ("--sink", sink)]
     with pytest.raises(UserError) as error:
-        main(["--robot", "nao", "--source", "udp:0", *words])
+        main(["--robot", "nao", "--source", "udp:0", *words, *settings])
     return str(error.value)
 
 

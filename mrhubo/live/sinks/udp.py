@@ -29,9 +29,9 @@ class UdpSink(NamedSink):
         """Looks the address up.
 
         Raises:
-            UserError: there is no such host.
+            UserError: there is no such host, or it is a network's broadcast address.
         """
-        self._socket, self._address = self.endpoint.socket()
+        self._socket, self._address = self.endpoint.destination()
         self._socket.setblocking(False)
 
     def send(self, output: Output) -> None:
