@@ -99,6 +99,11 @@ class Session:
         sent = ", ".join(f"{count} {state}" for state, count in self.states.items())
         came = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count)
         more = [sink.told() for sink in self.sinks if isinstance(sink, Telling)]
+        if pauses := self.pilot.pauses:
+            more.append(
+                f"held up: {pauses} times for longer than stop_time, in which the robot stopped; the machine is busy,"
+                " or a sink waits"
+            )
         return "\n".join([f"sent: {sent or 'nothing'}\nreceived: {came or 'nothing'}", *more])
 
     @classmethod

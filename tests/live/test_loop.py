@@ -166,6 +166,19 @@ def test_it_ends_after_some_time(clock: Clock, replay: ReplaySource) -> None:
     assert 30 <= len(sink.outputs) <= 33
 
 
+def test_a_sink_that_waits_is_told_and_moves_nothing(clock: Clock, replay: ReplaySource) -> None:
+    class Waiting(Kept):
+        def send(self, output: Output) -> None:
+            super().send(output)
+            clock.sleep(0.5)
+
+    sink, config = Waiting(), LiveConfig()
+    session = loop.run(random_robot(0), [replay], [sink], config, seconds=4)
+    assert not any(np.abs(output.velocity_N).max() for output in sink.outputs)
+    assert session.summary().endswith("a sink waits") and f"held up: {len(sink.outputs) - 1} times" in session.summary()
+    assert "held up" not in loop.run(random_robot(0), [replay], [Kept()], config, seconds=1).summary()
+
+
 def test_what_cannot_be_opened_leaves_nothing_open(replay: ReplaySource, tmp_path: Path) -> None:
     first, second = UdpSource(Endpoint("127.0.0.1", 0)), Kept()
     first.open()
