@@ -152,9 +152,9 @@ def point_entry(link: str, offset_3: Sequence[float]) -> str | dict[str, Any]:
 def end_entry(end: FoundEnd) -> str | dict[str, Any]:
     """The entry of an oriented part."""
     axes = _axes(end)
-    if all(axes[word] == list(DEFAULT_AXES.get(word, ())) for word in axes):
-        return end.link
-    return {"link": end.link, **axes}
+    axes = {} if all(axes[word] == list(DEFAULT_AXES.get(word, ())) for word in axes) else axes
+    sole = {} if end.sole_3 is None else {"sole": list(end.sole_3)}
+    return {"link": end.link, **axes, **sole} if axes or sole else end.link
 
 
 def _axes(end: FoundEnd) -> dict[str, list[float]]:
