@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import NamedTuple, NoReturn
 
 from mrhubo.config import run_command
@@ -10,33 +11,35 @@ from mrhubo.errors import UserError, unknown_name
 
 
 class Verb(NamedTuple):
-    """A command: the module whose `main(argv)` it is, and what it does."""
+    """A command: the module whose `main(argv)` it is, what it does, and whether it goes on where it was stopped."""
 
     module: str
     meaning: str
+    resumes: bool = False
 
 
 VERBS = {
     "describe": Verb("mrhubo.describe", "find out from a robot's URDF which link stands for what, and draw it"),
-    "fit": Verb("mrhubo.fit", "make pairs for a robot, train a retargeter on them, measure and package it"),
-    "pair": Verb("mrhubo.pair", "make, check or show the pairs alone"),
+    "fit": Verb("mrhubo.fit", "make pairs for a robot, train a retargeter on them, measure and package it", True),
+    "pair": Verb("mrhubo.pair", "make, check or show the pairs alone", True),
     "retarget": Verb("mrhubo.retarget", "make a robot's joint angles of files of human motion"),
     "live": Verb("mrhubo.live.__main__", "let a robot follow a person who is seen now"),
     "show": Verb("mrhubo.show", "look at a motion and what robots make of it, in the browser or as a film"),
     "evaluate": Verb("mrhubo.evaluate", "measure a trained retargeter on human motion"),
     "export": Verb("mrhubo.export", "write a retargeter's networks as ONNX, or as a file that needs NumPy alone"),
-    "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit"),
-    "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE"),
-    "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours"),
-    "universal": Verb("mrhubo.universal.__main__", "train the network that is the same for every robot"),
+    "sweep": Verb("mrhubo.sweep", "search for the best settings of a fit", True),
+    "baseline": Verb("mrhubo.baseline", "train and measure the baseline S3LE", True),
+    "reproduce": Verb("mrhubo.reproduce", "the paper's tables, its figures beside ours", True),
+    "universal": Verb("mrhubo.universal.__main__", "train the network that is the same for every robot", True),
     "models": Verb("mrhubo.models", "fetch the models that find a human body in videos, once"),
-    "prior": Verb("mrhubo.prior", "train a body prior on motion capture of your own"),
+    "prior": Verb("mrhubo.prior", "train a body prior on motion capture of your own", True),
 }
 
 
 def main() -> NoReturn:
     """What the `mrhubo` script runs."""
-    run_command(dispatch)
+    verb = VERBS.get(sys.argv[1]) if len(sys.argv) > 1 else None
+    run_command(dispatch, resumes=verb is not None and verb.resumes)
 
 
 def dispatch(argv: list[str]) -> int | None:

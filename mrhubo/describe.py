@@ -136,4 +136,4 @@ def _try(file: Path) -> None:
 
 
 if __name__ == "__main__":
-    run_command(main)
+    run_command(main, resumes=False)

@@ -137,4 +137,4 @@ def choose_answerer(robot: Robot, method: str | None, avoid_collisions: bool) ->
 
 
 if __name__ == "__main__":
-    run_command(main)
+    run_command(main, resumes=False)

@@ -189,4 +189,4 @@ def _save(stage: Stage, out: Path, title: str) -> None:
 
 
 if __name__ == "__main__":
-    run_command(main)
+    run_command(main, resumes=False)

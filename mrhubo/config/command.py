@@ -20,8 +20,9 @@ _LONGEST = 4_000
 """Letters of the longest sentence that is printed: some name what a stranger's file holds."""
 
 
-def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
-    """Run a command's `main(arguments)` and leave with its exit status.
+def run_command(main: Callable[[list[str]], int | None], resumes: bool = True) -> NoReturn:
+    """Run a command's `main(arguments)` and leave with its exit status; `resumes`: whether the same command, given
+    again, goes on where it was stopped.
 
     A `UserError` is one line on stderr and status 2, and so is a fault of the machine, such as a full disk. Ctrl-C is
     one line and status 130, SIGTERM one line and 143, a reader that went away (``| head``) silence and status 141.
@@ -42,7 +43,7 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
     except UserError as error:
         status = print_error(str(error))
     except KeyboardInterrupt:
-        status = _interrupted()
+        status = _interrupted(resumes)
     except BrokenPipeError:
         if not _reader_is_gone():
             raise
@@ -50,9 +51,9 @@ def run_command(main: Callable[[list[str]], int | None]) -> NoReturn:
         status = 141
     except Exception as error:
         if was_interrupted(error):
-            status = _interrupted()
+            status = _interrupted(resumes)
         elif (fault := machine_fault(error)) is not None:
-            sentence = f"{fault}; put that right and start the same command again, it goes on"
+            sentence = f"{fault}; put that right and start the same command again{', it goes on' if resumes else ''}"
             status = _end(f"error: {' '.join(sentence.split())}", 2)
         else:
             status = _bug()
@@ -95,11 +96,12 @@ def _wait_briefly() -> None:
         os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
 
 
-def _interrupted() -> int:
+def _interrupted(resumes: bool) -> int:
     settle_signals()
     number = Terminated.number
     word = "interrupted" if number is None else "terminated"
-    return _end(f"{word}; the same command resumes", 130 if number is None else 128 + number)
+    then = "resumes" if resumes else "begins anew"
+    return _end(f"{word}; the same command {then}", 130 if number is None else 128 + number)
 
 
 def _bug() -> int:

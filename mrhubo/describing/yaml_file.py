@@ -23,6 +23,8 @@ from mrhubo.robot.parts import CHEST, PARTS, UPPER_BODY, BodyPart
 _WIDTH = 120
 _FINE = 1e5
 """Parts of a metre or a radian that are written."""
+_NOUGHT = 1e-4
+"""Part of a direction that is 0 to files whose quarter turns are 1.5708."""
 _HEAD = """\
 # What `mrhubo describe` found in {source}. Look at {picture}, beside this file, first. Every entry may be changed:
 #   mrhubo describe {file}  # draws the picture anew
@@ -152,13 +154,15 @@ def point_entry(link: str, offset_3: Sequence[float]) -> str | dict[str, Any]:
 def end_entry(end: FoundEnd) -> str | dict[str, Any]:
     """The entry of an oriented part."""
     axes = _axes(end)
-    if all(axes[word] == list(DEFAULT_AXES.get(word, ())) for word in axes):
-        return end.link
-    return {"link": end.link, **axes}
+    axes = {} if all(axes[word] == list(DEFAULT_AXES.get(word, ())) for word in axes) else axes
+    sole = {} if end.sole_3 is None else {"sole": list(end.sole_3)}
+    return {"link": end.link, **axes, **sole} if axes or sole else end.link
 
 
 def _axes(end: FoundEnd) -> dict[str, list[float]]:
-    return {word: [_number(number) for number in axis] for word, axis in end.axes.items()}
+    return {
+        word: [_number(number) if abs(number) > _NOUGHT else 0.0 for number in axis] for word, axis in end.axes.items()
+    }
 
 
 def _inward(lower: float, upper: float) -> list[float]:

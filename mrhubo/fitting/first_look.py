@@ -7,7 +7,7 @@ Legend: T frames, D measured directions, N robot joints.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,7 +133,7 @@ def _missed_limbs(body_map: BodyMap, error_deg: Mapping[str, float]) -> list[str
         if names:
             found.append(
                 f"robot.keypoints.{names[0]}: the {limb.part.name.replace('_', ' ')} misses the human's by "
-                f"{error_deg[limb.name]:.0f} degrees, so this entry may be wrong{body_map.yardstick.advice(*names)}"
+                f"{error_deg[limb.name]:.0f} degrees{_remedy(body_map, names)}"
             )
     return found
 
@@ -147,9 +147,18 @@ def _stuck_joints(body_map: BodyMap, at_limit: Mapping[str, float]) -> list[str]
         if names:
             found.append(
                 f"robot.keypoints.{names[0]}: the joint '{joint}' is at a limit in {at_limit[joint]:.0%} of the "
-                f"frames, so this entry may be wrong{body_map.yardstick.advice(names[0])}"
+                f"frames{_remedy(body_map, names[:1])}"
             )
     return found
+
+
+def _remedy(body_map: BodyMap, names: Sequence[str]) -> str:
+    """What entries should be, where the axes tell others; else that it may be the robot's build."""
+    yardstick = body_map.yardstick
+    advice = yardstick.advice(*names, given=body_map.keypoints)
+    if advice or yardstick.found is None:
+        return f", so this entry may be wrong{advice}"
+    return "; the robot's joints may reach no farther, or this entry may be wrong: look at the picture"
 
 
 def _turned_elbows(body_map: BodyMap, backwards: Mapping[str, float]) -> list[str]:

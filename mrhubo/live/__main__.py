@@ -81,6 +81,7 @@ def main(argv: list[str]) -> int:
     from mrhubo.config.interrupts import Terminated
     from mrhubo.fast.kept import is_kept, numba_is_there
     from mrhubo.live import LiveRobot
+    from mrhubo.live.governor import brake_steps
     from mrhubo.live.loop import Session, run_session
     from mrhubo.live.plan import Plan
 
@@ -88,6 +89,7 @@ def main(argv: list[str]) -> int:
     if options.certificate is not None and not options.https:
         raise UserError("--certificate goes with --https")
     check_whole_body(options)
+    brake_steps(config)
     if options.https:
         from mrhubo.live.certificate import open_certificate
 
@@ -100,13 +102,17 @@ def main(argv: list[str]) -> int:
     plan.refuse_inputs([options.robot, options.retargeter, options.certificate])
     if certificate is not None and not plan.has_page:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
-    plan.check_addresses()
-    if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
-        print("the first session on a machine compiles, which takes a minute", flush=True)
+    plan.check()
+
+    def known(joint_names: Sequence[str], urdf: Path | None) -> None:
+        plan.check_robot(joint_names, urdf)
+        if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
+            print("the first session on a machine compiles, which takes a minute", flush=True)
+
     if options.retargeter is None:
-        robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body)
+        robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body, known)
     else:
-        robot = LiveRobot.of_package(options.retargeter, config, options.form)
+        robot = LiveRobot.of_package(options.retargeter, config, options.form, known)
     print(f"robot '{robot.facts.name}', {len(robot.joint_names)} joints; {config.rate:g} joint angles a second")
 
     def started() -> None:
@@ -125,4 +131,4 @@ def main(argv: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    run_command(main)
+    run_command(main, resumes=False)

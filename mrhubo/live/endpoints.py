@@ -57,6 +57,43 @@ class Endpoint:
         """Whether only this machine reaches it."""
         return is_loopback(self.host)
 
+    def destination(self) -> tuple[socket.socket, tuple]:
+        """A socket that may send datagrams to the address, and the address.
+
+        Raises:
+            UserError: the host has no address, or is a whole network (broadcast), to which the system sends nothing.
+        """
+        unbound, address = self.socket()
+        try:
+            with socket.socket(unbound.family, socket.SOCK_DGRAM) as probe:
+                probe.connect(address)  # sends nothing
+        except PermissionError as error:
+            unbound.close()
+            raise UserError(f"{self.shown}: cannot be sent to: it is a broadcast address; name one receiver") from error
+        except OSError:  # a network that is not there now may be later
+            pass
+        return unbound, address
+
+    def reaches(self, other: Endpoint) -> bool:
+        """Whether a datagram that is sent here comes to a socket that is bound to another endpoint.
+
+        Raises:
+            UserError: one of the hosts has no address.
+        """
+        if self.port != other.port or self.port == 0:
+            return False
+        to, at = self._address(), other._address()
+        if to.is_unspecified:  # the system takes it for this machine's own loopback
+            to = ipaddress.ip_address("::1" if to.version == 6 else LOOPBACK)
+        return _is_ours(to) if at.is_unspecified else to == at
+
+    def _address(self) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
+        unbound, address = self.socket()
+        unbound.close()
+        found = ipaddress.ip_address(address[0].split("%")[0])
+        mapped = found.ipv4_mapped if isinstance(found, ipaddress.IPv6Address) else None
+        return mapped or found
+
     def bound(self, kind: int = socket.SOCK_DGRAM) -> socket.socket:
         """A socket that is bound to the address.
 
@@ -84,6 +121,16 @@ class Endpoint:
             return socket.socket(family, kind, protocol), address
         except (OSError, UnicodeError) as error:
             raise UserError(f"{self.shown}: cannot be used: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _is_ours(address: ipaddress.IPv4Address | ipaddress.IPv6Address) -> bool:
+    """Whether an address is one of this machine's."""
+    try:
+        with socket.socket(socket.AF_INET if address.version == 4 else socket.AF_INET6, socket.SOCK_DGRAM) as probe:
+            probe.bind((str(address), 0))
+    except OSError:
+        return False
+    return True
 
 
 def is_loopback(host: str) -> bool:

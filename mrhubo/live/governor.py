@@ -23,6 +23,22 @@ _STILL = 1e-9
 """What is slower [rad/s] stands: roundings alone are left."""
 
 
+def brake_steps(config: LiveConfig) -> int:
+    """The periods in which every joint comes to stand, at most.
+
+    Raises:
+        UserError: there is no time to brake in.
+    """
+    steps = math.floor((config.stop_time - config.heartbeat_timeout) * config.rate + 1e-9) - 1
+    if steps < _LEAST_STEPS:
+        least = config.heartbeat_timeout + (_LEAST_STEPS + 1) / config.rate
+        raise UserError(
+            f"stop_time: {config.stop_time:g} s leaves no time to brake after heartbeat_timeout="
+            f"{config.heartbeat_timeout:g} at rate={config.rate:g}; give {least:.3g} or more, or another of them"
+        )
+    return steps
+
+
 class Governor:
     """The joints of one robot."""
 
@@ -41,13 +57,7 @@ class Governor:
             raise UserError(f"robot '{facts.name}': its limits are not known, so it cannot be steered")
         self.lower_N, self.upper_N = (limit.astype(np.float64) for limit in (facts.lower, facts.upper))
         self.period = 1.0 / config.rate
-        steps = math.floor((config.stop_time - config.heartbeat_timeout) * config.rate + 1e-9) - 1
-        if steps < _LEAST_STEPS:
-            least = config.heartbeat_timeout + (_LEAST_STEPS + 1) * self.period
-            raise UserError(
-                f"stop_time: {config.stop_time:g} s leaves no time to brake after heartbeat_timeout="
-                f"{config.heartbeat_timeout:g} at rate={config.rate:g}; give {least:.3g} or more, or another of them"
-            )
+        steps = brake_steps(config)
         self.acceleration = config.acceleration
         self.brake_time = steps * self.period
         """In which every joint comes to stand [s], at most."""

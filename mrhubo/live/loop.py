@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.live.inbox import Inbox
@@ -66,6 +66,15 @@ class Sink(Protocol):
         ...
 
 
+@runtime_checkable
+class Telling(Protocol):
+    """A sink that has something to say of a session that is over, which others need not."""
+
+    def told(self) -> str:
+        """A line."""
+        ...
+
+
 @dataclass
 class Session:
     """A pilot between its sources and its sinks."""
@@ -89,7 +98,12 @@ class Session:
         """What happened, in a few lines."""
         sent = ", ".join(f"{count} {state}" for state, count in self.states.items())
         came = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count)
-        more = [str(told()) for sink in self.sinks if callable(told := getattr(sink, "told", None))]
+        more = [sink.told() for sink in self.sinks if isinstance(sink, Telling)]
+        if pauses := self.pilot.pauses:
+            more.append(
+                f"held up: {pauses} times for longer than stop_time, in which the robot stopped; the machine is busy,"
+                " or a sink waits"
+            )
         return "\n".join([f"sent: {sent or 'nothing'}\nreceived: {came or 'nothing'}", *more])
 
     @classmethod

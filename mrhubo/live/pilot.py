@@ -47,6 +47,8 @@ class Pilot:
         """Since when the robot may move [s]; None: it may not."""
         self._ticked = -math.inf
         """When the last moment was [s]."""
+        self.pauses = 0
+        """How often a period took longer than `stop_time`, so that the robot had stopped by itself."""
         self._body = Body(has_legs=robot.standing is not None)
         self._answer_N, self._confidence_X = robot.home_N, np.zeros(len(robot.branch_names))
         self._met = False
@@ -69,6 +71,7 @@ class Pilot:
     def tick(self, now: float) -> Output:
         """The joint angles of this moment; one period after the last. `now`: our clock [s]."""
         if now - self._ticked > self.config.stop_time:  # the process was held up, and the robot has stopped by itself
+            self.pauses += math.isfinite(self._ticked)
             self.governor.settle()
             if self.legs is not None:
                 self.legs.settle()

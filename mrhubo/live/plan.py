@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,8 +12,9 @@ from mrhubo.errors import UserError, shortened, unknown_name
 from mrhubo.files.regular import refuse_input
 from mrhubo.live.certificate import ServerCertificate
 from mrhubo.live.endpoints import LOOPBACK, Endpoint
-from mrhubo.live.loop import Sink, Source
+from mrhubo.live.named import NamedSink, NamedSource
 from mrhubo.live.server import PORT, PageSink, PageSource, Server
+from mrhubo.live.sinks.own_file import tried
 
 UDP_PORT = 8766
 Part = TypeVar("Part")
@@ -26,8 +27,8 @@ class Plan:
         """`host`: where to listen; `certificate`: pages are served by https."""
         self._host, self._certificate = host, certificate
         self._servers: dict[int, Server] = {}
-        self.sources: list[Source] = []
-        self.sinks: list[Sink] = []
+        self.sources: list[NamedSource] = []
+        self.sinks: list[NamedSink] = []
         self.read: list[Path] = []
         """The files that are replayed or simulated."""
 
@@ -42,13 +43,7 @@ class Plan:
         if self._servers and self._certificate is not None:
             made = "made for this machine, so that browsers warn of it" if self._certificate.ours else "your own"
             said.append(f"certificate: {made}; SHA-256 {self._certificate.fingerprint}")
-        for source in self.sources:
-            endpoint = getattr(source, "endpoint", None)
-            if isinstance(endpoint, Endpoint):
-                token = getattr(source, "token", None)
-                said.append(f"listening: udp {endpoint.shown}" + ("" if token is None else f", token {token}"))
-            said += [f"note: {note}" for note in getattr(source, "notes", ())]
-        return said
+        return said + [sentence for source in self.sources for sentence in source.notes()]
 
     def add_source(self, text: str) -> None:
         """`NAME` or `NAME:WHERE`.
@@ -57,7 +52,7 @@ class Plan:
             UserError: there is no such source, or it needs what is missing.
         """
         name, _, where = text.partition(":")
-        makers: dict[str, Callable[[str], Source]] = {
+        makers: dict[str, Callable[[str], NamedSource]] = {
             "ws": lambda where: PageSource(self._server(where, text)),
             "udp": self._udp_source,
             "vmc": self._vmc_source,
@@ -74,7 +69,7 @@ class Plan:
             UserError: there is no such sink, or it needs what is missing.
         """
         name, _, where = text.partition(":")
-        makers: dict[str, Callable[[str], Sink]] = {
+        makers: dict[str, Callable[[str], NamedSink]] = {
             "ws": lambda where: PageSink(self._server(where, text)),
             "udp": _udp_sink,
             "file": _file_sink,
@@ -93,43 +88,59 @@ class Plan:
         """
         inputs = [*self.read, *more]
         for sink in self.sinks:
-            path = getattr(sink, "path", None)
-            if isinstance(path, Path):
+            for path in sink.writes:
                 refuse_input("--sink", path, inputs)
 
-    def check_addresses(self) -> None:
-        """Binds all addresses and leaves them again: one that cannot be had is told before anything is compiled.
+    def check(self) -> None:
+        """Binds all addresses and opens all files, and leaves them as they were: what cannot be had is told before
+        anything is compiled.
 
         Raises:
-            UserError: one is used, by another program or by two sources of this session, is not ours, or is unknown.
+            UserError: an address is used, by another program or by two sources of this session, is not ours, or is
+                unknown; what a sink sends would come back to a source; a file cannot be written, or has two sinks.
         """
-        with contextlib.ExitStack() as bound:
+        listening = [source.endpoint for source in self.sources if source.endpoint is not None]
+        with contextlib.ExitStack() as taken:
             for server in self._servers.values():
-                bound.enter_context(server.endpoint.bound(socket.SOCK_STREAM))
-            for source in self.sources:
-                endpoint = getattr(source, "endpoint", None)
-                if isinstance(endpoint, Endpoint):
-                    bound.enter_context(endpoint.bound())
+                taken.enter_context(server.endpoint.bound(socket.SOCK_STREAM))
+            for endpoint in listening:
+                taken.enter_context(endpoint.bound())
             for sink in self.sinks:
-                endpoint = getattr(sink, "endpoint", None)
-                if isinstance(endpoint, Endpoint):
-                    bound.enter_context(endpoint.socket()[0])
+                if sink.endpoint is not None:
+                    taken.enter_context(sink.endpoint.destination()[0])
+                    _refuse_loop(sink.endpoint, listening)
+                for path in sink.writes:
+                    taken.enter_context(tried(path))
+
+    def check_robot(self, joint_names: Sequence[str], urdf: Path | None) -> None:
+        """Looks whether all sinks are for a robot, as `NamedSink.check`.
+
+        Raises:
+            UserError: one is not.
+        """
+        for sink in self.sinks:
+            sink.check(joint_names, urdf)
 
     def _server(self, where: str, text: str) -> Server:
         endpoint = Endpoint.read(where, text, PORT, self._host)
-        return self._servers.setdefault(endpoint.port, Server(endpoint, certificate=self._certificate))
+        if endpoint.port not in self._servers:
+            self._servers[endpoint.port] = Server(endpoint, certificate=self._certificate)
+        server = self._servers[endpoint.port]
+        if server.endpoint.host != endpoint.host:
+            raise UserError(f"{text}: port {endpoint.port} is already that of {server.endpoint.host}; name one host")
+        return server
 
-    def _udp_source(self, where: str) -> Source:
+    def _udp_source(self, where: str) -> NamedSource:
         from mrhubo.live.sources.udp import UdpSource
 
         return UdpSource(Endpoint.read(where, "--source udp", UDP_PORT, self._host))
 
-    def _vmc_source(self, where: str) -> Source:
+    def _vmc_source(self, where: str) -> NamedSource:
         from mrhubo.live.sources.vmc import PORT, VmcSource
 
         return VmcSource(Endpoint.read(where, "--source vmc", PORT))
 
-    def _replay(self, where: str, loop: bool) -> Source:
+    def _replay(self, where: str, loop: bool) -> NamedSource:
         from mrhubo.live.sources.replay import ReplaySource
 
         path, rate = _at_rate(where)
@@ -138,7 +149,7 @@ class Plan:
         self.read.append(Path(path))
         return ReplaySource.of_file(Path(path), loop, rate)
 
-    def _mujoco_sink(self, where: str, free: bool) -> Sink:
+    def _mujoco_sink(self, where: str, free: bool) -> NamedSink:
         from mrhubo.live.sinks.mujoco import MujocoSink
 
         model = Path(where) if where else None
@@ -152,7 +163,16 @@ def _chosen(kind: str, name: str, makers: Mapping[str, Callable[[str], Part]]) -
     return makers[name]
 
 
-def _pico(where: str) -> Source:
+def _refuse_loop(to: Endpoint, listening: Iterable[Endpoint]) -> None:
+    for endpoint in listening:
+        if to.reaches(endpoint):
+            raise UserError(
+                f"--sink udp:{to.shown}: this session's own --source listens there, and would hear what it sends; name"
+                " another port"
+            )
+
+
+def _pico(where: str) -> NamedSource:
     from mrhubo.live.sources.pico import PicoSource
 
     return PicoSource()
@@ -169,13 +189,16 @@ def _at_rate(where: str) -> tuple[str, float | None]:
         return where, None
 
 
-def _udp_sink(where: str) -> Sink:
+def _udp_sink(where: str) -> NamedSink:
     from mrhubo.live.sinks.udp import UdpSink
 
-    return UdpSink(Endpoint.read(where, "--sink udp"))
+    endpoint = Endpoint.read(where, "--sink udp")
+    if endpoint.port == 0:
+        raise UserError(f"--sink udp:{endpoint.shown}: nobody listens at port 0; name the receiver's port")
+    return UdpSink(endpoint)
 
 
-def _file_sink(where: str) -> Sink:
+def _file_sink(where: str) -> NamedSink:
     from mrhubo.live.sinks.file import FileSink
 
     if not where:
@@ -183,7 +206,7 @@ def _file_sink(where: str) -> Sink:
     return FileSink(Path(where))
 
 
-def _mcap_sink(where: str) -> Sink:
+def _mcap_sink(where: str) -> NamedSink:
     from mrhubo.live.sinks.mcap import McapSink
 
     if not where:
@@ -191,7 +214,7 @@ def _mcap_sink(where: str) -> Sink:
     return McapSink(Path(where))
 
 
-def _ros2_sink(where: str) -> Sink:
+def _ros2_sink(where: str) -> NamedSink:
     from mrhubo.live.sinks.ros2 import Ros2Sink
 
     return Ros2Sink(where)

@@ -5,7 +5,7 @@ Legend: N joints, X branches (an arm, the head), J = 21 human joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,9 @@ from mrhubo.robot_motion import RobotFacts
 _CHEST = POSED_JOINT_NAMES.index("spine3")
 
 
+Known = Callable[[Sequence[str], Path | None], object]
+"""Is told the joints of what will be sent, and the robot's model where it is known, before anything is compiled; what
+it raises ends the rest."""
 StreamRoot = tuple[np.ndarray, np.ndarray]
 """A pelvis' rotation (3, 3) and place (3,) [m] in a world whose y is up."""
 
@@ -70,7 +73,9 @@ class LiveRobot:
         return () if self.standing is None else tuple(self.standing.settings.facts["feet"])
 
     @classmethod
-    def of_package(cls, source: str, config: LiveConfig, form: str | None = None) -> LiveRobot:
+    def of_package(
+        cls, source: str, config: LiveConfig, form: str | None = None, known: Known = lambda *_: None
+    ) -> LiveRobot:
         """By a package, without PyTorch; `form` as for `mrhubo.load_fast`.
 
         Raises:
@@ -85,6 +90,7 @@ class LiveRobot:
             raise UserError(
                 f"--retargeter {source}: was made before packages told how a robot stands; `mrhubo fit` makes it anew"
             )
+        known(fast.joint_names, None)
         found = cls.of_retargeter(fast, config)
 
         def figure() -> dict[str, Any]:
@@ -96,7 +102,14 @@ class LiveRobot:
         return replace(found, figure=figure)
 
     @classmethod
-    def of_robot(cls, name: str, config: LiveConfig, form: str | None = None, whole_body: bool = False) -> LiveRobot:
+    def of_robot(
+        cls,
+        name: str,
+        config: LiveConfig,
+        form: str | None = None,
+        whole_body: bool = False,
+        known: Known = lambda *_: None,
+    ) -> LiveRobot:
         """By the universal network, without training; as `mrhubo.for_robot`, whose `whole_body` it is.
 
         Raises:
@@ -108,7 +121,9 @@ class LiveRobot:
         robot = open_robot(name, whole_body)
         retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
-        found = cls.of_retargeter(FastRetargeter(retargeter.describe(), form), config, urdf)
+        fast = FastRetargeter(retargeter.describe(), form)
+        known(fast.joint_names, urdf)
+        found = cls.of_retargeter(fast, config, urdf)
 
         def figure() -> dict[str, Any]:
             from mrhubo.live.figure import figure_of

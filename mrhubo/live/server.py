@@ -24,9 +24,11 @@ from mrhubo.live.certificate import ServerCertificate
 from mrhubo.live.endpoints import Endpoint, find_token
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
+from mrhubo.live.named import NamedSink, NamedSource
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.visitors import ROBOT_PATH, SECURITY_HEADERS, SOCKET_PATH, Visitors, find_file, find_model
+from mrhubo.live.waiting import Waiting
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -36,8 +38,6 @@ PORT = 8765
 PAGE = Path(__file__).with_name("page")
 """The folder of the page; `index.html` in it is what the browser shows."""
 _MOST_CLIENTS = 16
-_MOST_MESSAGES = 64
-"""That wait for the session."""
 _MOST_PER_WINDOW, _WINDOW = 60, 0.1
 """Messages of one client in so many seconds; then it has to wait."""
 _SHOWN_RATE = 30.0
@@ -70,10 +70,9 @@ class Server:
         )
         self.endpoint, self.token = endpoint, find_token(endpoint.host)
         self._page, self.certificate = page, certificate
-        self._waiting: deque[tuple[str, bytes | str | None]] = deque(maxlen=_MOST_MESSAGES)
+        self._waiting = Waiting()
         self.figure = b"null"
         """How the robot looks (`mrhubo.live.figure`), JSON; null: nobody knows."""
-        self._lost = 0
         self._faults: deque[str] = deque(maxlen=1_000)
         self._thread: threading.Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -111,14 +110,12 @@ class Server:
         """Gives the inbox all that has come since the last call."""
         for _ in range(len(self._faults)):
             inbox.counts[self._faults.popleft()] += 1
-        lost, self._lost = self._lost, 0
+        messages, gone, lost = self._waiting.take()
         inbox.counts["overflow"] += lost
-        for _ in range(len(self._waiting)):
-            sender, data = self._waiting.popleft()
-            if data is None:
-                inbox.gone(sender)
-            else:
-                inbox.offer(data, sender, now)
+        for sender, data in messages:
+            inbox.offer(data, sender, now)
+        for sender in gone:
+            inbox.gone(sender)
 
     def show(self, text: str) -> None:
         """Tells all who watch; returns at once."""
@@ -194,9 +191,7 @@ class Server:
         loop, begun, count = asyncio.get_running_loop(), 0.0, 0
         try:
             async for data in connection:
-                if len(self._waiting) == _MOST_MESSAGES:
-                    self._lost += 1
-                self._waiting.append((sender, data))
+                self._waiting.put(sender, data)
                 if loop.time() - begun > _WINDOW:
                     begun, count = loop.time(), 0
                 count += 1
@@ -209,7 +204,7 @@ class Server:
             del self._clients[connection]
             if connection.protocol.close_sent is not None and connection.protocol.close_sent.code == 1009:
                 self._faults.append("too_long")
-            self._waiting.append((sender, None))
+            self._waiting.end(sender)
 
     async def _tell(self, connection: ServerConnection, news: asyncio.Event) -> None:
         """Sends one client the newest output, over and over."""
@@ -233,7 +228,7 @@ def _response(status: int, body: bytes, kind: str) -> Any:
     return Response(status, HTTPStatus(status).phrase, Headers(headers), body)
 
 
-class PageSource:
+class PageSource(NamedSource):
     """Frames and heartbeats of those who are connected."""
 
     has_heartbeat = True
@@ -255,7 +250,7 @@ class PageSource:
         self.server.close()
 
 
-class PageSink:
+class PageSink(NamedSink):
     """Tells outputs to those who are connected, thirty times a second at most, with the session's counts."""
 
     def __init__(self, server: Server) -> None:

@@ -53,13 +53,17 @@ class Visitors:
             origin: the header Origin, which browsers send.
             given: the token in the header Authorization, without "Bearer ".
         """
+        try:
+            parts = urlsplit(path)
+        except ValueError:
+            return "malformed"
         if host is None or not self._is_ours(host):
             return "host"
         if origin is not None and origin not in self._origins(host):
             return "origin"
-        if urlsplit(path).path not in (SOCKET_PATH, ROBOT_PATH):
+        if parts.path not in (SOCKET_PATH, ROBOT_PATH):
             return None
-        told = parse_qs(urlsplit(path).query).get("token", [given])
+        told = parse_qs(parts.query).get("token", [given])
         return None if token_fits(self.token, told[0]) else "token"
 
     def _origins(self, host: str) -> tuple[str, ...]:
@@ -102,7 +106,10 @@ def find_file(folder: Path, path: str) -> tuple[Path, str] | None:
         return None
     folder = folder.resolve()
     file = (folder / name).resolve()
-    if not file.is_relative_to(folder) or not file.is_file():
+    try:
+        if not file.is_relative_to(folder) or not file.is_file():
+            return None
+    except OSError:  # a name that is too long
         return None
     kind = _TYPES.get(file.suffix.lower()) or mimetypes.guess_type(file.name)[0] or "application/octet-stream"
     return file, f"{kind}; charset=utf-8" if kind.startswith("text/") else kind

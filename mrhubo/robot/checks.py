@@ -160,7 +160,7 @@ def _check_lengths(body_map: BodyMap, limbs: Sequence[Limb], lengths: dict[str, 
     """Refuses a limb between two points that are one; warns of lengths that no limb has."""
     for limb in limbs:
         shortest, longest = lengths[limb.part.name]
-        advice = body_map.yardstick.advice(limb.part.start, limb.part.end)
+        advice = body_map.yardstick.advice(limb.part.start, limb.part.end, given=body_map.keypoints)
         if shortest < _NO_LENGTH:
             raise UserError(
                 f"robot.keypoints: '{limb.part.start}' and '{limb.part.end}' lie on one point, so the limb has no "

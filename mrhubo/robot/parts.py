@@ -98,6 +98,9 @@ class OrientedPart(BodyPart):
     """The human keypoints of its sole, the rear one and the front one; none for what does not stand on the floor."""
     first_weight: float | None = None
     """Weight of the first direction, where it is not `weight`."""
+    unturned_weights: tuple[float, float] | None = None
+    """Weights of both where no joint swings it against the limb that carries it, and where joints do that turn it not
+    every way, if these are others (`mrhubo.robot.swings`)."""
     by_itself: bool = False
     """Whether a robot may have it without the part that carries it, or on the same link: then it has no directions of
     its own, and others are seen from it all the same."""
@@ -166,6 +169,9 @@ _BEND_WEIGHT = 2e-3
 _HEADING_WEIGHT = 0.1
 """Of where a foot points, against a limb's 1. Thigh, shin and foot ask for seven angles, and most robots' legs have six
 joints: what is missing is taken from here, and not from the limbs or from how flat the sole is."""
+_UNTURNED_WEIGHTS = 0.02, _HEADING_WEIGHT
+"""Of a hand that points where its forearm does, enough to tell how the forearm is twisted; and of one whose wrist has
+two joints: what is missing is taken from the hand, as from where a foot points."""
 
 
 def _arm(side: str, elbow_axis: Vector) -> tuple[LimbPart, BendPart, LimbPart]:
@@ -186,6 +192,7 @@ def _hand(side: str, outward: Vector) -> OrientedPart:
     return OrientedPart(
         name=f"{side}_hand", joint=wrist, region="hand", hangs_on=f"{side}_forearm", seen_from="chest",
         words=("fingers", "thumb"), rest=(outward, _FORWARD), turned_by=(wrist,), inputs=(wrist,), weight=0.5,
+        unturned_weights=_UNTURNED_WEIGHTS,
         points=tuple(f"{side}_{point}" for point in ("thumb", "index", "middle", "pinky")),
     )  # fmt: skip
 

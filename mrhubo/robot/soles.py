@@ -81,13 +81,16 @@ def _sole(part: OrientedPart, end: End, description: Description) -> Sole:
 
 def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
     """Balls (K, 4) of all that is fixed to a link, in its frame: of collision shapes, or of looks where there are none,
-    or the links' origins; and whether shapes told.
+    or the links' origins; and whether shapes told. What only looks beside meshes marks a place, as a ball at a foot's
+    frame does.
     """
     links, parsed = _fixed_to(link, description), description.parsed
     poses = StandingRobot(description, {}).poses
     from_44 = {name: np.linalg.inv(poses[link]) @ poses[name] for name in links}
     size = float(np.linalg.norm(np.ptp([pose_44[:3, 3] for pose_44 in poses.values()], axis=0)))
-    for read in (read_collision_geometry, read_geometry):
+    shaped = [shape for each in parsed.robot.links if each.name in links for shape in (*each.visuals, *each.collisions)]
+    meshed = any(shape.geometry is not None and shape.geometry.mesh is not None for shape in shaped)
+    for read in (read_collision_geometry, *(() if meshed else (read_geometry,))):
         shapes = without_markers(read(parsed), size)
         found = [_placed(_of_shape(s), from_44[s.link] @ s.origin_44) for s in shapes if s.link in links]
         if found:

@@ -11,12 +11,15 @@ from mrhubo.errors import UserError
 from mrhubo.robot.ancestry import Ancestry
 from mrhubo.robot.discovery import Discovery, FoundPoint, discover
 from mrhubo.robot.entries import End, Point
+from mrhubo.robot.keypoints import Keypoints
 from mrhubo.robot.model import Robot
 from mrhubo.robot.standing import StandingRobot
 from mrhubo.robot.suggestions import axes_entry, point_entry
 
 _SURE = 0.5
 """Confidence from which on something counts as known: below it the user is asked (`Discovery.questions`)."""
+_SAME_M, _SAME_DEG = 1e-3, 0.5
+"""How near an entry is to another one that need not be told in its place."""
 
 
 class Yardstick:
@@ -77,10 +80,26 @@ class Yardstick:
         found = self.found.points.get(name) if link is None else self._on_side(self.found.points, name, link)
         return None if found is None else point_entry(name, Point(found.link, found.offset_3))
 
-    def advice(self, *names: str, after: str = "; ") -> str:
-        """``; the robot's axes tell: left_elbow: l_lower, left_wrist: l_hand``, to end a sentence; or nothing."""
+    def advice(self, *names: str, after: str = "; ", given: Keypoints | None = None) -> str:
+        """``; the robot's axes tell: left_elbow: l_lower, left_wrist: l_hand``, to end a sentence; or nothing, as where
+        just these entries are given.
+        """
+        names = tuple(name for name in names if given is None or not self._is_given(name, given))
         entries = [entry for name in names if (entry := self.entry(name)) is not None]
         return f"{after}the robot's axes tell: {', '.join(entries)}" if entries else ""
+
+    def _is_given(self, name: str, given: Keypoints) -> bool:
+        """Whether an entry is the one that was found."""
+        if self.found is None:
+            return False
+        if name in given.ends:
+            turned = self.turned(given.ends[name], name)
+            return turned is not None and turned < _SAME_DEG
+        found, standing = self.found.points.get(name), StandingRobot(self._description, {})
+        if found is None or name not in given.points:
+            return False
+        apart_3 = standing.position(Point(found.link, found.offset_3)) - standing.position(given.points[name])
+        return float(np.linalg.norm(apart_3)) < _SAME_M
 
     def _on_side(self, points: Mapping[str, FoundPoint], name: str, link: str) -> FoundPoint | None:
         both = next((pair for pair in PAIRED_KEYPOINTS.values() if name in pair), (name,))

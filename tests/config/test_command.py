@@ -16,11 +16,11 @@ def run(body: str, **options) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", script(body)], capture_output=True, text=True, timeout=300, **options)
 
 
-def script(body: str) -> str:
+def script(body: str, more: str = "") -> str:
     lines = "".join(f"    {line}\n" for line in body.splitlines())
     return (
         "import os, sys, time\nfrom mrhubo.config import run_command\nfrom mrhubo.errors import UserError\n"
-        f"def main(argv):\n{lines}\nrun_command(main)"
+        f"def main(argv):\n{lines}\nrun_command(main{more})"
     )
 
 
@@ -50,6 +50,21 @@ def script(body: str) -> str:
 def test_ends(body, status, out, err):
     done = run(body)
     assert (done.returncode, done.stdout, done.stderr) == (status, out, err)
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("raise KeyboardInterrupt", "interrupted; the same command begins anew"),
+        (
+            "import errno; raise OSError(errno.ENOSPC, 'x', 'a.npz')",
+            "error: a.npz: No space left on device; put that right and start the same command again",
+        ),
+    ],
+)
+def test_a_command_that_does_not_go_on_does_not_say_so(body: str, sentence: str) -> None:
+    done = subprocess.run([sys.executable, "-c", script(body, ", resumes=False")], capture_output=True, text=True)
+    assert done.stderr == f"{sentence}\n"
 
 
 def test_a_current_folder_that_is_gone_is_one_sentence(tmp_path: Path) -> None:

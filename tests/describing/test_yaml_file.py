@@ -11,7 +11,7 @@ import torch
 import yaml
 
 from mrhubo.config import load_config
-from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, next_command, relative, unsure
+from mrhubo.describing.yaml_file import described_yaml, end_entry, keypoint_entries, next_command, relative, unsure
 from mrhubo.robot import build_body_map, read_keypoints
 from mrhubo.robot.discovery import Candidate, Discovery, FoundRange, Question, discover
 from tests.robot.two_arms import PAIR
@@ -107,6 +107,13 @@ def test_a_range_never_leaves_the_limits_by_its_rounding(tmp_path: Path, lower: 
     found_ = dataclasses.replace(found(tmp_path), ranges={"l_elbow": FoundRange(lower, upper, "why")})
     low, high = load_config(written(tmp_path, found_)).robot.ranges["l_elbow"]
     assert lower <= low < lower + 2e-5 and upper - 2e-5 < high <= upper
+
+
+def test_quarter_turns_of_five_digits_leave_no_rest(tmp_path: Path) -> None:
+    end = dataclasses.replace(
+        found(tmp_path).ends["chest"], axes={"forward": (1.0, 0.0, 1e-5), "up": (-1e-5, 0.0, 1.0)}
+    )
+    assert end_entry(end) == end.link
 
 
 def test_a_text_from_a_file_stays_in_its_comment(tmp_path: Path) -> None:

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from mrhubo.config import RobotConfig, load_config
+from mrhubo.describing.run import open_robot
 from mrhubo.evaluation import Clip
-from mrhubo.fitting.first_look import FirstLook, judge
+from mrhubo.fitting.first_look import FirstLook, judge, look_at
 from mrhubo.motion import read_motion, resample, trim
 from mrhubo.reference import OptimizationRetargeter
-from mrhubo.robot import build_body_map
+from mrhubo.robot import BodyMap, build_body_map
 from tests.robot.more_robots import more_robot
 
 
@@ -51,3 +52,15 @@ def test_a_limb_that_is_missed_is_named(root: Path) -> None:
     beside = {"left_shoulder": {"link": "left_shoulder_yaw_link", "offset": [0, 0.1, 0.1]}}
     found = look(root, more_robot("g1", keypoints=beside, **fixed))
     assert any("the left upper arm misses the human's by" in doubt for doubt in found.doubts)
+
+
+@pytest.mark.filterwarnings("ignore::mrhubo.errors.InputWarning")
+def test_a_robot_that_reaches_no_farther_is_not_told_to_write_what_stands_there(root: Path, tmp_path: Path) -> None:
+    text = (root / "data" / "robots" / "nao" / "nao.urdf").read_text()
+    for joint in ("LShoulderRoll", "LElbowYaw", "RShoulderRoll", "RElbowYaw"):  # what is left are two hinges an arm
+        assert f'<joint name="{joint}" type="revolute">' in text
+        text = text.replace(f'<joint name="{joint}" type="revolute">', f'<joint name="{joint}" type="fixed">')
+    (tmp_path / "nao.urdf").write_text(text)
+    body_map = BodyMap.of(open_robot(str(tmp_path / "nao.urdf")))
+    doubts = [doubt for doubt in look_at(body_map).doubts if "misses" in doubt or "at a limit" in doubt]
+    assert doubts and all("look at the picture" in doubt and "axes tell" not in doubt for doubt in doubts)

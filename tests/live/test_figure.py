@@ -48,8 +48,12 @@ def ask(server: Server, path: str) -> tuple[int, bytes]:
     return answer.status, answer.read()
 
 
+PARTS = {"left_leg_and_right_leg": 0.5}
+"""A part with a long name."""
+
+
 def message(angles: np.ndarray, names: tuple[str, ...]) -> str:
-    told: dict[str, Any] = {"mrhubo": 1, "kind": "joints", "state": "following", "confidence": {}}
+    told: dict[str, Any] = {"mrhubo": 1, "kind": "joints", "state": "following", "confidence": PARTS}
     return json.dumps({**told, "names": names, "angles": angles.tolist(), "velocities": [0.0] * len(names)})
 
 
@@ -75,6 +79,9 @@ def test_the_page_draws_what_forward_kinematics_say(
         told = json.loads(message(angles_N, tuple(nao.joint_names))) | {"base": json.loads(base)}
         server.show(json.dumps(told))
         browser.until(f"{pixels} !== {pen}")
+        assert browser.ask("document.querySelector('#confidence span').textContent") == "left leg and right leg"
+        assert browser.ask("(([a, b]) => a.right <= b.left)([...document.querySelector('#confidence div').children]"
+                           ".map((one) => one.getBoundingClientRect()))")  # fmt: skip
         assert browser.complaints() == []
     base_44 = np.eye(4)
     base_44[:3, :3], base_44[:3, 3] = quaternion_to_matrix(turn_4[[1, 2, 3, 0]]), at_3

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import socket
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,6 @@ from mrhubo.live.endpoints import TOKEN_VARIABLE, Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.loop import Periods, Session
 from mrhubo.live.output import STATES, Output
-from mrhubo.live.plan import Plan
 from mrhubo.live.sinks.file import FileSink
 from mrhubo.live.sinks.udp import UdpSink
 from mrhubo.live.sources.replay import ReplaySource
@@ -125,28 +123,6 @@ def test_a_slow_file_is_resampled(tmp_path: Path) -> None:
     assert ReplaySource.of_file(tmp_path / "slow.npz")._rate == 30
 
 
-def test_a_file_without_a_rate_is_replayed_at_the_one_that_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "poses@2.npz"
-    np.savez(path, poses=np.zeros((50, 66)), trans=np.zeros((50, 3)))
-    for kind in ("replay", "replay-loop"):
-        with pytest.raises(
-            UserError, match=f"holds no frame rate; say what it is, by --source {kind}:.*poses@2.npz@30$"
-        ):
-            Plan().add_source(f"{kind}:{path}")
-    plan = Plan()
-    plan.add_source(f"replay:{path}@60")
-    assert plan.sources[0]._rate == 60  # pyright: ignore
-    told = path.rename(tmp_path / "a@60")
-    with pytest.raises(UserError, match="--source replay:.*a@60@30$"):
-        plan.add_source(f"replay:{told}")
-    for wrong in ("0", "nan", "1e9"):
-        with pytest.raises(UserError, match="expected 1 to 1000"):
-            plan.add_source(f"replay:{told}@{wrong}")
-    np.savez(tmp_path / "b.npz", poses=np.zeros((50, 66)), trans=np.zeros((50, 3)), mocap_frame_rate=60.0)
-    plan.add_source(f"replay:{tmp_path / 'b.npz'}@50")
-    assert plan.sources[1]._rate == 60 and any("50" in said and "60" in said for said in plan.told())  # pyright: ignore
-
-
 def test_a_bug_in_a_source_stops_the_robot(clock: Clock, replay: ReplaySource, monkeypatch: pytest.MonkeyPatch) -> None:
     read, sink = replay.read, Kept()
 
@@ -188,6 +164,19 @@ def test_it_ends_after_some_time(clock: Clock, replay: ReplaySource) -> None:
     sink = Kept()
     loop.run(make_robot(), [replay], [sink], LiveConfig(), seconds=0.5)
     assert 30 <= len(sink.outputs) <= 33
+
+
+def test_a_sink_that_waits_is_told_and_moves_nothing(clock: Clock, replay: ReplaySource) -> None:
+    class Waiting(Kept):
+        def send(self, output: Output) -> None:
+            super().send(output)
+            clock.sleep(0.5)
+
+    sink, config = Waiting(), LiveConfig()
+    session = loop.run(random_robot(0), [replay], [sink], config, seconds=4)
+    assert not any(np.abs(output.velocity_N).max() for output in sink.outputs)
+    assert session.summary().endswith("a sink waits") and f"held up: {len(sink.outputs) - 1} times" in session.summary()
+    assert "held up" not in loop.run(random_robot(0), [replay], [Kept()], config, seconds=1).summary()
 
 
 def test_what_cannot_be_opened_leaves_nothing_open(replay: ReplaySource, tmp_path: Path) -> None:
@@ -290,62 +279,3 @@ def test_a_replay_gives_the_newest_frame_that_is_due(replay: ReplaySource) -> No
     assert not replay.read(inbox, 500.0)
     replay._loop = True
     assert replay.read(inbox, 500.0)
-
-
-WRONG: list[tuple[Callable[[Plan], object], str]] = [
-    (lambda plan: plan.add_source("udb:1"), "nearest: 'udp'"),
-    (lambda plan: plan.add_source("replay"), "names no file"),
-    (lambda plan: plan.add_source("replay:@30"), "names no file"),
-    (lambda plan: plan.add_source("replay:dance@me.bvh"), "dance@me.bvh: there is no such file"),
-    (lambda plan: plan.add_source("replay:/no/such/file.bvh"), "no such file"),
-    (lambda plan: plan.add_source("udp:x"), "HOST:PORT"),
-    (lambda plan: plan.add_sink("udp"), "HOST:PORT"),
-    (lambda plan: plan.add_sink("file:"), "names no file"),
-    (lambda plan: plan.add_sink("tape:1"), "does not exist"),
-]
-
-
-@pytest.mark.parametrize(("add", "sentence"), WRONG)
-def test_what_a_command_line_may_get_wrong(add: Callable[[Plan], object], sentence: str) -> None:
-    with pytest.raises(UserError, match=sentence):
-        add(Plan())
-
-
-@pytest.mark.parametrize("sink", ["file:walk.npz", "mcap:walk.npz", "file:./walk.npz", "file:my.yaml"])
-def test_what_is_replayed_or_read_is_not_written_over(
-    sink: str, tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("walk.npz").write_bytes((root / "data/motions/wave.npz").read_bytes())
-    Path("my.yaml").touch()
-    plan = Plan()
-    plan.add_source("replay-loop:walk.npz")
-    plan.add_sink("file:other.npz")
-    plan.refuse_inputs([None, "nao", "my.yaml"])
-    plan.add_sink(sink)
-    with pytest.raises(UserError, match="--sink .*: would be written over what is read"):
-        plan.refuse_inputs([None, "nao", "my.yaml"])
-
-
-def test_addresses_that_cannot_be_had_are_refused_before_anything_is_compiled() -> None:
-    with Endpoint("127.0.0.1", 0).bound() as used:
-        port = used.getsockname()[1]
-        plan = Plan()
-        for part in ("ws:0", f"udp:{port}"):
-            plan.add_source(part)
-        with pytest.raises(UserError, match=f"127.0.0.1:{port}: cannot listen there"):
-            plan.check_addresses()
-    plan.check_addresses()
-    plan.check_addresses()  # nothing is kept
-    plan.add_source(f"udp:{port}")
-    with pytest.raises(UserError, match="cannot listen there"):
-        plan.check_addresses()
-
-
-def test_source_and_sink_on_one_port_share_a_server() -> None:
-    plan = Plan()
-    plan.add_source("ws:8111")
-    plan.add_sink("ws:8111")
-    plan.add_sink("ws:8112")
-    assert plan.sources[0].server is plan.sinks[0].server is not plan.sinks[1].server  # pyright: ignore
-    assert [said.split(" ")[0] for said in plan.told()] == ["page:", "page:"]

@@ -143,6 +143,18 @@ def test_what_is_no_request_is_survived(server: Server) -> None:
     assert get(server, "/")[0] == 200
 
 
+@pytest.mark.parametrize("path", ["//[x", "//[1]x/live"])
+def test_an_address_that_is_none_is_refused_and_counted(server: Server, path: str) -> None:
+    assert get(server, path)[0] == 403
+    inbox = Inbox(0.25)
+    server.take(inbox, 0.0)
+    assert inbox.counts["malformed"] == 1
+
+
+def test_a_name_that_no_file_can_have_is_not_there(server: Server) -> None:
+    assert get(server, "/" + "a" * 5_000)[0] == 404
+
+
 def test_a_message_that_is_too_long_ends_the_connection(server: Server) -> None:
     inbox = Inbox(0.25)
     with connect(live(server)) as client, pytest.raises(ConnectionClosed):

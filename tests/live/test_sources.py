@@ -27,6 +27,7 @@ from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Nobody, Refused
 from mrhubo.live.sources import vmc
 from mrhubo.live.sources.pico import PicoSource, to_landmarks
+from mrhubo.live.sources.udp import Datagrams
 from mrhubo.live.sources.vmc import ADDRESS, BONES, Bones, VmcSource
 
 UNITY = {"pelvis": "Hips", **{joint: bone for bone, joint in BONES.items()}}
@@ -196,6 +197,51 @@ def test_datagrams_between_two_periods_are_one_frame(source: VmcSource) -> None:
         assert inbox.counts["frames"] == 1
 
 
+def test_two_avatars_do_not_become_one(source: VmcSource) -> None:
+    inbox, unit, turned = Inbox(0.25), [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.6, 0.8]
+    address = ("127.0.0.1", source.endpoint.port)
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,
+    ):
+        two.sendto(b"garbage", address)  # steers nothing
+        for step in range(3):
+            one.sendto(osc("LeftUpperArm", unit).dgram, address)
+            two.sendto(osc("RightUpperArm", turned).dgram, address)
+            source.read(inbox, 0.1 * step)
+        assert inbox.counts["frames"] == 3 and inbox.counts["other_sender"] == 3
+        assert source._bones._seen_J.sum() == 1
+        two.sendto(osc("RightUpperArm", turned).dgram, address)
+        source.read(inbox, 2.0)  # the first one has been silent
+        one.sendto(osc("LeftUpperArm", unit).dgram, address)
+        source.read(inbox, 2.1)
+    assert inbox.counts["frames"] == 4 and inbox.counts["other_sender"] == 4
+    seen = inbox.take_frame()
+    assert isinstance(seen, SeenPose)
+    shoulders = [seen.sure_J[POSED_JOINT_NAMES.index(f"{side}_shoulder")] for side in ("left", "right")]
+    assert shoulders == [0, 1], "nothing of the first avatar is left"
+
+
+def test_a_datagram_of_too_many_messages_is_refused_whole() -> None:
+    arm = osc("LeftUpperArm", [0, 0, 0.6, 0.8]).dgram
+    assert Bones().take(bundled(*[arm] * 300))
+    for datagram in (bundled(*[b""] * 10_000), bundled(*[bundled(*[arm] * 100)] * 6)):
+        bones = Bones()
+        with pytest.raises(Refused, match="too_long"):
+            bones.take(datagram)
+        assert not bones._seen_J.any()
+
+
+def test_a_flood_leaves_time_for_the_robot() -> None:
+    """Whatever comes, and however fast: a session that reads for long tells the robot nothing meanwhile."""
+    datagrams, came = Datagrams(Endpoint("127.0.0.1", 0)), []
+    for size in (60_000, 10):
+        datagrams._socket = SimpleNamespace(recvfrom=lambda most, size=size: (b"x" * size, ("127.0.0.1", 1)))  # pyright: ignore
+        came.clear()
+        datagrams.read(lambda data, sender: came.append(len(data)))
+        assert sum(came) <= 200_000 and len(came) <= 512
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.one_of(st.binary(max_size=80), st.binary(max_size=40).map(lambda tail: b"#bundle\0" + tail), st.binary(max_size=40).map(lambda tail: ADDRESS.encode() + b"\0\0\0,sfffffff\0\0\0" + tail)))  # fmt: skip
 def test_whatever_is_sent_is_read_or_refused(data: bytes) -> None:
@@ -258,6 +304,18 @@ def test_pico_numbers_that_a_newer_sdk_adds_are_not_read() -> None:
 def test_pico_what_is_no_pose(poses: Any) -> None:
     with pytest.raises(Refused):
         to_landmarks(poses)
+
+
+def test_pico_an_sdk_that_fails_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing() -> bool:
+        raise RuntimeError("the service has gone")
+
+    sdk = SimpleNamespace(init=lambda: None, close=lambda: None, is_body_data_available=failing)
+    monkeypatch.setitem(sys.modules, "xrobotoolkit_sdk", sdk)
+    source = PicoSource()
+    source.open()
+    with pytest.raises(UserError, match="--source pico: .* the service has gone"):
+        source.read(Inbox(0.25), 0.0)
 
 
 def test_pico_is_asked_as_its_documentation_says(monkeypatch: pytest.MonkeyPatch) -> None:

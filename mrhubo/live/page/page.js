@@ -39,7 +39,7 @@ function show(message) {
     const line = make("div"), meter = make("meter");
     meter.value = value;
     meter.setAttribute("aria-label", name);
-    line.append(make("span", name.replace("_", " ")), meter, make("span", value.toFixed(2)));
+    line.append(make("span", name.replaceAll("_", " ")), meter, make("span", value.toFixed(2)));
     return line;
   }));
   if (message.counts) {

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
+from mrhubo.live.named import NamedSink
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.own_file import open_own
@@ -20,7 +21,7 @@ _BASE = 7
 """Numbers of a row that tell where the base is."""
 
 
-class FileSink:
+class FileSink(NamedSink):
     """Rows go to `NAME.part` as they come, so that memory does not grow; at the end they become the file."""
 
     def __init__(self, path: Path) -> None:
@@ -36,6 +37,11 @@ class FileSink:
         self._file: BinaryIO | None = None
         self._robot: LiveRobot | None = None
         self._rate = 0.0
+
+    @property
+    def writes(self) -> tuple[Path, ...]:
+        """The file, and its part."""
+        return self.path, self._part
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Makes the part.

@@ -9,6 +9,7 @@ from typing import Any, BinaryIO
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
+from mrhubo.live.named import NamedSink
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.own_file import open_own
@@ -25,7 +26,7 @@ from mrhubo.robot_motion.mcap import (
 )
 
 
-class McapSink:
+class McapSink(NamedSink):
     """A JointTrajectory for every output, handed to the system some ten at a time."""
 
     def __init__(self, path: Path) -> None:
@@ -39,6 +40,11 @@ class McapSink:
         self._file: BinaryIO | None = None
         self._bag: Any = None
         self._period, self._first = 0.0, 0
+
+    @property
+    def writes(self) -> tuple[Path, ...]:
+        """The bag."""
+        return (self.path,)
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Begins the file.

@@ -9,6 +9,7 @@ Legend: V degrees of freedom.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from mrhubo.errors import UserError, first_line, listed, shortened
 from mrhubo.files.regular import check_regular
 from mrhubo.lazy import import_optional
 from mrhubo.live.floating_base import FloatingBase
+from mrhubo.live.named import NamedSink
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.turns import quaternion_of
@@ -35,7 +37,7 @@ _ROBOT, _FLOOR = 1, 2
 """Bits of contact: the robot's shapes meet the floor, and not each other."""
 
 
-class MujocoSink:
+class MujocoSink(NamedSink):
     """A simulation that goes on by one period with each output. `model` and `data` are MuJoCo's."""
 
     def __init__(self, model: Path | None = None, free: bool = False) -> None:
@@ -46,8 +48,10 @@ class MujocoSink:
             free: whether the base is free, above a floor; else it is fixed.
 
         Raises:
-            UserError: MuJoCo is not installed.
+            UserError: MuJoCo is not installed, or there is no such file.
         """
+        if model is not None:
+            check_regular(model, _MAX_BYTES)
         self._mujoco = import_optional("mujoco", "--sink mujoco: needs MuJoCo: pip install 'mrhubo[mjcf]'")
         self._file, self._free = model, free
         self.model: Any = None
@@ -60,13 +64,13 @@ class MujocoSink:
         self._base_off: list[float] = []
         """How far the base has been from where it was told to be [m]: now, and at most; empty: it is fixed."""
 
-    def open(self, robot: LiveRobot, config: LiveConfig) -> None:
-        """Loads the model, and puts the robot where it starts.
+    def check(self, joint_names: Sequence[str], urdf: Path | None) -> None:
+        """Loads the model.
 
         Raises:
-            UserError: no model is known, it cannot be loaded, or lacks one of the robot's joints.
+            UserError: none is known, it cannot be loaded, or lacks one of the robot's joints.
         """
-        file = self._file or robot.urdf
+        file = self._file or urdf
         if file is None:
             raise UserError("--sink mujoco: a package does not tell where the robot's model is; write mujoco:MODEL")
         check_regular(file, _MAX_BYTES)
@@ -79,10 +83,22 @@ class MujocoSink:
             raise UserError(f"{file}: MuJoCo cannot load it: {shortened(first_line(error), 200)}") from error
         finally:
             self._mujoco.set_mju_user_warning(None)
+        number = self._controllers()
+        missing = [name for name in joint_names if name not in number]
+        if missing:
+            raise UserError(f"{file}: has no joint {listed(missing)}; its joints: {listed(number)}")
+
+    def open(self, robot: LiveRobot, config: LiveConfig) -> None:
+        """Loads the model, and puts the robot where it starts.
+
+        Raises:
+            UserError: as for `check`.
+        """
+        self.check(robot.joint_names, robot.urdf)
         self._substeps = max(1, round(1.0 / config.rate / _STEP))
         self.model.opt.timestep = 1.0 / config.rate / self._substeps
         self.data = self._mujoco.MjData(self.model)
-        self._connect(robot, file)
+        self._connect(robot)
         self._stand(robot)
 
     def _load(self, file: Path) -> Any:
@@ -121,13 +137,14 @@ class MujocoSink:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         return spec.compile()
 
-    def _connect(self, robot: LiveRobot, file: Path) -> None:
+    def _controllers(self) -> dict[str, int]:
+        """Each joint's."""
+        kind = self._mujoco.mjtObj.mjOBJ_ACTUATOR
+        return {self._mujoco.mj_id2name(self.model, kind, i): i for i in range(self.model.nu)}
+
+    def _connect(self, robot: LiveRobot) -> None:
         """Which controller each joint has, and which joints follow another."""
-        model, mujoco = self.model, self._mujoco
-        number = {mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i): i for i in range(model.nu)}
-        missing = [name for name in robot.joint_names if name not in number]
-        if missing:
-            raise UserError(f"{file}: has no joint {listed(missing)}; its joints: {listed(number)}")
+        model, number = self.model, self._controllers()
         joint = model.actuator_trnid[:, 0]
         self._actuator = np.array([number[name] for name in robot.joint_names])
         self._place = model.jnt_qposadr[joint]

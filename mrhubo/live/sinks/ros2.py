@@ -8,13 +8,14 @@ from typing import Any
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.lazy import import_optional
+from mrhubo.live.named import NamedSink
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.trajectory import trajectory
 from mrhubo.robot_motion.mcap import BASE_TOPIC, TOPIC
 
 
-class Ros2Sink:
+class Ros2Sink(NamedSink):
     """Publishes; the newest message alone is kept for who is slow."""
 
     def __init__(self, topic: str = "") -> None:

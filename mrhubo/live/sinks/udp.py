@@ -7,25 +7,31 @@ import socket
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.live.endpoints import Endpoint
+from mrhubo.live.named import NamedSink
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 
 
-class UdpSink:
+class UdpSink(NamedSink):
     """Sends to one address; what nobody takes is lost."""
 
     def __init__(self, endpoint: Endpoint) -> None:
-        self.endpoint = endpoint
+        self._endpoint = endpoint
         self._socket: socket.socket | None = None
         self._address: tuple = ()
+
+    @property
+    def endpoint(self) -> Endpoint:
+        """Where it sends."""
+        return self._endpoint
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Looks the address up.
 
         Raises:
-            UserError: there is no such host.
+            UserError: there is no such host, or it is a network's broadcast address.
         """
-        self._socket, self._address = self.endpoint.socket()
+        self._socket, self._address = self.endpoint.destination()
         self._socket.setblocking(False)
 
     def send(self, output: Output) -> None:

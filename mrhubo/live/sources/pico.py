@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, first_line
 from mrhubo.lazy import import_optional
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Message, Nobody, Refused
+from mrhubo.live.named import NamedSource
 from mrhubo.live.point_sets import POINT_SETS
 
 _JOINTS, _NUMBERS = 24, 7
@@ -44,7 +45,7 @@ def to_landmarks(poses: Any) -> Landmarks:
     return Landmarks(points, {}, in_world=True)
 
 
-class PicoSource:
+class PicoSource(NamedSource):
     """Asks the SDK once a period."""
 
     has_heartbeat = False
@@ -70,15 +71,23 @@ class PicoSource:
         self._is_open = True
 
     def read(self, inbox: Inbox, now: float) -> bool:
-        """Gives the pose, if it is a new one; nobody, where the headset tracks no body."""
-        tracked = bool(self._sdk.is_body_data_available())
-        stamp = self._sdk.get_body_timestamp_ns() if tracked else None
-        if tracked and stamp == self._stamp:
-            return True
+        """Gives the pose, if it is a new one; nobody, where the headset tracks no body.
+
+        Raises:
+            UserError: the SDK has failed.
+        """
+        try:
+            tracked = bool(self._sdk.is_body_data_available())
+            stamp = self._sdk.get_body_timestamp_ns() if tracked else None
+            if tracked and stamp == self._stamp:
+                return True
+            poses = self._sdk.get_body_joints_pose() if tracked else None
+        except Exception as error:
+            raise UserError(f"--source pico: XRoboToolkit's SDK has failed: {first_line(error)}") from error
         self._stamp = stamp
         self._number += 1
         try:
-            content = to_landmarks(self._sdk.get_body_joints_pose()) if tracked else Nobody()
+            content = to_landmarks(poses) if tracked else Nobody()
         except Refused as fault:
             inbox.counts[str(fault)] += 1
             return True

@@ -9,6 +9,7 @@ import numpy as np
 from mrhubo.live.body import Root, SeenPose
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Message
+from mrhubo.live.named import NamedSource
 from mrhubo.motion import Motion, ReadOptions, read_motion, resample
 from mrhubo.motion.readers.options import NoRate
 
@@ -17,7 +18,7 @@ _SLOWEST = 30.0
 """Frames per second: slower ones would look like a stream that breaks off again and again."""
 
 
-class ReplaySource:
+class ReplaySource(NamedSource):
     """The frames of a motion, each when it is due; those that are over when they are asked for are left out."""
 
     has_heartbeat = False
@@ -25,8 +26,7 @@ class ReplaySource:
     def __init__(self, motion: Motion, loop: bool = False) -> None:
         """A motion from its first frame on; `loop`: again and again."""
         arrays = motion.arrays
-        self.notes = motion.notes
-        """What is to be known about it, a sentence each."""
+        self._notes = motion.notes
         self._local_TJ33, self._rate, self._loop = arrays.local_TJ33, motion.frame_rate, loop
         sure_TJ = arrays.confidence_TJ
         self._root_T33, self._place_T3 = arrays.root_rotation_T33, arrays.root_position_T3
@@ -51,6 +51,10 @@ class ReplaySource:
         except NoRate as error:
             raise error.instead(f"say what it is, by --source {_LOOP if loop else _NAME}:{path}@30") from error
         return cls(motion if motion.frame_rate >= _SLOWEST else resample(motion, _SLOWEST), loop)
+
+    def notes(self) -> list[str]:
+        """What is to be known of the file."""
+        return [f"note: {note}" for note in self._notes]
 
     def open(self) -> None:
         """The first frame is due when it is asked for."""

@@ -9,11 +9,16 @@ from collections.abc import Callable
 from mrhubo.live.endpoints import Endpoint, find_token, token_fits
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
+from mrhubo.live.named import NamedSource
 
 _BUFFER = 2**17
 """Bytes that the system keeps for us between two periods: more are lost, and none gets old."""
 _MOST = 512
 """Datagrams that are looked at in a period; the rest of a flood waits in the system's buffer, or is lost there."""
+_MOST_BYTES = 2 * MAX_BYTES
+"""Of these; reading what is in so many takes some milliseconds, and a session that reads for longer tells the robot
+nothing meanwhile.
+"""
 
 
 class Datagrams:
@@ -37,8 +42,9 @@ class Datagrams:
 
     def read(self, take: Callable[[bytes, str], None]) -> None:
         """Gives every datagram that has come, with its sender's address."""
+        left = _MOST_BYTES
         for _ in range(_MOST):
-            if self._socket is None:
+            if self._socket is None or left <= 0:
                 return
             try:
                 data, address = self._socket.recvfrom(MAX_BYTES + 1)
@@ -46,6 +52,7 @@ class Datagrams:
                 return
             except OSError:  # what the network says of an earlier datagram
                 continue
+            left -= len(data)
             take(data, f"udp:{address[0]}:{address[1]}")
 
     def close(self) -> None:
@@ -55,8 +62,11 @@ class Datagrams:
             self._socket = None
 
 
-class DatagramSource:
+class DatagramSource(NamedSource):
     """What sources that come by UDP share."""
+
+    token: str | None = None
+    """What messages need that come from elsewhere; None: none come."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._datagrams = Datagrams(endpoint)
@@ -65,6 +75,10 @@ class DatagramSource:
     def endpoint(self) -> Endpoint:
         """Where it listens."""
         return self._datagrams.endpoint
+
+    def notes(self) -> list[str]:
+        """The address, and the token."""
+        return [f"listening: udp {self.endpoint.shown}" + ("" if self.token is None else f", token {self.token}")]
 
     def open(self) -> None:
         """Binds."""

@@ -20,7 +20,7 @@ from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
 from mrhubo.live.body import LEG_LENGTH, Root, SeenPose
 from mrhubo.live.endpoints import Endpoint
-from mrhubo.live.inbox import Inbox
+from mrhubo.live.inbox import LEASE, Inbox
 from mrhubo.live.messages import MAX_BYTES, Message, Refused, of_quaternions
 from mrhubo.live.sources.udp import DatagramSource
 
@@ -29,6 +29,8 @@ PORT = 39_539
 ADDRESS, ROOT = "/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"
 _ARGUMENTS = 8
 """Name, position and rotation. What newer versions of the protocol tell after them is not read."""
+_MOST_MESSAGES = 512
+"""Of one datagram: an avatar has some sixty bones, and some hundred other values."""
 _BUNDLE, _BUNDLE_HEADER, _SIZE = b"#bundle\0", 16, 4
 """How a bundle of OSC begins, and bytes: before its first element, and of an element's size."""
 _CENTRAL = {"Spine": "spine1", "Chest": "spine2", "UpperChest": "spine3", "Neck": "neck", "Head": "head"}
@@ -145,7 +147,7 @@ def _messages(datagram: bytes) -> list[bytes]:
     (https://opensoundcontrol.stanford.edu/spec-1_0.html). python-osc gives up a bundle for one bad message in it.
 
     Raises:
-        Refused: a bundle is cut off.
+        Refused: a bundle is cut off, or has too many messages.
     """
     found: list[bytes] = []
     waiting = [(0, len(datagram))]
@@ -161,6 +163,8 @@ def _messages(datagram: bytes) -> list[bytes]:
                 raise Refused("malformed")
             inner.append((start, start + size))
             start += size
+            if len(found) + len(waiting) + len(inner) > _MOST_MESSAGES:
+                raise Refused("too_long")
         waiting += inner[::-1]  # so that they come out in order
     return found
 
@@ -204,6 +208,10 @@ class VmcSource(DatagramSource):
         super().__init__(endpoint)
         self._bones = Bones()
         self._session, self._number = str(time.time_ns()), 0
+        self._owner: str | None = None
+        """Whose avatar it is: bones of two would make one that nobody has."""
+        self._at = -math.inf
+        """When the owner was heard of last [s]."""
 
     def read(self, inbox: Inbox, now: float) -> bool:
         """Empties the socket; all bones that have come are one frame."""
@@ -211,15 +219,21 @@ class VmcSource(DatagramSource):
 
         def take(data: bytes, sender: str) -> None:
             nonlocal moved
+            is_owner = sender == self._owner
+            if not is_owner and now - self._at <= LEASE:
+                inbox.counts["other_sender"] += 1
+                return
+            bones = self._bones if is_owner else Bones()
             try:
-                moved |= self._bones.take(data)
+                if bones.take(data):
+                    self._bones, self._owner, self._at, moved = bones, sender, now, True
             except Refused as fault:
                 inbox.counts[str(fault)] += 1
+            inbox.counts["malformed"] += bones.dropped
+            bones.dropped = 0
 
         self._datagrams.read(take)
-        inbox.counts["malformed"] += self._bones.dropped
-        self._bones.dropped = 0
-        if moved:
+        if moved and self._owner is not None:
             self._number += 1
-            inbox.offer(Message(self._session, self._number, now, self._bones.pose), "vmc", now)
+            inbox.offer(Message(self._session, self._number, now, self._bones.pose), self._owner, now)
         return True

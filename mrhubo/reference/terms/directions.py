@@ -13,10 +13,11 @@ from torch import Tensor
 from mrhubo.reference.blocks import Blocks
 from mrhubo.reference.jacobian import DirectionJacobian
 from mrhubo.reference.terms.term import Quadratic, State, Term
+from mrhubo.robot.swings import direction_weights
 
 
 class DirectionTerm(Term):
-    """The term above; the weights w are those of the table of body parts."""
+    """The term above; the weights w are those of `mrhubo.robot.swings`."""
 
     weight_D: Tensor
     partial_D: Tensor
@@ -25,9 +26,7 @@ class DirectionTerm(Term):
     def __init__(self, kinematics: DirectionJacobian) -> None:
         super().__init__()
         self.kinematics = kinematics
-        parts = kinematics.body_map.keypoints.parts
-        of = {name: w for p in parts for name, w in zip(p.direction_names, p.direction_weights, strict=True)}
-        weights = [of[direction.name] for direction in kinematics.body_map.directions]
+        weights = direction_weights(kinematics.body_map)
         partial = [float(i in kinematics.body_map.shared.bend_columns) for i in range(len(weights))]
         self.register_buffer("partial_D", torch.tensor(partial).to(kinematics.robot.lower_N), persistent=False)
         self.register_buffer("weight_D", torch.tensor(weights).to(kinematics.robot.lower_N), persistent=False)

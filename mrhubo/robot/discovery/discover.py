@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from mrhubo.robot.discovery.result import (
     Vector,
 )
 from mrhubo.robot.discovery.roles import find_roles
+from mrhubo.robot.discovery.sole import GuessedSole, guess_sole
 from mrhubo.robot.discovery.symmetry import find_pairs
 from mrhubo.robot.urdf import Description, describe
 
@@ -82,6 +84,7 @@ class _Finder:
         limbs = Limbs(self.bodies, self.roles, self.heading, self.arms, self.legs, self.hands, whole_body)
         spots = list(self._spots())
         legs = self.legs if limbs.whole_body else {}
+        soles = {side: sole for side, leg in legs.items() if (sole := guess_sole(self.bodies, leg, self.feet[side]))}
         ranges, asked = find_ranges(self.bodies, self.arms, legs, limbs.moving.values(), self.heading)
         joints = limbs.moved
         ranges = {name: found for name, found in ranges.items() if name in joints}
@@ -92,14 +95,14 @@ class _Finder:
             forward=FoundAxis(_vector(self.heading.forward_3), self.heading.forward_sure, self.heading.forward_cue),
             up=FoundAxis(_vector(self.heading.up_3), self.heading.up_sure, self.heading.up_cue),
             points=points,
-            ends=dict(self._ends()),
+            ends=dict(self._ends(soles)),
             chains={name: tuple(step.hinge.name for step in chain) for name, chain in limbs.chains.items()},
             joints=joints,
             held=held,
             left_out=dict(limbs.left_out({*joints, *held})),
             ranges=ranges,
             key_links=limbs.key_links(),
-            questions=(*questions(limbs, spots, self.feet), *asked, *coupled(limbs)),
+            questions=(*questions(limbs, spots, self.feet, soles), *asked, *coupled(limbs)),
             notes=tuple(notes(limbs, ranges)),
             geometric={name: point for name, point in points.items() if point.confidence >= 0.75},
             whole_body=limbs.whole_body,
@@ -133,7 +136,7 @@ class _Finder:
     def _offset(self, link: str, point_3: np.ndarray) -> Vector:
         return _vector(self.bodies.in_link(link, point_3))
 
-    def _ends(self) -> Iterator[tuple[str, FoundEnd]]:
+    def _ends(self, soles: Mapping[str, GuessedSole]) -> Iterator[tuple[str, FoundEnd]]:
         forward_3, up_3, roles = self.heading.forward_3, self.heading.up_3, self.roles
         sure = min(self.heading.forward_sure, self.heading.up_sure)
         chest = self._main_link(roles.chest, [chain[0] for chain in roles.arms.chains])
@@ -156,7 +159,8 @@ class _Finder:
             yield f"{side}_hand", self._end(hand.link, axes, hand.confidence, hand.cue)
         for side, foot in self.feet.items():
             axes = {"forward": foot.forward_3, "up": foot.up_3}
-            yield f"{side}_foot", self._end(foot.link, axes, min(sure, foot.confidence), foot.cue)
+            end = self._end(foot.link, axes, min(sure, foot.confidence), foot.cue)
+            yield f"{side}_foot", replace(end, sole_3=soles[side].reach_3) if side in soles else end
 
     def _pelvis(self) -> str | None:
         """The link that carries both legs, or, without legs, the one on which the waist turns the chest."""

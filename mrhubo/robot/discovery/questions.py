@@ -13,8 +13,8 @@ from mrhubo.robot.discovery.other_side import copied_limits
 from mrhubo.robot.discovery.ranges import driver
 from mrhubo.robot.discovery.result import Candidate, FoundRange, Question
 from mrhubo.robot.discovery.roles import Roles
+from mrhubo.robot.discovery.sole import GuessedSole
 from mrhubo.robot.limits import beyond_turns
-from mrhubo.robot.soles import sole_balls
 
 _SURE = 0.5
 """Confidence under which the user is asked."""
@@ -30,7 +30,9 @@ Named = tuple[str, Spot, tuple[Candidate, ...]]
 """A point by its name, and where else it may lie."""
 
 
-def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) -> Iterator[Question]:
+def questions(
+    limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot], soles: Mapping[str, GuessedSole]
+) -> Iterator[Question]:
     """About directions, limbs, points, hands and feet."""
     heading, roles = limbs.heading, limbs.roles
     if heading.forward_sure < _SURE:
@@ -58,9 +60,9 @@ def questions(limbs: Limbs, spots: Sequence[Named], feet: Mapping[str, Foot]) ->
     for side, foot in feet.items():
         if foot.doubt is not None:
             yield Question(f"{side}_foot", foot.doubt, (foot.link,))
-        if not sole_balls(foot.link, limbs.bodies.description)[1]:
-            yield Question(f"{side}_foot", "no shape tells where its sole is; give how far it reaches backwards, "
-                           "forwards and down from the link's origin [m], as in sole: [0.05, 0.12, 0.035]",
+        if side in soles:
+            yield Question(f"{side}_foot", f"no shape tells where its sole is; taken: {soles[side].cue}; `sole` is how "
+                           "far it reaches backwards, forwards and down from the link's origin [m]",
                            (foot.link,))  # fmt: skip
     if not limbs.legs and (first := _unread_legs(roles)):
         yield Question("pelvis", "of the limbs below it no knee could be told, so they are left out: if they are legs, "

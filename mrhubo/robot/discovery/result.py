@@ -51,6 +51,9 @@ class FoundEnd:
     confidence: float
     cue: str
     candidates: tuple[Candidate, ...] = ()
+    sole_3: Vector | None = None
+    """Of a foot without shapes, where its sole is guessed to be: how far it reaches from the link's origin backwards,
+    forwards and down [m]."""
 
 
 @dataclass(frozen=True)
