@@ -106,7 +106,7 @@ def foreseeing_step(
         at_BN = torch.where(at_BN > upper_N - NEAR, upper_N, at_BN)
         slope_BN = slope_BN + share_B[:, None] * bent_BN
         changed_B = near.sums(((next_X > 0) != (lack_X > 0)).to(q_BN), frames) > 0
-        going_B = going_B & ((share_B < 1) | changed_B | (turn_BN != full_BN).any(dim=1))
+        going_B = going_B & ((share_B < 1) | changed_B | ((turn_BN != full_BN) | held_BN).any(dim=1))
         lack_X = next_X
         if not bool(going_B.any()):
             break

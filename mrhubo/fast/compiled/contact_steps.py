@@ -142,7 +142,7 @@ def _turn(t, work, at_N, count):
 @njit(**INNER)
 def _keep_within(work, at_N):
     """Cuts a turn at the limits: each joint's, or all joints' together, what leads further downhill. Returns 1 where it
-    was cut, else 0.
+    was cut, or a limit held a joint, else 0.
     """
     least, changed = alike(at_N[0], 1.0), alike(at_N[0], 0.0)
     cut_slope, short_slope = alike(at_N[0], 0.0), alike(at_N[0], 0.0)
@@ -157,7 +157,7 @@ def _keep_within(work, at_N):
         cut_slope += work.gradient_N[n] * cut
         short_slope += work.gradient_N[n] * turn
         least = min(least, choose(over & (most != 0.0), most / choose(over, turn, 1.0), 1.0))
-        changed = choose(over, 1.0, changed)
+        changed = choose(over | (work.free_N[n] < 1), 1.0, changed)
     steeper = cut_slope < least * short_slope
     for n in range(len(at_N)):
         work.step_N[n] = choose(steeper, work.bent_N[n], least * work.step_N[n])

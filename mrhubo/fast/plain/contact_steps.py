@@ -23,9 +23,9 @@ import numpy as np
 from mrhubo.fast.plain.steps import FLOOR, Model, diagonal
 from mrhubo.fast.sections import Cost
 
-REACH = 0.01
+REACH = 0.005
 """Pairs that are so much further apart than their clearance [m] are foreseen. Hardly any step goes further."""
-TURNS, SEARCHES = 8, 10
+TURNS, SEARCHES = 12, 10
 """Turns of Newton's method at most, and steps at most to where along one the sum is least."""
 LITTLE, LEVEL, TINY = 1e-9, 1e-6, 1e-12
 """What a turn wins at least; and the share of its slope that is taken for none, or rounding would choose."""
@@ -136,7 +136,7 @@ def foreseeing_step(
         at_BN = np.where(at_BN > cost.upper_N - NEAR, cost.upper_N, at_BN)
         slope_BN = slope_BN + share_B[:, None] * bent_BN
         changed_B = near.sums((next_X > 0) != (lack_X > 0), frames) > 0
-        going_B &= (share_B < 1) | changed_B | (turn_BN != full_BN).any(axis=1)
+        going_B &= (share_B < 1) | changed_B | ((turn_BN != full_BN) | held_BN).any(axis=1)
         lack_X = next_X
         if not going_B.any():
             break
