@@ -156,14 +156,15 @@ def _answers(options: Namespace, motion: Motion | None) -> tuple[list[Robot], li
 
 def _given(options: Namespace, robots: list[Robot], motion: Motion | None) -> list[Performance]:
     """The robot motions that are there already."""
-    from mrhubo.robot_motion import read_joint_order, read_robot_motion
+    from mrhubo.robot_motion import read_joint_order, read_robot_motion, trim_robot_motion
     from mrhubo.viewer import perform
 
     names = () if options.joint_order is None else read_joint_order(Path(options.joint_order)).names
-    rate = options.rate or (None if motion is None else motion.frame_rate)
-    found = []
+    rate, request, found = options.rate or (None if motion is None else motion.frame_rate), read_request(options), []
     for file in map(Path, options.robot_motion):
         answer = read_robot_motion(file, names, rate)
+        if request.start or request.end is not None:
+            answer = trim_robot_motion(answer, request.start, request.end, rate)
         robot = next((r for r in robots if set(answer.joint_names) <= set(r.description.joints)), None)
         if robot is None:
             lacking = set(answer.joint_names) - set(robots[0].description.joints)

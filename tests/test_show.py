@@ -111,6 +111,16 @@ def test_a_robot_motion_alone_as_every_kind_of_file(
     assert main(["--robot-motion", str(theirs), "--robot", "nao", "--save", str(tmp_path / "a.png")]) == 0  # replaced
 
 
+def test_a_span_is_that_of_everybody(wave: Path, theirs: Path, shown: list[Stage]) -> None:
+    """A robot motion that is given is of the whole human motion, of which `--from` and `--to` leave a part."""
+    span = ["--from", "0.05", "--to", "0.15"]
+    assert (
+        main(["--motion", str(wave), "--robot", "nao", "--method", "none", "--robot-motion", str(theirs), *span]) == 0
+    )
+    (stage,) = shown
+    assert [len(robot.motion) for robot in stage.robots] == [3] and stage.frames < 3
+
+
 def test_names_need_not_be_utf_8(wave: Path, tmp_path: Path) -> None:
     odd = Path(shutil.copy(wave, tmp_path / "w\udce4lle.npz"))
     for ending in ("html", "png", "mp4"):

@@ -5,16 +5,11 @@ Legend: T frames, J = 21: SMPL's joints 1..21.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from mrhubo.body.joints import MIRROR
-from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
-
-_SLACK = 1e-6
-"""Of a frame: times that were rounded still name the frame that they are of."""
+from mrhubo.robot_motion.span import frames_between
 
 
 def trim(motion: Motion, start: float = 0.0, end: float | None = None) -> Motion:
@@ -23,24 +18,9 @@ def trim(motion: Motion, start: float = 0.0, end: float | None = None) -> Motion
     Raises:
         UserError: the times are no such span, or no frame lies between them.
     """
-    check_span(start, end)
-    first = math.ceil(start * motion.frame_rate - _SLACK)
-    last = len(motion) - 1
-    if end is not None:
-        last = min(last, math.floor(end * motion.frame_rate + _SLACK))
-    if first > last:
-        length = max(0, len(motion) - 1) / motion.frame_rate
-        span = f"from {start:g} s" + ("" if end is None else f" to {end:g} s")
-        raise UserError(f"{motion.name}: has no frame {span}; it lasts from 0 to {length:.3f} s")
+    rows = frames_between(motion.name, len(motion), motion.frame_rate, start, end)
     arrays = vars(motion.arrays)
-    return motion.changed(**{name: array[first : last + 1] for name, array in arrays.items() if array is not None})
-
-
-def check_span(start: float, end: float | None) -> None:
-    """Refuses seconds between which no motion can be."""
-    if not math.isfinite(start) or start < 0 or (end is not None and not start <= end < math.inf):
-        until = "its end" if end is None else f"{end:g} s"
-        raise UserError(f"from {start:g} s to {until} is no span of time; motions begin at 0")
+    return motion.changed(**{name: array[rows] for name, array in arrays.items() if array is not None})
 
 
 def mirror(motion: Motion) -> Motion:

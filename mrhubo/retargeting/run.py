@@ -9,12 +9,12 @@ from pathlib import Path
 from mrhubo.errors import UserError
 from mrhubo.fast.poses import check_frame_rate
 from mrhubo.motion import Motion, ReadOptions, mirror, read_motion, resample, trim
-from mrhubo.motion.editing import check_span
 from mrhubo.retargeting.answering import Answerer
 from mrhubo.retargeting.places import Places
 from mrhubo.retargeting.summary import Summary
 from mrhubo.robot_motion import JointOrder, RobotMotion, in_order, write_lerobot, write_robot_motion
 from mrhubo.robot_motion.lerobot import check_lerobot_rate
+from mrhubo.robot_motion.span import check_span
 from mrhubo.runtime.progress import Reporter
 
 

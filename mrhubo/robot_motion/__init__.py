@@ -14,6 +14,7 @@ from mrhubo.robot_motion.order import JointOrder, in_order, read_joint_order
 if TYPE_CHECKING:
     from mrhubo.robot_motion.formats import FORMATS, find_format, read_robot_motion, write_robot_motion
     from mrhubo.robot_motion.lerobot import read_lerobot, write_lerobot
+    from mrhubo.robot_motion.span import trim_robot_motion
 
 __all__ = [
     "FORMATS",
@@ -26,6 +27,7 @@ __all__ = [
     "read_joint_order",
     "read_lerobot",
     "read_robot_motion",
+    "trim_robot_motion",
     "write_lerobot",
     "write_robot_motion",
 ]
@@ -34,9 +36,10 @@ _HOMES = {
     "find_format": ".formats",
     "read_lerobot": ".lerobot",
     "read_robot_motion": ".formats",
+    "trim_robot_motion": ".span",
     "write_lerobot": ".lerobot",
     "write_robot_motion": ".formats",
 }
-"""Module of each name that belongs to formats."""
+"""Module of each name that answers do not need."""
 
 __getattr__ = lazy_names(__name__, _HOMES)

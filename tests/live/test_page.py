@@ -107,7 +107,7 @@ def test_a_camera_moves_a_robot_while_the_key_is_held(
     picture = "((c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((value) => value))(document.getElementById('picture'))"  # fmt: skip
     assert browser.ask(picture)
     browser.ask("document.getElementById('camera').click()")
-    assert not browser.ask(picture), "who is not seen any more is not shown either"
+    until(lambda: not browser.ask(picture), "who is not seen any more is still shown", 10.0)
     assert browser.complaints() == []
 
     estimator = PoseEstimator("lite")

@@ -79,7 +79,7 @@ export class Camera {
     this.stream?.getTracks().forEach((track) => track.stop());
     if (this.stream) this.live.landmarks(null, performance.now() / 1000);
     this.stream = null;
-    this.canvas.getContext("2d").clearRect(0, 0, this.canvas.width, this.canvas.height); // nobody is seen any more
+    this.canvas.height = this.canvas.height; // empties it: nobody is seen any more
     this.turn();
     this.button.textContent = "Start the camera";
     this.figures.textContent = "";
