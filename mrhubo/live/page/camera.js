@@ -38,6 +38,7 @@ export class Camera {
   }
 
   turn() {
+    this.canvas.classList.toggle("off", !this.stream); // without a camera nobody is seen any more
     this.canvas.classList.toggle("mirrored", this.mirror.checked);
     this.mirrored(this.mirror.checked && Boolean(this.stream));
   }
@@ -79,7 +80,7 @@ export class Camera {
     this.stream?.getTracks().forEach((track) => track.stop());
     if (this.stream) this.live.landmarks(null, performance.now() / 1000);
     this.stream = null;
-    this.canvas.height = this.canvas.height; // empties it: nobody is seen any more
+    this.canvas.getContext("2d").clearRect(0, 0, this.canvas.width, this.canvas.height);
     this.turn();
     this.button.textContent = "Start the camera";
     this.figures.textContent = "";
