@@ -16,6 +16,7 @@ from typing import Any
 from mrhubo.config import flow_yaml
 from mrhubo.errors import listed, printable
 from mrhubo.robot.discovery import Discovery, FoundEnd
+from mrhubo.robot.discovery.ranges import NOUGHT
 from mrhubo.robot.entries import DEFAULT_AXES
 from mrhubo.robot.keypoints import entry_names
 from mrhubo.robot.parts import CHEST, PARTS, UPPER_BODY, BodyPart
@@ -23,8 +24,6 @@ from mrhubo.robot.parts import CHEST, PARTS, UPPER_BODY, BodyPart
 _WIDTH = 120
 _FINE = 1e5
 """Parts of a metre or a radian that are written."""
-_NOUGHT = 1e-4
-"""Part of a direction that is 0 to files whose quarter turns are 1.5708."""
 _HEAD = """\
 # What `mrhubo describe` found in {source}. Look at {picture}, beside this file, first. Every entry may be changed:
 #   mrhubo describe {file}  # draws the picture anew
@@ -161,7 +160,7 @@ def end_entry(end: FoundEnd) -> str | dict[str, Any]:
 
 def _axes(end: FoundEnd) -> dict[str, list[float]]:
     return {
-        word: [_number(number) if abs(number) > _NOUGHT else 0.0 for number in axis] for word, axis in end.axes.items()
+        word: [_number(number) if abs(number) > NOUGHT else 0.0 for number in axis] for word, axis in end.axes.items()
     }
 
 

@@ -97,10 +97,8 @@ class Avoidance(nn.Module):
         """What frames cost (B,), the model of that without contacts, and the contacts."""
         state = self.problem.state(q_BN, target_BD3)
         model, scale = self.problem.quadratic_at(state, self.contact), self.contact.weight**0.5
-        near = self.collision.near(q_BN, CLEARANCE + REACH, state.poses)
-        short_X = self.contact.lack(near)
-        x = torch.nonzero(short_X > -REACH)[:, 0]
-        touching = Contacts(near.row_X[x], scale * short_X[x], -scale * near.jacobian_XN[x])
+        short_X, rows_XN, row_X = self.contact.residual(state, REACH)
+        touching = Contacts(row_X, scale * short_X, scale * rows_XN)
         return model.cost_BC[:, 0] + touching.costs(touching.short_X, len(q_BN)), model, touching
 
     def in_motion(

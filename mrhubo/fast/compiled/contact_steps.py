@@ -13,7 +13,7 @@ from mrhubo.fast.compiled.human import dot
 from mrhubo.fast.compiled.lanes import alike, choose, no, some
 from mrhubo.fast.compiled.tables import BALL_Z, CLEAR_Y, FIRST_Z, INNER, ORDER_N, real, size, whole
 from mrhubo.fast.plain.collision import SHORT
-from mrhubo.fast.plain.contact_steps import LEVEL, LITTLE, NEAR, REACH, SEARCHES, TINY, TURNS
+from mrhubo.fast.plain.contact_steps import LEVEL, LITTLE, NEAR, SEARCHES, TINY, TURNS
 from mrhubo.fast.plain.steps import FLOOR
 
 _AWAY = -1e6
@@ -21,10 +21,10 @@ _AWAY = -1e6
 
 
 @njit(**INNER)
-def look(t, work, q_N, root):
+def look(t, work, q_N, root, more):
     """The model of what has no bend at joint angles [rad], for the goal in `work`, into `next_gradient_N` and
-    `next_hessian_NN`; and the pairs within reach, into `short_Y` and `rows_YN`. `root`: of what a pair's lack is
-    weighted by. Returns what a frame costs, and how many pairs there are.
+    `next_hessian_NN`; and the pairs that are so much farther apart than their clearance [m] at most, into `short_Y` and
+    `rows_YN`. `root`: of what a pair's lack is weighted by. Returns what a frame costs, and how many pairs there are.
     """
     joints, hessian_NN = len(q_N), work.next_hessian_NN
     for n in range(joints):
@@ -41,10 +41,10 @@ def look(t, work, q_N, root):
             hessian_NN[m, n] = both
     place_capsules(t, work)
     for z in range(size(t, BALL_Z)):
-        if far(t, work, z, REACH):
+        if far(t, work, z, more):
             continue
         for y in range(whole(t, FIRST_Z, z), whole(t, FIRST_Z, z + 1)):
-            margin = real(t, CLEAR_Y, y) + REACH
+            margin = real(t, CLEAR_Y, y) + more
             if far_apart(t, work, y, margin):
                 continue
             distance, point, between = apart(t, work, y)
@@ -59,6 +59,23 @@ def look(t, work, q_N, root):
                 cost += max(short, 0.0) * max(short, 0.0)
                 count += 1
     return cost, count
+
+
+@njit(**INNER)
+def add_pairs(work, lack_Y, count, gradient_N, hessian_NN):
+    """Adds the pairs in `rows_YN` that cost something, the roots of which are `lack_Y`, to a model."""
+    for k in range(count):
+        lack = max(lack_Y[k], 0.0)
+        if not some(lack > 0):
+            continue
+        active = choose(lack > 0, alike(lack, 1.0), 0.0)
+        for n in range(len(gradient_N)):
+            own = work.rows_YN[k, n]
+            if some(own != 0.0):
+                gradient_N[n] += own * lack
+                own = own * active
+                for m in range(len(gradient_N)):
+                    hessian_NN[n, m] += own * work.rows_YN[k, m]
 
 
 @njit(**INNER)
@@ -121,18 +138,7 @@ def _turn(t, work, at_N, count):
         for m in range(joints):
             system_NN[n, m] = work.next_hessian_NN[n, m]
         system_NN[n, n] += work.extra_N[n]
-    for k in range(count):
-        lack = max(work.lack_Y[k], 0.0)
-        if not some(lack > 0):
-            continue
-        active = choose(lack > 0, alike(lack, 1.0), 0.0)
-        for n in range(joints):
-            own = work.rows_YN[k, n]
-            if some(own != 0.0):
-                work.gradient_N[n] += own * lack
-                own = own * active
-                for m in range(joints):
-                    system_NN[n, m] += own * work.rows_YN[k, m]
+    add_pairs(work, work.lack_Y, count, work.gradient_N, system_NN)
     systems.begin(t, work, at_N, 0, joints)
     systems.solve(t, work, 0, joints, 0.0, 0.0)
     for x in range(joints):

@@ -56,23 +56,21 @@ def zeros(kind: Any, shape: Any) -> Any:
     raise NotImplementedError("compiled alone")
 
 
-@overload(zeros, BARE)
-def _zeros(kind, shape):
-    if kind == Lanes:
-        return lambda kind, shape: side_by_side(np.zeros((*shape, LANES)))
-    return lambda kind, shape: np.zeros(shape)
-
-
 def room(kind: Any, shape: Any) -> Any:
     """As `zeros`, with any numbers: memory that is not used is not touched."""
     raise NotImplementedError("compiled alone")
 
 
-@overload(room, BARE)
-def _room(kind, shape):
-    if kind == Lanes:
-        return lambda kind, shape: side_by_side(np.empty((*shape, LANES)))
-    return lambda kind, shape: np.empty(shape)
+def _made_by(function: Any, make: Any) -> None:
+    @overload(function, BARE)
+    def of_kind(kind, shape):
+        if kind == Lanes:
+            return lambda kind, shape: side_by_side(make((*shape, LANES)))
+        return lambda kind, shape: make(shape)
+
+
+_made_by(zeros, np.zeros)
+_made_by(room, np.empty)
 
 
 @in_llvm

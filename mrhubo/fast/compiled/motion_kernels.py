@@ -58,9 +58,7 @@ def make_motion_kernels() -> MotionKernels:
         joints = q_BN.shape[1]
         for b in range(len(q_BN)):
             steps.aim(t, work, target_BD3, b)
-            cost_BC[b, 0] = avoidance.whole_model(
-                t, work, q_BN[b], work.next_cost_C, work.next_gradient_N, work.next_hessian_NN
-            )
+            cost_BC[b, 0] = avoidance.whole_model(t, work, q_BN[b])
             for n in range(joints):
                 gradient_BN[b, n] = work.next_gradient_N[n]
                 for m in range(n + 1):

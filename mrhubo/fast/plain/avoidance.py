@@ -26,8 +26,6 @@ STEPS = 10
 """Steps at most; hardly any frame makes more than four."""
 WORTH = 1e-5
 """A step that promises to win less is not made: a limb that is off by 6 degrees would be so by 0.003 less."""
-
-
 _CHUNK = 512
 """Frames that are worked on at a time: their contacts are in memory."""
 
@@ -63,41 +61,38 @@ class Avoidance:
 
     def quadratic(self, description: Description, q_BN: np.ndarray, target_BD3: np.ndarray) -> steps.Model:
         """Cost (B, 1) and Gauss-Newton model at joint angles (B, N) [rad], for human directions (B, D, 3)."""
-        model = steps.quadratic(description, q_BN, target_BD3)
-        kinematics, capsules = description.kinematics, description.capsules
-        placed = place(kinematics, q_BN)
-        found = near(capsules, placed.rotation_BL33, placed.position_BL3, self.clear_Y)
-        short_X = self.clear_Y[found.pair_X] - found.distance_X
-        row_X, rows_XN = found.row_X, -distance_jacobian(kinematics, capsules, placed, found, self._carried_LAN)
-        np.add.at(model.cost_BC[:, 0], row_X, WEIGHT * short_X * short_X)
-        np.add.at(model.gradient_BN, row_X, WEIGHT * short_X[:, None] * rows_XN)
-        np.add.at(model.hessian_BNN, row_X, WEIGHT * rows_XN[:, :, None] * rows_XN[:, None, :])
-        return model
+        cost_B, model, touching = self._look(description, q_BN, target_BD3)
+        touching.add_to(touching.short_X, model.gradient_BN, model.hessian_BNN)
+        return steps.Model(cost_B[:, None], model.gradient_BN, model.hessian_BNN)
 
-    def _look(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> tuple[np.ndarray, steps.Model, Contacts]:
-        """What frames cost (B,), the model of that without contacts, and the contacts."""
-        description, scale = self.description, np.sqrt(WEIGHT)
+    def _look(
+        self, description: Description, q_BN: np.ndarray, target_BD3: np.ndarray, more: float = 0.0
+    ) -> tuple[np.ndarray, steps.Model, Contacts]:
+        """What frames cost (B,), the model of that without contacts, and pairs that are so much farther apart than
+        their clearance [m] at most.
+        """
+        kinematics, capsules, scale = description.kinematics, description.capsules, np.sqrt(WEIGHT)
         model = steps.quadratic(description, q_BN, target_BD3)
-        placed = place(description.kinematics, q_BN)
-        rotation_BL33, position_BL3 = placed.rotation_BL33, placed.position_BL3
-        found = near(description.capsules, rotation_BL33, position_BL3, self.clear_Y + REACH)
+        placed = place(kinematics, q_BN)
+        found = near(capsules, placed.rotation_BL33, placed.position_BL3, self.clear_Y + more)
         short_X = scale * (self.clear_Y[found.pair_X] - found.distance_X)
-        rows_XN = distance_jacobian(description.kinematics, description.capsules, placed, found, self._carried_LAN)
-        touching = Contacts(found.row_X, short_X, -scale * rows_XN)
+        rows_XN = -scale * distance_jacobian(kinematics, capsules, placed, found, self._carried_LAN)
+        touching = Contacts(found.row_X, short_X, rows_XN)
         return model.cost_BC[:, 0] + touching.costs(short_X, len(q_BN)), model, touching
 
     def _give_way(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
-        found_BN, row_B, damping_B = q_BN.copy(), np.arange(len(q_BN)), np.full(len(q_BN), DAMPING)
-        cost_B, model, touching = self._look(q_BN, target_BD3)
+        together, found_BN, row_B = self.description, q_BN.copy(), np.arange(len(q_BN))
+        damping_B = np.full(len(q_BN), DAMPING)
+        cost_B, model, touching = self._look(together, q_BN, target_BD3, REACH)
         for _ in range(STEPS):
-            trial_BN, won_B = foreseeing_step(self.description.cost, q_BN, model, damping_B, touching)
+            trial_BN, won_B = foreseeing_step(together.cost, q_BN, model, damping_B, touching)
             worth_B = won_B > WORTH
             if not worth_B.any():
                 break
             row_B, q_BN, trial_BN, target_BD3, cost_B, damping_B = (
                 own_B[worth_B] for own_B in (row_B, q_BN, trial_BN, target_BD3, cost_B, damping_B)
             )
-            trial_cost_B, model, touching = self._look(trial_BN, target_BD3)
+            trial_cost_B, model, touching = self._look(together, trial_BN, target_BD3, REACH)
             better_B, moved_B = trial_cost_B < cost_B, np.abs(trial_BN - q_BN).max(axis=1)
             found_BN[row_B[better_B]] = trial_BN[better_B]
             going_B = ~((moved_B < TOLERANCE) | (~better_B & (damping_B > STUCK)))
@@ -111,7 +106,7 @@ class Avoidance:
             if better_B[going_B].all():
                 model, touching = model.rows(going_B), touching.rows(going_B)
             else:  # some are where they were
-                _, model, touching = self._look(q_BN, target_BD3)
+                _, model, touching = self._look(together, q_BN, target_BD3, REACH)
         return found_BN
 
     def __call__(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:

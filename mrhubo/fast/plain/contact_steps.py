@@ -57,6 +57,13 @@ class Contacts:
         """Of each frame (B,)."""
         return np.bincount(self.row_X, value_X, minlength=frames)
 
+    def add_to(self, short_X: np.ndarray, gradient_BN: np.ndarray, hessian_BNN: np.ndarray) -> None:
+        """Adds those that cost something, where they lack so much, to the halves of a gradient and a Hessian."""
+        x = np.flatnonzero(short_X > 0)
+        rows_XN = self.rows_XN[x]
+        np.add.at(gradient_BN, self.row_X[x], short_X[x, None] * rows_XN)
+        np.add.at(hessian_BNN, self.row_X[x], rows_XN[:, :, None] * rows_XN[:, None, :])
+
     def costs(self, short_X: np.ndarray, frames: int) -> np.ndarray:
         """What they cost each frame (B,), where they lack so much."""
         return self.sums(np.maximum(short_X, 0.0) ** 2, frames)
@@ -116,9 +123,8 @@ def foreseeing_step(
     at_BN, lack_X, slope_BN = q_BN, near.short_X, model.gradient_BN  # the slope of what has no bend
     going_B = np.ones(frames, bool)
     for _ in range(TURNS):
-        whole_BN, system_BNN, x = slope_BN.copy(), damped_BNN.copy(), np.flatnonzero(lack_X > 0)
-        np.add.at(whole_BN, row_X[x], lack_X[x, None] * near.rows_XN[x])
-        np.add.at(system_BNN, row_X[x], near.rows_XN[x, :, None] * near.rows_XN[x, None, :])
+        whole_BN, system_BNN = slope_BN.copy(), damped_BNN.copy()
+        near.add_to(lack_X, whole_BN, system_BNN)
         held_BN = ((at_BN <= cost.lower_N) & (whole_BN > 0)) | ((at_BN >= cost.upper_N) & (whole_BN < 0))
         free_BN = 1.0 - held_BN
         system_BNN *= free_BN[:, :, None] * free_BN[:, None, :]

@@ -56,6 +56,8 @@ class MujocoSink(NamedSink):
         self._file, self._free = model, free
         self.model: Any = None
         self.data: Any = None
+        self._loaded: Path | None = None
+        """The file that `model` is of, between `check` and `close`."""
         self._actuator: np.ndarray = np.zeros(0, int)
         self._place: np.ndarray = np.zeros(0, int)
         self._others: list[tuple[int, int | None, float, float]] = []
@@ -73,20 +75,24 @@ class MujocoSink(NamedSink):
         file = self._file or urdf
         if file is None:
             raise UserError("--sink mujoco: a package does not tell where the robot's model is; write mujoco:MODEL")
+        if file != self._loaded:
+            self.model, self._loaded = self._read(file), file
+        number = self._controllers()
+        missing = [name for name in joint_names if name not in number]
+        if missing:
+            raise UserError(f"{file}: has no joint {listed(missing)}; its joints: {listed(number)}")
+
+    def _read(self, file: Path) -> Any:
         check_regular(file, _MAX_BYTES)
         self._mujoco.set_mju_user_warning(lambda _: None)  # else it writes a log file where the user happens to be
         try:
-            self.model = self._load(file)
+            return self._load(file)
         except UserError:
             raise
         except Exception as error:  # ValueError and mujoco.FatalError, whose types differ between versions
             raise UserError(f"{file}: MuJoCo cannot load it: {shortened(first_line(error), 200)}") from error
         finally:
             self._mujoco.set_mju_user_warning(None)
-        number = self._controllers()
-        missing = [name for name in joint_names if name not in number]
-        if missing:
-            raise UserError(f"{file}: has no joint {listed(missing)}; its joints: {listed(number)}")
 
     def open(self, robot: LiveRobot, config: LiveConfig) -> None:
         """Loads the model, and puts the robot where it starts.
@@ -217,6 +223,7 @@ class MujocoSink(NamedSink):
 
     def close(self) -> None:
         """`model` and `data` stay as they are."""
+        self._loaded = None
 
 
 def _drop_missing_meshes(spec: Any, file: Path) -> None:

@@ -35,13 +35,13 @@ class SelfCollisionTerm(Term):
         """All joints."""
         return [set(range(len(self.collision.robot.joint_names)))]
 
-    def residual(self, state: State) -> tuple[Tensor, Tensor, Tensor]:
-        """max(0, margin - distance) [m] of the pairs nearer than the margin (X,), their Jacobian (X, N) [m/rad], and to
-        which of the B problems they belong (X,).
+    def residual(self, state: State, more: float = 0.0) -> tuple[Tensor, Tensor, Tensor]:
+        """margin - distance [m] of the pairs nearer than the margin and so much `more` [m] (X,), their Jacobian (X, N)
+        [m/rad], and to which of the B problems they belong (X,).
         """
-        near = self.collision.near(state.q_BN, self.margin, state.poses)
+        near = self.collision.near(state.q_BN, self.margin + more, state.poses)
         short_X = self.lack(near)
-        x = torch.nonzero(short_X > 0)[:, 0]
+        x = torch.nonzero(short_X > -more)[:, 0]
         return short_X[x], -near.jacobian_XN[x], near.row_X[x]
 
     def add_to(self, model: Quadratic | None, state: State, blocks: Blocks) -> Quadratic:

@@ -18,8 +18,8 @@ from mrhubo.robot.discovery.motion import bend_side, straight_angle
 from mrhubo.robot.discovery.result import FoundRange, Question
 from mrhubo.robot.joint import Mimic, drive
 
-_NOUGHT = 1e-4
-"""Radians that are 0 to files whose quarter turns are 1.5708."""
+NOUGHT = 1e-4
+"""Radians, or parts of a direction, that are 0 to files whose quarter turns are 1.5708."""
 _ELBOW, _KNEE = 0.1, 0.35
 """How far an elbow, and a knee, must bend the other way [rad] for their range to be narrowed. A knee stands behind the
 line from hip to ankle on some robots, which then stand on it bent that way."""
@@ -225,7 +225,7 @@ def _human_range(
     axis_3 = bend.step.sign * hinge.line.axis_3
     straight = straight_angle(axis_3, bend.lower_3, upper_3) / bodies.gains.get(name, 1.0)
     straight = min((straight + turn for turn in (-math.tau, 0.0, math.tau)), key=lambda s: max(lower - s, s - upper))
-    straight = 0.0 if abs(straight) < _NOUGHT else straight
+    straight = 0.0 if abs(straight) < NOUGHT else straight
     share = bend_side(lower, upper, straight)
     goes_3 = cross(axis_3, upper_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
     ahead = float(goes_3 @ bend.human_3)
