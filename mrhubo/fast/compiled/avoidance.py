@@ -41,7 +41,7 @@ def avoid(t, work, q_N):
     damping, cost, steps, stands = alike(live, DAMPING), alike(live, 0.0), 0, True
     for n in range(joints):
         work.trial_N[n] = q_N[n]
-    while True:  # one place to look: each would be compiled anew
+    while True:
         found, count = look(t, work, work.trial_N, _ROOT, REACH)
         if stands:
             cost = found
