@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
+from mrhubo.body.joints import OFFSETS_J3, PARENTS
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.motion import Motion
@@ -23,6 +26,8 @@ FARTHEST_M = 1e5
 """No root is that far from the origin [m]."""
 LARGEST_BETA = 1e6
 """No number of a body's shape is that large."""
+_SEEN = 500
+"""About how many frames tell which way is up."""
 _LOOKS = 30.0
 """How often a second it is looked whether feet stand: more often, those that swing would seem to."""
 _UPRIGHT_M = 0.6
@@ -70,9 +75,23 @@ def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
     rotation_T33, position_T3 = motion.arrays.root_rotation_T33, motion.arrays.root_position_T3
     if rotation_T33 is None:
         return motion.changed(root_position_T3=None, source=f"{motion.source}; {rest}")
-    up, turn_33 = find_up(rotation_T33[:, :, 1], worlds)
+    joints_TK3 = None
+    if position_T3 is not None:
+        few = slice(None, None, 1 + len(motion) // _SEEN)
+        joints_TK3 = _joints(rotation_T33[few], motion.arrays.local_TJ33[few]) + position_T3[few, None]
+    up, turn_33 = find_up(rotation_T33[:, :, 1], worlds, joints_TK3)
     return motion.changed(
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,
         source=f"{motion.source}, {up}; {rest}",
     )
+
+
+def _joints(root_T33: np.ndarray, local_TJ33: np.ndarray) -> np.ndarray:
+    """Places (T, 22, 3) [m] of the joints of our skeleton from the pelvis, in the root's world."""
+    rotations, places = [root_T33], [np.zeros((len(root_T33), 3), root_T33.dtype)]
+    for joint, offset_3 in enumerate(OFFSETS_J3, start=1):
+        carrier_T33 = rotations[PARENTS[joint]]
+        places.append(places[PARENTS[joint]] + carrier_T33 @ offset_3)
+        rotations.append(carrier_T33 @ local_TJ33[:, joint - 1])
+    return np.stack(places, axis=1)

@@ -1,10 +1,13 @@
 """Which way is up in a file's world, and turning it so that y is.
 
 Worlds of files have y or z up; cameras look along z with y down. People stand and walk more than they lie, so the axis
-that the body's own up axis follows on the mean is the world's.
+that the body's own up axis follows on the mean is the world's. Who stands and lies, each for a while, stands along one
+axis that is up and along one that is not; the floor tells which, as the lowest joint stays on it.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -25,9 +28,41 @@ ANY_WORLD = ("y up", "y down", "z up")
 """Of files that do not say whose they are."""
 
 
-def find_up(body_up_T3: np.ndarray, worlds: tuple[str, ...]) -> tuple[str, np.ndarray]:
-    """Which of some worlds a body's own up axes (T, 3) are in, and the matrix (3, 3) that makes y its up axis."""
-    up_3 = body_up_T3.mean(axis=0)
-    turns = {world: np.array(_TO_Y_UP[world], up_3.dtype) for world in worlds}
-    best = max(worlds, key=lambda world: float((turns[world] @ up_3)[1]))
+_STANDING = math.cos(math.radians(35.0))
+"""The pelvis of who stands is tilted by no more than that."""
+_A_WHILE = 0.03
+"""Share of the frames in which somebody stands who does so for a while."""
+_RISES_M = 0.2
+"""How much more the lowest joint's height varies [m] in a world that is not the file's, to tell so."""
+
+
+def find_up(
+    body_up_T3: np.ndarray, worlds: tuple[str, ...], joints_TK3: np.ndarray | None = None
+) -> tuple[str, np.ndarray]:
+    """Which of some worlds a body is in, and the matrix (3, 3) that makes y its up axis.
+
+    Args:
+        body_up_T3: the body's own up axis, a unit vector a frame.
+        worlds: some of those above.
+        joints_TK3: where its joints are [m], if its way through the world is known.
+    """
+    turns = {world: np.array(_TO_Y_UP[world], body_up_T3.dtype) for world in worlds}
+    height_T = {world: body_up_T3 @ turn_33[1] for world, turn_33 in turns.items()}
+    best = max(worlds, key=lambda world: float(height_T[world].mean()))
+    if joints_TK3 is not None:
+        tried = [world for world in worlds if world == best or _stands(height_T[world])]
+        rises = {world: _rise(joints_TK3 @ turns[world][1]) for world in tried}
+        steady = min(tried, key=rises.__getitem__)
+        if rises[best] - rises[steady] > _RISES_M:
+            best = steady
     return best, turns[best]
+
+
+def _stands(height_T: np.ndarray) -> bool:
+    return float((height_T > _STANDING).mean()) > _A_WHILE
+
+
+def _rise(height_TK: np.ndarray) -> float:
+    """How much the lowest joint's height varies: the range of nine frames in ten."""
+    low, high = np.percentile(height_TK.min(axis=1), (5, 95))
+    return float(high - low)

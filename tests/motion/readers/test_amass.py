@@ -537,3 +537,24 @@ def test_amass_has_z_up_also_where_nobody_stands(own: str, turn: list[float], tm
     np.testing.assert_allclose(motion.root_position_T3[0], [1.0, 0.15, -2.0], atol=1e-6)
     up = Rotation.from_euler("x", -90, degrees=True).apply(Rotation.from_rotvec(root).apply([0.0, 1.0, 0.0]))
     np.testing.assert_allclose(motion.root_rotation_T33[0, :, 1], up, atol=1e-6)
+
+
+@pytest.mark.parametrize("z_up", [False, True])
+@pytest.mark.parametrize("heading", range(0, 360, 45))
+@pytest.mark.parametrize("lying", [-90, 90])
+def test_who_lies_longer_than_he_stands_does_not_turn_the_world(
+    z_up: bool, heading: float, lying: float, tmp_path: Path
+) -> None:
+    """A third of the time he stands, then he lies on his back or his face; the pelvis goes straight down."""
+    share = np.concatenate((np.zeros(20), np.linspace(0, 1, 11), np.ones(40)))
+    turns = [Rotation.from_euler("YX", [heading, lying * part], degrees=True) for part in share]
+    low = [0.12 if part == 1 else 0.12 + 0.8 * np.cos(np.radians(90 * part)) for part in share]
+    position_T3 = np.stack((np.full(71, 0.3), low, np.full(71, -0.4)), axis=-1)
+    world = Rotation.from_euler("x", 90 if z_up else 0, degrees=True)
+    root_T3 = np.array([(world * turn).as_rotvec() for turn in turns])
+    pose_T63 = np.zeros((71, 63))
+    pose_T63[:, [3 * 15 + 2, 3 * 16 + 2]] = np.radians((-75, 75))  # arms hang
+    path = _save(tmp_path / "a.npz", pose_body=pose_T63, root_orient=root_T3, trans=world.apply(position_T3), **RATE)
+    motion = read_motion(path)
+    assert ("z up;" if z_up else "y up;") in motion.source and motion.root_position_T3 is not None
+    np.testing.assert_allclose(motion.root_position_T3, position_T3, atol=1e-6)
