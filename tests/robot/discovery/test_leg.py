@@ -65,3 +65,15 @@ def test_of_two_parallel_axes_without_a_foot_between_them_and_the_floor_the_uppe
     found = found_of(["yaw", "roll", "pitch"], [], tmp_path)
     assert at(found, "left_knee") == pytest.approx([0, 0.1, -0.5], abs=1e-6)
     assert "left_ankle" in about(found)
+
+
+@pytest.mark.parametrize("axis", ["pitch", "roll"])
+def test_knees_that_bend_sideways_are_asked_about(axis: str, tmp_path: Path) -> None:
+    """As where somebody wrote all axes along one direction."""
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        link = made.join(f"{side}_hip", "chest", (0, 0.1 * SIDES[side], -0.1), AXES[axis], (-1.5, 0.8))
+        link = made.join(f"{side}_knee", link, (0, 0, -0.4), AXES[axis], (0.0, 2.2))
+        made.join(f"{side}_ankle", link, (0, 0, -0.35), AXES[axis], (-0.6, 0.6), shape=FOOT)
+    assert ({"left_knee", "right_knee"} <= about(made.found(tmp_path))) == (axis == "roll")
