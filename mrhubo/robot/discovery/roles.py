@@ -142,9 +142,10 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             )
     if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
         legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
-    # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings.
+    # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings, if no name tells.
     spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
-    if (legs is not None and len(legs.chains[0]) < _LEG) or any(pair.size > arms.size for pair in spare):
+    winged = legs is not None and len(legs.chains[0]) < _LEG and not _named_legs(legs)
+    if winged or any(pair.size > arms.size for pair in spare):
         sure = min(sure, GUESS)
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)

@@ -77,3 +77,13 @@ def test_knees_that_bend_sideways_are_asked_about(axis: str, tmp_path: Path) -> 
         link = made.join(f"{side}_knee", link, (0, 0, -0.4), AXES[axis], (0.0, 2.2))
         made.join(f"{side}_ankle", link, (0, 0, -0.35), AXES[axis], (-0.6, 0.6), shape=FOOT)
     assert ({"left_knee", "right_knee"} <= about(made.found(tmp_path))) == (axis == "roll")
+
+
+@pytest.mark.parametrize(("hip", "knee"), [("hip", "knee"), ("part", "piece")])
+def test_legs_of_two_joints_may_be_wings_where_no_name_tells(hip: str, knee: str, tmp_path: Path) -> None:
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        link = made.join(f"{side}_{hip}", "chest", (0, 0.1 * SIDES[side], -0.1), Y, (-1.5, 0.8))
+        made.join(f"{side}_{knee}", link, (0, 0, -0.4), Y, (0.0, 2.2), shape=FOOT.replace("-0.05", "-0.4"))
+    assert ("chest" in about(made.found(tmp_path))) == (hip == "part")
