@@ -56,10 +56,13 @@ def _described(word: str) -> Path:
 
 
 @contextlib.contextmanager
-def model_named() -> Iterator[None]:
-    """A `UserError` in here about `robot.urdf` is about the file that the user has named, not about a config."""
+def model_named(model: Path, urdf: Path) -> Iterator[None]:
+    """A `UserError` in here about `robot.urdf`, or about a URDF that was made of the model, is about the file that the
+    user has named.
+    """
     try:
         yield
     except UserError as error:
-        error.args = (str(error).removeprefix("robot.urdf: ").replace("; name a URDF file, relative to the YAML", ""),)
+        text = str(error).removeprefix("robot.urdf: ").replace("; name a URDF file, relative to the YAML", "")
+        error.args = (text.replace(str(urdf), str(model)),)
         raise

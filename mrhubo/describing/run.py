@@ -60,10 +60,9 @@ def read_model(word: str) -> Description:
         UserError: there is no such model, or it cannot be read.
     """
     path = find_model(word)
-    with model_named(), tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, model_named(path, urdf := Path(folder) / f"{path.stem}.urdf"):
         if not is_mjcf(path):
             return read_urdf(path)
-        urdf = Path(folder) / f"{path.stem}.urdf"
         urdf.write_text(urdf_of_mjcf(path, Path(folder)).urdf, encoding="utf-8")
         return read_urdf(urdf)
 
@@ -82,8 +81,9 @@ def describe_model(word: str, out: Path | None = None, force: bool = False, whol
     """
     path = find_model(word)
     file = out or default_config(path, whole_body)
-    with model_named(), _as_urdf(path, file, force) as (urdf, notes):
-        found = _discover(read_urdf(urdf), whole_body)
+    with _as_urdf(path, file, force) as (urdf, notes):
+        with model_named(path, urdf):
+            found = _discover(read_urdf(urdf), whole_body)
         check_name("the config's file name", file.stem)
         picture = file.with_suffix(".png")
         if not force:
@@ -134,7 +134,7 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
             )
         return Robot.from_config(word)
     description = read_model(word)
-    with model_named():
+    with model_named(find_model(word), description.path):
         found = _discover(description, whole_body)
         robot = _robot(description, found, _file_name(find_model(word)))
     for about, text in unsure(found).items():

@@ -152,20 +152,24 @@ def joint_speed(joints: Mapping[str, Joint], name: str, most: float) -> float:
     return min(speeds)
 
 
-def held_angle(joint: Joint, wanted: float | None) -> float:
+def held_angle(joint: Joint, wanted: float | None, degrees: bool = False) -> float:
     """Angle [rad], or position [m], at which a joint rests when it is not sampled; one that mimics another follows it.
 
     Args:
         joint: the joint.
         wanted: what `robot.hold` gives it; None: 0, or the limit nearest to 0.
+        degrees: whether the file's limits are degrees, as `in_degrees` tells.
 
     Raises:
         UserError: what is wanted lies outside the limits, or is in degrees.
     """
+    lower, upper = joint.lower, joint.upper
+    if degrees and joint.rotary:
+        lower, upper = (None if end is None else math.radians(end) for end in (lower, upper))
     # Limits that cannot be meant keep it from nothing.
-    continuous = joint.kind == "continuous" or (joint.rotary and _too_wide(joint.lower or 0.0, joint.upper or 0.0))
-    lower = -math.inf if joint.lower is None or continuous else joint.lower
-    upper = math.inf if joint.upper is None or continuous else joint.upper
+    continuous = joint.kind == "continuous" or (joint.rotary and _too_wide(lower or 0.0, upper or 0.0))
+    lower = -math.inf if lower is None or continuous else lower
+    upper = math.inf if upper is None or continuous else upper
     if wanted is None:
         return float(min(max(0.0, lower), max(lower, upper)))
     if not lower <= wanted <= upper:

@@ -25,7 +25,7 @@ from mrhubo.robot.chain import build_chain, chain_joints, chain_like, chain_xml
 from mrhubo.robot.entries import check_names
 from mrhubo.robot.joint import Joint, Mimic, drive
 from mrhubo.robot.keypoints import Keypoints, read_keypoints
-from mrhubo.robot.limits import MAX_SPEED, held_angle, joint_range, joint_speed, narrow_to_mimics
+from mrhubo.robot.limits import MAX_SPEED, held_angle, in_degrees, joint_range, joint_speed, narrow_to_mimics
 from mrhubo.robot.urdf import Description, describe
 
 _MOST_LISTED = 5
@@ -122,7 +122,9 @@ class Robot(nn.Module):
         self.moving_links = tuple(description.joint(j).child for j in self.joint_names)
         more = [description.check_link(link) for link in self._made_with["links"]]
         self.links = tuple(dict.fromkeys((*self.moving_links, *more)))
-        self.held = {j.name: held_angle(j, hold.get(j.name)) for j in description.joints.values() if j.kind != "fixed"}
+        moving = [joint for joint in description.joints.values() if joint.kind != "fixed"]
+        degrees = in_degrees(moving)
+        self.held = {joint.name: held_angle(joint, hold.get(joint.name), degrees) for joint in moving}
         self._prepare_chain()
 
     def _prepare_chain(self) -> None:

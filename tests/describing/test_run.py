@@ -62,8 +62,10 @@ def test_a_urdf_that_was_to_be_replaced_is_back_where_the_model_is_no_humanoid(
     chair = '<body name="seat"><joint name="turn"/><geom size="0.1"/></body>'
     Path("m.xml").write_text(f"<mujoco><worldbody>{chair}</worldbody></mujoco>")
     Path("m.urdf").write_text(PAIR)
-    with pytest.raises(UserError, match="no two arms"):
+    with pytest.raises(UserError, match=r"^m\.xml: no two arms"):
         describe_model("m.xml", Path("m.yaml"), force=True)
+    with pytest.raises(UserError, match=r"^m\.xml: no two arms"):
+        open_robot("m.xml")
     assert Path("m.urdf").read_text() == PAIR and files(tmp_path) == {"m.xml", "m.urdf"}
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 from collections.abc import Callable
 
 import pytest
@@ -66,6 +68,19 @@ def test_a_joint_whose_limits_are_in_degrees_is_held_at_zero(pair: Pair) -> None
     limits = 'lower="-1.5" upper="1.5"'
     assert build_body_map(pair(within("neck", limits, 'lower="5" upper="120"'))).robot.held["neck"] == 0.0
     assert build_body_map(pair(within("neck", limits, 'lower="0.5" upper="1.2"'))).robot.held["neck"] == 0.5
+
+
+def test_where_all_limits_are_degrees_a_joint_is_held_at_the_nearest_of_its_own(pair: Pair) -> None:
+    limits = 'lower="-1.5" upper="1.5"'
+    config = pair(within("neck", limits, 'lower="0.5" upper="1.2"'))
+    ranges = {name: [float(low), float(high)] for robot in [build_body_map(config).robot]
+              for name, low, high in zip(robot.joint_names, robot.lower_N, robot.upper_N, strict=True)}  # fmt: skip
+    text = config.urdf.read_text()
+    config.urdf.write_text(re.sub(r'(lower|upper)="([^"]+)"', lambda m: f'{m[1]}="{math.degrees(float(m[2]))}"', text))
+    held = build_body_map(dataclasses.replace(config, ranges=ranges)).robot.held["neck"]
+    assert held == pytest.approx(0.5)
+    with pytest.raises(UserError, match=r"robot.hold.neck: 0.2 leaves"):
+        build_body_map(dataclasses.replace(config, ranges=ranges, hold={"neck": 0.2}))
 
 
 def test_two_turns_are_a_range(pair: Pair) -> None:

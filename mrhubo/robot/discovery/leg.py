@@ -1,12 +1,12 @@
 """Hip, knee, ankle and sole from the axes of a leg.
 
 A knee is the middle one of three parallel lateral axes. The thigh starts on the pitch axis above it, which may lie far
-from where the hip's axes cross.
+from where the hip's axes cross. Of two parallel axes, as a leg has without an ankle's joint or without a hip's pitch,
+what is above and below them tells which ones they are.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -16,25 +16,18 @@ from mrhubo.robot.discovery.arm import GUESS, Spot, doubted
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.ends import limb_end, long_branches
+from mrhubo.robot.discovery.leg_axes import PARALLEL_PITCH, TILTED, gap, more_hinges, parallel, pitches
 from mrhubo.robot.discovery.lines import LEAST, ON, Line, feet, sine
 from mrhubo.robot.discovery.names import speaks_of
 
-_PARALLEL = 0.2
-"""Sine under which hip, knee and ankle pitch count as parallel, as the joints stand: 11 degrees."""
-_TILTED = 0.6
-"""The same of a hip's pitch, which some robots tilt by up to 30 degrees."""
 _TOES = 0.15
 """How far toes reach at most, as a share of the leg along its axes."""
 _OFF = 0.1
 """How far toes' axis is from the ankle's at least, as a share of the shank."""
-_FOURTH = 0.05
-"""How far from hip, knee and ankle an axis lies that bends a leg as well, as a share of the leg."""
 _SQUARE = 0.999
 """Sine over which an axis lies in the plane in which a knee moves the shank: 87 degrees."""
 _MEET = 0.05
 """How near axes of a hip pass each other that are meant to cross, as a share of the thigh."""
-_APART = 0.15
-"""How far hip, knee and ankle are at least from each other, as a share of the leg."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,7 @@ class Leg:
     knee: Spot
     ankle: Spot
     straight: bool
-    """Whether three parallel axes told the knee."""
+    """Whether parallel axes told the knee."""
     wheeled: bool = False
     """Whether it ends in a wheel, which is no foot: the ankle is the axle, and no joint of the chain turns it."""
 
@@ -61,7 +54,7 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     rotary = tuple(step for step in chain if step.hinge.rotary)
     wheel = rotary[-1] if _is_wheel(rotary) else None
     lines = lines_of(rotary)
-    places = _three(lines)
+    places = pitches(bodies, rotary, lines)
     # By what slides, how many joints turn before it.
     above = [sum(step.hinge.rotary for step in chain[:i]) for i, step in enumerate(chain) if not step.hinge.rotary]
     if places is None:
@@ -69,29 +62,30 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
         # What slides between a hip and an ankle stands for a knee.
         if knee_at is None or any(0 < count < len(rotary) for count in above):
             return None
-        hip_at = next((i for i in reversed(range(knee_at)) if _parallel(lines[i], lines[knee_at])), None)
+        hip_at = next((i for i in reversed(range(knee_at)) if parallel(lines[i], lines[knee_at])), None)
         ankle_at = knee_at + 1 if knee_at + 1 < len(rotary) else None
     else:
         hip_at, knee_at, ankle_at = places
-        if any(hip_at < count <= knee_at for count in above):
+        if hip_at is not None and any(hip_at < count <= knee_at for count in above):
             return None  # an ankle and toes
     ball_3 = _ball(lines[:knee_at], lines[knee_at])
     aside_3 = _across(lines, knee_at, hip_at, ankle_at, _SQUARE)
     if aside_3 is None:
-        aside_3 = ball_3 if ball_3 is not None else _across(lines, knee_at, hip_at, ankle_at, _PARALLEL)
+        aside_3 = ball_3 if ball_3 is not None else _across(lines, knee_at, hip_at, ankle_at, PARALLEL_PITCH)
     if aside_3 is None:
         aside_3 = bodies.position(rotary[knee_at].outer_link)
     knee_3 = lines[knee_at].nearest(aside_3)
     ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at, knee_3)
-    if hip_at is not None and (ball_3 is None or _parallel(lines[hip_at], lines[knee_at])):
+    if hip_at is not None and (ball_3 is None or parallel(lines[hip_at], lines[knee_at])):
         between = lines[hip_at + 1 : knee_at]
-        crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > _TILTED
+        crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > TILTED
         hip_3 = feet(lines[hip_at], between[-1])[0] if crossing else lines[hip_at].nearest(knee_3)
         cue, sure = f"the axis of '{rotary[hip_at].hinge.name}' above the knee", 0.9
     elif ball_3 is not None:
         hip_3, cue, sure = ball_3, "where the axes before the knee cross", 0.8
     else:
-        hip_3, cue, sure = lines[knee_at - 1].nearest(knee_3), "the point of the last axis before the knee", GUESS
+        hip_3, cue = _without_pitch(bodies, rotary[:knee_at], lines[knee_at], knee_3)
+        sure = GUESS
     step = rotary[knee_at]
     links = [step.inner_link]
     for i in reversed(range(hip_at if hip_at is not None else 0, knee_at)):
@@ -99,13 +93,17 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
             break
         links.append(rotary[i].outer_link)
     hip = Spot(hip_3, step.start, tuple(dict.fromkeys(links)), cue, sure)
-    how = "the middle one of three parallel axes" if places else "the axis with the longest stretches on either side"
-    knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, 0.95 if places else 0.6)
+    how, sure = "the middle one of three parallel axes", 0.95
+    if places is None:
+        how, sure = "the axis with the longest stretches on either side", 0.6
+    elif hip_at is None:
+        how, sure = "the upper one of two parallel axes, a thigh below the hip's axes", 0.8
+    knee = Spot(knee_3, step.start, (step.inner_link, step.outer_link), how, sure)
     if min(math.dist(hip_3, knee_3), math.dist(knee_3, ankle.point_3)) < LEAST * bodies.size:
         return None
     if branches := long_branches(bodies, chain, _TOES):
         ankle = doubted(ankle, branches)
-    if places is not None and (more := _more_hinges(lines, places)):
+    if places is not None and (more := more_hinges(lines, places)):
         names = " and ".join(f"'{rotary[i].hinge.name}'" for i in more)
         hip, knee = (doubted(spot, f", though {names} bends the leg as well, some way off") for spot in (hip, knee))
     if wheel is not None and ankle_at is not None and ankle_at == len(rotary) - 1:
@@ -126,7 +124,7 @@ def _is_wheel(chain: Chain) -> bool:
 
 def _ball(lines: list[Line], knee: Line) -> np.ndarray | None:
     """The point (3,) in which all axes before a knee cross, as those of a hip do that is mounted askew."""
-    if len(lines) < 2 or sine(lines[-2].axis_3, lines[-1].axis_3) < _TILTED:
+    if len(lines) < 2 or sine(lines[-2].axis_3, lines[-1].axis_3) < TILTED:
         return None
     point_3 = feet(lines[-2], lines[-1])[1]
     near = _MEET * knee.distance(point_3)
@@ -140,56 +138,20 @@ def _without_toes(chain: Chain, lines: list[Line], knee_at: int, ankle_at: int |
     least = _OFF * lines[ankle_at].distance(lines[knee_at].point_3)
     toes = (
         i for i in range(ankle_at + 1, len(chain))
-        if _parallel(lines[i], lines[ankle_at]) and lines[i].distance(lines[ankle_at].point_3) > least
+        if parallel(lines[i], lines[ankle_at]) and lines[i].distance(lines[ankle_at].point_3) > least
     )  # fmt: skip
     return chain[: next(toes, len(chain))]
 
 
-def _parallel(one: Line, other: Line) -> bool:
-    return sine(one.axis_3, other.axis_3) < _PARALLEL
-
-
-def _three(lines: list[Line]) -> tuple[int, int, int] | None:
-    """Hip pitch, knee and ankle pitch: three parallel axes far from each other."""
-    best, found = 0.0, None
-    length = (
-        max(one.distance(other.point_3) for one, other in itertools.combinations(lines, 2)) if len(lines) > 2 else 0.0
-    )
-    for j in range(1, len(lines)):
-        # The next parallel axis some way off is the ankle's; toes have one more.
-        shanks = {
-            k: lines[j].distance(lines[k].point_3) for k in range(j + 1, len(lines)) if _parallel(lines[j], lines[k])
-        }
-        k = next((k for k, shank in shanks.items() if shank > _APART * length), None)
-        if k is None:
-            continue
-        shank = shanks[k]
-        thighs = [lines[i].distance(lines[j].point_3) for i in range(j)]
-        above = [
-            i for i in range(j) if thighs[i] > _APART * (thighs[i] + shank) and _tilt(lines[i], lines[j]) < _TILTED
-        ]
-        if not above:
-            continue
-        i = min(above, key=lambda i: (round(_tilt(lines[i], lines[j]), 2), -i))
-        if min(thighs[i], shank) > best:
-            best, found = min(thighs[i], shank), (i, j, k)
-    return found
-
-
-def _more_hinges(lines: list[Line], places: tuple[int, int, int]) -> list[int]:
-    """Further axes down to the ankle's that are parallel to the knee's and lie away from hip, knee and ankle: a leg of
-    four parts, as of a bird.
-    """
-    length = sum(lines[i].distance(lines[j].point_3) for i, j in itertools.pairwise(places))
-    return [
-        i for i in range(places[2])
-        if i not in places and _parallel(lines[i], lines[places[1]])
-        and all(lines[i].distance(lines[j].point_3) > _FOURTH * length for j in places)
-    ]  # fmt: skip
-
-
-def _tilt(one: Line, other: Line) -> float:
-    return sine(one.axis_3, other.axis_3)
+def _without_pitch(bodies: Bodies, before: Chain, knee: Line, knee_3: np.ndarray) -> tuple[np.ndarray, str]:
+    """The hip (3,) where none of its axes is parallel to the knee's and they do not cross, and how it was told."""
+    lines = lines_of(before)
+    if gap(lines[-1], knee) > _MEET * bodies.size:
+        return lines[-1].nearest(knee_3), "the point of the last axis before the knee"
+    if len(lines) > 1 and sine(lines[-2].axis_3, lines[-1].axis_3) > TILTED:
+        return feet(lines[-2], lines[-1])[1], "where the last axes before the knee are nearest to each other"
+    name, link = before[-1].hinge.name, before[-1].outer_link
+    return bodies.position(link), f"where the file puts '{name}', as a turn about the thigh alone tells no place"
 
 
 def _across(
@@ -208,7 +170,7 @@ def _across(
         return feet(above[-1], lines[knee_at])[0]
     if ankle_at is not None and (others := upright(lines[knee_at + 1 :], ankle_at)):
         return feet(lines[ankle_at], others[0])[0]
-    before = [line for line in lines[: hip_at or 0] if _tilt(line, lines[knee_at]) > 0.9]
+    before = [line for line in lines[: hip_at or 0] if sine(line.axis_3, lines[knee_at].axis_3) > 0.9]
     return feet(lines[hip_at], before[-1])[0] if before and hip_at is not None else None
 
 
@@ -219,7 +181,7 @@ def _ankle(
         thigh_3 = knee_3 - lines[max(knee_at - 1, 0)].nearest(knee_3)
         end_3, how, sure = limb_end(bodies, chain[-1], knee_3, thigh_3, "ankle")
         return Spot(end_3, chain[-1].end, (chain[-1].outer_link,), how, sure)
-    others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not _parallel(lines[i], lines[ankle_at])]
+    others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not parallel(lines[i], lines[ankle_at])]
     step = chain[knee_at + 1]
     if others:
         point_3, cue, sure = (

@@ -45,9 +45,22 @@ def carried(chain: Chain, q_BN: np.ndarray, point_3: np.ndarray) -> np.ndarray:
 
 def reach_middle(chain: Chain, point_3: np.ndarray, count: int = 256) -> np.ndarray:
     """Mean (3,) of where a point at a chain's end goes in random poses within the limits."""
-    ranges = np.array([usual_range(step.hinge) for step in chain])
+    return carried(chain, _random_poses(chain, count), point_3).mean(0)
+
+
+def along_at_most(chain: Chain, axis_3: np.ndarray, line_3: np.ndarray, count: int = 256) -> float:
+    """Cosine of how near an axis (3,) at a chain's end comes to a line's direction (3,) in random poses within the
+    limits; both are unit vectors, and either way round.
+    """
+    q_BN = np.vstack([np.zeros(len(chain)), _random_poses(chain, count)])
+    axes_B3 = carried(chain, q_BN, axis_3) - carried(chain, q_BN, np.zeros(3))
+    return float(np.abs(axes_B3 @ line_3).max())
+
+
+def _random_poses(chain: Chain, count: int) -> np.ndarray:
+    ranges_N2 = np.array([usual_range(step.hinge) for step in chain]).reshape(-1, 2)
     unit_BN = np.random.default_rng(0).random((count, len(chain)))
-    return carried(chain, ranges[:, 0] + unit_BN * (ranges[:, 1] - ranges[:, 0]), point_3).mean(0)
+    return ranges_N2[:, 0] + unit_BN * (ranges_N2[:, 1] - ranges_N2[:, 0])
 
 
 def straight_angle(axis_3: np.ndarray, lower_3: np.ndarray, upper_3: np.ndarray) -> float:

@@ -8,6 +8,7 @@ from mrhubo.robot.discovery.arm import Spot
 from mrhubo.robot.discovery.bodies import Chain
 from mrhubo.robot.discovery.foot import Foot
 from mrhubo.robot.discovery.members import Limbs
+from mrhubo.robot.discovery.motion import along_at_most
 from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.other_side import copied_limits
 from mrhubo.robot.discovery.ranges import driver
@@ -21,6 +22,8 @@ _SURE = 0.5
 _BACK = 3
 """Joints of a waist at most, where no legs tell that it is one."""
 
+_ACROSS = 0.5
+"""Cosine of how far a knee's axis may stay away from the robot's left and right, however its hip turns: 60 degrees."""
 _LEG = 0.6
 """Length of a further leg at least, as a share of that of the legs; of one without a knee, of that of the arms."""
 _PARTS = 3
@@ -57,6 +60,12 @@ def questions(
             yield Question(f"{side}_hand", f"{hand.doubt}; taken: {hand.cue}", (hand.link,))
     if not limbs.whole_body:
         return
+    for side, leg in limbs.legs.items():
+        knee = leg.chain[leg.knee_at].hinge
+        if along_at_most(leg.chain[: leg.knee_at], knee.line.axis_3, heading.left_3) < _ACROSS:
+            yield Question(f"{side}_knee", f"'{knee.name}' bends the leg sideways, by its axis and by where the robot "
+                           "was found to face, one of which is wrong: correct the axis in the file and describe it "
+                           "anew, or give `forward`", (knee.name,))  # fmt: skip
     for side, foot in feet.items():
         if foot.doubt is not None:
             yield Question(f"{side}_foot", foot.doubt, (foot.link,))

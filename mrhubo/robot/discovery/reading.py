@@ -12,7 +12,7 @@ from mrhubo.errors import UserError
 from mrhubo.robot.discovery.bodies import FULL_TURN, Bodies, Hinge, Step
 from mrhubo.robot.discovery.lines import PARALLEL, Line, sine
 from mrhubo.robot.joint import ROTARY, Joint, drive, stuck
-from mrhubo.robot.limits import in_degrees
+from mrhubo.robot.limits import held_angle, in_degrees
 from mrhubo.robot.urdf import Description, moved
 
 _LIMB = 0.1
@@ -91,7 +91,10 @@ def _read(
                 continue
             if stuck(joint, degrees):
                 body_of[joint.child] = body_of[link]
-                pose_44[joint.child] = child_44 @ _held(joint, degrees)
+                # Its 0 may lie outside its limits.
+                pose_44[joint.child] = child_44 @ moved(
+                    joint.axis_3, held_angle(joint, None, degrees), not joint.rotary
+                )
                 continue
             body_of[joint.child] = max(body_of.values()) + 1
             line = Line(child_44[:3, 3], child_44[:3, :3] @ joint.axis_3)
@@ -111,12 +114,6 @@ def _limits(description: Description, joint: Joint) -> tuple[float | None, float
     if given is None or given.lower is None or given.upper is None:
         return joint.lower, joint.upper
     return (given.lower, given.upper) if 0.0 < given.upper - given.lower < FULL_TURN else (None, None)
-
-
-def _held(joint: Joint, degrees: bool) -> np.ndarray:
-    """How far (4, 4) limits turn a joint that does not move from its 0, which may lie outside them."""
-    at = min(max(0.0, joint.lower or 0.0), joint.upper or 0.0)
-    return moved(joint.axis_3, math.radians(at) if degrees and joint.rotary else at, not joint.rotary)
 
 
 def _radians(degrees: float | None) -> float | None:

@@ -14,6 +14,7 @@ from mrhubo.robot.discovery.bases import without_base
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
 from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
+from mrhubo.robot.discovery.leg import read_leg
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
 from mrhubo.robot.discovery.necks import find_necks
 from mrhubo.robot.discovery.symmetry import Pair, alike
@@ -101,8 +102,12 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed, or, of a "
             f"robot with one arm, a config that is written by hand (docs/robots.md){_following(bodies)}"
         )
+    read = {id(pair) for pair in armed}
     # A waist and a neck that are alike, one below the chest and one above, are no limbs.
     armed = [pair for pair in armed if not any(_between(bodies, pair, other) for other in armed)]
+    # What stands for an elbow in a leg is its knee, but for one whose hip turns about the thigh alone.
+    arms_count = len(armed)
+    armed += [pair for pair in large if id(pair) not in read and _has_knees(bodies, pair)]
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     fronts = _fronts(armed)
     if len(armed) == 1:
@@ -117,7 +122,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     else:
         options = [
             (legness[id(low)] - legness[id(high)] + 2.0 * _hangs_below(low, high) + 2.0 * _whole_arm(high), i, j)
-            for i, low in enumerate(armed) for j, high in enumerate(armed) if i != j
+            for i, low in enumerate(armed) for j, high in enumerate(armed[:arms_count]) if i != j
         ]  # fmt: skip
         options.sort(key=lambda option: -option[0])
         score, i, j = options[0]
@@ -129,7 +134,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
                 )
             score, i, j = different[0]
         arms, legs = armed[j], armed[i]
-        reverse = next(option[0] for option in options if option[1:] == (j, i))
+        reverse = next((option[0] for option in options if option[1:] == (j, i)), 0.0)
         sure = float(np.clip(0.5 + 0.25 * (score - reverse), 0.0, 1.0))
         if _named_legs(arms):
             raise UserError(
@@ -137,9 +142,10 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             )
     if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
         legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
-    # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings.
+    # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings, if no name tells.
     spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
-    if (legs is not None and len(legs.chains[0]) < _LEG) or any(pair.size > arms.size for pair in spare):
+    winged = legs is not None and len(legs.chains[0]) < _LEG and not _named_legs(legs)
+    if winged or any(pair.size > arms.size for pair in spare):
         sure = min(sure, GUESS)
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
@@ -159,6 +165,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if legs is None:
         waist = without_base(waist, bodies.size)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
+
+
+def _has_knees(bodies: Bodies, pair: Pair) -> bool:
+    """Whether parallel axes tell the knees of both of its limbs."""
+    return all((leg := read_leg(bodies, chain)) is not None and leg.straight for chain in pair.chains)
 
 
 def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
