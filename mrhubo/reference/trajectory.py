@@ -14,9 +14,18 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from mrhubo.fast.together.motion import AHEAD, BRIDGE_STEPS, BRIDGE_TOLERANCE, JUMP, REACH, WINDOW, sides
+from mrhubo.fast.together.motion import (
+    AHEAD,
+    BRIDGE_STEPS,
+    BRIDGE_TOLERANCE,
+    JUMP,
+    PRICES,
+    REACH,
+    WINDOW,
+    sides,
+)
 from mrhubo.reference.avoidance import Avoidance
-from mrhubo.reference.refine import refine
+from mrhubo.reference.refine import motion_cost, refine
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed, nearest_slow
 from mrhubo.reference.terms import Smoothness
@@ -75,20 +84,26 @@ def _smooth_window(
     smoothness, target_TD3, joints_NC = task.smoothness, task.target_TD3, problem.blocks.joints_NC
     fixed_T = torch.arange(len(candidates_TSN), device=candidates_TSN.device) < len(before_LN)
 
-    def polish(path_TN: Tensor) -> tuple[Tensor, Tensor]:
-        return refine(problem, path_TN, target_TD3, smoothness, task.sweeps, task.tolerance, fixed_T)
+    def polish(path_TN: Tensor) -> Tensor:
+        motion_TN, _ = refine(problem, path_TN, target_TD3, smoothness, task.sweeps, task.tolerance, fixed_T)
+        return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
     settled = _settled(candidates_TSN, cost_TSC, before_LN)
     path_TN, path_cost_TC = best_path(*settled, joints_NC, smoothness.pull)
-    motion_TN, cost_C = polish(path_TN)
+    paths = [path_TN]
     more_TSN, more_cost_TSC = _bridge(problem, path_TN, path_cost_TC, target_TD3)
     if more_TSN.shape[1]:
         candidates_TSN, cost_TSC = torch.cat((candidates_TSN, more_TSN), 1), torch.cat((cost_TSC, more_cost_TSC), 1)
-        other_TN = best_path(*_settled(candidates_TSN, cost_TSC, before_LN), joints_NC, smoothness.pull)[0]
-        if bool(((other_TN - path_TN).abs() > JUMP).any()):
-            other_TN, other_cost_C = polish(other_TN)
-            motion_TN = torch.where((other_cost_C < cost_C)[problem.blocks.block_N], other_TN, motion_TN)
-    motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+        settled = _settled(candidates_TSN, cost_TSC, before_LN)
+        for price in PRICES:
+            other_TN, _ = best_path(*settled, joints_NC, smoothness.pull * price)
+            if all(bool(((other_TN - known_TN).abs() > JUMP).any()) for known_TN in paths):
+                paths.append(other_TN)
+    motions = [polish(path_TN) for path_TN in paths]
+    motion_TN = motions[0]
+    if len(motions) > 1:
+        cost_SC = torch.stack([motion_cost(problem, own_TN, target_TD3, smoothness) for own_TN in motions])
+        motion_TN = pick(torch.stack(motions, 1), cost_SC.argmin(dim=0).expand(len(path_TN), -1), joints_NC)
     if task.avoidance is None:
         return motion_TN
     return task.avoidance.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mrhubo.fast.together.motion import FAR, _without_jumps, sides
+from mrhubo.fast.together.motion import FAR, _other_paths, sides
 
 LIMIT, FRAMES = 3.0, 300
 
@@ -47,5 +47,15 @@ def test_a_joint_of_nearly_a_turn_stays_at_one_end() -> None:
     target_T = np.pi + 0.2 * np.sin(np.arange(FRAMES) / 20)  # behind, now more to the one side, now to the other
     path_TN = np.where(target_T < np.pi, LIMIT, -LIMIT)[:, None]
     assert (np.abs(np.diff(path_TN, axis=0)) > 5).sum() > 3
-    found_TN = _without_jumps(OneJoint(), path_TN, target_T, 0.5, 0)  # type: ignore[arg-type]
-    assert found_TN is not None and np.ptp(found_TN) < 0.3
+    for found_TN in (found := _other_paths(OneJoint(), path_TN, target_T, 0.5, 0)):  # type: ignore[arg-type]
+        assert np.ptp(found_TN) < 0.3
+    assert len(found) == 1  # the dearer path is the same
+
+
+def test_where_jumps_are_worth_it_there_is_a_path_without_them_too() -> None:
+    """What the joint loses on its way to the other end no path knows of: the slower one decides."""
+    target_T = np.pi + 0.8 * np.sin(np.arange(FRAMES) / 47)
+    path_TN = np.where(target_T < np.pi, LIMIT, -LIMIT)[:, None]
+    assert (np.abs(np.diff(path_TN, axis=0)) > 5).sum() == 2
+    cheap_TN, dear_TN = _other_paths(OneJoint(), path_TN, target_T, 0.5, 0)  # type: ignore[arg-type]
+    assert np.ptp(cheap_TN) > 5 and np.ptp(dear_TN) < 1

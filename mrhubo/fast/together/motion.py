@@ -14,7 +14,7 @@ from mrhubo.fast.description import Description
 from mrhubo.fast.side_by_side import side_by_side
 from mrhubo.fast.together.avoiding import GivingWay
 from mrhubo.fast.together.problem import Problem
-from mrhubo.fast.together.refine import refine
+from mrhubo.fast.together.refine import motion_cost, refine
 from mrhubo.fast.together.smoothness import Smoothness, smoothness_of
 from mrhubo.fast.together.speed import keep_speed, nearest_slow, speed_bound
 
@@ -28,6 +28,9 @@ REACH = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
 FAR = 512
 """Frames over which the side of a jump is looked for that it leaves, or that the next one takes."""
 BRIDGE_STEPS, BRIDGE_TOLERANCE = 12, 1e-2
+PRICES = (1.0, 30.0)
+"""How many times as much the moves of other paths are made to cost. A path pays for a jump once, and the joints, which
+are not as fast, for every frame on the way to its other side: what stays on one side may be cheaper in the end."""
 
 
 def join_frames(
@@ -94,38 +97,43 @@ def _smooth_window(problem: Problem, q_TN: np.ndarray, task: Task, before_LN: np
     fixed_T = np.arange(len(q_TN)) < len(before_LN)
     path_TN = np.concatenate((before_LN, q_TN[len(before_LN) :]))
 
-    def polish(path_TN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return refine(problem, path_TN, target_TD3, smoothness, SWEEPS, TOLERANCE, fixed_T)
+    def polish(path_TN: np.ndarray) -> np.ndarray:
+        motion_TN, _ = refine(problem, path_TN, target_TD3, smoothness, SWEEPS, TOLERANCE, fixed_T)
+        return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
-    def polish_other(path_TN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        other_TN = _without_jumps(problem, path_TN, target_TD3, smoothness.pull, len(before_LN))
-        return (path_TN, np.full(problem.cost.joints_NC.shape[1], np.inf)) if other_TN is None else polish(other_TN)
+    def polish_others(path_TN: np.ndarray) -> list[np.ndarray]:
+        return side_by_side(polish, _other_paths(problem, path_TN, target_TD3, smoothness.pull, len(before_LN)))
 
-    ways = side_by_side(lambda work: work(path_TN), (polish, polish_other))
-    (motion_TN, cost_C), (other_TN, other_cost_C) = ways
-    motion_TN = np.where((other_cost_C < cost_C)[problem.cost.block_N], other_TN, motion_TN)
-    motion_TN = keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
+    motion_TN, others = side_by_side(lambda work: work(path_TN), (polish, polish_others))
+    if others:
+        motions = [motion_TN, *others]
+        cost_SC = np.stack([motion_cost(problem, own_TN, target_TD3, smoothness) for own_TN in motions])
+        motion_TN = np.choose(cost_SC.argmin(axis=0)[problem.cost.block_N], motions)
     if task.giving_way is None:
         return motion_TN
     return task.giving_way.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
 
-def _without_jumps(
+def _other_paths(
     problem: Problem, path_TN: np.ndarray, target_TD3: np.ndarray, pull: float, settled: int
-) -> np.ndarray | None:
-    """Another path (T, N), of which some frames are settled, through answers that are found from either side of the
-    path's jumps; None: it does not jump, or no other is better.
+) -> list[np.ndarray]:
+    """Other paths (T, N), of which some frames are settled, through answers that are found from either side of the
+    path's jumps, for each of `PRICES`; none if it does not jump, or no other is better.
     """
     if not (np.abs(np.diff(path_TN, axis=0)) > JUMP).any():
-        return None
+        return []
     path_cost_TC = problem.quadratic(path_TN, target_TD3).cost_BC
     path_cost_TC[:settled] = 0.0
     more_TSN, more_cost_TSC = _bridge(problem, path_TN, path_cost_TC, target_TD3)
     candidates_TSN = np.concatenate((path_TN[:, None], more_TSN), axis=1)
     cost_TSC = np.concatenate((path_cost_TC[:, None], more_cost_TSC), axis=1)
     candidates_TSN[:settled], cost_TSC[:settled] = path_TN[:settled, None], 0.0
-    other_TN = best_path(candidates_TSN, cost_TSC, problem.cost.joints_NC, pull)
-    return other_TN if (np.abs(other_TN - path_TN) > JUMP).any() else None
+    paths = [path_TN]
+    for price in PRICES:
+        other_TN = best_path(candidates_TSN, cost_TSC, problem.cost.joints_NC, pull * price)
+        if all((np.abs(other_TN - known_TN) > JUMP).any() for known_TN in paths):
+            paths.append(other_TN)
+    return paths[1:]
 
 
 def best_path(candidates_TSN: np.ndarray, cost_TSC: np.ndarray, joints_NC: np.ndarray, pull: float) -> np.ndarray:

@@ -74,6 +74,11 @@ def refine(
     return q_TN, cost_C
 
 
+def motion_cost(problem: Problem, q_TN: np.ndarray, target_TD3: np.ndarray, smoothness: Smoothness) -> np.ndarray:
+    """What each block of joints costs (C,) in a motion (T, N) [rad]."""
+    return _motion_model(problem, q_TN, target_TD3, smoothness).frames.cost_BC.sum(axis=0)
+
+
 def refine_around(
     problem: Problem,
     q_TN: np.ndarray,
