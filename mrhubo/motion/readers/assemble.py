@@ -11,7 +11,7 @@ from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.world import find_up
+from mrhubo.motion.readers.world import find_world
 
 BLOCK = 65_536
 """Frames that are read and converted at a time."""
@@ -70,9 +70,10 @@ def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
     rotation_T33, position_T3 = motion.arrays.root_rotation_T33, motion.arrays.root_position_T3
     if rotation_T33 is None:
         return motion.changed(root_position_T3=None, source=f"{motion.source}; {rest}")
-    up, turn_33 = find_up(rotation_T33[:, :, 1], worlds)
+    up, turn_33, why = find_world(rotation_T33[:, :, 1], position_T3, worlds)
     return motion.changed(
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,
         source=f"{motion.source}, {up}; {rest}",
+        notes=(*motion.notes, why) if why else motion.notes,
     )
