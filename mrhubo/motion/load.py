@@ -53,7 +53,7 @@ def read_folder(folder: Path, options: ReadOptions | None = None) -> list[Motion
 
 
 def motion_files(folder: Path) -> list[Path]:
-    """The files of a folder that `read_folder` would try, one at least, sorted; the folder itself, if that has a JSON
+    """The files of a folder that `read_folder` would try, one at least, sorted; the folder itself, if that has a
     file a frame of one motion.
 
     Raises:
@@ -63,9 +63,9 @@ def motion_files(folder: Path) -> list[Path]:
     _refuse_file(folder)
     if not os.path.isdir(folder):
         raise UserError(f"{folder}: there is no such folder")
-    files = _motion_files(folder)
-    if not files and frame_files(folder):
+    if frame_files(folder) is not None:
         return [folder]
+    files = _motion_files(folder)
     if not files:
         raise UserError(f"{folder}: holds no motion file")
     return files

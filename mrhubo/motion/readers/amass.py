@@ -37,7 +37,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.units import find_unit
-from mrhubo.motion.readers.world import WORLDS, Z_UP
+from mrhubo.motion.readers.world import ANY_WORLD, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
 _MAX_SMALL = 1_000_000
@@ -81,7 +81,9 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
     Joints may have an axis of their own, and be matrices: (T, 21, 3), (T, 52, 3, 3).
 
     The root is read from `root_orient` or from `poses`, and from `trans`. AMASS's world has its z axis up; of other
-    files of this kind, the body tells whether y or z is.
+    files of this kind, the body tells: y or z is up, or y is down, as in the cameras' worlds of BEHAVE
+    (https://virtualhumans.mpi-inf.mpg.de/behave), HuMoR (https://github.com/davrempe/humor) and who saves what an
+    estimator saw.
 
     Rotations refer to the rest pose of the body model that the file says it is of; they are told in our skeleton's.
 
@@ -97,7 +99,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         betas = _read_betas(file, notes)
         contact_T4 = _read_contacts(file, len(local_TJ33), notes)
         family, rest = find_family(file, betas)
-        worlds = Z_UP if _ITS_OWN & file.keys else WORLDS
+        worlds = Z_UP if _ITS_OWN & file.keys else ANY_WORLD
     name = motion_name(path)
     motion = Motion.of(
         name=name,

@@ -14,7 +14,7 @@ from mrhubo.body.joints import OFFSETS_J3, PARENTS
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.world import find_up
+from mrhubo.motion.readers.world import find_world
 
 BLOCK = 65_536
 """Frames that are read and converted at a time."""
@@ -79,11 +79,12 @@ def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
     if position_T3 is not None:
         few = slice(None, None, 1 + len(motion) // _SEEN)
         joints_TK3 = _joints(rotation_T33[few], motion.arrays.local_TJ33[few]) + position_T3[few, None]
-    up, turn_33 = find_up(rotation_T33[:, :, 1], worlds, joints_TK3)
+    up, turn_33, why = find_world(rotation_T33[:, :, 1], position_T3, worlds, joints_TK3)
     return motion.changed(
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,
         source=f"{motion.source}, {up}; {rest}",
+        notes=(*motion.notes, why) if why else motion.notes,
     )
 
 

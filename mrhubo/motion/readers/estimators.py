@@ -12,6 +12,7 @@ from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.humanml import read_features
 from mrhubo.motion.readers.keypoint_arrays import points_in
 from mrhubo.motion.readers.keypoint_files import checked
@@ -70,6 +71,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
     if points is not None:
         return motion_of_points(path, checked(path, points), options)
     if found is None:
+        refuse_frame(tree)
         content = Content.open(path)
         what = content.described if content.arrays else f"{content.described} of {tree.described}"
         raise NoMotion(

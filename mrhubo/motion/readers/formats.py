@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -78,10 +77,10 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
         NoMotion: nobody does; says what the file is.
         UserError: whoever does finds it bad.
     """
-    if frames := frame_files(path) if os.path.isdir(path) else []:
-        from mrhubo.motion.readers.frame_folders import read_frames
-
-        return fill_repeats(read_frames(path, frames, options))
+    if (frames := frame_files(path)) is not None:
+        name, reader = ("pose_folders", "read_pose_files") if frames.poses else ("frame_folders", "read_frames")
+        module = importlib.import_module(f"mrhubo.motion.readers.{name}")
+        return fill_repeats(getattr(module, reader)(path, frames.files, options))
     content = Content.open(path)
     row = find_format(content)
     if row is None:

@@ -1,39 +1,97 @@
-"""Which folders are motions with a JSON file a frame (`mrhubo.motion.readers.frame_folders` reads them): told by names
-and beginnings of files, without PyTorch.
+"""Which folders are motions with a file a frame, of points (`mrhubo.motion.readers.frame_folders` reads them) or SMPL
+parameters (`mrhubo.motion.readers.pose_folders`): told by names and by what the first and the last file hold.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import re
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from mrhubo.errors import UserError
-from mrhubo.files.regular import read_regular
+from mrhubo.errors import UserError, shortened
+from mrhubo.files.regular import check_regular, read_regular
+from mrhubo.files.tree import Tree, read_tree, tree_of
+from mrhubo.motion.readers.frame_bodies import bodies_in
 
 MAX_BYTES = 10_000_000
 """Of a frame."""
 _MAX_FRAMES = 100_000
-_BEGINNING = re.compile(
+_POINTS = re.compile(
     rb'\s*+(?:\{.{0,300}?"(?:people|bodies)"\s*:\s*\[|\[\s*(?:\]\s*$|\{(?=.{0,300}?"keypoints3d"))).*', re.DOTALL
 )
+_ENDINGS = (".json", ".npz", ".npy", ".pkl")
 _NUMBER = re.compile(r"[0-9]")
 
 
-def frame_files(folder: Path) -> list[Path]:
-    """The files of a folder with one a frame, by name; none where it is no such folder."""
+@dataclass(frozen=True)
+class Frames:
+    """The files of a folder with one a frame, by name."""
+
+    files: list[Path]
+    poses: bool
+    """Whether they hold SMPL parameters; else points."""
+
+
+def frame_files(folder: Path) -> Frames | None:
+    """The files of a folder with one a frame; None where it is no such folder. Does not raise."""
+    if not os.path.isdir(folder):
+        return None
+    by_ending: dict[str, list[Path]] = {ending: [] for ending in _ENDINGS}
     try:
-        files = [file for file in folder.iterdir() if file.suffix.lower() == ".json" and not file.name.startswith(".")]
+        for file in folder.iterdir():
+            if file.suffix.lower() in by_ending and not file.name.startswith("."):
+                by_ending[file.suffix.lower()].append(file)
     except OSError:
-        return []
-    if len(files) < 2 or len(files) > _MAX_FRAMES or not all(_NUMBER.search(file.stem) for file in files):
-        return []
-    files = sorted(files, key=lambda file: file.name)
-    return files if is_frame(files[0]) and is_frame(files[-1]) else []
+        return None
+    for files in by_ending.values():
+        if not 2 <= len(files) <= _MAX_FRAMES or not all(_NUMBER.search(file.stem) for file in files):
+            continue
+        files.sort(key=lambda file: file.name)
+        if _is_points(files[0]) and _is_points(files[-1]):
+            return Frames(files, poses=False)
+        if _is_pose(files[0]) and _is_pose(files[-1]):
+            return Frames(files, poses=True)
+    return None
 
 
-def is_frame(file: Path) -> bool:
-    """Whether a file is a frame of such a folder; does not raise."""
+def read_frame_tree(file: Path) -> Tree:
+    """What a file of a frame holds.
+
+    Raises:
+        UserError: it is damaged, hostile, or too large.
+    """
+    if file.suffix.lower() == ".json":
+        return tree_of(read_frame_json(file), file, "")
+    check_regular(file, MAX_BYTES)
+    return read_tree(file)
+
+
+def read_frame_json(file: Path) -> Any:
+    """What a JSON file of a frame holds.
+
+    Raises:
+        UserError: it is damaged or too large.
+    """
     try:
-        return bool(_BEGINNING.match(read_regular(file, MAX_BYTES)[:4096]))
+        return json.loads(read_regular(file, MAX_BYTES))
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"{file}: is no JSON: {shortened(str(error), 80)}") from error
+
+
+def _is_points(file: Path) -> bool:
+    if file.suffix.lower() != ".json":
+        return False
+    try:
+        return bool(_POINTS.match(read_regular(file, MAX_BYTES)[:4096]))
+    except UserError:
+        return False
+
+
+def _is_pose(file: Path) -> bool:
+    try:
+        return bodies_in(read_frame_tree(file)) is not None
     except UserError:
         return False

@@ -12,17 +12,15 @@ Legend: T frames, K keypoints.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mrhubo.errors import UserError, shortened
-from mrhubo.files.regular import read_regular
+from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import NoMotion
-from mrhubo.motion.readers.frame_files import MAX_BYTES
+from mrhubo.motion.readers.frame_files import read_frame_json
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoints import motion_of_points
@@ -80,10 +78,7 @@ def read_frames(folder: Path, files: list[Path], options: ReadOptions) -> Motion
 
 def _people(file: Path) -> list[dict[str, Any]]:
     """The people of a frame."""
-    try:
-        value = json.loads(read_regular(file, MAX_BYTES))
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{file}: is no JSON: {shortened(error, 80)}") from error
+    value = read_frame_json(file)
     if isinstance(value, dict):
         value = next((value[key] for key in _LISTS if key in value), None)
     if not isinstance(value, list) or len(value) > _MOST_PEOPLE or not all(isinstance(one, dict) for one in value):

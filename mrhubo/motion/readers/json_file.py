@@ -16,6 +16,7 @@ from mrhubo.files.tree import tree_of
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.estimators import smpl_motion
+from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.keypoint_files import POSE_KEYS, checked
 from mrhubo.motion.readers.keypoint_json import points_of_json
 from mrhubo.motion.readers.keypoints import motion_of_points
@@ -43,5 +44,10 @@ def read_json(path: Path, options: ReadOptions) -> Motion:
         value = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: is no JSON: {shortened(str(error), 80)}") from error
-    found = smpl_motion(path, tree_of(value, path, ""), options) if _POSES.search(text) else None
+    found = None
+    if _POSES.search(text):
+        tree = tree_of(value, path, "")
+        found = smpl_motion(path, tree, options)
+        if found is None:
+            refuse_frame(tree)
     return found or motion_of_points(path, checked(path, points_of_json(path, value, options)), options)

@@ -18,6 +18,13 @@ _TO_Y_UP: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 """What turns each world so that y is up: a turn about x, so that who looks along z in a camera's world, away from it,
 looks along -z."""
+_UPRIGHT, _FLAT = 0.85, 0.5
+"""Cosines between the body's own up axis, on the mean, and that of the world: more than the first, of somebody who
+stands, sits or walks; less than the second, of somebody who lies or crawls."""
+_ON_A_FLOOR_M = (-0.15, 0.65)
+"""How high the origin of a model's pelvis is over a floor at height 0 of who lies or crawls on it, and not higher."""
+_MOST_TIMES = (0.05, 0.95)
+"""Quantiles between which it is."""
 WORLDS = ("y up", "z up")
 """Of files of motion capture; where both fit alike, the first is taken."""
 Y_UP, Z_UP = ("y up",), ("z up",)
@@ -46,7 +53,7 @@ def find_up(
         worlds: some of those above.
         joints_TK3: where its joints are [m], if its way through the world is known.
     """
-    turns = {world: np.array(_TO_Y_UP[world], body_up_T3.dtype) for world in worlds}
+    turns = {world: _turn(world, body_up_T3) for world in worlds}
     height_T = {world: body_up_T3 @ turn_33[1] for world, turn_33 in turns.items()}
     best = max(worlds, key=lambda world: float(height_T[world].mean()))
     if joints_TK3 is not None:
@@ -58,6 +65,38 @@ def find_up(
     return best, turns[best]
 
 
+def find_world(
+    body_up_T3: np.ndarray,
+    place_T3: np.ndarray | None,
+    worlds: tuple[str, ...],
+    joints_TK3: np.ndarray | None = None,
+) -> tuple[str, np.ndarray, str]:
+    """Which of some worlds a root is in, the matrix (3, 3) that makes y its up axis, and what is to be said of it.
+
+    Who lies or crawls from the first frame to the last stands along no world's axis; then the place tells, where just
+    one world has the body flat, and as low as that of somebody on a floor at height 0. Nothing tells of who
+    lies along an axis that may be up, and is taken to stand.
+
+    Args:
+        body_up_T3: the body's own up axes, in the file's world.
+        place_T3: where the root is [m], if that is known.
+        worlds: which there may be, the likeliest first.
+        joints_TK3: where joints are in some frames [m], if their places are known.
+    """
+    up, turn_33 = find_up(body_up_T3, worlds, joints_TK3)
+    upright = float((body_up_T3 @ turn_33[1]).mean())
+    if len(worlds) == 1 or upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
+        return up, turn_33, ""
+    said = "the body is not upright on the mean, as of somebody who lies or crawls"
+    floors = [world for world in worlds if world in WORLDS and place_T3 is not None]
+    flat = [world for world in floors if _lies_on_its_floor(body_up_T3, place_T3, _turn(world, body_up_T3))]
+    if len(flat) == 1:
+        return flat[0], _turn(flat[0], body_up_T3), f"{said}: {flat[0]} is taken, by how low the root is"
+    if upright > _FLAT:
+        return up, turn_33, ""
+    return worlds[0], _turn(worlds[0], body_up_T3), f"{said}, and nothing tells which way is up: {worlds[0]} is taken"
+
+
 def _stands(height_T: np.ndarray) -> bool:
     return float((height_T > _STANDING).mean()) > _A_WHILE
 
@@ -66,3 +105,16 @@ def _rise(height_TK: np.ndarray) -> float:
     """How much the lowest joint's height varies: the range of nine frames in ten."""
     low, high = np.percentile(height_TK.min(axis=1), (5, 95))
     return float(high - low)
+
+
+def _lies_on_its_floor(body_up_T3: np.ndarray, place_T3: np.ndarray | None, turn_33: np.ndarray) -> bool:
+    """Whether a body lies flat in a world, on a floor at height 0."""
+    if place_T3 is None or abs(float((body_up_T3 @ turn_33[1]).mean())) > _FLAT:
+        return False
+    low, high = _ON_A_FLOOR_M
+    lowest, highest = np.quantile(place_T3 @ turn_33[1], _MOST_TIMES)
+    return bool(low < lowest and highest < high)
+
+
+def _turn(world: str, like: np.ndarray) -> np.ndarray:
+    return np.array(_TO_Y_UP[world], like.dtype)
