@@ -90,7 +90,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is missing, damaged, hostile, too large, or not a motion.
     """
-    notes: list[str] = []
+    notes = options.of_one()
     with open_npz(path) as file:
         key, form, local_TJ33 = _read_pose(file)
         frame_rate = find_rate(path, [_rates(file)], options, notes)

@@ -42,6 +42,7 @@ def read_acclaim(path: Path, options: ReadOptions) -> Motion:
     skeleton = read_asf(_find_skeleton(path))
     rate = asked_rate(path, options, "an .amc file does not tell its frame rate (most of CMU's and HDM05's have 120)")
     tree, notes = read_amc(path, skeleton)
+    notes = [*options.of_one(), *notes]
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     kind = f"ASF/AMC files, skeleton {skeleton.path.name}:"
     return tree_motion(tree, motion_name(path), str(path), rate, kind, given, tuple(notes))

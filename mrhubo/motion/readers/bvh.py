@@ -59,6 +59,7 @@ def _of_person(path: Path, tree: JointTree, options: ReadOptions, notes: list[st
     """
     roots = tree.roots
     if len(roots) < 2:
+        notes += options.of_one()
         return tree
     people: dict[str, JointTree] = {}
     for root in roots:

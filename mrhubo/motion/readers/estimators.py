@@ -63,7 +63,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
     found = (
         read_rows(tree, options)
         or read_features(tree, options)
-        or read_soma(tree, rate)
+        or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)
     )
     found = found or smpl_motion(path, tree, options)

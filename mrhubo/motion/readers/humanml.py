@@ -43,7 +43,7 @@ def read_features(tree: Tree, options: ReadOptions) -> Motion | None:
             f"{tree.path}: has rows of {_WIDTH} numbers, as HumanML3D's features have, but they make no body; if they"
             " are normalised, multiply them by its Std.npy and add its Mean.npy"
         )
-    notes = []
+    notes = options.of_one()
     rate = options.rate
     if rate is None:
         rate = _RATE

@@ -9,6 +9,7 @@ Legend: T frames, K keypoints.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +37,11 @@ CONFIDENCE_KEYS = ("confidence", "confidences", "conf", "scores", "visibility", 
 LIFT = "lift them to three dimensions first, for instance with MMPose or MotionBERT"
 """What to do with points in a picture."""
 _SAMPLES, _LENGTHS = "motion", "lengths"
+_BODY, _BODY_KEY = "skel_body", re.compile(r"skel_body[0-9]{1,2}")
+KINECT_RATE = 30.0
+"""Frames a second of NTU RGB+D's motions."""
+_MOST_PEOPLE = 20
+"""In one array."""
 
 
 @dataclass
@@ -57,27 +63,29 @@ def point_key(keys: Iterable[str]) -> str | None:
     return min(((_PLAIN[bare], key) for bare, key in plain.items() if bare in _PLAIN), default=(0, None))[1]
 
 
-def in_npz(tree: Tree) -> Keypoints:
+def in_npz(tree: Tree, options: ReadOptions) -> Keypoints:
     """The points of an .npz file.
 
     Raises:
         UserError: they are no points of frames, or its names are no text.
     """
-    found = _named_in(tree)
+    found = _named_in(tree, options)
     named = tree.get(*NAME_KEYS)
     if named is not None and found.names is None:
         raise UserError(f"{named.named} is {named.described}; expected the names of the points")
     return found
 
 
-def in_array(path: Path, tree: Tree) -> Keypoints:
-    """The points that a node is itself.
+def in_array(path: Path, tree: Tree, options: ReadOptions) -> Keypoints:
+    """The points that a node is itself, of one of the people in it.
 
     Raises:
         NoMotion: it is no points of frames; says what it is.
     """
-    point_TK3, confidence_TK = _split(path, tree.array(), "the array")
-    return Keypoints(point_TK3, confidence_TK=confidence_TK)
+    notes: list[str] = []
+    array, _ = _of_one(path, tree.array(), "the array", options, notes)
+    point_TK3, confidence_TK = _split(path, array, "the array")
+    return Keypoints(point_TK3, confidence_TK=confidence_TK, notes=notes)
 
 
 def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
@@ -89,24 +97,27 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
     path = tree.path
     if not tree.is_mapping:
         shape = tree.shape()
-        return in_array(path, tree) if shape is not None and _may_be_points(shape) else None
+        return in_array(path, tree, options) if shape is not None and _may_be_points(shape) else None
     samples = _samples(tree, options)
     if samples is not None:
         return samples
     if point_key(tree.keys) is not None:
-        return _named_in(tree)
+        return _named_in(tree, options)
+    bodies = _kinect_bodies(tree, options)
+    if bodies is not None:
+        return bodies
     people = {name: child for name, child in tree.items() if point_key(child.keys) is not None}
     if not people:
         return None
     shapes = {name: child[_key(child)].shape() for name, child in people.items()}
     tracks = [Person(name, shape[0]) for name, shape in shapes.items() if shape is not None and len(shape) > 2]
     if not tracks:  # says what the first is
-        return _named_in(next(iter(people.values())))
+        return _named_in(next(iter(people.values())), options)
     notes: list[str] = []
     if len(tracks) < len(people):
         others = set(people) - {track.person for track in tracks}
         notes.append(f"left out, as there are no points of frames in them: {shortened(listed(others), 200)}")
-    found = _named_in(people[choose(path, tracks, options, notes).person])
+    found = _named_in(people[choose(path, tracks, options, notes).person], ReadOptions())
     if found.rate is None and (told := rate_in(tree, found.notes)) is not None:
         found.rate = told[1]
     found.notes += notes
@@ -118,20 +129,28 @@ def _may_be_points(shape: tuple[int, ...]) -> bool:
     return len(shape) in (3, 4) and shape[-1] in (2, 3, 4) and (len(shape) == 3 or shape[-2:] != (3, 3))
 
 
-def _named_in(node: Tree) -> Keypoints:
-    found = _in_node(node.path, node)
+def _named_in(node: Tree, options: ReadOptions) -> Keypoints:
+    found = _in_node(node.path, node, options)
     names = node.get(*NAME_KEYS)
     found.names = (names.texts() or None) if names is not None else None
     return found
 
 
-def _in_node(path: Path, node: Tree) -> Keypoints:
-    key = _key(node)
-    point_TK3, confidence_TK = _split(path, node[key].array(), f"'{key}'")
-    found = Keypoints(point_TK3, confidence_TK=confidence_TK, where=f"'{key}'")
+def _in_node(path: Path, node: Tree, options: ReadOptions) -> Keypoints:
+    key, notes = _key(node), []
+    array, person = _of_one(path, node[key].array(), f"'{key}'", options, notes)
+    point_TK3, confidence_TK = _split(path, array, f"'{key}'")
+    found = Keypoints(point_TK3, confidence_TK=confidence_TK, where=f"'{key}'", notes=notes)
     given = (node.find_array(key) for key in CONFIDENCE_KEYS)
     confidence = next((array for array in given if array is not None and array.ndim), None)
     if confidence is not None:
+        axis, number = person or (0, 0)
+        if (
+            person is not None
+            and confidence.ndim > 2
+            and confidence.shape[: axis + 1] == node[key].array().shape[: axis + 1]
+        ):
+            confidence = confidence.take(number, axis)
         found.confidence_TK = np.asarray(confidence, dtype=np.float64)
     told = rate_in(node, found.notes)
     found.rate = None if told is None else told[1]
@@ -158,6 +177,46 @@ def _samples(tree: Tree, options: ReadOptions) -> Keypoints | None:
     point_KXT = tree[_SAMPLES].array()[int(chosen.person), :, :, : chosen.length]
     point_TK3 = point_KXT.transpose(2, 0, 1).astype(np.float64)
     return Keypoints(point_TK3, where=f"'{_SAMPLES}', sample {chosen.person}", notes=notes)
+
+
+def _of_one(
+    path: Path, array: np.ndarray, where: str, options: ReadOptions, notes: list[str]
+) -> tuple[np.ndarray, tuple[int, int] | None]:
+    """The points of one of the people in an array (people, T, K, 3) or (T, people, K, 3), and along which axis they are
+    and where; the array itself, where it has no such axis. There are more frames than people.
+    """
+    if array.ndim != 4 or array.shape[3] not in (3, 4) or 1 in array.shape[:2] or array.dtype.kind not in "fiu":
+        notes += options.of_one()
+        return array, None
+    axis = int(np.argmin(array.shape[:2]))
+    if not 0 < array.shape[axis] < min(array.shape[1 - axis], _MOST_PEOPLE) or 0 in array.shape:
+        return array, None
+    seen_TP = (np.isfinite(array).all(-1) & (array[..., :3] != 0).any(-1)).any(-1)
+    people = [Person(str(number), int(seen)) for number, seen in enumerate(seen_TP.sum(1 - axis)) if seen]
+    number = int(choose(path, people, options, notes).person)
+    notes.append(f"{where} has shape {array.shape}: taken as those of {array.shape[axis]} people")
+    return array.take(number, axis), (axis, number)
+
+
+def _kinect_bodies(tree: Tree, options: ReadOptions) -> Keypoints | None:
+    """The points of one of the people in what NTU RGB+D's own script makes of a .skeleton file: `skel_body0` (T, 25, 3)
+    and others, all 0 where there is nobody (https://github.com/shahroudy/NTURGB-D, Python/txt2npy.py); None of anything
+    else.
+    """
+    bodies = {name.removeprefix(_BODY): child for name, child in tree.items() if _BODY_KEY.fullmatch(name)}
+    arrays = {name: child.array() for name, child in bodies.items() if len(child.shape() or ()) == 3}
+    people = [Person(name, int((array != 0).any(-1).any(-1).sum())) for name, array in arrays.items()]
+    people = [person for person in people if person.length]
+    if not people:
+        return None
+    notes: list[str] = []
+    chosen = choose(tree.path, people, options, notes).person
+    point_TK3, _ = _split(tree.path, arrays[chosen], f"'{_BODY}{chosen}'")
+    rate = options.rate
+    if rate is None:
+        rate = KINECT_RATE
+        notes.append(f"{rate:g} frames a second, as NTU RGB+D says of all its motions; --rate says otherwise")
+    return Keypoints(point_TK3, rate=rate, where=f"'{_BODY}{chosen}'", notes=notes)
 
 
 def _split(path: Path, array: np.ndarray, where: str) -> tuple[np.ndarray, np.ndarray | None]:

@@ -13,6 +13,7 @@ from mrhubo.errors import UserError
 from mrhubo.files.tree import read_tree
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.keypoint_arrays import Keypoints, in_array, in_npz, point_key
+from mrhubo.motion.readers.options import ReadOptions
 
 POSE_KEYS = {
     "poses", "pose_body", "body_pose", "pose", "smpl_poses", "pose_world", "fullpose", "thetas", "pose_aa",
@@ -26,16 +27,16 @@ def holds_points(content: Content) -> bool:
     return point_key(content.arrays) is not None and not content.arrays & POSE_KEYS
 
 
-def read_keypoints_file(path: Path) -> Keypoints:
-    """Reads points from an .npy or .npz file.
+def read_keypoints_file(path: Path, options: ReadOptions) -> Keypoints:
+    """Reads points from an .npy or .npz file, of one of the people in it.
 
     Raises:
         UserError: the file is damaged, or holds no points of frames; says what it holds.
     """
     content = Content.open(path)
     if content.is_npy:
-        return checked(path, in_array(path, read_tree(path)))
-    return checked(path, in_npz(read_tree(path)))
+        return checked(path, in_array(path, read_tree(path), options))
+    return checked(path, in_npz(read_tree(path), options))
 
 
 def checked(path: Path, found: Keypoints) -> Keypoints:

@@ -99,7 +99,7 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     placed_TK4[numbers] = point_TK4
     sure_TK = placed_TK4[..., 3] if None not in wanted else None
     names = list(header.points) if by_names(list(header.points)).keys() >= set(NEEDED) else None
-    found = Keypoints(placed_TK4[..., :3], names, sure_TK, rate, "the table")
+    found = Keypoints(placed_TK4[..., :3], names, sure_TK, rate, "the table", options.of_one())
     return motion_of_points(path, checked(path, found), options)
 
 

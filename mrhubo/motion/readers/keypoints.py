@@ -54,7 +54,7 @@ def is_keypoints(content: Content) -> bool:
     if not content.is_npy:
         return holds_points(content)
     try:
-        points = read_keypoints_file(content.path)
+        points = read_keypoints_file(content.path, ReadOptions())
     except UserError:
         return False
     fits = fitting_sets(_some(points.point_TK3))
@@ -69,7 +69,8 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is damaged, it has no points of a body, which points they are or the rate is not known.
     """
-    return motion_of_points(path, read_keypoints_file(path), options)
+    found = read_keypoints_file(path, options)
+    return motion_of_points(path, found, options)
 
 
 def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Motion:

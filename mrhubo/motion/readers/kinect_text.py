@@ -19,7 +19,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.keypoint_arrays import Keypoints
+from mrhubo.motion.readers.keypoint_arrays import KINECT_RATE, Keypoints
 from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
@@ -32,7 +32,6 @@ _JOINTS, _BODY, _JOINT = 25, 10, 12
 _MOST_PEOPLE = 10
 _MAX_BYTES = 2**28
 _MAX_FRAMES = 100_000
-_RATE = 30.0
 _SURE = np.array([0.0, 0.5, 1.0])
 """Confidence of what was not seen, guessed, seen."""
 
@@ -62,7 +61,7 @@ def read_skeleton(path: Path, options: ReadOptions) -> Motion:
     state_TK = np.nan_to_num(joint_TKX[:, :, -1]).clip(0, len(_SURE) - 1).astype(int)
     rate = options.rate
     if rate is None:
-        rate = _RATE
+        rate = KINECT_RATE
         notes.append(f"{rate:g} frames a second, as NTU RGB+D says of all; --rate says otherwise")
     names = list(SETS["Kinect 2"])
     # what is not used has a name that is none of ours

@@ -13,6 +13,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_frame_list, read_phalp, read_romp
+from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.smpl_names import Found, find_inside, search
 from mrhubo.motion.readers.tracks import Kind, Layout
@@ -79,7 +80,9 @@ def _single(tree: Tree) -> Layout | None:
     return Layout(_kind("SMPL parameters", found, tree), found.tracks())
 
 
-_FINDERS = (read_phalp, read_romp, read_frame_list, read_pymaf, read_cliff, _people, _single)
+_FINDERS = (
+    read_phalp, read_romp, read_frame_list, read_pymaf, read_cliff, read_six, read_egoallo, _people, _single,
+)  # fmt: skip
 
 
 def _kind(source: str, found: Found, tree: Tree) -> Kind:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, shortened
 
 RATES = (1.0, 1000.0)
 """Frames per second that are believed."""
@@ -46,3 +46,9 @@ class ReadOptions:
             low, high = RATES
             if not (isinstance(self.rate, int | float) and low <= self.rate <= high):
                 raise UserError(f"the rate is {self.rate} frames per second; expected {low:g} to {high:g}")
+
+    def of_one(self) -> list[str]:
+        """What to say of a file that has one person only, whom it does not name: that another is asked for, if so."""
+        if self.person is None:
+            return []
+        return [f"the person '{shortened(self.person, 40)}' that was asked for is left out: there is one only"]

@@ -51,7 +51,7 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     shape = tree.shape()
     if shape is None or len(shape) != 2 or not shape[0]:
         return None
-    rows_TX, notes = tree.array(), []
+    rows_TX, notes = tree.array(), options.of_one()
     if shape[1] == _MOTION_X:
         arrays = SmplArrays("rows", rows_TX[:, 3:66], _BODY, 0, rows_TX[:, :3], rows_TX[:, 309:312], rows_TX[:, 312:])
         rate = _MOTION_X_RATE if options.rate is None else float(options.rate)

@@ -22,6 +22,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES, MAX_ROOT_TURN, upright
 from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rotations import find_form, rows_of, to_matrices
 from mrhubo.motion.readers.smpl_names import search
 from mrhubo.motion.readers.world import WORLDS
@@ -97,11 +98,12 @@ class _Arrays:
     """Places of the hips (T, 3) [m]."""
 
 
-def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | None:
+def read_soma(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]], float]) -> Motion | None:
     """Reads a motion of SOMA's skeleton; None of anything else.
 
     Args:
         tree: the file.
+        options: may ask for a person, of whom there is one only.
         find_rate: gives the frame rate, and may add to the notes.
 
     Raises:
@@ -113,7 +115,7 @@ def read_soma(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion | N
     missing = sorted(set(_CHAIN) - set(arrays.names) - {"Neck2"})
     if missing:
         raise UserError(f"{tree.path}: is of SOMA's skeleton, but has no joint {', '.join(missing)}")
-    notes: list[str] = []
+    notes = options.of_one()
     world = _world(tree, arrays)
     if arrays.places is not None:
         _point(world, arrays, notes)

@@ -125,7 +125,7 @@ def choose(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: li
         return chosen
     chosen = next((track for track in tracks if track.person == options.person), None)
     if chosen is None and len(tracks) == 1 and not tracks[0].person:
-        notes.append(f"the person '{shortened(options.person, 40)}' that was asked for is left out: there is one only")
+        notes += options.of_one()
         return tracks[0]
     if chosen is None:
         near = nearest(options.person, [track.person for track in tracks]) if len(tracks) > 10 else None

@@ -370,6 +370,44 @@ def fit3d(path: Path, people: dict[int, np.ndarray]) -> None:
     path.write_text(json.dumps({key: array.tolist() for key, array in content.items()}))
 
 
+def mdm(path: Path, people: dict[int, np.ndarray]) -> None:
+    """What it fits to one of the motions that it made up: 6D numbers are the first two rows of matrices."""
+    ((_, pose),) = people.items()
+    theta = matrices(padded(pose, 24).reshape(len(pose), 24, 3))[:, :, :2].reshape(len(pose), 24, 6)
+    motion = np.zeros((25, 6, len(pose)))
+    motion[:24], motion[24, :3] = theta.transpose(1, 2, 0), 1
+    content = {
+        "motion": motion,
+        "thetas": motion[:-1],
+        "root_translation": motion[-1, :3],
+        "faces": np.zeros((4, 3)),
+        "vertices": np.zeros((6, 3, len(pose))),
+        "text": "a person turns",
+        "length": len(pose),
+    }
+    with path.open("wb") as file:
+        np.save(file, content)  # type: ignore[arg-type]
+
+
+def egoallo(path: Path, people: dict[int, np.ndarray]) -> None:
+    poses = np.stack(list(people.values()))
+    turn = Rotation.from_euler("x", 90, degrees=True) * Rotation.from_rotvec(poses[:, :, 0].reshape(-1, 3))
+    root = np.ones((*poses.shape[:2], 7))
+    root[..., :4] = np.roll(turn.as_quat(), 1, axis=1).reshape(*poses.shape[:2], 4)
+    body = np.roll(Rotation.from_rotvec(poses[:, :, 1:].reshape(-1, 3)).as_quat(), 1, axis=1)
+    content = {
+        "Ts_world_cpf": np.zeros((poses.shape[1], 7)),
+        "Ts_world_root": root,
+        "body_quats": body.reshape(*poses.shape[:2], 21, 4),
+        "left_hand_quats": np.zeros((*poses.shape[:2], 15, 4)),
+        "betas": np.zeros((*poses.shape[:2], 16)),
+        "frame_nums": np.arange(poses.shape[1]),
+        "timestamps_ns": np.arange(poses.shape[1], dtype=np.int64) * 33_333_333 + 10**15,
+    }
+    with path.open("wb") as file:
+        np.savez(file, **content)
+
+
 WRITERS: dict[str, Writer] = {
     "wham": Writer(wham, ".pkl", "WHAM", "smpl", many=True, position=0.5),
     "vibe": Writer(vibe, ".pkl", "VIBE", "smpl", camera=True, many=True, position=None),
@@ -390,6 +428,8 @@ WRITERS: dict[str, Writer] = {
     "cliff": Writer(cliff, ".npz", "CLIFF", "smpl", camera=True, many=True),
     "frame_list": Writer(frame_list, ".pkl", "SMPL parameters, frame by frame", "smpl", camera=True),
     "meshcapade": Writer(meshcapade, ".smpl", "SMPL parameters", "smplx"),
+    "mdm": Writer(mdm, ".npy", "MDM's or MoMask's SMPL parameters", "smpl"),
+    "egoallo": Writer(egoallo, ".npz", "EgoAllo", "smplh", many=True),
     "fit3d": Writer(fit3d, ".json", "SMPL parameters", "smplx"),
     "smplx": Writer(smplx, ".npz", "SMPL parameters", "smplx"),
 }

@@ -55,7 +55,7 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
     assert (motion.root_position_T3 is None) == (writer.position is None)
     if motion.root_position_T3 is not None:
         assert float(motion.root_position_T3[-1, 0]) == pytest.approx(writer.position)
-    if name not in ("phc", "interhuman"):
+    if name not in ("phc", "interhuman", "egoallo"):
         with pytest.raises(UserError, match="--rate"):
             read_motion(path)
 
@@ -111,11 +111,11 @@ def test_features_of_humanml3d_tell_where_joints_are(tmp_path: Path) -> None:
 )
 def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, name: str) -> None:
     writer = WRITERS[name]
-    lengths = (FRAMES, FRAMES) if name == "slahmr" else (4, FRAMES)
+    lengths = (FRAMES, FRAMES) if name in ("slahmr", "egoallo") else (4, FRAMES)
     people = {n: made_up(length, seed=n, camera=writer.camera) for n, length in enumerate(lengths)}
     path = tmp_path / f"clip{writer.ending}"
     writer.write(path, people)
-    taken, others = (0, 1) if name == "slahmr" else (1, 0)
+    taken, others = (0, 1) if name in ("slahmr", "egoallo") else (1, 0)
     names = [f"0-clip_{n}" if name == "phc" else str(n) for n in people]
     motion = read_motion(path, RATE)
     assert close(motion, people[taken], writer.family)
@@ -351,7 +351,11 @@ def entries_of(value: Any) -> list[tuple[Any, Any]]:
 @pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.ending in (".pkl", ".pk", ".npy")])
 def test_odd_values_anywhere_are_read_or_refused_by_name(tmp_path: Path, name: str) -> None:
     WRITERS[name].write(tmp_path / "good", {1: made_up(3, camera=WRITERS[name].camera)})
-    good = np.load(tmp_path / "good", allow_pickle=True).item() if name == "tram" else joblib.load(tmp_path / "good")
+    good = (
+        np.load(tmp_path / "good", allow_pickle=True).item()
+        if name in ("tram", "mdm")
+        else joblib.load(tmp_path / "good")
+    )
     generator = np.random.default_rng(0)
     for _ in range(25):
         content = copy.deepcopy(good)

@@ -11,8 +11,12 @@ import numpy as np
 import pytest
 import torch
 
+from mrhubo.body.joints import JOINT_NAMES, REST_K3
 from mrhubo.errors import UserError
-from mrhubo.motion import ReadOptions, find_motions, read_folder, read_motion, write_motion
+from mrhubo.motion import ReadOptions, find_motions, read_folder, read_motion, trim, write_motion
+from tests.motion.bvh_writer import Style, write_bvh
+
+_SHIPPED = Path(__file__).resolve().parents[3] / "data" / "motions" / "wave.npz"
 
 
 def write(path: Path) -> Path:
@@ -93,3 +97,27 @@ def test_reading_imports_no_pytorch(tmp_path: Path) -> None:
         "    assert 'torch' not in sys.modules, path\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+@pytest.mark.parametrize("name", ["amass.npz", "rows.npy", "features.npy", "joints.npy", "table.csv", "a.bvh"])
+def test_a_person_who_is_asked_for_where_there_is_one_is_said(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if name == "amass.npz":
+        np.savez(path, poses=np.zeros((4, 66)), fps=30.0)
+    elif name == "rows.npy":
+        np.save(path, np.zeros((4, 322)))
+    elif name == "features.npy":
+        rows = np.zeros((4, 263))
+        rows[:, 3], rows[:, 4:67] = 0.9, np.tile(REST_K3[1:22].reshape(63), (4, 1))
+        np.save(path, rows)
+    elif name == "joints.npy":
+        np.save(path, np.tile(REST_K3[:22], (4, 1, 1)))
+    elif name == "table.csv":
+        columns = [f"{joint}_{axis}" for joint in JOINT_NAMES for axis in "xyz"]
+        row = ",".join(f"{x:.3f}" for x in REST_K3[:22].reshape(-1))
+        path.write_text("\n".join([",".join(columns), *[row] * 4]))
+    else:
+        path.write_text(write_bvh(trim(read_motion(_SHIPPED), end=0.1), Style()))
+    notes = [read_motion(path, ReadOptions(rate=30.0, person=person)).notes for person in (None, "2")]
+    said = "the person '2' that was asked for is left out: there is one only"
+    assert said in notes[1] and not any("asked for" in note for note in notes[0])

@@ -597,3 +597,42 @@ def test_damaged_tables_are_read_or_refused_in_a_sentence(
     path = tmp_path / "points.csv"
     path.write_bytes(damaged(_table(array_of(points, SETS["MediaPipe"])[:3], "NAME_AXIS").encode(), steps))
     read_or_refused(path)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("ending", [".npy", ".npz", ".pkl"])
+def test_people_along_an_axis_of_an_array(
+    axis: int, ending: str, points: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    """As InterGen writes two of them; the second is seen in the first frames only."""
+    one = array_of(points, SETS["SMPL's body"])
+    other = one + [1.0, 0.0, 0.5]
+    other[len(one) // 2 :] = 0
+    both, path = np.stack([other, one], axis=axis), tmp_path / f"a{ending}"
+    if ending == ".npy":
+        np.save(path, both)
+    elif ending == ".npz":
+        np.savez(path, keypoints=both, confidence=np.ones(both.shape[:3]))
+    else:
+        path.write_bytes(pickle.dumps({"joints": both}))
+    longest, second = (mrhubo.read_motion(path, ReadOptions(rate=30.0, person=person)) for person in (None, "0"))
+    np.save(tmp_path / "one.npy", one)
+    alone = mrhubo.read_motion(tmp_path / "one.npy", RATE)
+    assert torch.equal(longest.local_TJ33, alone.local_TJ33) and "'1' is seen longest" in longest.notes[0]
+    assert second.confidence_TJ is not None and not second.confidence_TJ[len(one) // 2 :].any()
+    half = len(one) // 2
+    torch.testing.assert_close(second.local_TJ33[: half - 1], alone.local_TJ33[: half - 1], atol=1e-5, rtol=0)
+
+
+def test_what_ntus_script_makes_of_a_skeleton_file(points: dict[str, np.ndarray], tmp_path: Path) -> None:
+    """Bodies that are not there are all 0."""
+    body = array_of(points, SETS["Kinect 2"])
+    content: dict[str, Any] = {"file_name": "S001C001P001R001A002", "nbodys": [1] * len(body), "njoints": 25}
+    for number in range(4):
+        content[f"skel_body{number}"] = body if number == 1 else np.zeros_like(body)
+        content[f"rgb_body{number}"] = body[..., :2]
+    np.save(tmp_path / "a.skeleton.npy", content, allow_pickle=True)
+    motion = mrhubo.read_motion(tmp_path / "a.skeleton.npy")
+    assert motion.frame_rate == 30.0 and "'skel_body1'" in motion.source and "Kinect 2" in motion.source
+    with pytest.raises(UserError, match="there is no person '3'"):
+        mrhubo.read_motion(tmp_path / "a.skeleton.npy", ReadOptions(person="3"))
