@@ -101,12 +101,15 @@ def _smooth_window(problem: Problem, q_TN: np.ndarray, task: Task, before_LN: np
         motion_TN, _ = refine(problem, path_TN, target_TD3, smoothness, SWEEPS, TOLERANCE, fixed_T)
         return keep_speed(problem, motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)
 
+    def polish_own(path_TN: np.ndarray) -> list[np.ndarray]:
+        return [polish(path_TN)]
+
     def polish_others(path_TN: np.ndarray) -> list[np.ndarray]:
         return side_by_side(polish, _other_paths(problem, path_TN, target_TD3, smoothness.pull, len(before_LN)))
 
-    motion_TN, others = side_by_side(lambda work: work(path_TN), (polish, polish_others))
+    ways = side_by_side(lambda work: work(path_TN), (polish_own, polish_others))
+    motion_TN, *others = motions = [motion_TN for way in ways for motion_TN in way]
     if others:
-        motions = [motion_TN, *others]
         cost_SC = np.stack([motion_cost(problem, own_TN, target_TD3, smoothness) for own_TN in motions])
         motion_TN = np.choose(cost_SC.argmin(axis=0)[problem.cost.block_N], motions)
     if task.giving_way is None:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from mrhubo.errors import UserError
 from mrhubo.files.regular import naming
@@ -39,6 +38,8 @@ def link(places: Sequence[np.ndarray], reach: float, frames: Sequence[float] | N
     Raises:
         UserError: there are more than a hundred people in a frame.
     """
+    from scipy.optimize import linear_sum_assignment  # takes longer to import than most files to read
+
     last: dict[int, tuple[float, np.ndarray]] = {}
     numbers: list[list[int]] = []
     people = 0
