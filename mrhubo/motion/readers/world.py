@@ -25,6 +25,12 @@ _ON_A_FLOOR_M = (-0.15, 0.65)
 """How high the origin of a model's pelvis is over a floor at height 0 of who lies or crawls on it, and not higher."""
 _MOST_TIMES = (0.05, 0.95)
 """Quantiles between which it is."""
+_STANDING = math.cos(math.radians(35.0))
+"""The pelvis of who stands is tilted by no more than that."""
+_A_WHILE = 0.03
+"""Share of the frames in which somebody stands who does so for a while."""
+_RISES_M = 0.2
+"""How much more the lowest joint's height varies [m] in a world that is not the file's, to tell so."""
 WORLDS = ("y up", "z up")
 """Of files of motion capture; where both fit alike, the first is taken."""
 Y_UP, Z_UP = ("y up",), ("z up",)
@@ -33,14 +39,6 @@ CAMERAS = ("y down", "y up")
 """Of estimators: what a camera sees, and what some have turned upright."""
 ANY_WORLD = ("y up", "y down", "z up")
 """Of files that do not say whose they are."""
-
-
-_STANDING = math.cos(math.radians(35.0))
-"""The pelvis of who stands is tilted by no more than that."""
-_A_WHILE = 0.03
-"""Share of the frames in which somebody stands who does so for a while."""
-_RISES_M = 0.2
-"""How much more the lowest joint's height varies [m] in a world that is not the file's, to tell so."""
 
 
 def find_up(
