@@ -25,7 +25,7 @@ _ON_A_FLOOR_M = (-0.15, 0.65)
 """How high the origin of a model's pelvis is over a floor at height 0 of who lies or crawls on it, and not higher."""
 _MOST_TIMES = (0.05, 0.95)
 """Quantiles between which it is."""
-_STANDING = math.cos(math.radians(35.0))
+_STANDING = math.cos(math.radians(25.0))
 """The pelvis of who stands is tilted by no more than that."""
 _A_WHILE = 0.03
 """Share of the frames in which somebody stands who does so for a while."""
