@@ -133,10 +133,10 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
                 f"'{word}' says itself what of a body it has"
             )
         return Robot.from_config(word)
-    description = read_model(word)
-    with model_named(find_model(word), description.path):
+    model, description = find_model(word), read_model(word)
+    with model_named(model, description.path):
         found = _discover(description, whole_body)
-        robot = _robot(description, found, _file_name(find_model(word)))
+        robot = _robot(description, found, _file_name(model))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
     if guessed := found.guessed:

@@ -38,7 +38,7 @@ LIFT = "lift them to three dimensions first, for instance with MMPose or MotionB
 """What to do with points in a picture."""
 _SAMPLES, _LENGTHS = "motion", "lengths"
 _BODY, _BODY_KEY = "skel_body", re.compile(r"skel_body[0-9]{1,2}")
-KINECT_RATE = 30.0
+_KINECT_RATE = 30.0
 """Frames a second of NTU RGB+D's motions."""
 _MOST_PEOPLE = 20
 """In one array."""
@@ -212,11 +212,15 @@ def _kinect_bodies(tree: Tree, options: ReadOptions) -> Keypoints | None:
     notes: list[str] = []
     chosen = choose(tree.path, people, options, notes).person
     point_TK3, _ = _split(tree.path, arrays[chosen], f"'{_BODY}{chosen}'")
-    rate = options.rate
-    if rate is None:
-        rate = KINECT_RATE
-        notes.append(f"{rate:g} frames a second, as NTU RGB+D says of all its motions; --rate says otherwise")
-    return Keypoints(point_TK3, rate=rate, where=f"'{_BODY}{chosen}'", notes=notes)
+    return Keypoints(point_TK3, rate=kinect_rate(options, notes), where=f"'{_BODY}{chosen}'", notes=notes)
+
+
+def kinect_rate(options: ReadOptions, notes: list[str]) -> float:
+    """The frame rate of one of NTU RGB+D's motions, of which files do not tell; the notes say where it is from."""
+    if options.rate is not None:
+        return options.rate
+    notes.append(f"{_KINECT_RATE:g} frames a second, as NTU RGB+D says of all; --rate says otherwise")
+    return _KINECT_RATE
 
 
 def _split(path: Path, array: np.ndarray, where: str) -> tuple[np.ndarray, np.ndarray | None]:

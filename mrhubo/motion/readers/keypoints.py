@@ -69,8 +69,7 @@ def read_keypoints(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is damaged, it has no points of a body, which points they are or the rate is not known.
     """
-    found = read_keypoints_file(path, options)
-    return motion_of_points(path, found, options)
+    return motion_of_points(path, read_keypoints_file(path, options), options)
 
 
 def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Motion:

@@ -19,7 +19,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.keypoint_arrays import KINECT_RATE, Keypoints
+from mrhubo.motion.readers.keypoint_arrays import Keypoints, kinect_rate
 from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
@@ -59,10 +59,7 @@ def read_skeleton(path: Path, options: ReadOptions) -> Motion:
     first, last = np.flatnonzero(seen_T)[[0, -1]] if seen_T.any() else (0, frames - 1)
     joint_TKX = joint_TKX[first : last + 1]
     state_TK = np.nan_to_num(joint_TKX[:, :, -1]).clip(0, len(_SURE) - 1).astype(int)
-    rate = options.rate
-    if rate is None:
-        rate = KINECT_RATE
-        notes.append(f"{rate:g} frames a second, as NTU RGB+D says of all; --rate says otherwise")
+    rate = kinect_rate(options, notes)
     names = list(SETS["Kinect 2"])
     # what is not used has a name that is none of ours
     found = Keypoints(joint_TKX[..., :3], names, _SURE[state_TK], rate, f"of person {chosen.person}", notes)

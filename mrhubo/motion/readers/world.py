@@ -82,17 +82,21 @@ def find_world(
         joints_TK3: where joints are in some frames [m], if their places are known.
     """
     up, turn_33 = find_up(body_up_T3, worlds, joints_TK3)
+    turns = {world: _turn(world, body_up_T3) for world in worlds}
     upright = float((body_up_T3 @ turn_33[1]).mean())
     if len(worlds) == 1 or upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
         return up, turn_33, ""
     said = "the body is not upright on the mean, as of somebody who lies or crawls"
-    floors = [world for world in worlds if world in WORLDS and place_T3 is not None]
-    flat = [world for world in floors if _lies_on_its_floor(body_up_T3, place_T3, _turn(world, body_up_T3))]
+    flat = [
+        world
+        for world in worlds
+        if world in WORLDS and place_T3 is not None and _lies_on_its_floor(body_up_T3, place_T3, turns[world])
+    ]
     if len(flat) == 1:
-        return flat[0], _turn(flat[0], body_up_T3), f"{said}: {flat[0]} is taken, by how low the root is"
+        return flat[0], turns[flat[0]], f"{said}: {flat[0]} is taken, by how low the root is"
     if upright > _FLAT:
         return up, turn_33, ""
-    return worlds[0], _turn(worlds[0], body_up_T3), f"{said}, and nothing tells which way is up: {worlds[0]} is taken"
+    return worlds[0], turns[worlds[0]], f"{said}, and nothing tells which way is up: {worlds[0]} is taken"
 
 
 def _stands(height_T: np.ndarray) -> bool:
@@ -105,9 +109,9 @@ def _rise(height_TK: np.ndarray) -> float:
     return float(high - low)
 
 
-def _lies_on_its_floor(body_up_T3: np.ndarray, place_T3: np.ndarray | None, turn_33: np.ndarray) -> bool:
+def _lies_on_its_floor(body_up_T3: np.ndarray, place_T3: np.ndarray, turn_33: np.ndarray) -> bool:
     """Whether a body lies flat in a world, on a floor at height 0."""
-    if place_T3 is None or abs(float((body_up_T3 @ turn_33[1]).mean())) > _FLAT:
+    if abs(float((body_up_T3 @ turn_33[1]).mean())) > _FLAT:
         return False
     low, high = _ON_A_FLOOR_M
     lowest, highest = np.quantile(place_T3 @ turn_33[1], _MOST_TIMES)
