@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +32,7 @@ class Controls:
     def __init__(self, server: viser.ViserServer, scene: Scene, player: Player) -> None:
         """Adds the controls to the server's page."""
         self._gui, self._scene, self._player, self._stage = server.gui, scene, player, scene.stage
-        self.panels: list[Callable[[float], None]] = []
+        self.panels: list[list[Callable[[float], None]]] = []
         self._drawn_at, self._stale = -np.inf, True
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
@@ -48,11 +49,17 @@ class Controls:
         if self._stage.followed_F2.any():
             follow = gui.add_checkbox("follow who walks", scene.follows)
             follow.on_update(lambda _: setattr(scene, "follows", follow.value))
-        if self._stage.robots:
-            tabs = gui.add_tab_group()
-            for number, robot in enumerate(self._stage.robots):
-                with tabs.add_tab(robot.label):
-                    self._add_robot(number, robot)
+        labels = _distinct([robot.label for robot in self._stage.robots])
+        # A list, and not tabs, as a click on a robot has to open its panels, and viser's tabs open by hand alone.
+        self.robot = gui.add_dropdown("robot", labels, visible=len(labels) > 1) if labels else None
+        self.folders: list[Any] = []
+        self.joints: list[Any] = []
+        for number, robot in enumerate(self._stage.robots):
+            self.folders.append(gui.add_folder(None, visible=number == 0))
+            with self.folders[-1]:
+                self._add_robot(number, robot, labels[number])
+        if self.robot is not None:
+            self.robot.on_update(lambda _: self._choose())
 
     def show(self, time: float, clock: float) -> None:
         """Puts the controls where the player is.
@@ -70,27 +77,43 @@ class Controls:
             self._stale = True
         if self._stale and clock - self._drawn_at >= _PANEL_S:
             self._drawn_at, self._stale = clock, False
-            for panel in self.panels:
-                panel(time)
+            self._draw_panels(time)
 
     def _seek(self, event: Any) -> None:
         if event.client is not None:  # moved by somebody, and not by the player
             self._player.seek(float(self.timeline.value))
 
-    def _add_robot(self, number: int, robot: Performance) -> None:
+    def _chosen(self) -> int | None:
+        return None if self.robot is None else self.robot.options.index(self.robot.value)
+
+    def _choose(self) -> None:
+        chosen = self._chosen()
+        for number, folder in enumerate(self.folders):
+            if folder.visible != (number == chosen):
+                folder.visible = number == chosen
+        self._draw_panels(self._player.time)
+
+    def _draw_panels(self, time: float) -> None:
+        if (chosen := self._chosen()) is not None:
+            for panel in self.panels[chosen]:
+                panel(time)
+
+    def _add_robot(self, number: int, robot: Performance, label: str) -> None:
         motion, gui = robot.motion, self._gui
+        panels: list[Callable[[float], None]] = []
         gui.add_html(_note(about(robot)))
         if motion.confidence is not None:
             confidence_T = motion.confidence
             gui.add_html(_note("confidence (red: not to be trusted)"))
             strip = gui.add_html(confidence_strip(confidence_T))
-            self.panels.append(lambda time: _draw(strip, confidence_strip(confidence_T, self._share(robot, time))))
+            panels.append(lambda time: _draw(strip, confidence_strip(confidence_T, self._share(robot, time))))
         if motion.contact is not None and motion.contact_names:
             contact_TF, names = motion.contact, motion.contact_names
             gui.add_html(_note(CONTACTS))
             feet = gui.add_html(contact_strips(contact_TF, names))
-            self.panels.append(lambda time: _draw(feet, contact_strips(contact_TF, names, self._share(robot, time))))
+            panels.append(lambda time: _draw(feet, contact_strips(contact_TF, names, self._share(robot, time))))
         joint = gui.add_dropdown("joint", list(motion.joint_names), initial_value=motion.joint_names[0])
+        self.joints.append(joint)
         curve, bars = gui.add_html(""), gui.add_html("")
 
         def draw_curve(time: float) -> None:
@@ -103,9 +126,14 @@ class Controls:
             _draw(bars, joint_bars(motion.joint_names, robot.lower_N, robot.upper_N, q_N))
 
         joint.on_update(lambda _: draw_curve(self._player.time))
-        self.panels += [draw_curve, draw_bars]
+        self.panels.append([*panels, draw_curve, draw_bars])
         for handle, column in self._scene.clickable[number]:
-            handle.on_click(lambda _, name=motion.joint_names[column]: setattr(joint, "value", name))
+            handle.on_click(lambda _, name=motion.joint_names[column]: self._click(label, joint, name))
+
+    def _click(self, label: str, joint: Any, name: str) -> None:
+        joint.value = name
+        if self.robot is not None and self.robot.value != label:
+            self.robot.value = label
 
     def _share(self, robot: Performance, time: float) -> float:
         return self._stage.frame_of(robot, time) / max(len(robot) - 1, 1)
@@ -116,6 +144,15 @@ def about(robot: Performance) -> str:
     size = "at its own size" if robot.scale == 1.0 else f"shown {robot.scale:.2g} times its size"
     made = robot.motion.robot.made_by or "a file of its motion"
     return f"{robot.robot.name}, {len(robot.motion.joint_names)} joints, by {made}; {size}"
+
+
+def _distinct(labels: Sequence[str]) -> list[str]:
+    """Labels of which those that have come before have a number: files of one name may lie in several folders."""
+    found: list[str] = []
+    for label in labels:
+        fits = (name for n in itertools.count(1) if (name := label if n == 1 else f"{label} ({n})") not in found)
+        found.append(next(fits))
+    return found
 
 
 def _note(text: str) -> str:

@@ -5,6 +5,7 @@ the page is served; a saved page has all of it.
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import re
 import threading
@@ -103,6 +104,21 @@ def test_controls_and_player_agree(stage: Stage) -> None:
         controls.show(player.advance(0.02), 1.0)
         assert controls.timeline.value == pytest.approx(0.07) and controls.play.label == "Pause"
         controls.speed.value, controls.loop.value = "0.5x", False
+
+
+def test_a_click_on_a_robot_opens_its_panels_and_the_joint_that_moves_the_part(stage: Stage) -> None:
+    with local_server() as server:
+        twins = dataclasses.replace(stage.robots[0]), dataclasses.replace(stage.robots[1], label=stage.robots[0].label)
+        scene, player = Scene(server, dataclasses.replace(stage, robots=twins)), Player(stage.duration)
+        controls = Controls(server, scene, player)
+        assert controls.robot is not None and len(set(controls.robot.options)) == 2  # also of one name
+        for number in (1, 0):
+            for handle, column in scene.clickable[number][-3:]:
+                (entry,) = handle._impl.click_cb
+                entry.callback(None)
+                assert controls.robot.value == controls.robot.options[number]
+                assert [folder.visible for folder in controls.folders] == [number == 0, number == 1]
+                assert controls.joints[number].value == twins[number].motion.joint_names[column]
 
 
 def test_the_page_is_served_until_it_is_enough(stage: Stage, capsys: pytest.CaptureFixture[str]) -> None:
