@@ -200,7 +200,7 @@ class OptimizationRetargeter(nn.Module):
             q_TN = self._polish(*candidates, target_TD3)[0]
             return q_TN if avoidance is None else avoidance(q_TN, target_TD3)
         bound = speed_bound(self.body_map.robot.velocity_N, frame_rate)
-        task = MotionTask(target_TD3, smoothness, *bound, avoidance=avoidance)
+        task = MotionTask(target_TD3, smoothness, frame_rate, *bound, avoidance=avoidance)
         return smooth_motion(self.problem, *candidates, task)
 
     @torch.no_grad()

@@ -25,6 +25,7 @@ from mrhubo.fast.together.motion import (
     sides,
 )
 from mrhubo.reference.avoidance import Avoidance
+from mrhubo.reference.detours import smooth_detours
 from mrhubo.reference.refine import motion_cost, refine
 from mrhubo.reference.solve import DirectionProblem
 from mrhubo.reference.speed import keep_speed, nearest_slow
@@ -41,6 +42,8 @@ class MotionTask:
     """The human's directions."""
     smoothness: Smoothness
     """Of the joints."""
+    frame_rate: float
+    """Frames per second."""
     step_N: Tensor
     """The longest step of a joint from one frame to the next [rad]."""
     around: int
@@ -104,6 +107,9 @@ def _smooth_window(
     if len(motions) > 1:
         cost_SC = torch.stack([motion_cost(problem, own_TN, target_TD3, smoothness) for own_TN in motions])
         motion_TN = pick(torch.stack(motions, 1), cost_SC.argmin(dim=0).expand(len(path_TN), -1), joints_NC)
+    motion_TN, smoothness = smooth_detours(
+        problem, motion_TN, target_TD3, smoothness, task.frame_rate, task.step_N, fixed_T
+    )
     if task.avoidance is None:
         return motion_TN
     return task.avoidance.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)

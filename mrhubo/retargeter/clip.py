@@ -58,7 +58,7 @@ def join_frames(
         return q_TN if avoidance is None else avoidance(q_TN, target_TD3)
     smoothness = smoothness_of(problem, target_TD3, frame_rate)
     bound = speed_bound(problem.robot.velocity_N, frame_rate)
-    task = MotionTask(target_TD3, smoothness, *bound, SWEEPS, TOLERANCE, avoidance)
+    task = MotionTask(target_TD3, smoothness, frame_rate, *bound, SWEEPS, TOLERANCE, avoidance)
     return smooth_motion(problem, q_TN[:, None], problem.cost(q_TN, target_TD3)[:, None], task)
 
 

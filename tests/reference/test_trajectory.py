@@ -103,7 +103,7 @@ def test_windows_do_not_show(retargeters: dict[str, OptimizationRetargeter], mon
     target_TD3 = problem.body_map.robot_directions(problem.robot.forward(q_TN))
     jerk_YN = torch.full((397, 8), 0.5)
     task = MotionTask(
-        target_TD3, Smoothness(0.02, jerk_YN), *speed_bound(problem.robot.velocity_N / 2, rate), sweeps=30
+        target_TD3, Smoothness(0.02, jerk_YN), rate, *speed_bound(problem.robot.velocity_N / 2, rate), sweeps=30
     )
     found = []
     for window, ahead in ((1000, 100), (220, 110)):

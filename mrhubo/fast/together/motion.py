@@ -13,6 +13,7 @@ import numpy as np
 from mrhubo.fast.description import Description
 from mrhubo.fast.side_by_side import side_by_side
 from mrhubo.fast.together.avoiding import GivingWay
+from mrhubo.fast.together.detours import smooth_detours
 from mrhubo.fast.together.problem import Problem
 from mrhubo.fast.together.refine import motion_cost, refine
 from mrhubo.fast.together.smoothness import Smoothness, smoothness_of
@@ -55,7 +56,7 @@ def join_frames(
     if len(q_TN) < 2:
         return q_TN if giving_way is None else giving_way.alone(q_TN, target_TD3)
     smoothness = smoothness_of(description, target_TD3, frame_rate)
-    task = Task(target_TD3, smoothness, *speed_bound(problem.cost.velocity_N, frame_rate), giving_way)
+    task = Task(target_TD3, smoothness, frame_rate, *speed_bound(problem.cost.velocity_N, frame_rate), giving_way)
     return smooth_motion(problem, q_TN, task)
 
 
@@ -66,6 +67,8 @@ class Task:
     target_TD3: np.ndarray
     """The human's directions."""
     smoothness: Smoothness
+    frame_rate: float
+    """Frames per second."""
     step_N: np.ndarray
     """The longest step of a joint from one frame to the next [rad]."""
     around: int
@@ -112,6 +115,9 @@ def _smooth_window(problem: Problem, q_TN: np.ndarray, task: Task, before_LN: np
     if others:
         cost_SC = np.stack([motion_cost(problem, own_TN, target_TD3, smoothness) for own_TN in motions])
         motion_TN = np.choose(cost_SC.argmin(axis=0)[problem.cost.block_N], motions)
+    motion_TN, smoothness = smooth_detours(
+        problem, motion_TN, target_TD3, smoothness, task.frame_rate, task.step_N, fixed_T
+    )
     if task.giving_way is None:
         return motion_TN
     return task.giving_way.in_motion(motion_TN, target_TD3, smoothness, task.step_N, task.around, fixed_T)

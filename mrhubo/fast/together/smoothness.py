@@ -109,11 +109,17 @@ def calmness(description: Description, target_TD3: np.ndarray, frame_rate: float
     jerk_YD = norm(np.diff(target_TD3[:, columns], n=3, axis=0)) * frame_rate**3
     weight_DC = (cost.directions_DC * cost.weight_D[:, None])[columns]
     jerk_YC = jerk_YD @ (weight_DC / np.maximum(weight_DC.sum(axis=0), 1e-9))
-    return 1 / (1 + (_averaged(jerk_YC, round(WINDOW_S / 2 * frame_rate)) / CALM_JERK) ** 2)
+    return calm_at(averaged(jerk_YC, frame_rate))
 
 
-def _averaged(value_YC: np.ndarray, half: int) -> np.ndarray:
-    """Means over so many neighbours on either side, as far as there are."""
+def calm_at(jerk_YC: np.ndarray) -> np.ndarray:
+    """The factor (Y, C) of a human's jerk [1/s^3]."""
+    return 1 / (1 + (jerk_YC / CALM_JERK) ** 2)
+
+
+def averaged(value_YC: np.ndarray, frame_rate: float) -> np.ndarray:
+    """Means (Y, C) over `WINDOW_S`, as far as there are neighbours on either side."""
+    half = round(WINDOW_S / 2 * frame_rate)
     total_XC = np.concatenate((np.zeros_like(value_YC[:1]), value_YC.cumsum(axis=0))) if len(value_YC) else value_YC
     place_Y = np.arange(len(value_YC))
     first_Y, last_Y = np.maximum(place_Y - half, 0), np.minimum(place_Y + half + 1, len(value_YC))
