@@ -21,7 +21,8 @@ ROUGH = 3.0
 jerks less than `CALM_JERK` counts as one who jerks as much."""
 STRONGER = 2.0
 """How many times as much jerk costs in a detour as where the human moves evenly. With 1, 2 and 4, Reachy's arms jerk
-1.52, 1.40 and 1.30 times as much as the human's in `arm_sweep`, and are 0.64, 0.73 and 0.83 degrees over the optimum."""
+1.52, 1.40 and 1.30 times as much as the human's in `arm_sweep`, and are 0.64, 0.73 and 0.83 degrees from their optimum.
+"""
 AROUND_S = 0.5
 """Frames this near in time [s] to a detour belong to it."""
 SWEEPS, TOLERANCE = 10, 2e-3
