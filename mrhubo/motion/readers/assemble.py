@@ -14,6 +14,7 @@ from mrhubo.body.joints import OFFSETS_J3, PARENTS
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.units import find_unit
 from mrhubo.motion.readers.world import find_world
 
 BLOCK = 65_536
@@ -62,6 +63,22 @@ def to_our_rest(motion: Motion) -> Motion:
         )
         local_TJ33 = turn_feet(local_TJ33, up)
     return motion.changed(local_TJ33=local_TJ33, notes=(*motion.notes, *notes))
+
+
+def in_metres(motion: Motion, where: str, beyond: float = 0.0) -> Motion:
+    """The motion, whose y axis is up, with places in metres, and a note where the file's were not.
+
+    Args:
+        motion: as the file has it.
+        where: what the file calls places, for the beginning of a sentence.
+        beyond: as of `find_unit`.
+    """
+    place_T3 = motion.arrays.root_position_T3
+    unit = None if place_T3 is None else find_unit(place_T3, motion.frame_rate, beyond)
+    if place_T3 is None or unit is None:
+        return motion
+    note = f"{where} is in {unit[0]}, by how fast or how high the root is: told in metres"
+    return motion.changed(root_position_T3=place_T3 * np.float32(unit[1]), notes=(*motion.notes, note))
 
 
 def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
