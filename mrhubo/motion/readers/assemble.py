@@ -12,7 +12,7 @@ import numpy as np
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
 from mrhubo.body.joints import OFFSETS_J3, PARENTS
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
-from mrhubo.body.rest_directions import from_family
+from mrhubo.body.rest_directions import FAMILIES, from_family
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.units import find_unit
 from mrhubo.motion.readers.world import find_world
@@ -96,7 +96,9 @@ def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
     if position_T3 is not None:
         few = slice(None, None, 1 + len(motion) // _SEEN)
         joints_TK3 = _joints(rotation_T33[few], motion.arrays.local_TJ33[few]) + position_T3[few, None]
-    up, turn_33, why = find_world(rotation_T33[:, :, 1], position_T3, worlds, joints_TK3)
+    known = [FAMILIES[motion.family].pelvis] if motion.family else [family.pelvis for family in FAMILIES.values()]
+    origins = (*known, *([] if motion.family else [(0.0, 0.0, 0.0)]))
+    up, turn_33, why = find_world(rotation_T33[:, :, 1], position_T3, worlds, joints_TK3, origins)
     return motion.changed(
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.body.rest_directions import FAMILIES
 from mrhubo.errors import UserError
 from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
@@ -46,10 +47,6 @@ _IDS = ("id", "personID", "person_id", "track_id")
 _EASYMOCAP = {78: "smplh", 87: "smplx"}
 """How many numbers a pose of EasyMocap has that ends with coefficients, and of which model it is."""
 _BODY = 66
-_PELVIS = {"smplx": (0.0, -0.35, 0.01)}
-_SMPL_PELVIS = (0.0, -0.22, 0.03)
-"""Where the pelvis of a mean body at rest is from the model's origin [m], from the sources of
-`mrhubo.body.rest_directions`."""
 _MOST, _LONGEST = 100, 9 * 55
 """People in a frame, and numbers of a pose."""
 
@@ -207,7 +204,7 @@ def _easymocap(node: Tree) -> Body | None:
     if form is None or form.matrices:
         return None
     family = family or family_of("", form.joints, node.keys, None) or "smplx"
-    pelvis_3 = np.array(_PELVIS.get(family, _SMPL_PELVIS))
+    pelvis_3 = np.array(FAMILIES[family].pelvis)
     place = place + axis_angle_to_matrix(turn.astype(np.float64)) @ pelvis_3
     betas = _one_frame(node.get("shapes"))
     return Body(_person(node), "poses", pose, form, turn, place, betas, None, "EasyMocap", family)
