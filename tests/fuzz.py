@@ -30,7 +30,14 @@ from mrhubo.robot_motion import FORMATS, write_robot_motion
 from tests.files.bounded import bounded
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.motion.damage import altered_words, damaged_by, read_or_refused
-from tests.motion.readers import estimator_files, test_amc, test_keypoints, test_pose_folders, test_soma_and_points
+from tests.motion.readers import (
+    estimator_files,
+    test_amc,
+    test_keypoints,
+    test_nymeria,
+    test_pose_folders,
+    test_soma_and_points,
+)
 from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
 
@@ -127,6 +134,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "points.json": ("damaged.json", _points_json),
     "skeleton": ("damaged.skeleton", _ntu),
     "features": ("damaged.npy", _features),
+    "nymeria": ("damaged.npz", lambda path: test_nymeria.write(path, *test_nymeria.body())),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
