@@ -89,7 +89,7 @@ def test_who_lies_along_an_axis_that_may_be_up_is_left_lying_where_a_floor_tells
 def test_who_may_stand_or_lie_stands_and_is_told_of() -> None:
     up_T3, joints_TK3 = on_the_floor("y up", 180.0, (1.3, 0.12, 0.9))  # as high as a pelvis is, if z were up
     found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
-    assert found == "z up" and "lies on a floor with y up" in said
+    assert found == "z up" and "with y up it would lie on a floor" in said
 
 
 @pytest.mark.parametrize("world", ANY_WORLD)
@@ -100,3 +100,12 @@ def test_who_stands_wherever_the_floor_is_is_not_laid_down(world: str, height: f
     joints_TK3 = np.tile(body + [0.3, height, depth], (FRAMES, 1, 1)) @ TO_Y_UP[world]
     up_T3 = np.tile([0.0, 1.0, 0.0] @ TO_Y_UP[world], (FRAMES, 1))
     assert find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)[0] == world
+
+
+@pytest.mark.parametrize("low", [-0.4, -0.1, 0.0, 0.3])
+def test_who_stands_on_a_floor_that_is_off_as_recordings_have_it_stands(low: float) -> None:
+    body = np.array([(0, 0, 0), (0.2, 0.4, 0), (-0.2, 0.4, 0), (0.3, 0, 0.1), (-0.3, 0, 0.1), (0, -0.9, -0.1)])
+    joints_TK3 = np.tile(body + [0.3, 0.9 + low, 0.17], (FRAMES, 1, 1))
+    up_T3 = np.tile([0.0, 1.0, 0.0], (FRAMES, 1))
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == "y up" and "with z up it would lie on a floor" in said
