@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import pickle
+import re
 import sys
 import tempfile
 import time
@@ -29,7 +30,14 @@ from mrhubo.robot_motion import FORMATS, write_robot_motion
 from tests.files.bounded import bounded
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.motion.damage import altered_words, damaged_by, read_or_refused
-from tests.motion.readers import estimator_files, test_amc, test_soma_and_points
+from tests.motion.readers import (
+    estimator_files,
+    test_amc,
+    test_keypoints,
+    test_nymeria,
+    test_pose_folders,
+    test_soma_and_points,
+)
 from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
 
@@ -86,6 +94,37 @@ def _estimator(name: str) -> Callable[[Path], None]:
     return lambda path: writer.write(path, {1: estimator_files.made_up(_FRAMES, camera=writer.camera)})
 
 
+_FRAME = re.compile(r"[^0-9]*0*2(?:[^0-9].*)?")
+"""The name of the file of a folder that meets with accidents: that of the third frame, and of the first person in it."""
+
+
+def _pose_folder(name: str) -> Callable[[Path], None]:
+    def write(folder: Path) -> None:
+        people = {person: estimator_files.made_up(_FRAMES, person) for person in (0, 1)}
+        places = {person: np.tile([4.0 * person, 0.9, 3.0], (_FRAMES, 1)) for person in people}
+        test_pose_folders.WRITERS[name][0](folder, people, places, range(_FRAMES))
+
+    return write
+
+
+def _openpose_folder(folder: Path) -> None:
+    rows = [np.pad(point_K3, ((0, 0), (0, 1)), constant_values=1.0) for point_K3 in _points()]
+    test_keypoints.openpose(folder, [[row, row + [3, 0, 0, 0]] for row in rows], list(range(_FRAMES)))
+
+
+def _easymocap_points_folder(folder: Path) -> None:
+    for frame, point_K3 in enumerate(_points()):
+        people = [{"id": 3, "keypoints3d": np.pad(point_K3, ((0, 0), (0, 1)), constant_values=1.0).tolist()}]
+        (folder / f"{frame:06}.json").write_text(json.dumps(people, indent=1))
+
+
+FOLDERS: dict[str, Callable[[Path], None]] = {
+    **{f"folder of {name}": _pose_folder(name) for name in test_pose_folders.WRITERS},
+    "folder of OpenPose": _openpose_folder,
+    "folder of points": _easymocap_points_folder,
+}
+"""What writes a good folder with a file a frame, a reader."""
+
 READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "amass": ("damaged.npz", lambda path: path.write_bytes(_MOTION.read_bytes())),
     "bvh": ("damaged.bvh", _bvh(Style())),
@@ -95,6 +134,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "points.json": ("damaged.json", _points_json),
     "skeleton": ("damaged.skeleton", _ntu),
     "features": ("damaged.npy", _features),
+    "nymeria": ("damaged.npz", lambda path: test_nymeria.write(path, *test_nymeria.body())),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
@@ -105,7 +145,9 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
 
 
 def _read(name: str, path: Path) -> None:
-    if name.startswith("robot's "):
+    if name in FOLDERS:
+        read_or_refused(path.parent, names=(path.parent.name,))
+    elif name.startswith("robot's "):
         robot_motion_read_or_refused(path)
     elif name == "asf":
         read_or_refused(path.with_name("07_01.amc"), names=("07_01", "07.asf"))
@@ -115,9 +157,13 @@ def _read(name: str, path: Path) -> None:
 
 def fuzz(name: str, first: int, accidents: int, folder: Path) -> tuple[float, list[str]]:
     """The longest time [s] that one of the accidents of seeds first, first + 1, ... took, and what went wrong."""
-    file, write = READERS[name]
-    path = folder / file
-    write(path)
+    if name in FOLDERS:
+        FOLDERS[name](folder)
+        path = min(file for file in folder.iterdir() if _FRAME.fullmatch(file.stem))
+    else:
+        file, write = READERS[name]
+        path = folder / file
+        write(path)
     good, text = (
         path.read_bytes(),
         not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv", ".skeleton"},
@@ -145,12 +191,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--accidents", type=int, default=10_000)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--reader", choices=READERS, action="append")
+    parser.add_argument("--reader", choices=[*READERS, *FOLDERS], action="append")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     failed = 0
     print(f"{'reader':24} {'accidents':>9} {'wrong':>6} {'slowest [s]':>12}")
-    for name in given.reader or READERS:
+    for name in given.reader or [*READERS, *FOLDERS]:
         with tempfile.TemporaryDirectory() as folder:
             slowest, wrong = fuzz(name, given.first, given.accidents, Path(folder))
         failed += len(wrong)

@@ -45,6 +45,8 @@ class Family:
     name: str
     """For a sentence."""
     directions: dict[str, tuple[float, float, float]]
+    pelvis: tuple[float, float, float]
+    """Where the pelvis is from the model's origin [m], along the axes of the file, however the root is turned."""
 
 
 _SMPL = {
@@ -71,9 +73,9 @@ _SMPLX = {
 # github.com/ZhengyiLuo/PHC, phc/data/assets/mjcf/smpl_humanoid.xml; SMPL-X's from
 # github.com/SMPLOlympics/SMPLOlympics, phc/data/assets/mjcf/smplx_humanoid.xml. SMPL-H has SMPL's body.
 FAMILIES: dict[str, Family] = {
-    "smpl": Family("SMPL", _SMPL),
-    "smplh": Family("SMPL-H", _SMPL),
-    "smplx": Family("SMPL-X", _SMPLX),
+    "smpl": Family("SMPL", _SMPL, (0.0, -0.22, 0.03)),
+    "smplh": Family("SMPL-H", _SMPL, (0.0, -0.22, 0.03)),
+    "smplx": Family("SMPL-X", _SMPLX, (0.0, -0.35, 0.01)),
 }
 """By the names that AMASS's `surface_model_type` has for them."""
 

@@ -60,6 +60,8 @@ def open_archive(path: Path, otherwise: str, max_bytes: int = MAX_BYTES) -> Iter
         except Exception as error:  # whatever zipfile makes of a stranger's bytes
             raise UserError(f"{path}: {otherwise}") from error
         file.limit = None
+        if any(member.compress_size > packed for member in archive.infolist()):  # would be asked of the file at once
+            raise UserError(f"{path}: {otherwise}")
         unpacked = sum(member.file_size for member in archive.infolist())
         if unpacked > max_bytes:
             raise UserError(f"{path}: unpacks to more than {max_bytes / 2**30:.3g} GiB, which are not read")

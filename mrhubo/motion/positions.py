@@ -67,8 +67,8 @@ class BodyPoints:
     """Points (T, 3) [m] by the names of human keypoints, also `nose`, `left_ear`, `right_ear`, `head_top`; NaN where
     they are not known. Shoulders and hips are needed."""
     turns: Mapping[str, np.ndarray] = field(default_factory=dict)
-    """Rotations (T, 3, 3) in the world of pelvis, spine3 (the chest), head, wrists (the hands) or ankles (the feet),
-    relative to our rest pose, where the source has them; else points tell."""
+    """Rotations (T, 3, 3) in the world of pelvis, spine3 (the chest), neck, head, wrists (the hands) or ankles (the
+    feet), relative to our rest pose, where the source has them; else points tell."""
     hinges: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Where shoulders and hips have the axes (T, 3) of elbow and knee by their bones' own turn, in the world, in the
     sense of `mrhubo.body.anatomy.hinge_axis`."""
@@ -178,7 +178,7 @@ def _trunk(build: _Build, what: str) -> None:
     sides = [f"{side}_{joint}" for joint in ("shoulder", "hip") for side in SIDES]
     known_T = known_frames(chest_T33)
     chest_T33 = fill_rotations(chest_T33, known_T)
-    build.sure["spine3"] = build.surety(known_T, *(() if "spine3" in build.body.turns else sides))
+    build.sure["spine3"] = build.surety(known_T, *sides)
     if not known_T.all():
         build.notes.append(f"how the chest is turned is not known in {_count(~known_T)}: filled in, confidence 0")
     pelvis_T33, _ = _filled(chest_T33, chest_T33 if pelvis_T33 is None else pelvis_T33)
@@ -255,8 +255,11 @@ def _head(build: _Build) -> None:
         build.sure["neck"] = build.sure["head"] = sure_T
         if not known_T.all():
             build.notes.append(f"how the head is turned is not known in {_count(~known_T)}: filled in, confidence 0")
-    half_T3 = matrix_to_axis_angle(chest_T33.mT @ head_T33) / 2
-    build.world["neck"], build.world["head"] = chest_T33 @ axis_angle_to_matrix(half_T3), head_T33
+    neck_T33 = build.body.turns.get("neck")
+    if neck_T33 is None:
+        half_T3 = matrix_to_axis_angle(chest_T33.mT @ head_T33) / 2
+        neck_T33 = chest_T33 @ axis_angle_to_matrix(half_T3)
+    build.world["neck"], build.world["head"] = _filled(chest_T33, neck_T33)[0], head_T33
 
 
 def _filled(carrier_T33: np.ndarray, part_T33: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

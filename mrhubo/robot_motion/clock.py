@@ -22,6 +22,8 @@ _FEW = 7
 """Digits of a rate whose times agree with a file's to the last bit by no accident."""
 _NTSC = tuple(rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240))
 """Rates of video that are no whole numbers (SMPTE ST 12-1)."""
+_MOST_USUAL = (30.0, 60.0, 120.0, 24.0, 25.0, 50.0, 100.0, 240.0, 15.0, 90.0, 20.0, 12.0, 144.0, 200.0, 10.0)
+"""Rates, the most usual first."""
 _SINGLE, _DOUBLE = 2.0**-22, 2.0**-51
 """How far apart numbers lie, as a share of them, that are the same but for float32 and its texts, or for float64."""
 _SURE, _FINEST = 6, 9
@@ -101,6 +103,19 @@ def rate_of_step(text: str) -> float | None:
     if found is None and step >= _COARSE * unit:
         found = _first(1 / step, lambda rate: _has_step(rate, step, unit))
     return found or 1 / step
+
+
+def usual_rates(text: str) -> tuple[float, ...]:
+    """The usual rates whose step a file may have rounded, or cut off, to the seconds that it writes, where these are so
+    few digits that they do not tell one; none where they do, or are no time.
+    """
+    step = float(text)
+    if not (math.isfinite(step) and step > 0):
+        return ()
+    unit = 10.0 ** int(Decimal(text).as_tuple().exponent)
+    if step >= _COARSE * unit * (1 - 1e-9):
+        return ()
+    return tuple(rate for rate in _MOST_USUAL if _has_step(rate, step, unit))
 
 
 def in_full(rate: float) -> str:

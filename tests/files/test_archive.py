@@ -46,6 +46,19 @@ def test_methods_that_cannot_be_bounded_are_not_read(tmp_path: Path, method: int
         read_motion(tmp_path / "a.npz")
 
 
+@pytest.mark.parametrize("name", ["a.npz", "a.pt"])
+def test_a_member_that_claims_more_than_the_file_has_asks_for_no_memory(name: str, tmp_path: Path) -> None:
+    member = "damaged/data.pkl" if name == "a.pt" else "pose_body.npy"
+    with zipfile.ZipFile(tmp_path / name, "w") as archive:
+        archive.writestr(member, npy((2, 63)) + bytes(504))
+    content = bytearray((tmp_path / name).read_bytes())
+    place = content.rindex(b"PK\x01\x02") + 20  # of its size as it is packed
+    content[place : place + 4] = (600 * 2**20).to_bytes(4, "little")
+    (tmp_path / name).write_bytes(content)
+    with bounded(20, 2), pytest.raises(UserError, match=name):
+        read_motion(tmp_path / name)
+
+
 def test_a_table_of_contents_without_end_is_not_read(tmp_path: Path) -> None:
     """Some fifty bytes a name in the file, and some hundreds in the memory."""
     buffer = io.BytesIO()

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mrhubo.robot_motion import read_robot_motion
-from mrhubo.robot_motion.clock import find_rate, in_full, nanoseconds, rate_of_step, rate_of_times, seconds
+from mrhubo.robot_motion.clock import find_rate, in_full, nanoseconds, rate_of_step, rate_of_times, seconds, usual_rates
 
 NTSC = [rate * 1000 / 1001 for rate in (24, 30, 60)]
 USUAL = [12, 15, 24, 25, 30, 48, 50, 60, 90, 100, 120, 144, 200, 240, *NTSC]
@@ -105,3 +105,14 @@ def test_a_table_of_another_program_has_the_rate_that_it_means(tmp_path: Path) -
 
 def test_a_rate_is_told_in_full() -> None:
     assert [in_full(rate) for rate in (30.0, 30.00003, 29.97, 1e-7)] == ["30", "30.00003", "29.97", "1e-07"]
+
+
+@pytest.mark.parametrize(
+    ("step", "rates"),
+    [
+        ("0.03", {30}), ("0.008", {120}), ("0.02", {50, 60}), ("0.04", {24, 25}), ("0.01", {100, 120}), ("0.033", set()),
+        ("0.0083", set()), ("0.0333333", set()), ("0", set()), ("nan", set()), ("0.009", set()),
+    ],
+)  # fmt: skip
+def test_a_single_digit_may_be_the_step_of_several_rates(step: str, rates: set[int]) -> None:
+    assert rates <= set(usual_rates(step)) and (bool(rates) or not usual_rates(step))

@@ -38,6 +38,16 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"//Maya ASCII", "a scene of Maya", "export the skeleton as BVH, over FBX and Blender for instance"),
     (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH from Motive"),
     (
+        r"[^\n]{0,4000}?(?:root_translate|_joint(?:_dof|_pos)?\b|_dof\b)[^\n]*+\n",
+        "a table of a robot's joints",
+        "name the human motion from which it was made; mrhubo.read_robot_motion reads tables that mrhubo wrote",
+    ),
+    (
+        r"\s*+(?:[-+]?[0-9][0-9.eE+-]*+[ \t]*+[,;\t][ \t]*+){18,500}[-+]?[0-9][0-9.eE+-]*+[ \t\r]*+\n",
+        "a table of numbers without a header",
+        "a robot's, as Unitree's tools write them, are no human's; of points, the first line must name the columns",
+    ),
+    (
         r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b",
         "a skeleton (.asf) without a motion",
         "name the .amc file, and leave this one beside it",

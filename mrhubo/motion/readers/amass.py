@@ -27,6 +27,7 @@ from mrhubo.motion.readers.assemble import (
     LARGEST_BETA,
     MAX_FRAMES,
     MAX_ROOT_TURN,
+    in_metres,
     to_our_rest,
     upright,
 )
@@ -36,7 +37,6 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
-from mrhubo.motion.readers.units import find_unit
 from mrhubo.motion.readers.world import ANY_WORLD, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
@@ -47,8 +47,10 @@ _ITS_OWN = {"dmpls", "markers_latent", "latent_labels"}
 """Keys of AMASS's own files alone: of the soft tissue beside SMPL-H, or of the markers beside SMPL-X, of which files
 that others wrote with its keys have none.
 """
+_OTHER_NAMES = {"root_orient": {"global_orient", "root_pose"}, "trans": {"transl", "translation", "root_trans"}}
+"""What else files call what AMASS calls so; such files are read by `mrhubo.motion.readers.smpl_names`."""
 _JOINTS = {
-    "pose_body": {21: "body without root"},
+    "pose_body": {21: "body without root", 23: "SMPL without root"},
     "poses": {22: "body", 24: "SMPL", 52: "SMPL-H", 55: "SMPL-X"},
 }
 """How many joints each has, and what has so many."""
@@ -60,6 +62,8 @@ def is_amass(content: Content) -> bool:
         return False
     key = next((key for key in _POSE_KEYS if key in content.arrays), None)
     if "joint_names" in content.arrays:  # SOMA-X, whose joints are others
+        return False
+    if any(ours not in content.arrays and theirs & content.arrays for ours, theirs in _OTHER_NAMES.items()):
         return False
     return not content.names or (key is not None and not _has_people(content.path, key))
 
@@ -114,17 +118,7 @@ def read_amass(path: Path, options: ReadOptions) -> Motion:
         family=family,
         notes=tuple(notes),
     )
-    return to_our_rest(_in_metres(upright(motion, worlds, rest)))
-
-
-def _in_metres(motion: Motion) -> Motion:
-    """The motion with places in metres, and a note where the file's were not."""
-    place_T3 = motion.arrays.root_position_T3
-    unit = None if place_T3 is None else find_unit(place_T3, motion.frame_rate)
-    if place_T3 is None or unit is None:
-        return motion
-    note = f"'trans' is in {unit[0]}, by how fast or how high the root is: told in metres"
-    return motion.changed(root_position_T3=place_T3 * np.float32(unit[1]), notes=(*motion.notes, note))
+    return to_our_rest(in_metres(upright(motion, worlds, rest), "'trans'"))
 
 
 def _read_pose(file: NpzFile) -> tuple[str, Form, np.ndarray]:
@@ -135,11 +129,13 @@ def _read_pose(file: NpzFile) -> tuple[str, Form, np.ndarray]:
         found = ", ".join(map(shortened, sorted(keys)[:12])) or "nothing"
         raise UserError(f"{path}: holds neither 'pose_body' nor 'poses', so it is no human motion; it holds: {found}")
     shape, counts = file.shape(key, max_rows=MAX_FRAMES), _JOINTS[key]
+    if "root_orient" in keys:
+        counts = {**_JOINTS["pose_body"], **counts}
     form = find_form(shape, counts)
     if form is None:
         expected = " or ".join(f"(frames, {3 * joints}) ({what})" for joints, what in counts.items())
         raise UserError(f"{path}: '{key}' has shape {shape}; expected {expected}, or matrices (frames, joints, 3, 3)")
-    first = 0 if key == "pose_body" else 1
+    first = 0 if form.joints in _JOINTS["pose_body"] else 1
     return key, form, read_local(path, key, shape[0], _blocks(file, key), form, first)
 
 

@@ -12,8 +12,9 @@ import numpy as np
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
 from mrhubo.body.joints import OFFSETS_J3, PARENTS
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
-from mrhubo.body.rest_directions import from_family
+from mrhubo.body.rest_directions import FAMILIES, from_family
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.units import find_unit
 from mrhubo.motion.readers.world import find_world
 
 BLOCK = 65_536
@@ -64,6 +65,22 @@ def to_our_rest(motion: Motion) -> Motion:
     return motion.changed(local_TJ33=local_TJ33, notes=(*motion.notes, *notes))
 
 
+def in_metres(motion: Motion, where: str, beyond: float = 0.0) -> Motion:
+    """The motion, whose y axis is up, with places in metres, and a note where the file's were not.
+
+    Args:
+        motion: as the file has it.
+        where: what the file calls places, for the beginning of a sentence.
+        beyond: as of `find_unit`.
+    """
+    place_T3 = motion.arrays.root_position_T3
+    unit = None if place_T3 is None else find_unit(place_T3, motion.frame_rate, beyond)
+    if place_T3 is None or unit is None:
+        return motion
+    note = f"{where} is in {unit[0]}, by how fast or how high the root is: told in metres"
+    return motion.changed(root_position_T3=place_T3 * np.float32(unit[1]), notes=(*motion.notes, note))
+
+
 def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
     """The motion, whose root is as the file has it, in a world whose y axis is up; its source says which way was up.
 
@@ -79,7 +96,9 @@ def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:
     if position_T3 is not None:
         few = slice(None, None, 1 + len(motion) // _SEEN)
         joints_TK3 = _joints(rotation_T33[few], motion.arrays.local_TJ33[few]) + position_T3[few, None]
-    up, turn_33, why = find_world(rotation_T33[:, :, 1], position_T3, worlds, joints_TK3)
+    known = [FAMILIES[motion.family].pelvis] if motion.family else [family.pelvis for family in FAMILIES.values()]
+    origins = (*known, *([] if motion.family else [(0.0, 0.0, 0.0)]))
+    up, turn_33, why = find_world(rotation_T33[:, :, 1], position_T3, worlds, joints_TK3, origins)
     return motion.changed(
         root_rotation_T33=turn_33 @ rotation_T33,
         root_position_T3=None if position_T3 is None else position_T3 @ turn_33.T,

@@ -32,8 +32,11 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
     Raises:
         UserError: the file is missing, damaged or too large, or no human is found in it.
     """
-    tree, told, notes = read_bvh_file(path)
+    tree, rates, notes = read_bvh_file(path)
     rate = options.rate
+    told = next(
+        (rate for rate in rates if options.rate and abs(rate / options.rate - 1) < 1e-3), next(iter(rates), None)
+    )
     low, high = RATES
     if told is not None and not low <= told <= high:
         said = f"'Frame Time' makes {told:.3g} frames per second"
@@ -41,6 +44,12 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
             raise NoRate(path, f"{said}; expected {low:g} to {high:g}")
         notes.append(f"{said}; {rate:g} are taken, as given")
     elif told is not None:
+        if rate is None and len(rates) > 1:
+            others = " or ".join(f"{other:.4g}" for other in rates[1:])
+            notes.append(
+                f"'Frame Time' is rounded to a single digit: {told:.4g} frames per second are taken, and it may be"
+                f" {others}; --rate says otherwise"
+            )
         if rate is not None and abs(rate / told - 1) > 1e-3:
             notes.append(f"the file says {told:.6g} frames per second, which is believed, and not {rate:g}")
         rate = told

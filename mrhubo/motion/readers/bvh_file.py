@@ -20,7 +20,7 @@ import numpy as np
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import open_regular
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
-from mrhubo.robot_motion.clock import rate_of_step
+from mrhubo.robot_motion.clock import rate_of_step, usual_rates
 
 MAX_BYTES = 2**30
 """Largest file."""
@@ -44,8 +44,9 @@ _CUT = re.compile(rb"[-+]?\d*\.?\d*(?:[eE][-+]?)?")
 """The beginning of a number."""
 
 
-def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
-    """Reads a BVH file: the tree, the frames per second (None where the file does not say), and notes.
+def read_bvh_file(path: Path) -> tuple[JointTree, tuple[float, ...], list[str]]:
+    """Reads a BVH file: the tree, the frames per second that it may tell, the likeliest first (none where it does not
+    say), and notes.
 
     Raises:
         UserError: it is missing, damaged, too large, or no BVH file; says where.
@@ -59,10 +60,10 @@ def read_bvh_file(path: Path) -> tuple[JointTree, float | None, list[str]]:
             )
         joints, columns = _read_hierarchy(path, _decoded(start[: found.start()]))
         after = start[found.end() :]
-        frames, rate, rest = _read_counts(path, after)
+        frames, rates, rest = _read_counts(path, after)
         handle.seek(found.end() + rest)
         value_TC, notes = _read_numbers(path, handle, columns, frames)
-    return JointTree(tuple(joints), value_TC), rate, notes
+    return JointTree(tuple(joints), value_TC), rates, notes
 
 
 def _decoded(content: bytes) -> str:
@@ -150,9 +151,9 @@ def _read_channels(path: Path, line: str, words: list[str], joint: Joint, first:
     return replace(joint, rotation=tuple(rotation), position=tuple(position)), count
 
 
-def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, int]:
-    """How many frames are promised, how many a second there are, and where the numbers begin."""
-    frames, rate, place = None, None, 0
+def _read_counts(path: Path, after: bytes) -> tuple[int | None, tuple[float, ...], int]:
+    """How many frames are promised, how many a second there may be, and where the numbers begin."""
+    frames, rates, place = None, (), 0
     for pattern in (_FRAMES, _TIME):
         found = pattern.match(after, place)
         if found is None:
@@ -163,10 +164,21 @@ def _read_counts(path: Path, after: bytes) -> tuple[int | None, float | None, in
         else:
             text = found[1].decode("latin1")
             try:
-                rate = rate_of_step(text.replace(",", "."))
+                rates = _rates(text.replace(",", "."))
             except ValueError as error:
                 raise UserError(f"{path}: 'Frame Time' is '{shortened(text)}'") from error
-    return frames, rate, place
+    return frames, rates, place
+
+
+def _rates(step: str) -> tuple[float, ...]:
+    """Frames per second of a step [s]: the rate that has it, and usual ones that may, if it has a single digit; the
+    first of these goes before a rate that is no whole number.
+    """
+    rate, usual = rate_of_step(step), usual_rates(step)
+    if rate is None:
+        return ()
+    others = [other for other in usual if abs(other / rate - 1) > 1e-3]
+    return (rate, *others) if not others or round(rate, 3) == round(rate) else (*others, rate)
 
 
 def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | None) -> tuple[np.ndarray, list[str]]:

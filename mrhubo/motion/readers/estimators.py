@@ -18,6 +18,7 @@ from mrhubo.motion.readers.keypoint_arrays import points_in
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
+from mrhubo.motion.readers.nymeria import read_nymeria
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.people import holds_parameters
 from mrhubo.motion.readers.rate import find_rate
@@ -65,6 +66,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         or read_features(tree, options)
         or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)
+        or read_nymeria(tree, rate)
     )
     found = found or smpl_motion(path, tree, options)
     points = points_in(tree, options) if found is None else None

@@ -10,8 +10,8 @@ from mrhubo.files.npz import NpzFile
 from mrhubo.motion.readers.rotations import find_form
 from mrhubo.motion.writers.amass import OWN_REST, REST_KEY
 
-_FAMILY_OF_JOINTS = {23: "smpl", 24: "smpl", 52: "smplh", 55: "smplx"}
-"""By how many joints a pose has; 23 are SMPL's without the root."""
+_FAMILY_OF_JOINTS = {23: "smpl", 24: "smpl", 52: "smplh", 53: "smplx", 55: "smplx"}
+"""By how many joints a pose has; 23 are SMPL's without the root, 53 SMPL-X's without eyes."""
 _FACE = {
     "pose_jaw", "pose_eye", "jaw_pose", "leye_pose", "reye_pose", "expression", "smplx_verts", "smplx_params",
     "pose_lhand", "pose_rhand",
@@ -80,12 +80,15 @@ def rest_in_words(family: str) -> str:
 
 
 def _joints(file: NpzFile) -> int:
-    """How many joints `poses` has; 0 where there are none."""
-    try:
-        form = find_form(file.shape("poses"), _FAMILY_OF_JOINTS) if "poses" in file.keys else None
-    except UserError:
-        form = None
-    return 0 if form is None else form.joints
+    """How many joints the pose has; 0 where that is not told."""
+    for key in ("poses", "pose_body"):
+        try:
+            form = find_form(file.shape(key), _FAMILY_OF_JOINTS) if key in file.keys else None
+        except UserError:
+            form = None
+        if form is not None:
+            return form.joints
+    return 0
 
 
 def _read_text(file: NpzFile, key: str) -> str:

@@ -1,4 +1,4 @@
-"""SMPL parameters of whoever is seen in one frame, in a file that has nothing else.
+"""SMPL parameters of whoever is seen in one frame, in a file that has nothing else, or in one place of a file.
 
 * EasyMocap: a list, or `annots`, of people with `id`, `Rh` (1, 3), `Th` (1, 3), `shapes` and `poses`, (1, 72) of SMPL's
   joints, (1, 78) of SMPL-H's and (1, 87) of SMPL-X's body with coefficients of hands and face, the first three 0. The
@@ -9,37 +9,44 @@
 * FrankMocap: `pred_output_list`, an entry a person, `None` or with `pred_body_pose` (1, 72), and `smpl_type` and
   `body_bbox_list`, rows of x, y, width and height (https://github.com/facebookresearch/frankmocap,
   mocap_utils/demo_utils.py).
+* Multi-HMR: a list of people with `rotvec` (53, 3) of SMPL-X's joints, the root first, without eyes, `transl_pelvis`
+  (1, 3) and `shape` (https://github.com/naver/multi-hmr, model.py).
+* 4D-Humans' HMR2: `pred_smpl_params` with `global_orient` (N, 1, 3, 3) and `body_pose` (N, 23, 3, 3) of N people, and
+  beside it `pred_cam_t` (N, 3) (https://github.com/shubham-goel/4D-Humans, hmr2/models/hmr2.py).
 
-Legend: K joints.
+Legend: K joints, N people, X numbers of a row.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.body.rest_directions import FAMILIES
 from mrhubo.errors import UserError
 from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.family import family_of
-from mrhubo.motion.readers.rotations import Form
+from mrhubo.motion.readers.rotations import Form, find_form
 from mrhubo.motion.readers.sightings import person_called
 
-_FORMS = {
-    **{3 * joints: Form(joints, False) for joints in (21, 22, 23, 24, 52, 55)},
-    **{9 * joints: Form(joints, True) for joints in (21, 22, 23, 24, 52, 55)},
-}
-"""By how many numbers a pose has."""
+WITH_ROOT = (22, 24, 52, 53, 55)
+"""How many joints a pose has that begins with the root: body, SMPL, SMPL-H, Multi-HMR's of SMPL-X, SMPL-X."""
+_COUNTS = (21, 23, *WITH_ROOT)
+_POSES = (
+    "pred_rotmat", "pred_body_pose", "rotvec", "body_pose", "pose_body", "smpl_pose", "pose", "poses", "thetas",
+)  # fmt: skip
+_ROOTS = ("global_orient", "root_pose", "root_orient")
+_PLACES = ("transl_pelvis", "transl", "trans", "pred_cam_t", "cam_t", "cam_trans")
+_IDS = ("id", "personID", "person_id", "track_id")
+"""What files call a pose, the rotation of its root, where that is, and who it is."""
 _EASYMOCAP = {78: "smplh", 87: "smplx"}
 """How many numbers a pose of EasyMocap has that ends with coefficients, and of which model it is."""
 _BODY = 66
-_PELVIS = {"smplx": (0.0, -0.35, 0.01)}
-_SMPL_PELVIS = (0.0, -0.22, 0.03)
-"""Where the pelvis of a mean body at rest is from the model's origin [m], from the sources of
-`mrhubo.body.rest_directions`."""
 _MOST, _LONGEST = 100, 9 * 55
 """People in a frame, and numbers of a pose."""
 
@@ -66,26 +73,30 @@ class Body:
     family: str
 
 
-def bodies_in(tree: Tree) -> list[Body] | None:
-    """Everybody in a file of one frame; None where it is no such file.
+def bodies_in(tree: Tree, most_rows: int = 1) -> list[Body] | None:
+    """Everybody in a frame, which is a file or a part of one; None where it is no frame.
+
+    Args:
+        tree: the frame.
+        most_rows: how many people arrays may have along their first axis.
 
     Raises:
         UserError: there are too many, or something in it is no array that can be used.
     """
     listed = tree.get("pred_output_list", "annots") if tree.is_mapping else tree if tree.is_list else None
     if listed is None:
-        body = _body(tree, tree, None)
-        return None if body is None else [body]
+        return _bodies(tree, tree, None, most_rows)
     if not listed.is_list:
         return None
     if len(listed) > _MOST:
         raise UserError(f"{listed.named} has {len(listed):,} people; expected at most {_MOST}")
     boxes = tree.get("body_bbox_list") if tree.is_mapping else None
     frames_boxes = [*boxes] if boxes is not None and len(boxes) == len(listed) else [None] * len(listed)
-    found = [(node, _body(node, tree, box)) for node, box in zip(listed, frames_boxes, strict=True) if not node.is_none]
-    if any(body is None for node, body in found) or (not found and tree is listed):
+    here = [(node, box) for node, box in zip(listed, frames_boxes, strict=True) if not node.is_none]
+    found = [_bodies(node, tree, box, most_rows) for node, box in here]
+    if any(bodies is None for bodies in found) or (not found and tree is listed):
         return None
-    return [body for _, body in found if body is not None]
+    return [body for bodies in found if bodies is not None for body in bodies]
 
 
 def refuse_frame(tree: Tree) -> None:
@@ -100,32 +111,87 @@ def refuse_frame(tree: Tree) -> None:
         )
 
 
-def _body(node: Tree, around: Tree, box: Tree | None) -> Body | None:
-    """Somebody's parameters in a dictionary; None where it has none, or those of several frames."""
-    keys = set(node.keys)
-    if {"Rh", "Th", "poses"} <= keys:
-        return _easymocap(node)
-    for pose_key, root_keys in (
-        ("pred_rotmat", ()),
-        ("pred_body_pose", ()),
-        ("body_pose", ("global_orient", "root_pose", "root_orient")),
-    ):
-        if pose_key not in keys:
-            continue
-        root = next((node[key] for key in root_keys if key in keys), None)
-        pose = _one_frame(node[pose_key])
-        turn = None if root is None else _one_frame(root)
-        form = None if pose is None else _FORMS.get(pose.size)
-        if pose is None or form is None or (bool(root_keys) and (turn is None or turn.size not in (3, 9))):
-            return None
-        betas = _one_frame(node.get("betas", "pred_betas", "shape"))
-        said = around.get("smpl_type")
-        named = "" if said is None else said.text() or ""
-        family = family_of(named, form.joints, keys, None if betas is None else betas.tolist())
-        source = "FrankMocap" if not root_keys else "SMPL parameters"
-        place = _three(_one_frame(node.get("transl", "trans")))
-        return Body(None, pose_key, pose, form, turn, place, betas, _middle(box), source, family)
-    return None
+def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[Body] | None:
+    """Parameters in a dictionary, or in one in it, of somebody, or of several along the first axis of its arrays; None
+    where it has none, or those of several frames.
+    """
+    if {"Rh", "Th", "poses"} <= set(node.keys):
+        body = _easymocap(node)
+        return None if body is None else [body]
+    inner = next((one for one in _with_children(node) if set(_POSES) & set(one.keys)), None)
+    if inner is None:
+        return None
+    key = next(key for key in _POSES if key in inner.keys)
+    found = _rows(inner[key], most_rows)
+    if found is None:
+        return None
+    pose_NX, form = found
+    count = len(pose_NX)
+
+    def rows(names: tuple[str, ...]) -> np.ndarray | None:
+        told = inner.get(*names)
+        told = node.get(*names) if told is None else told
+        numbers = None if told is None else _numbers(told)
+        return None if numbers is None or numbers.size % count else numbers.reshape(count, -1)
+
+    root_NX, place_NX, betas_NX = rows(_ROOTS), rows(_PLACES), rows(("betas", "pred_betas", "shape"))
+    if root_NX is not None and root_NX.shape[1] not in (3, 9):
+        return None
+    if root_NX is None and (form.joints not in WITH_ROOT or inner.get(*_ROOTS) is not None):
+        return None
+    said = around.get("smpl_type") if around.is_mapping else None
+    named, keys = "" if said is None else said.text() or "", {*inner.keys, *node.keys}
+    betas = None if betas_NX is None else betas_NX[0].tolist()
+    family = family_of(named, form.joints, keys, betas)
+    source = "FrankMocap" if key.startswith("pred_") and around is not node else "SMPL parameters"
+    person = _person(node) if count == 1 else None
+    middle = _middle(box)
+    return [
+        Body(
+            person, key, pose_NX[n], form, None if root_NX is None else root_NX[n],
+            None if place_NX is None or place_NX.shape[1] != 3 else place_NX[n],
+            None if betas_NX is None else betas_NX[n], middle, source, family,
+        )
+        for n in range(count)
+    ]  # fmt: skip
+
+
+def _with_children(node: Tree) -> Iterator[Tree]:
+    yield node
+    for _, child in node.items():
+        if child.is_mapping:
+            yield child
+
+
+def _rows(node: Tree, most: int) -> tuple[np.ndarray, Form] | None:
+    """Rows (N, X) of a pose of each of some people, and their form; None where they are none, or more than `most`."""
+    shape = node.shape()
+    if shape is None or len(shape) < 1 or not 0 < math.prod(shape) <= most * _LONGEST:
+        return None
+    while len(shape) > 1 and shape[0] == 1:
+        shape = shape[1:]
+    form, count = find_form((1, *shape), _COUNTS), 1
+    if form is None:
+        form, count = find_form(shape, _COUNTS), shape[0]
+    return None if form is None or count > most else (node.array().reshape(count, -1).astype(np.float64), form)
+
+
+def _numbers(node: Tree) -> np.ndarray | None:
+    shape = node.shape()
+    if shape is None or not 0 < math.prod(shape) <= _MOST * _LONGEST:
+        return None
+    return node.array().astype(np.float64).reshape(-1)
+
+
+def _person(node: Tree) -> str | None:
+    """What a file calls somebody; None where it does not."""
+    number = node.get(*_IDS)
+    if number is None:
+        return None
+    text = number.text()
+    return (
+        person_called(text if text is not None else number.number()) if text or number.shape() in ((), (1,)) else None
+    )
 
 
 def _easymocap(node: Tree) -> Body | None:
@@ -134,16 +200,14 @@ def _easymocap(node: Tree) -> Body | None:
         return None
     family = _EASYMOCAP.get(pose.size, "")
     pose = pose[:_BODY] if family else pose
-    form = _FORMS.get(pose.size)
+    form = find_form((1, pose.size), _COUNTS)
     if form is None or form.matrices:
         return None
     family = family or family_of("", form.joints, node.keys, None) or "smplx"
-    pelvis_3 = np.array(_PELVIS.get(family, _SMPL_PELVIS))
+    pelvis_3 = np.array(FAMILIES[family].pelvis)
     place = place + axis_angle_to_matrix(turn.astype(np.float64)) @ pelvis_3
-    number = node.get("id", "personID")
-    person = None if number is None else person_called(number.text() or number.number())
     betas = _one_frame(node.get("shapes"))
-    return Body(person, "poses", pose, form, turn, place, betas, None, "EasyMocap", family)
+    return Body(_person(node), "poses", pose, form, turn, place, betas, None, "EasyMocap", family)
 
 
 def _one_frame(node: Tree | None) -> np.ndarray | None:
@@ -158,10 +222,6 @@ def _one_frame(node: Tree | None) -> np.ndarray | None:
     if len(shape) > 3 or (len(shape) > 1 and set(shape[1:]) != {3}):
         return None
     return node.array().reshape(-1).astype(np.float64)
-
-
-def _three(place: np.ndarray | None) -> np.ndarray | None:
-    return place if place is not None and place.size == 3 else None
 
 
 def _middle(box: Tree | None) -> np.ndarray | None:

@@ -138,7 +138,10 @@ def _named_in(node: Tree, options: ReadOptions) -> Keypoints:
 
 def _in_node(path: Path, node: Tree, options: ReadOptions) -> Keypoints:
     key, notes = _key(node), []
-    array, person = _of_one(path, node[key].array(), f"'{key}'", options, notes)
+    whole = node[key].array()
+    if whole.ndim == 2 and whole.shape[1] % 3 == 0:  # a row a frame
+        whole = whole.reshape(len(whole), -1, 3)
+    array, person = _of_one(path, whole, f"'{key}'", options, notes)
     point_TK3, confidence_TK = _split(path, array, f"'{key}'")
     found = Keypoints(point_TK3, confidence_TK=confidence_TK, where=f"'{key}'", notes=notes)
     given = (node.find_array(key) for key in CONFIDENCE_KEYS)

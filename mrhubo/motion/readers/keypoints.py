@@ -23,6 +23,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.sightings import check_size, known_points
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
+from mrhubo.motion.trunks import trunk_turns
 
 _SAMPLES = 256
 _NONSENSE = 0.2
@@ -93,8 +94,9 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
     _refuse_shares(path, found, points)
     points, world = _to_world(points, notes)
     sure = {} if found.confidence_TK is None else {n: found.confidence_TK[:, place] for n, place in places.items()}
-    body = BodyPoints(points, confidence=sure)
-    source = f"keypoints {found.where}, {what}, {world}"
+    turns, whose = trunk_turns(points)
+    body = BodyPoints(points, turns, confidence=sure)
+    source = f"keypoints {found.where}, {what}, {world}" + (f"; at rest, a trunk like {whose}'s" if whose else "")
     centred = _is_centred(points)
     if centred:
         notes.append("where the person goes is not told: the points are centred on the hips")

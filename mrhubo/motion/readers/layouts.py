@@ -12,10 +12,11 @@ from dataclasses import replace
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
-from mrhubo.motion.readers.frame_layouts import read_frame_list, read_phalp, read_romp
+from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
+from mrhubo.motion.readers.frame_lists import read_frame_list, read_numbered, read_pictures
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
-from mrhubo.motion.readers.smpl_names import Found, find_inside, search
+from mrhubo.motion.readers.smpl_names import Found, find_inside, forms_in, search
 from mrhubo.motion.readers.tracks import Kind, Layout
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
@@ -81,7 +82,8 @@ def _single(tree: Tree) -> Layout | None:
 
 
 _FINDERS = (
-    read_phalp, read_romp, read_frame_list, read_pymaf, read_cliff, read_six, read_egoallo, _people, _single,
+    read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo, _people,
+    _single, read_numbered,
 )  # fmt: skip
 
 
@@ -93,7 +95,12 @@ def _kind(source: str, found: Found, tree: Tree) -> Kind:
         return Kind("VIBE or one of its kin", "smpl", CAMERAS)
     said = next((text for node in (found.node, tree) if (text := _said(node))), "")
     keys = {*found.node.keys, *tree.keys}
-    return Kind(source, family_of(said, found.form.joints, keys, found.shape()), ANY_WORLD)
+    family = family_of(said, found.form.joints, keys, found.shape())
+    # a pose of the body alone may be told beside that of all joints, whose number tells the model
+    family = family or next(
+        (name for form in forms_in(found.node) if (name := family_of("", form.joints, (), None))), ""
+    )
+    return Kind(source, family, ANY_WORLD)
 
 
 def _said(node: Tree) -> str:

@@ -64,12 +64,12 @@ def read_egoallo(tree: Tree) -> Layout | None:
     frames = shape[1]
 
     def read(sample: int) -> SmplArrays:
-        local_TJ33 = _from_quaternions(body.array()[sample].astype(np.float64))
+        local_TJ33 = from_quaternions(body.array()[sample].astype(np.float64))
         root_T7 = root.array()[sample].astype(np.float64)
         betas = tree.find_array("betas")
         if betas is not None:
             betas = betas[sample] if betas.ndim == 3 and len(betas) == shape[0] else None
-        turn_T33 = _from_quaternions(root_T7[:, :4])
+        turn_T33 = from_quaternions(root_T7[:, :4])
         return SmplArrays("body_quats", local_TJ33, Form(_BODY, True), 0, turn_T33, root_T7[:, 4:], betas)
 
     rate = _rate(tree.find_array("timestamps_ns"))
@@ -94,7 +94,7 @@ def _from_rows(six_TJ6: np.ndarray) -> np.ndarray:
     return orthonormal_columns(six_TJ6.reshape(*six_TJ6.shape[:-1], 2, 3).mT).mT
 
 
-def _from_quaternions(quaternion_X4: np.ndarray) -> np.ndarray:
+def from_quaternions(quaternion_X4: np.ndarray) -> np.ndarray:
     """Matrices (..., 3, 3) of quaternions (..., 4), w first; NaN where one is 0."""
     length_X = np.linalg.norm(quaternion_X4, axis=-1)
     unit_X4 = np.roll(quaternion_X4, -1, axis=-1) / np.where(length_X > _SHORTEST, length_X, np.nan)[..., None]

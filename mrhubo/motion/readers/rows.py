@@ -1,4 +1,5 @@
-"""Motions in a single array whose rows are known by their length: those of Motion-X, of PHUMA, and SMPL's `body_pose`.
+"""Motions in a single array whose rows are known by their length: those of Motion-X, of TalkSHOW, of PHUMA, and SMPL's
+`body_pose`.
 
 Legend: T frames, X numbers of a row.
 """
@@ -19,6 +20,8 @@ from mrhubo.motion.readers.world import ANY_WORLD, find_up
 
 _MOTION_X = 322
 _MOTION_X_RATE = 30.0
+_TALKSHOW = 265
+_TALKSHOW_RATE = 30.0
 _PHUMA = (69, 73, 79)
 """Without more, with how much each foot touches the ground, with the body's shape."""
 _CONTACTS = 73
@@ -28,6 +31,8 @@ _STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
 _CLEARLY = 1.8
 """How much more the stiff joints turn as PHUMA's than as those of `body_pose`, at most in PHUMA's rows. Of 464 clips of
 CMU's written as PHUMA's, 99 in 100 have up to 1.2; of the same as `body_pose`, 99 in 100 have 2.1 or more."""
+_STIFF_TURN = 0.8
+"""How much [rad] the stiff joints turn at most, on the mean: of numbers drawn by chance, 1.6."""
 _NEARLY_STILL = 0.02
 """Turns [rad] that say nothing."""
 _PELVIS_M = (0.2, 2.2)
@@ -37,29 +42,40 @@ _UPRIGHT = 0.5
 
 
 def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
-    """Reads SMPL's or SMPL-X's parameters from an array (T, 322), (T, 69), (T, 73) or (T, 79); None of anything else.
+    """Reads SMPL's or SMPL-X's parameters from rows of 322, 265, 69, 73 or 79 numbers, (T, X) or (1, T, X); None of
+    anything else.
 
     Motion-X's rows are the root's rotation (3), the body's (63), hands, jaw, face, then at 309 the place of the root
     (3) and the body's shape (10); it says of all its motions that they have 30 frames a second
-    (https://github.com/IDEA-Research/Motion-X). PHUMA's are the place of the root (3), its rotation (3) and the body's
-    (63), then perhaps more (https://github.com/DAVIAN-Robotics/PHUMA). SMPL's `body_pose`, 23 joints without the root,
-    is as wide, and with the shape as wide as PHUMA's with it; which it is, is told by what is in it.
+    (https://github.com/IDEA-Research/Motion-X). TalkSHOW's are jaw and eyes (9), the root's rotation (3), the body's
+    (63), hands and face; its motions have 30 frames a second (https://github.com/yhw-yhw/TalkSHOW, scripts/demo.py).
+    PHUMA's are the place of the root (3), its rotation (3) and the body's (63), then perhaps more
+    (https://github.com/DAVIAN-Robotics/PHUMA). SMPL's `body_pose`, 23 joints without the root, is as wide, and with the
+    shape as wide as PHUMA's with it; which it is, is told by what is in it.
 
     Raises:
         UserError: the numbers are no motion, or may be of either kind; or the frame rate is not known.
     """
     shape = tree.shape()
-    if shape is None or len(shape) != 2 or not shape[0]:
+    if shape is not None and len(shape) == 3 and shape[0] == 1:
+        shape = shape[1:]
+    if shape is None or len(shape) != 2 or not shape[0] or shape[1] not in (_MOTION_X, _TALKSHOW, *_PHUMA):
         return None
-    rows_TX, notes = tree.array(), options.of_one()
+    rows_TX, notes = tree.array().reshape(shape), options.of_one()
     if shape[1] == _MOTION_X:
         arrays = SmplArrays("rows", rows_TX[:, 3:66], _BODY, 0, rows_TX[:, :3], rows_TX[:, 309:312], rows_TX[:, 312:])
         rate = _MOTION_X_RATE if options.rate is None else float(options.rate)
         if options.rate is None:
             notes.append(f"{rate:g} frames a second, as Motion-X says of all its motions; --rate says otherwise")
         return motion_of(tree.path, arrays, Kind("Motion-X rows (T, 322)", "smplx", ANY_WORLD), rate, notes)
-    if shape[1] not in _PHUMA:
-        return None
+    if shape[1] == _TALKSHOW:
+        if not _turn(rows_TX[:, 12:75].astype(np.float64)) < _STIFF_TURN:  # any features may have as many numbers
+            return None
+        arrays = SmplArrays("rows", rows_TX[:, 12:75], _BODY, 0, rows_TX[:, 9:12])
+        rate = _TALKSHOW_RATE if options.rate is None else float(options.rate)
+        if options.rate is None:
+            notes.append(f"{rate:g} frames a second, as TalkSHOW's motions have; --rate says otherwise")
+        return motion_of(tree.path, arrays, Kind("TalkSHOW's rows (T, 265)", "smplx", ANY_WORLD), rate, notes)
     betas = rows_TX[:, 69:] if shape[1] == max(_PHUMA) else None
     if shape[1] == _CONTACTS or _is_phuma(tree, rows_TX):
         arrays = SmplArrays("rows", rows_TX[:, 6:69], _BODY, 0, rows_TX[:, 3:6], rows_TX[:, :3], betas)

@@ -109,7 +109,7 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
         return {"": (len(stacked.points), lambda: stacked)}
     people: list[tuple[str, list[Tree]]] = []
     for name, frame in tree.items() if tree.is_mapping else (("", frame) for frame in tree):
-        people.append((name, [person for person in (frame if frame.is_list else (frame,)) if _KEY in person.keys]))
+        people.append((name, [person for person in (frame if frame.is_list else (frame,)) if _is_person(person)]))
     if not any(here for _, here in people):
         return {}
     frames = in_order(tree.path, people)
@@ -124,6 +124,12 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
         for person, number in zip(here, found, strict=True):
             seen.setdefault(number, {})[time] = person
     return {str(name): (len(found), lambda found=found: _gathered(found, count)) for name, found in seen.items()}
+
+
+def _is_person(node: Tree) -> bool:
+    """Whether somebody has points of this name that may be these: 4D-Humans' HMR2 calls its 44 so."""
+    shape = node[_KEY].shape() if _KEY in node.keys else None
+    return shape is not None and (len(shape) < 2 or shape[-2] == _POINTS)
 
 
 def _place(person: Tree) -> np.ndarray:

@@ -5,7 +5,9 @@ Where a name is from: `pose_world` WHAM, `smpl_poses` AIST++ (https://google.git
 package smplx (https://github.com/vchoutas/smplx), `pose_body` AMASS, `poses_body` EMDB
 (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC), `fullpose` GRAB
 (https://github.com/otaheri/GRAB), `smpl_pose` GLAMR (https://github.com/NVlabs/GLAMR), `local_rot_mats` Kimodo,
-`bodyPose` Meshcapade's .smpl (https://pypi.org/project/smplcodec), `poses` and `pose` everybody.
+`rotvec` Multi-HMR (https://github.com/naver/multi-hmr), `body_pose_axis` TalkSHOW
+(https://github.com/yhw-yhw/TalkSHOW), `bodyPose` Meshcapade's .smpl (https://pypi.org/project/smplcodec), `poses` and
+`pose` everybody.
 """
 
 from __future__ import annotations
@@ -22,8 +24,10 @@ from mrhubo.motion.readers.rotations import Form, find_form
 from mrhubo.motion.readers.tracks import SmplArrays, Track
 
 T = TypeVar("T")
-_WITH_ROOT, _WITHOUT = (22, 24, 52, 55), (21, 23)
-"""How many joints a pose has: of body, SMPL, SMPL-H and SMPL-X; and of SMPL-X's or SMPL's body without the root."""
+_WITH_ROOT, _WITHOUT = (22, 24, 52, 53, 55), (21, 23)
+"""How many joints a pose has: of body, SMPL, SMPL-H, SMPL-X without eyes, and SMPL-X; and of SMPL-X's or SMPL's body
+without the root."""
+_ROOTS = ("global_orient", "root_orient", "root_pose")
 _PLACES = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
 _ENTRIES = 50
@@ -39,6 +43,7 @@ class _Names:
 
     pose: str
     root: tuple[str, ...] = ()
+    """None: it is in the pose, or else called as usual."""
     position: tuple[str, ...] = _PLACES
     betas: tuple[str, ...] = ("betas", "beta", "shape")
 
@@ -55,8 +60,9 @@ _NAMES = (
         position=("root_trans_world", "root_trans_cam"),
         betas=("smpl_beta",),
     ),
-    _Names("body_pose", root=("global_orient", "root_pose", "root_orient")),
-    _Names("pose_body", root=("root_orient", "global_orient")),
+    _Names("body_pose"),
+    _Names("body_pose_axis"),
+    _Names("pose_body"),
     _Names("poses_body", root=("poses_root",)),
     _Names("pose_aa"),
     _Names("fullpose"),
@@ -64,6 +70,7 @@ _NAMES = (
     _Names("pose"),
     _Names("thetas"),
     _Names("rotations"),
+    _Names("rotvec", position=("transl_pelvis", "transl")),
     _Names("bodyPose", position=("bodyTranslation",), betas=("shapeParameters",)),
     _Names("local_rot_mats", position=("root_positions",)),
 )
@@ -91,7 +98,9 @@ class Found:
         node, names = self.node, self.names
         pose = node[names.pose]
         array = pose.array() if person is None else pose.array().take(person, 0 if self.people_first else 1)
-        root, position, betas = (self._array(keys, person) for keys in (names.root, names.position, names.betas))
+        first = 1 if self.form.joints in _WITH_ROOT else 0
+        roots = names.root or (() if first else _ROOTS)
+        root, position, betas = (self._array(keys, person) for keys in (roots, names.position, names.betas))
         frames = self._array(_FRAMES, person)
         if frames is None and self.outer is not None:
             frames = replace(self, node=self.outer)._array(_FRAMES, person)
@@ -99,7 +108,6 @@ class Found:
         if position is not None and scaling is not None and scaling.number() > 0:
             position = position / scaling.number()  # AIST++ has places in units of a scaled body
         frames = frames if frames is not None and frames.size == len(array) else None
-        first = 1 if self.form.joints in _WITH_ROOT else 0
         return SmplArrays(pose.where, array, self.form, first, root, position, betas, frames)
 
     def shape(self) -> list[float] | None:
@@ -143,6 +151,15 @@ def find_here(node: Tree) -> Found | None:
             people, frames = sorted(shape[:2])
             return Found(node, names, form, frames, people, people_first=shape[0] == people)
     return None
+
+
+def forms_in(node: Tree) -> Iterator[Form]:
+    """The forms of all that a dictionary calls a pose."""
+    for names in _NAMES:
+        shape = node[names.pose].shape() if names.pose in node.keys else None
+        form = None if shape is None or len(shape) < 2 else find_form(shape, _WITH_ROOT + _WITHOUT)
+        if form is not None:
+            yield form
 
 
 def find_inside(node: Tree) -> Found | None:

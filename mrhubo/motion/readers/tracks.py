@@ -22,6 +22,7 @@ from mrhubo.motion.readers.assemble import (
     LARGEST_BETA,
     MAX_FRAMES,
     MAX_ROOT_TURN,
+    in_metres,
     to_our_rest,
     upright,
 )
@@ -32,6 +33,9 @@ from mrhubo.motion.readers.rotations import JOINTS, Form, read_local, rows_of, t
 
 _SCARCEST = 0.02
 """Who is seen in a smaller share of the frames from their first to their last makes no motion."""
+
+_NOBODY_M = 100.0
+"""So far [m] from a camera nobody's pose is estimated."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +175,8 @@ def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, not
         notes=tuple(notes),
         confidence_TJ=confidence_TJ,
     )
-    return to_our_rest(upright(motion, kind.worlds, rest_in_words(kind.family)))
+    motion = upright(motion, kind.worlds, rest_in_words(kind.family))
+    return to_our_rest(in_metres(motion, "where the root is", _NOBODY_M))
 
 
 def check_span(path: Path, seen: int, frames: int) -> None:

@@ -25,12 +25,20 @@ _ON_A_FLOOR_M = (-0.15, 0.65)
 """How high the origin of a model's pelvis is over a floor at height 0 of who lies or crawls on it, and not higher."""
 _MOST_TIMES = (0.05, 0.95)
 """Quantiles between which it is."""
+_LYING_M, _LYING_LOW_M, _STANDING_LOW_M = (0.07, 0.45), (-0.06, 0.12), (-0.6, 0.6)
+"""How high the pelvis of who lies is over the floor, and the lowest joint; and that of who stands, as recordings have
+it: of CMU's clips that stand, one has its floor at -0.4 m."""
+_AT_ORIGIN_M = 0.1
+"""So near to height 0 is a pelvis that somebody put there."""
+_STEADY_M = 0.15
+"""How much the lowest joint's height varies of who lies."""
 _STANDING = math.cos(math.radians(25.0))
 """The pelvis of who stands is tilted by no more than that."""
 _A_WHILE = 0.03
 """Share of the frames in which somebody stands who does so for a while."""
 _RISES_M = 0.2
 """How much more the lowest joint's height varies [m] in a world that is not the file's, to tell so."""
+Place = tuple[float, float, float]
 WORLDS = ("y up", "z up")
 """Of files of motion capture; where both fit alike, the first is taken."""
 Y_UP, Z_UP = ("y up",), ("z up",)
@@ -68,25 +76,48 @@ def find_world(
     place_T3: np.ndarray | None,
     worlds: tuple[str, ...],
     joints_TK3: np.ndarray | None = None,
+    origins: tuple[Place, ...] = ((0.0, 0.0, 0.0),),
 ) -> tuple[str, np.ndarray, str]:
     """Which of some worlds a root is in, the matrix (3, 3) that makes y its up axis, and what is to be said of it.
 
     Who lies or crawls from the first frame to the last stands along no world's axis; then the place tells, where just
-    one world has the body flat, and as low as that of somebody on a floor at height 0. Nothing tells of who
-    lies along an axis that may be up, and is taken to stand.
+    one world has the body flat, and as low as that of somebody on a floor at height 0. Who seems to stand, because
+    they lie along an axis that may be up, have no floor under their feet and one under their back.
 
     Args:
         body_up_T3: the body's own up axes, in the file's world.
         place_T3: where the root is [m], if that is known.
         worlds: which there may be, the likeliest first.
-        joints_TK3: where joints are in some frames [m], if their places are known.
+        joints_TK3: where joints are in some frames [m], the pelvis first, if their places are known.
+        origins: where the pelvis may be from the place that the file tells [m], along the file's axes.
     """
     up, turn_33 = find_up(body_up_T3, worlds, joints_TK3)
     turns = {world: _turn(world, body_up_T3) for world in worlds}
     upright = float((body_up_T3 @ turn_33[1]).mean())
-    if len(worlds) == 1 or upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
+    if len(worlds) == 1:
         return up, turn_33, ""
+    lying = [
+        world
+        for world in worlds
+        if world in WORLDS
+        and joints_TK3 is not None
+        and abs(float((body_up_T3 @ turns[world][1]).mean())) < _FLAT
+        and any(_lies(joints_TK3 + np.array(origin, joints_TK3.dtype), turns[world]) for origin in origins)
+    ]
+    if upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
+        if len(lying) != 1 or joints_TK3 is None or upright <= _UPRIGHT:
+            return up, turn_33, ""
+        if any(_has_floor(joints_TK3 + np.array(origin, joints_TK3.dtype), turn_33) for origin in origins):
+            return (
+                up,
+                turn_33,
+                f"the body stands with {up}, which is taken; with {lying[0]} it would lie on a floor at height 0",
+            )
+        said = f"the body would stand on no floor with {up}, and lies on one with {lying[0]}, which is taken"
+        return lying[0], turns[lying[0]], said
     said = "the body is not upright on the mean, as of somebody who lies or crawls"
+    if len(lying) == 1:
+        return lying[0], turns[lying[0]], f"{said}: {lying[0]} is taken, by how low the joints are"
     flat = [
         world
         for world in worlds
@@ -107,6 +138,26 @@ def _rise(height_TK: np.ndarray) -> float:
     """How much the lowest joint's height varies: the range of nine frames in ten."""
     low, high = np.percentile(height_TK.min(axis=1), (5, 95))
     return float(high - low)
+
+
+def _has_floor(joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:
+    """Whether the feet of who stands are on a floor at height 0, or the pelvis is put there."""
+    low, high = _STANDING_LOW_M
+    height_TK = joints_TK3 @ turn_33[1]
+    lowest, pelvis = float(np.median(height_TK.min(axis=1))), float(np.median(height_TK[:, 0]))
+    return low < lowest < high or abs(pelvis) < _AT_ORIGIN_M
+
+
+def _lies(joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:
+    """Whether somebody whose body is flat lies on a floor at height 0."""
+    height_TK = joints_TK3 @ turn_33[1]
+    low_T, (low, high) = height_TK.min(axis=1), _LYING_LOW_M
+    pelvis = np.quantile(height_TK[:, 0], _MOST_TIMES)
+    return (
+        low < float(np.median(low_T)) < high
+        and float(np.ptp(np.quantile(low_T, _MOST_TIMES))) < _STEADY_M
+        and bool(_LYING_M[0] < pelvis[0] and pelvis[1] < _LYING_M[1])
+    )
 
 
 def _lies_on_its_floor(body_up_T3: np.ndarray, place_T3: np.ndarray, turn_33: np.ndarray) -> bool:

@@ -327,6 +327,78 @@ def frame_list(path: Path, people: dict[int, np.ndarray]) -> None:
     path.write_bytes(pickle.dumps(frames))
 
 
+def multi_hmr(path: Path, people: dict[int, np.ndarray]) -> None:
+    """People of each frame as Multi-HMR finds them, three metres from each other, now in one order and now in the other."""
+    frames = max(map(len, people.values()))
+    content = [
+        [
+            {
+                "scores": torch.tensor(0.9),
+                "rotvec": torch.from_numpy(np.concatenate((people[p][t], np.zeros((31, 3), np.float32)))),
+                "transl_pelvis": torch.tensor([[1.0, 3.0 * (p - max(people)), 0.0]]),
+                "transl": torch.zeros(3),
+                "shape": torch.zeros(10),
+                "expression": torch.zeros(10),
+                "v3d": torch.zeros(4, 3),
+            }
+            for p in list(people)[:: 1 if t % 2 else -1]
+            if t < len(people[p])
+        ]
+        for t in range(frames)
+    ]
+    torch.save(content, path)
+
+
+def hmr2_pictures(path: Path, people: dict[int, np.ndarray]) -> None:
+    """What 4D-Humans' HMR2 answers to each picture, by its name: arrays with a row a person."""
+    frames = max(map(len, people.values()))
+    content = {}
+    for t in range(frames):
+        here = [p for p in list(people)[:: 1 if t % 2 else -1] if t < len(people[p])]
+        turned = matrices(np.stack([padded(people[p][t : t + 1], 24).reshape(24, 3) for p in here]))
+        content[f"video/{t:06}.jpg"] = {
+            "pred_smpl_params": {
+                "global_orient": turned[:, :1],
+                "body_pose": turned[:, 1:],
+                "betas": np.zeros((len(here), 10), np.float32),
+            },
+            "pred_cam_t": np.array([(1.0, 3.0 * (p - max(people)), 0.0) for p in here]),
+            "pred_keypoints_3d": np.zeros((len(here), 44, 3)),
+        }
+    joblib.dump(content, path)
+
+
+def nlf(path: Path, people: dict[int, np.ndarray]) -> None:
+    """The body's pose of SMPL-X beside that of all joints."""
+    content = {}
+    for person, pose in people.items():
+        row = padded(pose, 55)
+        content[person] = {
+            "pose": row,
+            "betas": np.zeros((len(pose), 10)),
+            "trans": np.ones((len(pose), 3)),
+            "joints3d": np.zeros((len(pose), 127, 3)),
+            "global_orient": row[:, :3],
+            "body_pose": row[:, 3:66],
+        }
+    joblib.dump(content, path)
+
+
+def talkshow_data(path: Path, people: dict[int, np.ndarray]) -> None:
+    ((_, pose),) = people.items()
+    content = {
+        "root_orient": pose[:, 0],
+        "body_pose_axis": pose[:, 1:].reshape(len(pose), 63),
+        "transl": np.ones((len(pose), 3)),
+        "jaw_pose": np.zeros((len(pose), 3)),
+        "left_hand_pose": np.zeros((len(pose), 12)),
+        "expression": np.zeros((len(pose), 100)),
+        "betas": np.zeros(300),
+        "width": 1280,
+    }
+    path.write_bytes(pickle.dumps(content))
+
+
 @dataclass(frozen=True)
 class Writer:
     """A way of writing files, and what is known of them."""
@@ -427,6 +499,10 @@ WRITERS: dict[str, Writer] = {
     "glamr": Writer(glamr, ".pkl", "SMPL parameters of people", "smpl", many=True),
     "cliff": Writer(cliff, ".npz", "CLIFF", "smpl", camera=True, many=True),
     "frame_list": Writer(frame_list, ".pkl", "SMPL parameters, frame by frame", "smpl", camera=True),
+    "multi_hmr": Writer(multi_hmr, ".pt", "SMPL parameters, frame by frame", "smplx", camera=True, many=True),
+    "hmr2_pictures": Writer(hmr2_pictures, ".pkl", "SMPL parameters, frame by frame", "smpl", camera=True, many=True),
+    "nlf": Writer(nlf, ".pkl", "SMPL parameters of people", "smplx", camera=True, many=True),
+    "talkshow_data": Writer(talkshow_data, ".pkl", "SMPL parameters", "smplx"),
     "meshcapade": Writer(meshcapade, ".smpl", "SMPL parameters", "smplx"),
     "mdm": Writer(mdm, ".npy", "MDM's or MoMask's SMPL parameters", "smpl"),
     "egoallo": Writer(egoallo, ".npz", "EgoAllo", "smplh", many=True),

@@ -21,6 +21,12 @@ _FILES = {
     ),
     "C3D": (b"\x02P\0\0\0", "markers"),
     "TRC": (b"PathFileType\t4\t(X/Y/Z)\n", "markers"),
+    "a robot's joints": (
+        b"Frame,root_translateX,root_translateY,left_hip_pitch_joint_dof\n0,0,1,0.5\n",
+        "human motion",
+    ),
+    "robot's joints": (b"time [s],left_knee_joint [rad],right_knee_joint [rad]\n0,0,1\n", "human motion"),
+    "without a header": (b"0.1,-0.2,1e-3," * 12 + b"0.5\n" + b"0,0,0," * 12 + b"0.5\n", "first line"),
     "COLLADA": (b'<?xml version="1.0"?>\n<COLLADA xmlns="x">', "Blender"),
     r"\.asf": (b"# a comment\n:version 1.10\n:name VICON\n", "amc"),
 }

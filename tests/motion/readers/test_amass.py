@@ -7,6 +7,7 @@ import pickle
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -558,3 +559,19 @@ def test_who_lies_longer_than_he_stands_does_not_turn_the_world(
     motion = read_motion(path)
     assert ("z up;" if z_up else "y up;") in motion.source and motion.root_position_T3 is not None
     np.testing.assert_allclose(motion.root_position_T3, position_T3, atol=1e-6)
+
+
+@pytest.mark.parametrize("root, place", [("root_orient", "trans"), ("global_orient", "transl"), ("root_pose", "trans")])
+@pytest.mark.parametrize("key, joints", [("pose_body", 21), ("pose_body", 23), ("body_pose", 23), ("poses", 23)])
+def test_a_root_beside_the_pose_is_read_whatever_it_is_called(
+    key: str, joints: int, root: str, place: str, tmp_path: Path
+) -> None:
+    pose = np.random.default_rng(0).normal(0, 0.2, (6, 3 * joints))
+    arrays: dict[str, Any] = {key: pose, root: np.tile([0.0, 0.5, 0.0], (6, 1)), place: np.ones((6, 3)), "fps": 30}
+    np.savez(tmp_path / "clip.npz", **arrays)
+    motion = read_motion(tmp_path / "clip.npz")
+    assert motion.family == ("smpl" if joints == 23 else "")
+    assert motion.root_position_T3 is not None and bool((motion.root_position_T3 == 1).all())
+    turn_T33 = motion.arrays.root_rotation_T33
+    assert turn_T33 is not None
+    np.testing.assert_allclose(turn_T33[:, 0, 2], np.sin(0.5), atol=1e-5)

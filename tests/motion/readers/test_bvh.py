@@ -217,6 +217,29 @@ def test_a_rounded_frame_time_means_the_round_rate(step: str, rate: float, motio
     assert mrhubo.read_motion(path).frame_rate == rate
 
 
+@pytest.mark.parametrize(
+    ("step", "taken", "given"), [("0.03", 30, 29), ("0.008", 125, 120), ("0.02", 50, 60), ("0.04", 25, 24)]
+)
+def test_a_single_digit_of_the_frame_time_is_doubted(
+    step: str, taken: float, given: float, motion: Motion, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(re.sub("Frame Time: .*", f"Frame Time: {step}", write_bvh(motion, Style())))
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == taken and "--rate says otherwise" in " ".join(found.notes)
+    found = mrhubo.read_motion(path, ReadOptions(rate=given))
+    believed = given != 29  # which no one has
+    assert found.frame_rate == (given if believed else taken)
+    assert ("is believed, and not 29" in " ".join(found.notes)) != believed
+
+
+@pytest.mark.parametrize("height", [0.85, 1.0, 1.2, 1.8, 2.1])
+@pytest.mark.parametrize("unit", [1.0, 0.01, 0.001])
+def test_a_child_is_no_adult_in_inches(height: float, unit: float, motion: Motion, tmp_path: Path) -> None:
+    found = read(motion, Style(unit=unit * 1.7 / height), tmp_path)
+    assert {1.0: " metres,", 0.01: " centimetres,", 0.001: " millimetres,"}[unit] in found.source
+
+
 def test_frame_rate(motion: Motion, tmp_path: Path) -> None:
     odd = dataclasses.replace(motion, frame_rate=239.01)
     assert read(odd, Style(), tmp_path).frame_rate == pytest.approx(239.01, rel=1e-6)

@@ -24,7 +24,19 @@ from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.linking import link
 from tests.files.test_safe_pickle import attacks
 from tests.motion.damage import damaged_by, read_or_refused
-from tests.motion.readers.estimator_files import WRITERS, cliff, made_up, matrices, padded, phalp, pymaf, romp, wham
+from tests.motion.readers.estimator_files import (
+    WRITERS,
+    cliff,
+    hmr2_pictures,
+    made_up,
+    matrices,
+    multi_hmr,
+    padded,
+    phalp,
+    pymaf,
+    romp,
+    wham,
+)
 
 RATE = ReadOptions(rate=30)
 FRAMES = 6
@@ -106,9 +118,11 @@ def test_features_of_humanml3d_tell_where_joints_are(tmp_path: Path) -> None:
         read_motion(tmp_path / "walk.npy")
 
 
-@pytest.mark.parametrize(
-    "name", [name for name, writer in WRITERS.items() if writer.many and name not in ("pymaf", "cliff")]
-)
+FOLLOWED = ("pymaf", "cliff", "multi_hmr", "hmr2_pictures")
+"""Writers that do not say who is who."""
+
+
+@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.many and name not in FOLLOWED])
 def test_who_is_seen_longest_is_taken_and_the_others_by_name(tmp_path: Path, name: str) -> None:
     writer = WRITERS[name]
     lengths = (FRAMES, FRAMES) if name in ("slahmr", "egoallo") else (4, FRAMES)
@@ -230,11 +244,13 @@ def test_phalps_tracks_are_called_by_whole_numbers(tmp_path: Path) -> None:
     assert close(other, people[1234568], "smpl")
 
 
-@pytest.mark.parametrize("write", [pymaf, cliff, lambda path, people: romp(path, people, tracked=False)])
+@pytest.mark.parametrize(
+    "write", [pymaf, cliff, multi_hmr, hmr2_pictures, lambda path, people: romp(path, people, tracked=False)]
+)
 def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
     """They come in turns: in the first frame the second person first."""
     people = {0: made_up(FRAMES, camera=True), 1: made_up(4, seed=1, camera=True)}
-    family = "smplx" if write is pymaf else "smpl"
+    family = "smplx" if write in (pymaf, multi_hmr) else "smpl"
     write(tmp_path / "a", people)
     motion = read_motion(tmp_path / "a", RATE)
     assert close(motion, people[0], family) and "does not say who is who" in motion.notes[0]

@@ -636,3 +636,12 @@ def test_what_ntus_script_makes_of_a_skeleton_file(points: dict[str, np.ndarray]
     assert motion.frame_rate == 30.0 and "'skel_body1'" in motion.source and "Kinect 2" in motion.source
     with pytest.raises(UserError, match="there is no person '3'"):
         mrhubo.read_motion(tmp_path / "a.skeleton.npy", ReadOptions(person="3"))
+
+
+def test_named_points_may_stand_in_rows(points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    rows = array_of(points, tuple(JOINT_NAMES)).reshape(FRAMES, -1)
+    np.savez(tmp_path / "a.npz", joints=rows, fps=30)
+    assert bone_error(mrhubo.read_motion(tmp_path / "a.npz"), pose) < 0.01
+    np.savez(tmp_path / "a.npz", joints=np.random.default_rng(0).normal(size=(FRAMES, 66)), fps=30)
+    with pytest.raises(UserError, match="fit no body"):
+        mrhubo.read_motion(tmp_path / "a.npz")

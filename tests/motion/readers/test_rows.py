@@ -97,3 +97,21 @@ def test_rows_that_may_be_either_are_refused(tmp_path: Path) -> None:
     for rows in (np.zeros((FRAMES, 69)), turned_out):
         with pytest.raises(UserError, match=r"a\.npy: .*may be PHUMA's .* or SMPL's body_pose .*'global_orient'"):
             read(tmp_path / "a.npy", rows)
+
+
+@pytest.mark.parametrize("axes", [(), (1,)])
+def test_talkshows_rows_begin_with_jaw_and_eyes(tmp_path: Path, axes: tuple[int, ...]) -> None:
+    turned = Rotation.from_euler("y", np.linspace(0, 1, FRAMES)[:, None])
+    root = (Rotation.from_euler("x", 180, degrees=True) * turned).as_rotvec()
+    face = np.random.default_rng(0).normal(size=(FRAMES, 100))
+    rows = np.column_stack((np.full((FRAMES, 9), 0.1), root, walk().reshape(FRAMES, 63), np.zeros((FRAMES, 90)), face))
+    np.save(tmp_path / "a.npy", rows.reshape(*axes, *rows.shape))
+    motion = read_motion(tmp_path / "a.npy")
+    assert motion.family == "smplx" and motion.frame_rate == 30 and "TalkSHOW" in motion.notes[0]
+    assert motion.root_rotation_T33 is not None and bool((motion.root_rotation_T33[:, 1, 1] > 0.99).all())
+    np.testing.assert_allclose(motion.arrays.local_TJ33, from_family(matrices(walk()), "smplx"), atol=1e-5)
+
+
+def test_other_rows_as_wide_as_talkshows_are_none(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no human motion"):
+        read(tmp_path / "a.npy", np.random.default_rng(0).normal(size=(FRAMES, 265)))

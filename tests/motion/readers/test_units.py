@@ -42,3 +42,13 @@ def test_a_file_in_centimetres_is_read_in_metres(tmp_path: Path) -> None:
     found = read_motion(tmp_path / "a.npz")
     assert found.notes == ("'trans' is in centimetres, by how fast or how high the root is: told in metres",)
     np.testing.assert_allclose(found.arrays.root_position_T3, way(1.4), atol=1e-6)
+
+
+def test_depths_that_jump_near_a_camera_are_no_units() -> None:
+    generator = np.random.default_rng(0)
+    place_T3 = way(1.0, 0.2) * [0.1, 1.0, 0.1] + [0.0, 0.0, 4.0] + generator.normal(0, 0.5, (60, 3)) * [0, 0, 1]
+    assert find_unit(place_T3, 60.0) is not None and find_unit(place_T3, 60.0, beyond=100.0) is None
+    assert find_unit(1000 * place_T3[:1].repeat(60, 0) + way(1.0), 60.0, beyond=100.0) is None
+    steady_T3 = way(1.0, 0.2) * [0.1, 1.0, 0.1] + [0.0, 0.0, 4.0]
+    assert find_unit(1000 * steady_T3, 60.0, beyond=100.0) == ("millimetres", 0.001)
+    assert find_unit(steady_T3, 60.0, beyond=100.0) is None

@@ -61,3 +61,51 @@ def test_what_a_camera_sees_is_set_upright(key: str, tmp_path: Path) -> None:
     assert motion.arrays.root_rotation_T33 is not None and motion.arrays.root_position_T3 is not None
     assert motion.arrays.root_rotation_T33[:, 1, 1].min() > 0.999
     np.testing.assert_allclose(motion.arrays.root_position_T3, place * [1, -1, -1], atol=1e-6)
+
+
+def on_the_floor(world: str, yaw: float, place: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The up axis (T, 3) of somebody who lies on the back in a world with a floor at height 0, the head to an axis, and
+    joints (T, K, 3): pelvis, shoulders, hands and ankles.
+    """
+    turn = Rotation.from_euler("y", [[yaw]], degrees=True) * Rotation.from_euler("x", -90, degrees=True)
+    body = np.array([(0, 0, 0), (0.2, 0.4, 0), (-0.2, 0.4, 0), (0.4, 0, 0.02), (-0.4, 0, 0.02), (0, -0.9, -0.04)])
+    sway = Rotation.from_euler("z", 3 * np.sin(np.linspace(0, 5, FRAMES))[:, None], degrees=True)
+    whole = turn * sway
+    joints = np.stack([whole.apply(point) for point in body], axis=1) + place
+    return whole.apply([0.0, 1.0, 0.0]) @ TO_Y_UP[world], joints @ TO_Y_UP[world]
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("yaw", [0.0, 90.0, 180.0, 270.0])
+@pytest.mark.parametrize("place", [(1.3, 0.12, -2.3), (-2.0, 0.12, 1.5)])
+def test_who_lies_along_an_axis_that_may_be_up_is_left_lying_where_a_floor_tells(
+    world: str, yaw: float, place: tuple[float, float, float]
+) -> None:
+    up_T3, joints_TK3 = on_the_floor(world, yaw, place)
+    found, turn_33, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == world and "is taken" in said and np.array_equal(turn_33, TO_Y_UP[world])
+
+
+def test_who_may_stand_or_lie_stands_and_is_told_of() -> None:
+    up_T3, joints_TK3 = on_the_floor("y up", 180.0, (1.3, 0.12, 0.9))  # as high as a pelvis is, if z were up
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == "z up" and "with y up it would lie on a floor" in said
+
+
+@pytest.mark.parametrize("world", ANY_WORLD)
+@pytest.mark.parametrize("height", [0.0, 0.9, 3.0, -1.5])
+@pytest.mark.parametrize("depth", [0.0, 0.5, 3.0])
+def test_who_stands_wherever_the_floor_is_is_not_laid_down(world: str, height: float, depth: float) -> None:
+    body = np.array([(0, 0, 0), (0.2, 0.4, 0), (-0.2, 0.4, 0), (0.3, 0, 0.1), (-0.3, 0, 0.1), (0, -0.9, 0)])
+    joints_TK3 = np.tile(body + [0.3, height, depth], (FRAMES, 1, 1)) @ TO_Y_UP[world]
+    up_T3 = np.tile([0.0, 1.0, 0.0] @ TO_Y_UP[world], (FRAMES, 1))
+    assert find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)[0] == world
+
+
+@pytest.mark.parametrize("low", [-0.4, -0.1, 0.0, 0.3])
+def test_who_stands_on_a_floor_that_is_off_as_recordings_have_it_stands(low: float) -> None:
+    body = np.array([(0, 0, 0), (0.2, 0.4, 0), (-0.2, 0.4, 0), (0.3, 0, 0.1), (-0.3, 0, 0.1), (0, -0.9, -0.1)])
+    joints_TK3 = np.tile(body + [0.3, 0.9 + low, 0.17], (FRAMES, 1, 1))
+    up_T3 = np.tile([0.0, 1.0, 0.0], (FRAMES, 1))
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == "y up" and "with z up it would lie on a floor" in said

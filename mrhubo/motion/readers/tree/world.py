@@ -27,6 +27,9 @@ _LEG = 0.84
 """Thigh and shin of an adult [m]: 0.49 of 1.72 m (Winter, as in `mrhubo.motion.readers.tree.limbs`)."""
 _FACTOR = 1.7
 """How far from it a leg may be in a unit that is believed: legs of 0.5 to 1.4 m."""
+_METRIC, _CHILD = ("metres", "centimetres", "millimetres"), 0.4
+"""Units in which a leg may be a child's too [m], of somebody of 0.8 m: as many inches, 40, are an adult's legs of 1 m,
+whom only who is taller than two metres has."""
 _CLEAR = 0.7
 """Share of a mean upward vector along one axis, from which on the axis is up."""
 _STEADY = 0.5
@@ -134,8 +137,13 @@ def unit_of(pose: Pose, place: Mapping[str, int], given: float | None) -> tuple[
 
 
 def nearest_unit(leg: float) -> tuple[float, str]:
-    """The unit in which a leg (thigh and shin) of this length is most like an adult's: metres and name."""
+    """The unit in which a leg (thigh and shin) of this length is a person's, or else most like an adult's: metres and
+    name.
+    """
     leg = max(leg, 1e-9) if np.isfinite(leg) else 1e-9
+    for name in _METRIC:
+        if _CHILD <= leg * UNITS[name] <= _FACTOR * _LEG:
+            return UNITS[name], name
     name, unit = min(UNITS.items(), key=lambda entry: abs(np.log(leg * entry[1] / _LEG)))
     if abs(np.log(leg * unit / _LEG)) <= np.log(_FACTOR):
         return unit, name

@@ -1,0 +1,72 @@
+"""Lists of frames, or dictionaries of them by the names of pictures, each with SMPL parameters of whoever is seen.
+
+So they come from who calls an estimator on each picture of a video and keeps what it answers: Multi-HMR's people,
+4D-Humans' HMR2, NLF. Who is in a frame is read by `mrhubo.motion.readers.frame_bodies`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+
+from mrhubo.files.tree import Tree
+from mrhubo.motion.readers.body_tracks import body_tracks
+from mrhubo.motion.readers.frame_bodies import Body, bodies_in
+from mrhubo.motion.readers.frame_numbers import in_order
+from mrhubo.motion.readers.tracks import Kind, Layout
+from mrhubo.motion.readers.world import CAMERAS
+
+_FEWEST, _NUMBERED = 2, 20
+"""Frames of a list, and of a dictionary whose keys are numbers, which may be those of people."""
+_MOST_PEOPLE = 20
+"""Along an axis of an array of one frame; more are frames."""
+_PICTURE = re.compile(r".*\.(?:jpe?g|png|bmp|webp|tiff?)|.*frame.*[0-9].*", re.IGNORECASE)
+
+
+def read_frame_list(tree: Tree) -> Layout | None:
+    """A list of frames, each a dictionary with SMPL parameters, perhaps in one deeper, or a list of such. What sees
+    nobody is `None`, or empty.
+    """
+    return _layout(tree, enumerate(tree), len(tree)) if tree.is_list and len(tree) >= _FEWEST else None
+
+
+def read_pictures(tree: Tree) -> Layout | None:
+    """The same in a dictionary by the names of pictures."""
+    return _named(tree) if tree.is_mapping and all(map(_PICTURE.fullmatch, tree.keys)) else None
+
+
+def read_numbered(tree: Tree) -> Layout | None:
+    """The same in a dictionary by numbers."""
+    numbered = tree.is_mapping and len(tree) > _NUMBERED and all(map(str.isdecimal, tree.keys))
+    return _named(tree) if numbered else None
+
+
+def _named(tree: Tree) -> Layout | None:
+    entries = list(tree.items())
+    if len(entries) < _FEWEST or not any(_here(frame, len(entries)) for _, frame in entries[:_NUMBERED]):
+        return None
+    return _layout(tree, in_order(tree.path, entries), len(entries))
+
+
+def _layout(tree: Tree, frames: Iterable[tuple[int, Tree]], count: int) -> Layout | None:
+    seen: list[tuple[int, Body]] = []
+    for number, frame in frames:
+        here = _here(frame, count)
+        if here is None and seen:
+            return None
+        seen += [(number, body) for body in here or ()]
+    if len({number for number, _ in seen}) < _FEWEST:
+        return None
+    # single frames with SMPL-X's 21 joints and no more are of estimators of SMPL-X
+    seen = [(number, replace(body, source="", family=body.family or "smplx")) for number, body in seen]
+    notes: list[str] = []
+    tracks = body_tracks(tree.path, seen, notes)
+    return Layout(Kind("SMPL parameters, frame by frame", seen[0][1].family, CAMERAS), tracks, tuple(notes))
+
+
+def _here(frame: Tree, count: int) -> list[Body] | None:
+    """Who is in one of some frames: nobody where it is empty; None where it is no frame."""
+    if frame.is_none or ((frame.is_list or frame.is_mapping) and not len(frame)):
+        return []
+    return bodies_in(frame, most_rows=min(_MOST_PEOPLE, count - 1))
