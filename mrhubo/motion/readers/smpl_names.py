@@ -43,7 +43,7 @@ class _Names:
 
     pose: str
     root: tuple[str, ...] = ()
-    """None: it is in the pose, or else called as usual."""
+    """Empty: it is in the pose, or else called as usual."""
     position: tuple[str, ...] = _PLACES
     betas: tuple[str, ...] = ("betas", "beta", "shape")
 
