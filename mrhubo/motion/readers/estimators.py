@@ -10,6 +10,7 @@ import numpy as np
 from mrhubo.files.packed import is_packed
 from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.bare_poses import read_bare_poses
 from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.frame_bodies import refuse_frame
@@ -63,6 +64,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
 
     found = (
         read_rows(tree, options)
+        or read_bare_poses(tree, options)
         or read_features(tree, options)
         or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)

@@ -17,7 +17,7 @@ from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoint_files import holds_points, read_keypoints_file
-from mrhubo.motion.readers.keypoint_sets import SETS, by_names, fitting_sets
+from mrhubo.motion.readers.keypoint_sets import NONSENSE, SETS, by_names, fitting_sets
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
@@ -26,9 +26,6 @@ from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest
 from mrhubo.motion.trunks import trunk_turns
 
 _SAMPLES = 256
-_NONSENSE = 0.2
-"""From this misfit on points are no body in the order of a set: errors of 6 cm a point give 0.14, and a body's points
-in an order that is another's 0.2 or more, but for one order in thirty."""
 _CLEARLY = 2.0
 """A set fits clearly better than another if its misfit is so many times smaller."""
 _LARGEST = 1e7
@@ -59,7 +56,7 @@ def is_keypoints(content: Content) -> bool:
     except UserError:
         return False
     fits = fitting_sets(_some(points.point_TK3))
-    return bool(fits) and fits[0][0] < _NONSENSE
+    return bool(fits) and fits[0][0] < NONSENSE
 
 
 def read_keypoints(path: Path, options: ReadOptions) -> Motion:
@@ -110,7 +107,7 @@ def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
     if found.names is not None:
         return by_names(found.names), "by their names"
     fits = fitting_sets(_some(known_points(found.point_TK3, found.confidence_TK)))
-    if not fits or fits[0][0] >= _NONSENSE:
+    if not fits or fits[0][0] >= NONSENSE:
         known = ", ".join(f"{name} ({len(points)})" for name, points in SETS.items())
         raise NoMotion(
             f"{path}: its {count} points have no names and fit no body in the order of a set that is known ({known}); "
@@ -127,7 +124,7 @@ def _which(path: Path, found: Keypoints) -> tuple[dict[str, int], str]:
 
 def fits_a_body(point_TK3: np.ndarray, name: str) -> bool:
     """Whether points in the order of a set keep the lengths of bones and have a body's proportions."""
-    return any(found == name and bad < _NONSENSE for bad, found in fitting_sets(_some(point_TK3)))
+    return any(found == name and bad < NONSENSE for bad, found in fitting_sets(_some(point_TK3)))
 
 
 def _refuse_flat(path: Path, found: Keypoints) -> None:

@@ -26,12 +26,12 @@ _PHUMA = (69, 73, 79)
 """Without more, with how much each foot touches the ground, with the body's shape."""
 _CONTACTS = 73
 _BODY, _WITH_HANDS = Form(21, False), Form(23, False)
-_STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
+STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
 """Joints of spine, neck, collars and head, which turn less than those of limbs."""
 _CLEARLY = 1.8
 """How much more the stiff joints turn as PHUMA's than as those of `body_pose`, at most in PHUMA's rows. Of 464 clips of
 CMU's written as PHUMA's, 99 in 100 have up to 1.2; of the same as `body_pose`, 99 in 100 have 2.1 or more."""
-_STIFF_TURN = 0.8
+STIFF_TURN = 0.8
 """How much [rad] the stiff joints turn at most, on the mean: of numbers drawn by chance, 1.6."""
 _NEARLY_STILL = 0.02
 """Turns [rad] that say nothing."""
@@ -69,7 +69,7 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
             notes.append(f"{rate:g} frames a second, as Motion-X says of all its motions; --rate says otherwise")
         return motion_of(tree.path, arrays, Kind("Motion-X rows (T, 322)", "smplx", ANY_WORLD), rate, notes)
     if shape[1] == _TALKSHOW:
-        if not _turn(rows_TX[:, 12:75].astype(np.float64)) < _STIFF_TURN:  # any features may have as many numbers
+        if not _turn(rows_TX[:, 12:75].astype(np.float64)) < STIFF_TURN:  # any features may have as many numbers
             return None
         arrays = SmplArrays("rows", rows_TX[:, 12:75], _BODY, 0, rows_TX[:, 9:12])
         rate = _TALKSHOW_RATE if options.rate is None else float(options.rate)
@@ -113,7 +113,7 @@ def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:
 def _turn(body_TX: np.ndarray) -> float:
     """How much the joints that are stiff turn [rad], on the mean, in rows (T, 63) of the body's 21 joints."""
     joint_TJ3 = body_TX.reshape(len(body_TX), -1, 3)
-    return float(np.linalg.norm(joint_TJ3[:, _STIFF], axis=-1).mean())
+    return float(np.linalg.norm(joint_TJ3[:, STIFF], axis=-1).mean())
 
 
 def _stands(place_T3: np.ndarray, root_T3: np.ndarray) -> bool:
