@@ -57,12 +57,12 @@ def smooth_detours(
     found = find_detours(third_YD3, weight_YD, goal_YD3, directions_DC, frame_rate)
     if found is None:
         return q_TN, smoothness
-    factor_YC, free_T = torch.from_numpy(found.factor_YC).to(q_TN), torch.from_numpy(found.free_T).to(fixed_T)
+    factor_YC = torch.from_numpy(found.factor_YC).to(q_TN)
+    free_T, blocks_C = (torch.from_numpy(mask).to(fixed_T) for mask in (found.free_T, found.blocks_C))
     firmer = replace(
         smoothness,
         jerk_YN=smoothness.jerk_YN * factor_YC[:, blocks.block_N],
         directions=replace(jerk, weight_YD=jerk.weight_YD * (factor_YC @ blocks.directions_DC.T)),
     )
-    blocks_C = torch.from_numpy(found.blocks_C).to(fixed_T)
-    bound = (step_N, blocks_C)
-    return refine_around(problem, q_TN, target_TD3, firmer, free_T & ~fixed_T, SWEEPS, TOLERANCE, *bound), firmer
+    frames = (free_T & ~fixed_T, SWEEPS, TOLERANCE)
+    return refine_around(problem, q_TN, target_TD3, firmer, *frames, step_N, blocks_C), firmer

@@ -90,8 +90,5 @@ def smooth_detours(
         jerk_YN=smoothness.jerk_YN * found.factor_YC[:, cost.block_N],
         directions=replace(jerk, weight_YD=jerk.weight_YD * (found.factor_YC @ cost.directions_DC.T)),
     )
-    free_T = found.free_T & ~fixed_T
-    smooth_TN = refine_around(
-        problem, q_TN, target_TD3, firmer, free_T, SWEEPS, TOLERANCE, step_N, found.blocks_C
-    )  # fmt: skip
-    return smooth_TN, firmer
+    frames = (found.free_T & ~fixed_T, SWEEPS, TOLERANCE)
+    return refine_around(problem, q_TN, target_TD3, firmer, *frames, step_N, found.blocks_C), firmer

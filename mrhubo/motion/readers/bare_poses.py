@@ -15,7 +15,7 @@ from mrhubo.motion.readers.keypoint_sets import NONSENSE, fitting_sets
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate
 from mrhubo.motion.readers.rotations import Form, are_crooked, find_form
-from mrhubo.motion.readers.rows import STIFF, STIFF_TURN
+from mrhubo.motion.readers.rows import STIFF_TURN, stiff_turn
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, motion_of
 from mrhubo.motion.readers.world import ANY_WORLD
 
@@ -66,7 +66,7 @@ def _are_rotations(rows_TX: np.ndarray, form: Form, flat: bool) -> bool:
     body_TJ3 = value_TKX[:, 1:22]
     if not body_TJ3.any():  # nothing but 0 may be anything
         return False
-    if not np.linalg.norm(body_TJ3[:, STIFF], axis=-1).mean() < STIFF_TURN:  # nor where something is not finite
+    if not stiff_turn(body_TJ3) < STIFF_TURN:  # nor where something is not finite
         return False
     misfits = [misfit for misfit, _ in fitting_sets(value_TKX)]
     if min(misfits, default=np.inf) < NONSENSE:

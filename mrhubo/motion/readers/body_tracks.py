@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.motion.readers.frame_bodies import WITH_ROOT, Body
+from mrhubo.motion.readers.frame_bodies import Body
 from mrhubo.motion.readers.linking import LINKED, link_in
+from mrhubo.motion.readers.rotations import WITH_ROOT
 from mrhubo.motion.readers.tracks import SmplArrays, Track
 
 _METRES, _BOXES = 1.0, 0.5

@@ -31,12 +31,10 @@ from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.family import family_of
-from mrhubo.motion.readers.rotations import Form, find_form
+from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_form
 from mrhubo.motion.readers.sightings import person_called
 
-WITH_ROOT = (22, 24, 52, 53, 55)
-"""How many joints a pose has that begins with the root: body, SMPL, SMPL-H, Multi-HMR's of SMPL-X, SMPL-X."""
-_COUNTS = (21, 23, *WITH_ROOT)
+_COUNTS = WITHOUT_ROOT + WITH_ROOT
 _POSES = (
     "pred_rotmat", "pred_body_pose", "rotvec", "body_pose", "pose_body", "smpl_pose", "pose", "poses", "thetas",
 )  # fmt: skip

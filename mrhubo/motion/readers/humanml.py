@@ -20,6 +20,7 @@ from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.keypoints import fits_a_body, motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import rate_of_all
 
 _WIDTH = 263
 _PLACES = slice(4, 67)
@@ -44,10 +45,7 @@ def read_features(tree: Tree, options: ReadOptions) -> Motion | None:
             " are normalised, multiply them by its Std.npy and add its Mean.npy"
         )
     notes = options.of_one()
-    rate = options.rate
-    if rate is None:
-        rate = _RATE
-        notes.append(f"{rate:g} frames a second, as HumanML3D says of all its motions; --rate says otherwise")
+    rate = rate_of_all(_RATE, "HumanML3D says of all its motions", options, notes)
     found = Keypoints(point_TJ3, list(SETS[_SET]), None, rate, f"of HumanML3D's features (T, {_WIDTH})", notes)
     return motion_of_points(tree.path, found, options)
 

@@ -20,7 +20,7 @@ from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import rate_in
+from mrhubo.motion.readers.rate import rate_in, rate_of_all
 from mrhubo.motion.readers.tracks import Person, choose
 
 POINT_KEYS = (
@@ -220,10 +220,7 @@ def _kinect_bodies(tree: Tree, options: ReadOptions) -> Keypoints | None:
 
 def kinect_rate(options: ReadOptions, notes: list[str]) -> float:
     """The frame rate of one of NTU RGB+D's motions, of which files do not tell; the notes say where it is from."""
-    if options.rate is not None:
-        return options.rate
-    notes.append(f"{_KINECT_RATE:g} frames a second, as NTU RGB+D says of all; --rate says otherwise")
-    return _KINECT_RATE
+    return rate_of_all(_KINECT_RATE, "NTU RGB+D says of all", options, notes)
 
 
 def _split(path: Path, array: np.ndarray, where: str) -> tuple[np.ndarray, np.ndarray | None]:

@@ -192,9 +192,9 @@ def misfit(points: Mapping[str, np.ndarray]) -> float:
 
 def _is_short(points: Mapping[str, np.ndarray]) -> bool:
     """Whether the head is too near to `spine1`, in the middle of the frames in which both are seen."""
-    way_FK = np.linalg.norm(np.stack([*points.values()], axis=1) - points["spine1"][:, None], axis=-1)
-    way_FK = way_FK[np.isfinite(way_FK[:, [*points].index("head")])]
-    if not len(way_FK):
+    head_F = np.linalg.norm(points["head"] - points["spine1"], axis=-1)
+    seen_F = np.isfinite(head_F)
+    if not seen_F.any():
         return False
-    head = float(np.median(way_FK[:, [*points].index("head")]))
-    return head < _HEAD_AWAY * float(np.median(np.nanmax(way_FK, axis=1)))
+    way_FK = np.linalg.norm(np.stack([*points.values()], axis=1) - points["spine1"][:, None], axis=-1)[seen_F]
+    return float(np.median(head_F[seen_F])) < _HEAD_AWAY * float(np.median(np.nanmax(way_FK, axis=1)))

@@ -36,6 +36,16 @@ def find_rate(path: Path, nodes: Iterable[Tree], options: ReadOptions, notes: li
     return rate
 
 
+def rate_of_all(rate: float, who: str, options: ReadOptions, notes: list[str]) -> float:
+    """Frames per second of files that do not tell, whose makers say that all theirs have so many: that, with a note of
+    `who` says so, or what the options tell.
+    """
+    if options.rate is not None:
+        return float(options.rate)
+    notes.append(f"{rate:g} frames a second, as {who}; --rate says otherwise")
+    return rate
+
+
 def rate_in(node: Tree, notes: list[str]) -> tuple[str, float] | None:
     """The key of a dictionary that tells a rate, and what it tells; None where none does, and a note of each that
     leaves it open.

@@ -18,6 +18,9 @@ from mrhubo.motion.checks import MAX_TURN, Turns
 
 JOINTS = 21
 """SMPL's joints 1..21."""
+WITH_ROOT, WITHOUT_ROOT = (22, 24, 52, 53, 55), (21, 23)
+"""How many joints a pose has: of body, SMPL, SMPL-H, SMPL-X without eyes, and SMPL-X; and of SMPL-X's or SMPL's body
+without the root."""
 
 
 @dataclass(frozen=True)

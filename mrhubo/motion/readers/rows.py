@@ -13,7 +13,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import MAX_ROOT_TURN
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import asked_rate
+from mrhubo.motion.readers.rate import asked_rate, rate_of_all
 from mrhubo.motion.readers.rotations import Form, to_matrices
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, motion_of
 from mrhubo.motion.readers.world import ANY_WORLD, find_up
@@ -26,7 +26,7 @@ _PHUMA = (69, 73, 79)
 """Without more, with how much each foot touches the ground, with the body's shape."""
 _CONTACTS = 73
 _BODY, _WITH_HANDS = Form(21, False), Form(23, False)
-STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
+_STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
 """Joints of spine, neck, collars and head, which turn less than those of limbs."""
 _CLEARLY = 1.8
 """How much more the stiff joints turn as PHUMA's than as those of `body_pose`, at most in PHUMA's rows. Of 464 clips of
@@ -64,17 +64,13 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     rows_TX, notes = tree.array().reshape(shape), options.of_one()
     if shape[1] == _MOTION_X:
         arrays = SmplArrays("rows", rows_TX[:, 3:66], _BODY, 0, rows_TX[:, :3], rows_TX[:, 309:312], rows_TX[:, 312:])
-        rate = _MOTION_X_RATE if options.rate is None else float(options.rate)
-        if options.rate is None:
-            notes.append(f"{rate:g} frames a second, as Motion-X says of all its motions; --rate says otherwise")
+        rate = rate_of_all(_MOTION_X_RATE, "Motion-X says of all its motions", options, notes)
         return motion_of(tree.path, arrays, Kind("Motion-X rows (T, 322)", "smplx", ANY_WORLD), rate, notes)
     if shape[1] == _TALKSHOW:
-        if not _turn(rows_TX[:, 12:75].astype(np.float64)) < STIFF_TURN:  # any features may have as many numbers
+        if not stiff_turn(rows_TX[:, 12:75].astype(np.float64)) < STIFF_TURN:  # any features may have as many numbers
             return None
         arrays = SmplArrays("rows", rows_TX[:, 12:75], _BODY, 0, rows_TX[:, 9:12])
-        rate = _TALKSHOW_RATE if options.rate is None else float(options.rate)
-        if options.rate is None:
-            notes.append(f"{rate:g} frames a second, as TalkSHOW's motions have; --rate says otherwise")
+        rate = rate_of_all(_TALKSHOW_RATE, "TalkSHOW's motions have", options, notes)
         return motion_of(tree.path, arrays, Kind("TalkSHOW's rows (T, 265)", "smplx", ANY_WORLD), rate, notes)
     betas = rows_TX[:, 69:] if shape[1] == max(_PHUMA) else None
     if shape[1] == _CONTACTS or _is_phuma(tree, rows_TX):
@@ -97,7 +93,7 @@ def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:
         UserError: they may be either.
     """
     row_TX = rows_TX[:, :69].astype(np.float64)
-    more = (_turn(row_TX[:, 6:]) + _NEARLY_STILL) / (_turn(row_TX[:, :63]) + _NEARLY_STILL)
+    more = (stiff_turn(row_TX[:, 6:]) + _NEARLY_STILL) / (stiff_turn(row_TX[:, :63]) + _NEARLY_STILL)
     stands = _stands(row_TX[:, :3], row_TX[:, 3:6])
     if not np.isfinite(more) or more < (_CLEARLY if stands else 1.0):  # who reads them says what is not finite
         return True
@@ -110,10 +106,10 @@ def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:
     )
 
 
-def _turn(body_TX: np.ndarray) -> float:
+def stiff_turn(body_TX: np.ndarray) -> float:
     """How much the joints that are stiff turn [rad], on the mean, in rows (T, 63) of the body's 21 joints."""
     joint_TJ3 = body_TX.reshape(len(body_TX), -1, 3)
-    return float(np.linalg.norm(joint_TJ3[:, STIFF], axis=-1).mean())
+    return float(np.linalg.norm(joint_TJ3[:, _STIFF], axis=-1).mean())
 
 
 def _stands(place_T3: np.ndarray, root_T3: np.ndarray) -> bool:

@@ -20,13 +20,10 @@ from typing import TypeVar
 import numpy as np
 
 from mrhubo.files.tree import Tree
-from mrhubo.motion.readers.rotations import Form, find_form
+from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_form
 from mrhubo.motion.readers.tracks import SmplArrays, Track
 
 T = TypeVar("T")
-_WITH_ROOT, _WITHOUT = (22, 24, 52, 53, 55), (21, 23)
-"""How many joints a pose has: of body, SMPL, SMPL-H, SMPL-X without eyes, and SMPL-X; and of SMPL-X's or SMPL's body
-without the root."""
 _ROOTS = ("global_orient", "root_orient", "root_pose")
 _PLACES = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
@@ -98,7 +95,7 @@ class Found:
         node, names = self.node, self.names
         pose = node[names.pose]
         array = pose.array() if person is None else pose.array().take(person, 0 if self.people_first else 1)
-        first = 1 if self.form.joints in _WITH_ROOT else 0
+        first = 1 if self.form.joints in WITH_ROOT else 0
         roots = names.root or (() if first else _ROOTS)
         root, position, betas = (self._array(keys, person) for keys in (roots, names.position, names.betas))
         frames = self._array(_FRAMES, person)
@@ -142,7 +139,7 @@ def find_here(node: Tree) -> Found | None:
         shape = node[names.pose].shape() if names.pose in keys else None
         if shape is None or len(shape) < 2:
             continue
-        counts = _WITH_ROOT + _WITHOUT
+        counts = WITH_ROOT + WITHOUT_ROOT
         form = find_form(shape, counts)
         if form is not None:
             return Found(node, names, form, shape[0], None)
@@ -157,7 +154,7 @@ def forms_in(node: Tree) -> Iterator[Form]:
     """The forms of all that a dictionary calls a pose."""
     for names in _NAMES:
         shape = node[names.pose].shape() if names.pose in node.keys else None
-        form = None if shape is None or len(shape) < 2 else find_form(shape, _WITH_ROOT + _WITHOUT)
+        form = None if shape is None or len(shape) < 2 else find_form(shape, WITH_ROOT + WITHOUT_ROOT)
         if form is not None:
             yield form
 

@@ -96,23 +96,20 @@ def find_world(
     upright = float((body_up_T3 @ turn_33[1]).mean())
     if len(worlds) == 1:
         return up, turn_33, ""
+    placed = [] if joints_TK3 is None else [joints_TK3 + np.array(origin, joints_TK3.dtype) for origin in origins]
     lying = [
         world
         for world in worlds
         if world in WORLDS
-        and joints_TK3 is not None
         and abs(float((body_up_T3 @ turns[world][1]).mean())) < _FLAT
-        and any(_lies(joints_TK3 + np.array(origin, joints_TK3.dtype), turns[world]) for origin in origins)
+        and any(_lies(near_TK3, turns[world]) for near_TK3 in placed)
     ]
     if upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
-        if len(lying) != 1 or joints_TK3 is None or upright <= _UPRIGHT:
+        if len(lying) != 1 or upright <= _UPRIGHT:
             return up, turn_33, ""
-        if any(_has_floor(joints_TK3 + np.array(origin, joints_TK3.dtype), turn_33) for origin in origins):
-            return (
-                up,
-                turn_33,
-                f"the body stands with {up}, which is taken; with {lying[0]} it would lie on a floor at height 0",
-            )
+        if any(_has_floor(near_TK3, turn_33) for near_TK3 in placed):
+            said = f"the body stands with {up}, which is taken; with {lying[0]} it would lie on a floor at height 0"
+            return up, turn_33, said
         said = f"the body would stand on no floor with {up}, and lies on one with {lying[0]}, which is taken"
         return lying[0], turns[lying[0]], said
     said = "the body is not upright on the mean, as of somebody who lies or crawls"
