@@ -100,8 +100,10 @@ class Engine(Protocol):
         """
         ...
 
-    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
-        """Joint angles (B, N) [rad] after steps away from self-collision, float64."""
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray, staying: bool = False) -> np.ndarray:
+        """Joint angles (B, N) [rad] after steps away from self-collision, float64; as near to the human's directions
+        as can be, or, if `staying`, to their own.
+        """
         ...
 
     def follow(

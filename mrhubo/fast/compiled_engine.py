@@ -131,10 +131,10 @@ class CompiledEngine:
         self._retarget(polish, avoid, False, q_BN, target_BD3, self._no_shake, found)
         return q_BN
 
-    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray, staying: bool = False) -> np.ndarray:
         """As `Engine.avoid`."""
         q_BN, own = q_BN.copy(), self._asked_by(target_BD3)
-        in_parts(len(q_BN), lambda rows: self._kernels.avoid(own, target_BD3[rows], q_BN[rows]))
+        in_parts(len(q_BN), lambda rows: self._kernels.avoid(own, target_BD3[rows], q_BN[rows], staying))
         return q_BN
 
     def follow(

@@ -73,9 +73,9 @@ class NumpyEngine:
         found_BN = steps.polish(self.description, q_BN.astype(np.float64), target_BD3, polish)
         return (self._avoidance(found_BN, target_BD3) if avoid else found_BN).astype(np.float32)
 
-    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+    def avoid(self, q_BN: np.ndarray, target_BD3: np.ndarray, staying: bool = False) -> np.ndarray:
         """As `Engine.avoid`."""
-        return self._avoidance(q_BN, target_BD3)
+        return self._avoidance(q_BN, target_BD3, staying)
 
     def follow(
         self, q_BN: np.ndarray, target_BD3: np.ndarray, pull_B: np.ndarray, lower_BN: np.ndarray, upper_BN: np.ndarray

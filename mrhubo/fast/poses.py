@@ -158,3 +158,9 @@ def _of_axis_angle(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     angle = norm(vector)
     _refuse_first(~(angle <= _MOST_TURN), array, "no axis-angle in radians (degrees?)", shape)
     return axis_angle_to_matrix(vector)
+
+
+def has_gaps(given: np.ndarray) -> bool:
+    """Whether an array of numbers holds some that float32 cannot."""
+    with np.errstate(over="ignore"):
+        return given.dtype.kind == "f" and not bool(np.isfinite(given.astype(np.float32)).all())

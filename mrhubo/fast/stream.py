@@ -19,12 +19,13 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.fast.answers import Ground
 from mrhubo.fast.pelvis import Pelvises
-from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, one_euro, room
+from mrhubo.fast.plain.crossing import Crossing
+from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, follow_goal, one_euro, room
 from mrhubo.fast.plain.ground import Base, Seen, Stance
 from mrhubo.fast.plain.human import orthonormal_columns
 from mrhubo.fast.plain.judging import quaternions
 from mrhubo.fast.plain.root_turn import root_turn
-from mrhubo.fast.poses import check_frame_rate, is_motion, read_poses, refuse, to_array
+from mrhubo.fast.poses import check_frame_rate, has_gaps, is_motion, read_poses, refuse, to_array
 from mrhubo.fast.retargeter import POLISH, FastRetargeter
 from mrhubo.fast.roots import Ways, read_root
 from mrhubo.fast.stream_clock import StreamClock
@@ -89,7 +90,7 @@ class FastStream:
         """None: nobody has been seen."""
         stand_at_N = stand_N.astype(np.float64)
         self._followed = Followed(stand_at_N, np.zeros(cost.joints_NC.shape[1]), stand_at_N)
-        self._joints = Joints(stand_N, np.zeros(len(stand_N)))
+        self._joints, self._crossing = Joints(stand_N, np.zeros(len(stand_N))), Crossing.none(len(stand_N))
         self._ground: Ground | None = None
         """None: no root has come with a pose, or the robot has no feet."""
         self._base: Base | None = None
@@ -194,18 +195,20 @@ class FastStream:
     ) -> None:
         """Filter, two answers, limits, for a frame some time [s] after the last one."""
         self._unseen += passed
-        velocity_N = np.zeros(len(self._joints.q_N))
+        velocity_N, begun_N = np.zeros(len(self._joints.q_N)), np.zeros(len(self._joints.q_N), bool)
         if seen:
             aim_D3, wanted_X3 = self._look(target_D3, person)
             if math.isinf(self._unseen):
                 self._begin(local_1J33, aim_D3, wanted_X3)
             else:
-                velocity_N = self._follow(local_1J33, aim_D3, wanted_X3)
+                velocity_N, begun_N = self._follow(local_1J33, aim_D3, wanted_X3)
             self._unseen = 0.0
         elif self._ground is not None:
             self._ground.pass_by()
         step = min(passed, self._longest_step)
-        self._joints = self._limits.follow(self._joints, self._followed.goal_N, velocity_N, step)
+        last, goal = (self._joints, self._crossing), (self._followed.goal_N, velocity_N)
+        found = follow_goal(self._limits, self._cost, self.settings, last, goal, begun_N, step)
+        self._joints, self._crossing = found
         self._placed = True
         if self._ground is not None:
             self._base = self._ground.stand(self._joints.q_N)
@@ -244,19 +247,22 @@ class FastStream:
 
     def _free(self, q_N: np.ndarray, wanted_X3: np.ndarray) -> np.ndarray:
         """Joint angles (N,) [rad] after steps away from self-collision, if the settings ask for them."""
-        return self._engine.avoid(q_N[None], wanted_X3[None])[0] if self.settings.avoid_collisions else q_N
+        return self._engine.avoid(q_N[None], wanted_X3[None], True)[0] if self.settings.avoid_collisions else q_N
 
-    def _follow(self, local_1J33: np.ndarray, aim_D3: np.ndarray, wanted_X3: np.ndarray) -> np.ndarray:
-        """Follows both answers; how fast the goal moves (N,) [rad/s]: 0 where another answer is taken up."""
+    def _follow(
+        self, local_1J33: np.ndarray, aim_D3: np.ndarray, wanted_X3: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Follows both answers; how fast the goal moves (N,) [rad/s], and which joints begin to cross over (N,)."""
         cost, settings, since = self._cost, self.settings, min(self._unseen, self._longest_step)
         network_1N = self._engine.network(local_1J33, aim_D3[None])
         start_2N = np.concatenate((self._followed.kept_N[None], network_1N))
         limits = room(cost, settings, self._followed.kept_N, since)
         both_2N, cost_2C = self._engine.follow(start_2N, np.stack((wanted_X3, wanted_X3)), *limits)
-        kept_N, worse_C, left_N = cross_over(cost, settings, self._followed, both_2N, cost_2C, wanted_X3, since)
+        found = cross_over(cost, settings, self._followed, both_2N, cost_2C, wanted_X3, since)
+        kept_N, worse_C, left_N, begun_N = found
         goal_N, last_N = self._free(kept_N, wanted_X3), self._followed.goal_N
         self._followed = Followed(kept_N, worse_C, goal_N)
-        return np.where(left_N, 0.0, (goal_N - last_N) / since)
+        return np.where(left_N, 0.0, (goal_N - last_N) / since), begun_N
 
     def _read(self, pose: Any) -> tuple[np.ndarray, bool]:
         """A pose (1, 21, 3, 3), the last one where nobody is seen, and whether somebody is."""
@@ -269,7 +275,7 @@ class FastStream:
                 f"stream: expected a pose, found a motion of {poses.shape[0]} frames; give its frames one by one"
             )
         given = to_array(pose)[None]
-        seen = not _has_gaps(given)
+        seen = not has_gaps(given)
         poses = read_poses(given if seen else given[:0], None, own_rest)
         if len(poses.shape) != 1:
             raise UserError(
@@ -290,9 +296,3 @@ class FastStream:
         if not ((q_N >= cost.lower_N) & (q_N <= cost.upper_N)).all():  # nor NaN
             raise UserError("stream: q lies outside the joints' limits")
         return q_N
-
-
-def _has_gaps(given: np.ndarray) -> bool:
-    """Whether an array of numbers holds some that float32 cannot."""
-    with np.errstate(over="ignore"):
-        return given.dtype.kind == "f" and not bool(np.isfinite(given.astype(np.float32)).all())

@@ -37,6 +37,9 @@ class StreamSettings:
     ramp_time: float = 0.02
     """Time [s] from rest to a joint's full speed, which limits its acceleration; 0: no such limit. URDFs give none;
     a robot's maker may. Who starts or turns suddenly is followed half of this time later, at least."""
+    crossing_time: float = 0.1
+    """The same [s] of an arm that crosses over to another answer; no longer than `ramp_time`: it does so as hard as it
+    may."""
     avoid_collisions: bool = True
     """Whether answers in which the robot would touch itself give way (`mrhubo.reference.avoidance`), before the limits
     of speed and acceleration."""

@@ -50,18 +50,30 @@ class Avoidance(nn.Module):
         found_B = torch.zeros(len(q_BN), dtype=torch.bool, device=q_BN.device)
         return found_B.index_fill(0, near.row_X[self.contact.lack(near) > 0], True)
 
-    def forward(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
+    def forward(self, q_BN: Tensor, target_BD3: Tensor, staying: bool = False) -> Tensor:
         """Joint angles (B, N) [rad], inside the limits, of which as few as possible touch.
 
         Args:
             q_BN: where to begin [rad], inside the limits.
             target_BD3: the human's directions.
+            staying: those that touch keep to their own directions, and not to the human's: who goes from one frame to
+                the next knows where the arm is on its way to, and is not to give way to another place.
         """
         row_X = torch.nonzero(self.close(q_BN))[:, 0]
         if not len(row_X):
             return q_BN
-        chunks = (self._give_way(q_BN[x], target_BD3[x]) for x in row_X.split(self.problem.chunk))
-        return q_BN.index_copy(0, row_X, torch.cat(list(chunks)))
+        found = []
+        for x in row_X.split(self.problem.chunk):
+            target_XD3 = self._own_directions(q_BN[x], target_BD3[x]) if staying else target_BD3[x]
+            found.append(self._give_way(q_BN[x], target_XD3))
+        return q_BN.index_copy(0, row_X, torch.cat(found))
+
+    def _own_directions(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
+        """Targets with the robot's directions in place of the human's, which count as much."""
+        body_map = self.problem.body_map
+        own_BD3 = body_map.robot_directions(body_map.robot.forward(q_BN))
+        human_BD3, more_BX3 = target_BD3[:, : own_BD3.shape[1]], target_BD3[:, own_BD3.shape[1] :]
+        return torch.cat((own_BD3 * human_BD3.norm(dim=-1, keepdim=True), more_BX3), dim=1)
 
     def _give_way(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
         bounds = self.problem.lower_N, self.problem.upper_N

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.fast import StreamSettings
+from mrhubo.fast.plain.following import HELD
 from mrhubo.reference import Avoidance, DirectionProblem
 from mrhubo.reference.terms import REFERENCE_RATE, Quadratic
 from mrhubo.streaming.people import OfPeople
@@ -51,12 +52,13 @@ class Branches:
 
     def free(self, q_BN: Tensor, target_BD3: Tensor) -> Tensor:
         """Joint angles (B, N) [rad] after steps away from self-collision, if there are to be any."""
-        return q_BN if self.avoidance is None else self.avoidance(q_BN, target_BD3)
+        return q_BN if self.avoidance is None else self.avoidance(q_BN, target_BD3, staying=True)
 
     def advance(
         self, state: BranchState, network_BN: Tensor, target_BD3: Tensor, passed_B: Tensor
-    ) -> tuple[BranchState, Tensor]:
-        """The next state, and how fast the goal moves [rad/s] (B, N): 0 where another answer has been taken up.
+    ) -> tuple[BranchState, Tensor, Tensor]:
+        """The next state; how fast the goal moves [rad/s] (B, N), 0 where another answer has been taken up; and which
+        joints (B, N) begin to cross over to it: none of a block that is only behind, as its joints cannot go faster.
 
         Args:
             state: the last one.
@@ -83,10 +85,13 @@ class Branches:
         )
         leave_BC = worse_BC > max(self.settings.worse_time, 1e-9)
         leave_BN = leave_BC[:, problem.blocks.block_N]
+        held_BN = (moved_BN - kept_BN).abs() >= HELD * reach_BN
+        held_BC = (held_BN[..., None] * problem.blocks.joints_NC).amax(dim=1) > 0
         kept_BN = torch.where(leave_BN, other_BN, moved_BN)
         goal_BN = self.free(kept_BN, target_BD3)
         velocity_BN = torch.where(leave_BN, 0.0, (goal_BN - state.goal_BN) / passed_B[:, None])
-        return BranchState(kept_BN, torch.where(leave_BC, 0.0, worse_BC), goal_BN), velocity_BN
+        begun_BN = leave_BN & ~held_BC[:, problem.blocks.block_N]
+        return BranchState(kept_BN, torch.where(leave_BC, 0.0, worse_BC), goal_BN), velocity_BN, begun_BN
 
     def _steps(
         self, q_YN: Tensor, target_YD3: Tensor, pull_Y: Tensor, bounds: tuple[Tensor, Tensor]

@@ -15,6 +15,7 @@ from mrhubo.fast import StreamSettings
 from mrhubo.reference.standing import Standing
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.streaming.branches import Branches, BranchState
+from mrhubo.streaming.crossing import Crossing
 from mrhubo.streaming.ground import Ground, GroundState, Seen
 from mrhubo.streaming.limits import JointLimits, JointState
 from mrhubo.streaming.one_euro import OneEuroState, one_euro
@@ -27,6 +28,7 @@ class StreamState:
     filtered: OneEuroState
     branches: BranchState
     joints: JointState
+    crossing: Crossing
     unseen_B: Tensor
     """Time since each person was last seen [s]; infinite for one who never was."""
     placed_B: Tensor
@@ -79,7 +81,7 @@ class Follower:
         nothing_BD3 = stand_BN.new_zeros(people, len(self._unit_D1), 3)
         return StreamState(
             OneEuroState.at(nothing_BD3), BranchState.at(stand_BN, problem.blocks.joints_NC.shape[1]),
-            JointState.at_rest(stand_BN), stand_BN.new_full((people,), torch.inf),
+            JointState.at_rest(stand_BN), Crossing.none(stand_BN), stand_BN.new_full((people,), torch.inf),
             torch.full((people,), q_BN is not None, device=stand_BN.device),
             None if self.ground is None else self.ground.begin(people),
         )  # fmt: skip
@@ -107,6 +109,7 @@ class Follower:
         since_B = unseen_B.clamp_max(self.longest_step)
         filtered, branches, ground = state.filtered, state.branches, state.ground
         velocity_BN = torch.zeros_like(branches.kept_BN)
+        begun_BN = torch.zeros_like(velocity_BN, dtype=torch.bool)
         joints = state.joints
         if ground is not None:
             still = replace(ground.contacts, began_BP=ground.contacts.began_BP & False)
@@ -131,9 +134,10 @@ class Follower:
                 ground = ground.where(seen_B.cpu().numpy(), looked)
             network_BN = self.retargeter.answer(local_BJ33, aim_BD3)
             if bool(known_B.any()):
-                followed, speed_BN = self.branches.advance(branches, network_BN, wanted_BX3, since_B)
+                followed, speed_BN, left_BN = self.branches.advance(branches, network_BN, wanted_BX3, since_B)
                 branches = branches.where(known_B, followed)
                 velocity_BN = torch.where(known_B[:, None], speed_BN, velocity_BN)
+                begun_BN = known_B[:, None] & left_BN
             if bool(new_B.any()):
                 first_BN = self.retargeter.answer(local_BJ33, aim_BD3, POLISH)
                 if self.ground is not None:
@@ -143,8 +147,12 @@ class Follower:
                 joints = joints.where(new_B & ~state.placed_B, JointState.at_rest(goal_BN))
             unseen_B = torch.where(seen_B, 0.0, unseen_B)
         step_B = torch.full_like(unseen_B, min(passed, self.longest_step))
-        joints = self.limits.follow(joints, branches.goal_BN, velocity_BN, step_B)
+        distance_BN = (branches.goal_BN.double() - joints.q_BN).abs()
+        crossing = state.crossing.begun(self.problem.blocks, self.settings, begun_BN, distance_BN, self.limits.speed_N)
+        on_way = crossing.goals(joints.q_BN, joints.velocity_BN, branches.goal_BN, velocity_BN, step_B)
+        joints = self.limits.follow(joints, *on_way, step_B)
         if self.ground is not None and ground is not None and state.ground is not None:
             poses = self.retargeter.body_map.robot.forward(joints.q_BN)
             ground = self.ground.stand(state.ground, ground, poses)
-        return StreamState(filtered, branches, joints, unseen_B, torch.ones_like(state.placed_B), ground)
+        placed_B = torch.ones_like(state.placed_B)
+        return StreamState(filtered, branches, joints, crossing.after(step_B), unseen_B, placed_B, ground)

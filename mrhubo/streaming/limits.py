@@ -20,6 +20,7 @@ import torch
 from torch import Tensor
 
 from mrhubo.robot import Robot
+from mrhubo.streaming.crossing import stopping
 from mrhubo.streaming.people import OfPeople
 
 _WITHIN = 1 - 1e-6
@@ -62,18 +63,14 @@ class JointLimits:
         passed_B1, q_BN = passed_B.double()[:, None], state.q_BN.double()
         goal_velocity_BN = goal_velocity_BN.double()
         behind_BN = goal_BN.double() - goal_velocity_BN * passed_B1 - q_BN
-        wanted_BN = goal_velocity_BN + behind_BN.sign() * self._stopping(behind_BN.abs(), passed_B1)
-        least_BN = -self._stopping(q_BN - self.lower_N, passed_B1).clamp_max(self.speed_N)
-        most_BN = self._stopping(self.upper_N - q_BN, passed_B1).clamp_max(self.speed_N)
+        wanted_BN = goal_velocity_BN + behind_BN.sign() * stopping(behind_BN.abs(), self.acceleration_N, passed_B1)
+        least_BN = -stopping(q_BN - self.lower_N, self.acceleration_N, passed_B1).clamp_max(self.speed_N)
+        most_BN = stopping(self.upper_N - q_BN, self.acceleration_N, passed_B1).clamp_max(self.speed_N)
         change_BN = self.acceleration_N * passed_B1
         least_BN = torch.maximum(least_BN, state.velocity_BN - change_BN)
         most_BN = torch.minimum(most_BN, state.velocity_BN + change_BN)
         found_BN = self._rounded(q_BN, torch.clamp(wanted_BN, least_BN, most_BN), passed_B1)
         return JointState(found_BN, (found_BN.double() - q_BN) / passed_B1)
-
-    def _stopping(self, distance_BN: Tensor, passed_B1: Tensor) -> Tensor:
-        """The largest speed [rad/s] of a step after which a joint can still stop in time."""
-        return 2 * distance_BN / (passed_B1 + (passed_B1.square() + 2 * distance_BN / self.acceleration_N).sqrt())
 
     def _rounded(self, q_BN: Tensor, velocity_BN: Tensor, passed_B1: Tensor) -> Tensor:
         """The next angles as float32, rounded towards the last ones where the speed would be too high."""

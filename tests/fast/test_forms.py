@@ -80,6 +80,9 @@ def test_steps_away_from_self_collision_are_those_of_pytorch(
     for frame in range(0, len(array), 4):
         assert np.abs(fast(array[frame]).q - found[frame]).max() < SAME_RAD
     np.testing.assert_array_equal(fast.predict(array, 0), fast.predict(array, 0, avoid_collisions=False))
+    turned = target.roll(7, 0)  # what somebody else shows, who is not listened to
+    found = fast.engine.avoid(start.numpy(), turned.numpy(), staying=True)
+    assert largest(found, exact.avoidance(start, turned, staying=True)) < SAME_RAD
 
 
 def test_what_is_told_of_an_answer(

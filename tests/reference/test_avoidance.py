@@ -96,3 +96,21 @@ def test_a_motion_gives_way_without_jumps_and_at_no_higher_speed(
     apart = torch.linspace(0, 0.4, 20)[:, None] * torch.tensor([0.0, 0.0, 1.0])
     free_TJ33 = make_pose(left_shoulder=apart)
     assert torch.equal(retargeter(free_TJ33, rate, avoid_collisions=True).q, retargeter(free_TJ33, rate).q)
+
+
+@pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
+def test_who_stays_gives_way_and_goes_nowhere_else(avoidances: dict[str, Avoidance], name: str) -> None:
+    """Robots that touch, of which the human shows something else: they end free, and far nearer to where they were."""
+    avoidance, robot = avoidances[name], avoidances[name].problem.robot
+    q_BN = robot.sample(600, torch.Generator().manual_seed(0))
+    close_B = avoidance.close(q_BN)
+    target_BD3 = shown(avoidance, robot.sample(600, torch.Generator().manual_seed(1)))
+    stays_BN, goes_BN = avoidance(q_BN, target_BD3, staying=True), avoidance(q_BN, target_BD3)
+    assert torch.equal(stays_BN[~close_B], q_BN[~close_B])
+    assert bool(((stays_BN >= robot.lower_N) & (stays_BN <= robot.upper_N)).all())
+    touched, stay = (float(avoidance.collision.collides(q).sum()) for q in (q_BN, stays_BN))
+    assert stay < 0.2 * touched
+    own_BD3 = shown(avoidance, q_BN)
+    moved, gone = ((shown(avoidance, q) - own_BD3)[close_B].norm(dim=-1).mean() for q in (stays_BN, goes_BN))
+    assert float(moved) < 0.4 * float(gone)
+    assert torch.equal(stays_BN, avoidance(q_BN, own_BD3 * target_BD3.norm(dim=-1, keepdim=True)))

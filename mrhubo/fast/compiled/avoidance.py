@@ -8,9 +8,10 @@ from numba import njit  # pyright: ignore[reportMissingImports]
 
 from mrhubo.fast.compiled.collision import touches
 from mrhubo.fast.compiled.contact_steps import add_pairs, foreseeing_step, look
+from mrhubo.fast.compiled.human import put, row, turn_back
 from mrhubo.fast.compiled.lanes import alike, choose, no, some
 from mrhubo.fast.compiled.robot import place
-from mrhubo.fast.compiled.tables import INNER
+from mrhubo.fast.compiled.tables import INNER, LIMB_D, SEEN_D, size, whole
 from mrhubo.fast.plain.avoidance import STEPS, WEIGHT, WORTH
 from mrhubo.fast.plain.contact_steps import REACH
 from mrhubo.fast.plain.steps import DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, TOLERANCE
@@ -26,6 +27,14 @@ def whole_model(t, work, q_N):
     cost, count = look(t, work, q_N, _ROOT, 0.0)
     add_pairs(work, work.short_Y, count, work.next_gradient_N, work.next_hessian_NN)
     return cost
+
+
+@njit(**INNER)
+def aim_at_own(t, work, q_N):
+    """Takes the robot's own directions at joint angles [rad] as the goal, weighed as that in `work` was."""
+    place(t, work, q_N)
+    for d in range(size(t, LIMB_D)):
+        put(work.goal_D3, d, turn_back(work.view_V33, whole(t, SEEN_D, d), row(work.direction_D3, d)))
 
 
 @njit(**INNER)

@@ -91,12 +91,14 @@ def make_kernels() -> Kernels:
                 cost_BC[b, c] = work.cost_C[c]
 
     @njit(cache=True, **tables.COMPILED)
-    def avoid(t, target_BD3, q_BN):
-        """Steps away from self-collision from `q_BN`, where the answers will stand."""
+    def avoid(t, target_BD3, q_BN, staying):
+        """Steps away from self-collision from `q_BN`, where answers will stand; `staying` as in `Engine.avoid`."""
         _ = version
         work = robots.make_work(t)
         for b in range(len(q_BN)):
             steps.aim(t, work, target_BD3, b)
+            if staying:
+                avoidance.aim_at_own(t, work, q_BN[b])
             avoidance.avoid(t, work, q_BN[b])
 
     @njit(cache=True, **tables.COMPILED)

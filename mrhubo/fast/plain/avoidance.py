@@ -14,7 +14,8 @@ from mrhubo.fast.description import Description
 from mrhubo.fast.plain import steps
 from mrhubo.fast.plain.collision import carries, clearances, distance_jacobian, near
 from mrhubo.fast.plain.contact_steps import REACH, Contacts, foreseeing_step
-from mrhubo.fast.plain.robot import place
+from mrhubo.fast.plain.human import norm
+from mrhubo.fast.plain.robot import place, seen
 from mrhubo.fast.plain.steps import DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, TOLERANCE
 
 CLEARANCE = 0.002
@@ -109,10 +110,20 @@ class Avoidance:
                 _, model, touching = self._look(together, q_BN, target_BD3, REACH)
         return found_BN
 
-    def __call__(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
-        """Joint angles (B, N) [rad], inside the limits, of which as few as possible touch; others stay as they are."""
+    def __call__(self, q_BN: np.ndarray, target_BD3: np.ndarray, staying: bool = False) -> np.ndarray:
+        """Joint angles (B, N) [rad], inside the limits, of which as few as possible touch; others stay as they are.
+        `staying`: those that touch keep to their own directions, and not to the human's.
+        """
         found_BN, row_X = q_BN.copy(), np.flatnonzero(self.close(q_BN))
         for rows in steps.chunks(len(row_X), _CHUNK):
             x = row_X[rows]
-            found_BN[x] = self._give_way(q_BN[x], target_BD3[x])
+            target_XD3 = self._own_directions(q_BN[x], target_BD3[x]) if staying else target_BD3[x]
+            found_BN[x] = self._give_way(q_BN[x], target_XD3)
         return found_BN
+
+    def _own_directions(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
+        """Targets with the robot's directions in place of the human's, which count as much."""
+        placed, seen_D = place(self._own.kinematics, q_BN), self._own.human.seen_D
+        own_BD3 = np.moveaxis(seen(seen_D, placed.view_V33B, placed.direction_D3B), -1, 0)
+        own_BD3 = own_BD3 * norm(target_BD3[:, : len(seen_D)])[..., None]
+        return np.concatenate((own_BD3, target_BD3[:, len(seen_D) :]), axis=1)

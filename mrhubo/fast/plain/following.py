@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.fast.plain.crossing import Crossing, stopping
 from mrhubo.fast.plain.human import norm, normalize
 from mrhubo.fast.plain.steps import weights
 from mrhubo.fast.sections import Cost
@@ -22,6 +23,8 @@ _REFERENCE_RATE = 24.0
 _WITHIN = 1 - 1e-6
 """Share of the speed limit that is used."""
 _SMALL = 1e-9
+HELD = 0.999
+"""Share of the longest step that a joint can make from which on its speed is taken to hold it up."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +91,10 @@ def cross_over(
     cost_2C: np.ndarray,
     aim_D3: np.ndarray,
     passed: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The next kept answer (N,) [rad], since how long it has been worse (C,) [s], and which joints have left the last
-    one for the other answer (N,).
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The next kept answer (N,) [rad], since how long it has been worse (C,) [s], which joints have left the last one
+    for the other answer (N,), and which of those cross over to it (N,): none of a block that is only behind, as a joint
+    of it could not go any faster.
 
     Args:
         cost: the robot's.
@@ -106,7 +110,10 @@ def cross_over(
     worse_C = np.where(excess_C > math.radians(settings.worse_deg), last.worse_C + passed, 0.0)
     leave_C = worse_C > max(settings.worse_time, _SMALL)
     leave_N = leave_C[cost.block_N]
-    return np.where(leave_N, both_2N[1], both_2N[0]), np.where(leave_C, 0.0, worse_C), leave_N
+    held_N = np.abs(both_2N[0] - last.kept_N) >= HELD * passed * cost.velocity_N
+    held_C = (held_N[:, None] * cost.joints_NC).max(axis=0) > 0
+    kept_N = np.where(leave_N, both_2N[1], both_2N[0])
+    return kept_N, np.where(leave_C, 0.0, worse_C), leave_N, leave_N & ~held_C[cost.block_N]
 
 
 class Limits:
@@ -117,8 +124,9 @@ class Limits:
     ) -> None:
         """Limits of angles [rad], speeds [rad/s] and accelerations [rad/s^2]; infinite: acceleration is not limited."""
         self._lower_N, self._upper_N = lower_N, upper_N
-        self._speed_N = speed_N.astype(np.float64) * _WITHIN
         self._acceleration_N = acceleration_N
+        self.speed_N = speed_N.astype(np.float64) * _WITHIN
+        """What is used of the speeds [rad/s]."""
 
     @classmethod
     def of_cost(cls, cost: Cost, ramp_time: float) -> Limits:
@@ -147,21 +155,44 @@ class Limits:
         """
         q_N = last.q_N.astype(np.float64)
         behind_N = goal_N - goal_velocity_N * passed - q_N
-        wanted_N = goal_velocity_N + np.sign(behind_N) * self._stopping(np.abs(behind_N), passed)
+        wanted_N = goal_velocity_N + np.sign(behind_N) * stopping(np.abs(behind_N), self._acceleration_N, passed)
         if pace_N is not None:
             wanted_N = np.minimum(np.maximum(wanted_N, -pace_N), pace_N)
-        least_N = -np.minimum(self._stopping(q_N - self._lower_N, passed), self._speed_N)
-        most_N = np.minimum(self._stopping(self._upper_N - q_N, passed), self._speed_N)
+        least_N = -np.minimum(stopping(q_N - self._lower_N, self._acceleration_N, passed), self.speed_N)
+        most_N = np.minimum(stopping(self._upper_N - q_N, self._acceleration_N, passed), self.speed_N)
         change_N = self._acceleration_N * passed
         least_N = np.maximum(least_N, last.velocity_N - change_N)
         most_N = np.minimum(most_N, last.velocity_N + change_N)
         wanted_N = np.minimum(np.maximum(wanted_N, least_N), most_N)
         found_N = (q_N + wanted_N * passed).astype(self._lower_N.dtype)
         found_N = np.minimum(np.maximum(found_N, self._lower_N), self._upper_N)
-        fast_N = np.abs(found_N - q_N) > self._speed_N * passed
+        fast_N = np.abs(found_N - q_N) > self.speed_N * passed
         found_N = np.where(fast_N, np.nextafter(found_N, last.q_N), found_N)
         return Joints(found_N, (found_N - q_N) / passed)
 
-    def _stopping(self, distance_N: np.ndarray, passed: float) -> np.ndarray:
-        """The largest speed [rad/s] of a step after which a joint can still stop in time."""
-        return 2 * distance_N / (passed + np.sqrt(passed * passed + 2 * distance_N / self._acceleration_N))
+
+def follow_goal(
+    limits: Limits,
+    cost: Cost,
+    settings: StreamSettings,
+    last: tuple[Joints, Crossing],
+    goal: tuple[np.ndarray, np.ndarray],
+    begun_N: np.ndarray,
+    passed: float,
+) -> tuple[Joints, Crossing]:
+    """The joints' next state, and which of them cross over: those do so gently, the others go as `Limits.follow` says.
+
+    Args:
+        limits: the robot's.
+        cost: the same.
+        settings: of the stream.
+        last: the last state.
+        goal: where the joints are to go (N,) [rad], and how fast that moves (N,) [rad/s].
+        begun_N: those that begin to cross over.
+        passed: time since the last state [s].
+    """
+    (joints, crossing), (goal_N, velocity_N) = last, goal
+    q_N = joints.q_N.astype(np.float64)
+    crossing = crossing.begun(cost, settings, begun_N, np.abs(goal_N - q_N), limits.speed_N)
+    on_way_N = crossing.goals(q_N, joints.velocity_N, goal_N, velocity_N, passed)
+    return limits.follow(joints, *on_way_N, passed), crossing.after(passed)
