@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 from mrhubo.errors import encodable, nearest, unknown_name
 
 PARTS = ["chest", "head", "left_elbow", "left_hand", "left_shoulder", "left_wrist", "right_hand", "right_wrist"]
-KEYS = ["accelerator", "batch_size", "loss", "lr", "max_steps", "precision", "seed", "validate_every", "weight_decay"]
+KEYS = [
+    "accelerator", "batch_size", "loss", "lr", "max_steps", "muon_lr", "optimizer", "precision", "seed",
+    "validate_every", "weight_decay",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

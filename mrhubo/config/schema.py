@@ -192,15 +192,20 @@ class ModelConfig:
 class TrainerConfig:
     """The training."""
 
-    max_steps: int = bounded(9_000, 1, 1_000_000_000)
+    max_steps: int = bounded(6_000, 1, 1_000_000_000)
     """Optimiser steps; with `model.start: universal` 200."""
     batch_size: int = bounded(512, 1, 10_000_000)
     """Pairs per step; with `model.start: universal` 64."""
     loss: str = choice("l1", "l1", "mse")
     """Distance of links and joint angles from the pair's: `l1` = mean absolute, `mse` = mean square (the paper)."""
+    optimizer: str = choice("muon", "muon", "adamw")
+    """`muon`: hidden layers by Muon, all else by AdamW; `adamw`: all by AdamW, as it is with `model.start: universal`
+    in any case."""
     lr: float = bounded(8e-3, 1e-9, 10.0)
     """Learning rate of AdamW; cosine decay to 0, after a warm-up of 2% of the steps. With `model.start: universal`
     0.001."""
+    muon_lr: float = bounded(2e-2, 1e-9, 10.0)
+    """The same of Muon."""
     weight_decay: float = bounded(1e-6, 0.0, 10.0)
     """Weight decay of AdamW."""
     precision: str = choice("32", "32", "bf16")

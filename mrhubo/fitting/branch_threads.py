@@ -28,7 +28,7 @@ class BranchThreads:
     def __init__(self, pool: ThreadPoolExecutor, pieces: Sequence[Piece], losses: Callable[..., Losses]) -> None:
         """`losses` is `RetargetModule.losses`."""
         # The largest first, so that no thread is left alone with it.
-        self._pool, self._losses = pool, losses
+        self.pool, self._losses = pool, losses
         self._pieces = [
             (piece, torch.tensor(piece.inputs), torch.tensor(piece.joints), [*piece.weights()])
             for piece in sorted(pieces, key=lambda piece: -piece.share)
@@ -45,7 +45,7 @@ class BranchThreads:
             found["loss"].backward()
             return found
 
-        parts = list(self._pool.map(of, *zip(*self._pieces, strict=True)))
+        parts = list(self.pool.map(of, *zip(*self._pieces, strict=True)))
         return {name: torch.stack([part[name].detach() for part in parts]).sum() for name in parts[0]}
 
 

@@ -20,6 +20,7 @@ from torch import Tensor
 from torch.nn.functional import l1_loss, mse_loss
 
 from mrhubo.config import TrainerConfig
+from mrhubo.fitting.muon import make_muon
 from mrhubo.retargeter.networks import Piece, RetargetNetwork
 from mrhubo.runtime.trainer import stop_at, with_schedule
 
@@ -87,9 +88,9 @@ class RetargetModule(lightning.LightningModule):
         stop_at(self.settings.max_steps, self.trainer)
 
     def configure_optimizers(self) -> Any:
-        """AdamW with warm-up and cosine decay over `max_steps`."""
-        settings = self.settings
-        optimizer = torch.optim.AdamW(
-            self.network.parameters(), settings.lr, weight_decay=settings.weight_decay, fused=True
-        )
-        return with_schedule(optimizer, settings.max_steps)
+        """Muon or AdamW, with warm-up and cosine decay over `max_steps`."""
+        settings, network = self.settings, self.network
+        hidden = network.hidden_weights() if settings.optimizer == "muon" else []
+        pool = None if self.branch_threads is None else self.branch_threads.pool
+        rates = settings.lr, settings.muon_lr, settings.weight_decay
+        return with_schedule(make_muon(network, hidden, *rates, pool), settings.max_steps)

@@ -219,6 +219,16 @@ class RetargetNetwork(JointNetwork):
                 if isinstance(layer, nn.Linear):
                     layer.weight.copy_(torch.from_numpy(rounded(layer.weight.cpu().numpy())))
 
+    def hidden_weights(self) -> list[nn.Parameter]:
+        """The matrices from one hidden layer to the next (H, H)."""
+        found = []
+        for network in self.modules():
+            if isinstance(network, ResidualMLP):
+                found += [block.weight for block in network.blocks if isinstance(block, nn.Linear)]
+            elif isinstance(network, nn.Sequential):  # of `mlp`
+                found += [layer.weight for layer in network if isinstance(layer, nn.Linear)][1:-1]
+        return found
+
     def pieces(self) -> list[Piece]:
         """Its branches, each with networks of its own."""
         first, limited = self.pre or self.post, self.limited
