@@ -39,6 +39,10 @@ _MANY = 6
 """Joints of an arm that reaches anywhere in any way; no leg of a four-legged robot has as many."""
 
 
+class NoArms(UserError):
+    """No pair of arms can be told; there may be one arm."""
+
+
 @dataclass(frozen=True)
 class Roles:
     """The limbs and the trunk of a robot."""
@@ -84,7 +88,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     """Arms, legs and trunk.
 
     Raises:
-        UserError: no pair of arms can be told; says what the robot has.
+        NoArms: no pair of arms can be told; says what the robot has.
+        UserError: it is no humanoid.
     """
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
@@ -97,10 +102,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
-        raise UserError(
+        raise _no_arms(bodies)(
             f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
-            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed, or, of a "
-            f"robot with one arm, a config that is written by hand (docs/robots.md){_following(bodies)}"
+            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all), nor one arm beside the middle "
+            "of legs, a head or a trunk; of other robots a config is written by hand "
+            f"(docs/robots.md){why_no_arms(bodies)}"
         )
     read = {id(pair) for pair in armed}
     # A waist and a neck that are alike, one below the chest and one above, are no limbs.
@@ -113,8 +119,9 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
-            raise UserError(
-                f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found{_following(bodies)}"
+            raise _no_arms(bodies)(
+                f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were "
+                f"found{why_no_arms(bodies)}"
             )
         arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     elif fronts:
@@ -140,13 +147,13 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
-    if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
-        legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
     # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings, if no name tells.
     spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
     winged = legs is not None and len(legs.chains[0]) < _LEG and not _named_legs(legs)
     if winged or any(pair.size > arms.size for pair in spare):
         sure = min(sure, GUESS)
+    if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
+        legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
     same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
@@ -167,6 +174,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 
+def looks_like_legs(bodies: Bodies, pair: Pair) -> bool:
+    """Whether a pair of limbs has knees between parallel axes, or is like legs by its axes and names."""
+    return _has_knees(bodies, pair) or _legness(bodies, pair) > 0.0 or _named_legs(pair)
+
+
 def _has_knees(bodies: Bodies, pair: Pair) -> bool:
     """Whether parallel axes tell the knees of both of its limbs."""
     return all((leg := read_leg(bodies, chain)) is not None and leg.straight for chain in pair.chains)
@@ -179,10 +191,13 @@ def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
     return across and other.size > pair.size and float(np.abs(apart).max()) < _MIDDLE * bodies.size
 
 
-def _following(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, which hides its own, on joints whose limits
-    leave them no way to move, or on fixed ones that have limits; else nothing.
-    """
+def _no_arms(bodies: Bodies) -> type[UserError]:
+    """What to raise: where an arm mimics one of another limb, there are two, and neither is the only one."""
+    return UserError if _mimicking(bodies) else NoArms
+
+
+def _mimicking(bodies: Bodies) -> str:
+    """The end of a sentence on a joint that mimics one of another limb, which hides its own; else nothing."""
     root = bodies.body_of[bodies.description.root]
     for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
         mimic = bodies.description.joints[hinge.name].mimic
@@ -193,6 +208,15 @@ def _following(bodies: Bodies) -> str:
                 f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
                 "take the <mimic> elements of such joints out of the URDF"
             )
+    return ""
+
+
+def why_no_arms(bodies: Bodies) -> str:
+    """The end of a sentence on a joint that mimics one of another limb, on joints whose limits leave them no way to
+    move, or on fixed ones that have limits; else nothing.
+    """
+    if mimicking := _mimicking(bodies):
+        return mimicking
     still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint)]
     if not still:
         return _fixed_with_limits(bodies)

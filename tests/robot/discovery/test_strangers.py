@@ -265,15 +265,6 @@ def test_a_linkage_without_masses_that_is_drawn_beside_a_leg_is_passed_over(tmp_
     assert at(found, "left_knee") == pytest.approx([0, 0.1, -0.5], abs=1e-3)
 
 
-def test_a_robot_with_one_arm_is_told_what_it_needs(tmp_path: Path) -> None:
-    made = Made()
-    made.wrist("left", made.forearm("left", made.arm("left")))
-    with pytest.raises(
-        UserError, match=r"of a robot with one arm, a config that is written by hand \(docs/robots.md\)"
-    ):
-        made.found(tmp_path)
-
-
 def test_a_shoulder_of_three_axes_in_any_order_is_not_turned_inside_out(tmp_path: Path) -> None:
     """The axis that lies along the arm, which is the first one here, gets half a turn where a file gives no limits."""
     made = Made()
@@ -334,6 +325,16 @@ def test_a_second_pair_of_arms_is_asked_about(tmp_path: Path) -> None:
     for side in SIDES:
         made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
     assert "chest" in about(made.found(tmp_path))
+
+
+def test_legs_that_a_file_lists_from_the_other_side_are_no_second_pair_of_arms(tmp_path: Path) -> None:
+    """The body that carries them carries the arms too, as on a robot without a waist."""
+    made = Made()
+    for side in reversed(SIDES):
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    for side in SIDES:
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
+    assert "chest" not in about(made.found(tmp_path))
 
 
 def test_an_arm_without_a_wrist_beside_a_whole_one_is_an_arm(tmp_path: Path) -> None:
