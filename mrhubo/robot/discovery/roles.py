@@ -99,6 +99,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     armed = [
         pair for pair in armed
         if len(pair.chains[0]) > _CASTER or any(step.hinge.limited for step in pair.chains[0])
+        or _folds(pair.chains[0])
     ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
@@ -172,6 +173,12 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if legs is None:
         waist = without_base(waist, bodies.size)
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
+
+
+def _folds(chain: Chain) -> bool:
+    """Whether all axes of a limb are parallel, as those of a shoulder and an elbow may be; a caster's are not."""
+    lines = lines_of(chain)
+    return all(sine(line.axis_3, lines[0].axis_3) < PARALLEL for line in lines)
 
 
 def looks_like_legs(bodies: Bodies, pair: Pair) -> bool:

@@ -86,6 +86,37 @@ def test_a_box_of_a_millimetre_tells_no_sole(tmp_path: Path) -> None:
         assert ("left_foot" in about(found)) != known and (found.ends["left_foot"].confidence >= 0.9) == known
 
 
+def test_boxes_in_millimetres_are_read_so(tmp_path: Path) -> None:
+    """As Bez's, whose joints are in metres."""
+    soles = []
+    for unit in (1, 1000):
+        made = Made()
+        for side in SIDES:
+            made.wrist(side, made.forearm(side, made.arm(side)))
+            size, place = (
+                " ".join(f"{unit * length}" for length in box) for box in ((0.2, 0.1, 0.03), (0.04, 0, -0.05))
+            )
+            shape = f"<collision><origin xyz='{place}'/><geometry><box size='{size}'/></geometry></collision>"
+            foot = made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y, (-0.8, 0.8), shape=shape)
+            made.join(f"{side}_toes", foot, (0, 0, 0), Y, None, "fixed", shape=shape)
+        found = made.found(tmp_path)
+        soles.append(at(found, "left_sole"))
+        assert any("millimetres" in note for note in found.notes) == (unit == 1000)
+    assert soles[1] == pytest.approx(soles[0])
+
+
+def test_an_arm_of_two_parallel_axes_without_limits_is_no_caster(tmp_path: Path) -> None:
+    """As Bez's; a caster's two axes are at right angles."""
+    made = Made()
+    for side, sign in SIDES.items():
+        upper = made.join(f"{side}_arm_0", "chest", (0, 0.1 * sign, 0.1), Y, None, "continuous")
+        shape = "<collision><origin xyz='0 0 -0.1'/><geometry><box size='0.05 0.05 0.2'/></geometry></collision>"
+        made.join(f"{side}_arm_1", upper, (0, 0, -0.25), Y, None, "continuous", shape=shape)
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y, None, "continuous")
+    found = made.found(tmp_path)
+    assert at(found, "left_elbow") == pytest.approx([0, 0.1, -0.15]) and {"left_wrist", "right_wrist"} <= about(found)
+
+
 def test_a_wrist_whose_joints_are_fixed_is_where_they_are(tmp_path: Path) -> None:
     """As G1's with its wrists locked, and COMAN's; a hand's link, which lies farther on, is no wrist."""
     made = Made()
