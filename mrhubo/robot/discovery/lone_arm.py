@@ -45,8 +45,8 @@ class LoneArm:
     """A point of it."""
     cue: str
     """What tells that it is no robot arm by itself."""
-    sure: bool
-    """Whether it is more than names that tell it."""
+    doubt: str | None
+    """What of it was guessed, if anything."""
 
 
 @dataclass(frozen=True)
@@ -107,42 +107,48 @@ def _as_arm(bodies: Bodies, chain: Chain, pairs: Sequence[Pair]) -> LoneArm | No
     if size < _SHORT * bodies.size:
         return None
     for plane in _planes(bodies, chain, outer):
-        first, clear = _first(bodies, chain, plane)
+        others = {part[0].hinge for pair in outer for part in pair.chains}
+        first, clear = _first(bodies, chain, plane, others)
         arm = chain[first:]
         nodes_N3 = measure(lines_of(arm)).nodes_N3 if arm else np.zeros((0, 3))
         begins = next((i for i, at_3 in enumerate(nodes_N3) if plane.beside(at_3) > _BESIDE * size), len(arm))
         if sum(step.hinge.rotary for step in arm[begins:]) < _FEWEST or read_arm(bodies, arm) is None:
             continue
-        if (evidence := _humanoid(bodies, arm, plane, outer)) is not None:
-            cue, sure = evidence
-            # Without a pair of limbs or wheels, the middle is a guess.
-            return LoneArm(arm, plane.normal_3, plane.middle_3, cue, sure and clear and bool(outer))
+        if (cue := _humanoid(bodies, arm, plane, outer, others)) is not None:
+            doubt = None if clear else "which joints before it turn the trunk"
+            # Of limbs and wheels, there is no pair.
+            doubt = doubt if outer else "where the middle of the trunk is"
+            return LoneArm(arm, plane.normal_3, plane.middle_3, cue, doubt)
     return None
 
 
-def _first(bodies: Bodies, chain: Chain, plane: _Plane) -> tuple[int, bool]:
+def _first(bodies: Bodies, chain: Chain, plane: _Plane, others: set[Hinge]) -> tuple[int, bool]:
     """How many joints of a chain turn the trunk, before the arm, and whether that is clear: as many as carry a neck
     too; else those in the middle.
     """
-    middle = 0
+    middle, hinges = 0, {step.hinge for step in chain}
     while middle < len(chain) and in_plane(chain[middle], plane.normal_3, plane.middle_3, bodies.size):
         middle += 1
     carriers = [chain[0].start, *(step.end for step in chain[:middle])]
-    necks = [i for i, body in enumerate(carriers) if _neck(bodies, body, chain, plane)]
+    necks = [i for i, body in enumerate(carriers) if _has_neck(bodies, body, plane, others | hinges)]
     if necks:
         return necks[-1], True
+    # A lateral axis is its own mirror image wherever it is, and any may be a clavicle's: names tell more.
+    named = [i + 1 for i in range(middle) if is_named(chain[i : i + 1], "waist")]
+    arms = [i for i in range(middle) if is_named(chain[i : i + 1], "arm")]
+    if (named or arms) and max(named, default=0) == min(arms, default=middle):
+        return min(arms, default=middle), True
     nodes_N3 = measure(lines_of(chain)).nodes_N3
-    size = bodies.extent(chain[0])
-    while middle > 0 and plane.beside(nodes_N3[middle - 1]) > _BESIDE * size:
-        middle -= 1
-    return middle, middle == 0
+    far = [i for i in range(middle) if plane.beside(nodes_N3[i]) > _BESIDE * bodies.extent(chain[0])]
+    return min([*arms, *(i for i in far if i >= max(named, default=0)), middle]), not middle
 
 
-def _neck(bodies: Bodies, chest: int, arm: Chain, plane: _Plane) -> bool:
-    """Whether a body carries a neck: joints in the mirror plane, named so or not fewer than a head has."""
-    mine = {step.hinge for step in arm}
+def _has_neck(bodies: Bodies, chest: int, plane: _Plane, others: set[Hinge]) -> bool:
+    """Whether a body carries a neck: joints in the mirror plane, named so or not fewer than a head has, and none of
+    others.
+    """
     for step in bodies.steps_from[chest]:
-        if step.hinge in mine or step.hinge.bodies[0] != chest:
+        if step.hinge in others or step.hinge.bodies[0] != chest:
             continue
         neck: list[Step] = []
         on: Step | None = step
@@ -180,13 +186,13 @@ def _own_image(hinge: Hinge, normal_3: np.ndarray, middle_3: np.ndarray, size: f
     return in_plane(Step(hinge, hinge.bodies[0]), normal_3, middle_3, size)
 
 
-def _humanoid(bodies: Bodies, arm: Chain, plane: _Plane, outer: Sequence[Pair]) -> tuple[str, bool] | None:
-    """What tells that an arm belongs to a humanoid, and whether it is more than a name."""
+def _humanoid(bodies: Bodies, arm: Chain, plane: _Plane, outer: Sequence[Pair], others: set[Hinge]) -> str | None:
+    """What tells that an arm belongs to a humanoid."""
     for pair in outer:
         if pair.size > _LOW * bodies.size and looks_like_legs(bodies, pair):
-            return "there are legs", True
+            return "there are legs"
     chest = arm[0].start
-    if _neck(bodies, chest, arm, plane):
-        return "there is a head", True
+    if _has_neck(bodies, chest, plane, {*others, *(step.hinge for step in arm)}):
+        return "there is a head"
     trunk = [name for name in bodies.links_of[chest] if names.speaks_of(name, "trunk")]
-    return (f"'{trunk[0]}' is called a trunk", False) if trunk else None
+    return f"'{trunk[0]}' is called a trunk" if trunk else None

@@ -48,11 +48,11 @@ class Whole:
             )
 
     def asked(self) -> Iterator[Question]:
-        """Whether it is a humanoid's, if names alone tell it."""
-        if self.lone is not None and not self.lone.sure:
+        """What of the only arm was guessed."""
+        if self.lone is not None and self.lone.doubt is not None:
             name = self.lone.chain[0].hinge.name
             yield Question("chest", f"only one arm was found: {self.lone.cue}, so it was taken for a humanoid's, but "
-                           "where the middle of the trunk is was guessed", (name,))  # fmt: skip
+                           f"{self.lone.doubt} was guessed", (name,))  # fmt: skip
 
 
 def complete(description: Description) -> Whole:

@@ -109,3 +109,35 @@ def test_random_humanoids_with_one_arm_are_right_or_asked_about(tmp_path: Path) 
         right += not wrong
         assert not wrong or asked(found, wrong), (seed, wrong)
     assert right >= 9
+
+
+def test_what_turns_the_trunk_below_one_arm_is_no_part_of_it(tmp_path: Path) -> None:
+    """By a head that it carries too, or by names; else it is asked about."""
+    for waist, head, asks in (
+        ("waist", False, False),
+        ("waist", True, False),
+        ("joint", True, False),
+        ("j", False, True),
+    ):
+        made = Made(["<link name='pelvis'/>"])
+        made.parts.append("<link name='chest'/>")
+        made.parts.append(
+            f"<joint name='{waist}' type='revolute'><parent link='pelvis'/><child link='chest'/><axis xyz='0 1 0'/>"
+            "<limit lower='-0.5' upper='0.5' effort='1' velocity='1'/></joint>"
+        )
+        made.wrist("left", made.forearm("left", made.arm("left")))
+        for each, sign in SIDES.items():
+            link = made.join(f"{each}_hip_roll", "pelvis", (0, 0.1 * sign, -0.1), X)
+            link = made.join(f"{each}_hip_pitch", link, (0, 0, 0), Y, (-2.0, 0.5))
+            link = made.join(f"{each}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2))
+            made.join(f"{each}_foot", link, (0, 0, -0.4), Y, (-0.8, 0.8))
+        if head:
+            made.join("head_pitch", made.join("head_yaw", "chest", (0, 0, 0.5), Z), (0, 0, 0.05), Y)
+        if asks:
+            made.parts = [
+                part.replace("shoulder", "s").replace("elbow", "e").replace("left_", "l") for part in made.parts
+            ]
+        found = made.found(tmp_path)
+        assert ("chest" in about(found)) == asks, (waist, head)
+        if not asks:
+            assert found.chains["waist"] == (waist,) and len(found.chains["left_arm"]) == 7
