@@ -13,6 +13,8 @@ from mrhubo.robot.discovery.names import speaks_of
 
 OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
+_LONG = 1.5
+"""How long a shin is at most, as a share of its thigh: 0.8 to 1.2 on public humanoids."""
 _WRIST = 3
 """Joints of a wrist at most."""
 _ROLLS = 0.02
@@ -74,7 +76,12 @@ def limb_end(
     if far is not None and fixed[far] > OUT * usual:
         return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the {called}", 0.45
     centre_3 = bodies.centre(last.end)
-    if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
+    away = 0.0 if centre_3 is None else float(np.linalg.norm(centre_3 - start_3))
+    if centre_3 is not None and called == "ankle" and 2 * away > _LONG * usual:
+        # A heavy foot, or one alone, has its centre there; a shin is about as long as its thigh.
+        way_3 = unit(unit(centre_3 - start_3) + unit(usual_3))
+        return start_3 + usual * way_3, "as far as the thigh is long, as no joint tells the ankle", 0.4
+    if centre_3 is not None and away > 0.1 * usual:
         return (
             start_3 + 2 * (centre_3 - start_3),
             f"twice as far as the centre of mass, as no joint tells the {called}",

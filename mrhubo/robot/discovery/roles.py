@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,7 +17,7 @@ from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.leg import read_leg
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
-from mrhubo.robot.discovery.necks import find_necks
+from mrhubo.robot.discovery.necks import find_necks, is_named
 from mrhubo.robot.discovery.symmetry import Pair, alike
 from mrhubo.robot.joint import stuck
 
@@ -61,7 +62,8 @@ class Roles:
 
     def with_neck(self, neck: Chain) -> Roles:
         """With another neck, or none; what else begins in the middle of a root that is the chest is the waist."""
-        below = next((chain for chain in self.necks if chain is not neck), ())
+        rest = (_trunk(chain) for chain in self.necks if chain is not neck)
+        below = next(iter(sorted(filter(None, rest), key=lambda chain: not is_named(chain, "waist"))), ())
         return replace(self, neck=neck, waist=self.waist or (_reversed(below) if self.legs is None else ()))
 
     @property
@@ -77,6 +79,11 @@ class Roles:
     def chest(self) -> int:
         """The body that carries both arms."""
         return self.arms.body
+
+
+def _trunk(chain: Chain) -> Chain:
+    """The joints of a chain before those that names call an arm's or a tail's."""
+    return tuple(itertools.takewhile(lambda step: not any(is_named((step,), kind) for kind in ("arm", "tail")), chain))
 
 
 def _reversed(chain: Chain) -> Chain:

@@ -117,6 +117,20 @@ def test_an_arm_of_two_parallel_axes_without_limits_is_no_caster(tmp_path: Path)
     assert at(found, "left_elbow") == pytest.approx([0, 0.1, -0.15]) and {"left_wrist", "right_wrist"} <= about(found)
 
 
+def test_a_tail_by_its_name_is_no_waist(tmp_path: Path) -> None:
+    """Below a root that is the chest of a robot without legs, the waist is what names do not call otherwise."""
+    for tail, waist in (("tail", ()), ("tail", ("waist_joint",)), ("arm", ("waist_joint",))):
+        made, link = Made(), "chest"
+        for side in SIDES:
+            made.wrist(side, made.forearm(side, made.arm(side)))
+        for number in range(3):
+            link = made.join(f"{tail}_{number}", link, (-0.1, 0, 0), Y if number % 2 else Z)
+        if waist:
+            made.join("waist", "chest", (0, 0, -0.1), Z)
+        found = made.found(tmp_path)
+        assert found.chains["waist"] == waist and f"{tail}_0_joint" in found.left_out
+
+
 def test_a_wrist_whose_joints_are_fixed_is_where_they_are(tmp_path: Path) -> None:
     """As G1's with its wrists locked, and COMAN's; a hand's link, which lies farther on, is no wrist."""
     made = Made()
