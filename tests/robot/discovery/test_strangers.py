@@ -117,6 +117,18 @@ def test_an_arm_of_two_parallel_axes_without_limits_is_no_caster(tmp_path: Path)
     assert at(found, "left_elbow") == pytest.approx([0, 0.1, -0.15]) and {"left_wrist", "right_wrist"} <= about(found)
 
 
+def test_what_lies_on_an_elbows_hinge_tells_no_forearm(tmp_path: Path) -> None:
+    """As the brackets that Dora's elbows carry."""
+    made = Made()
+    for side, sign in SIDES.items():
+        made.join(f"{side}_elbow", made.arm(side), (0, 0, -0.3), Y, (-1.5, 1.5))
+        made.parts[-1] = made.parts[-1].replace("0 0 -0.05", f"0 {0.04 * sign} 0")
+    found = made.found(tmp_path)
+    assert at(found, "left_wrist") == pytest.approx([0, 0.2, -0.2]) and "left_wrist" in about(found)
+    limits = found.ranges["left_elbow_joint"]
+    assert (limits.lower, limits.upper) == pytest.approx((-1.5, 0.0))
+
+
 def test_a_tail_by_its_name_is_no_waist(tmp_path: Path) -> None:
     """Below a root that is the chest of a robot without legs, the waist is what names do not call otherwise."""
     for tail, waist in (("tail", ()), ("tail", ("waist_joint",)), ("arm", ("waist_joint",))):
