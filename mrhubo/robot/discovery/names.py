@@ -15,7 +15,7 @@ _WORDS = {
     "head": r"head|neck|skull",
     "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",
     "trunk": r"torso|chest|thorax|trunk|spine|breast|upper_?body",
-    "tail": r"(^|[^a-z])tail",
+    "tail": r"(^|[^a-z])tail(?!l)",  # taille is a waist
     "rod": r"rod(_|$|\d)|crank|piston|cylinder|linkage|lever|pushrod|four_?bar|tendon|spring",
     "face": r"jaw|chin|mouth|lip(_|s|$)|brow|eyelid|(^|_)lid|(^|^[lr]|[^a-z])eye|cheek|tongue|antenna|(^|_)ear(_|s|$)",
     "sensor": r"lidar|laser|radar|scanner|spin|rotor|propeller",

@@ -82,8 +82,12 @@ class Roles:
 
 
 def _trunk(chain: Chain) -> Chain:
-    """The joints of a chain before those that names call an arm's or a tail's."""
-    return tuple(itertools.takewhile(lambda step: not any(is_named((step,), kind) for kind in ("arm", "tail")), chain))
+    """The joints of a chain before those that names call an arm's or a tail's, and no waist's."""
+
+    def called(step: Step, *kinds: str) -> bool:
+        return any(is_named((step,), kind) for kind in kinds)
+
+    return tuple(itertools.takewhile(lambda step: called(step, "waist") or not called(step, "arm", "tail"), chain))
 
 
 def _reversed(chain: Chain) -> Chain:

@@ -131,16 +131,16 @@ def test_what_lies_on_an_elbows_hinge_tells_no_forearm(tmp_path: Path) -> None:
 
 def test_a_tail_by_its_name_is_no_waist(tmp_path: Path) -> None:
     """Below a root that is the chest of a robot without legs, the waist is what names do not call otherwise."""
-    for tail, waist in (("tail", ()), ("tail", ("waist_joint",)), ("arm", ("waist_joint",))):
+    for tail, word in (("tail", ""), ("tail", "waist"), ("arm", "waist"), ("tail", "taille")):
         made, link = Made(), "chest"
         for side in SIDES:
             made.wrist(side, made.forearm(side, made.arm(side)))
         for number in range(3):
             link = made.join(f"{tail}_{number}", link, (-0.1, 0, 0), Y if number % 2 else Z)
-        if waist:
-            made.join("waist", "chest", (0, 0, -0.1), Z)
+        if word:
+            made.join(word, "chest", (0, 0, -0.1), Z)
         found = made.found(tmp_path)
-        assert found.chains["waist"] == waist and f"{tail}_0_joint" in found.left_out
+        assert found.chains["waist"] == ((f"{word}_joint",) if word else ()) and f"{tail}_0_joint" in found.left_out
 
 
 def test_a_wrist_whose_joints_are_fixed_is_where_they_are(tmp_path: Path) -> None:
