@@ -220,6 +220,18 @@ def test_the_thumb_of_three_fingers_is_the_one_that_closes_against_the_others(tm
     assert found.ends["right_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
 
 
+def test_the_thumb_beside_one_finger_lies_along_the_axis_about_which_that_curls(tmp_path: Path) -> None:
+    """And not along the way between their bases, which may lie at different heights above the palm."""
+    made = Made()
+    for side, sign in SIDES.items():
+        hand = made.wrist(side, made.forearm(side, made.arm(side)))
+        for word, x, y, axis in (("finger", -0.03, 0, (-sign, 0, 0)), ("thumb", 0.03, -0.02 * sign, (0, sign, 0))):
+            link = made.join(f"{side}_{word}", hand, (x, y, -0.08), axis, (0.0, 1.2))
+            made.join(f"{side}_{word}_tip", link, (0, 0, -0.05), axis, (0.0, 1.2))
+    for side in SIDES:
+        assert made.found(tmp_path).ends[f"{side}_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
+
+
 def test_two_jaws_with_a_rod_beside_each_are_no_four_fingers(tmp_path: Path) -> None:
     """As Robotiq's grippers without the loops, and without <mimic>."""
     made = Made()
