@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import re
+import warnings
 from collections.abc import Collection
 
 import numpy as np
@@ -109,7 +110,8 @@ def _reflect(origin: etree._Element) -> None:
 def _place(joint: etree._Element, pose_44: np.ndarray) -> None:
     for origin in joint.findall("origin"):
         joint.remove(origin)
-    rpy = Rotation.from_matrix(pose_44[:3, :3]).as_euler("xyz")
+    with warnings.catch_warnings(action="ignore"):  # where pitch is a right angle, any of the angles will do
+        rpy = Rotation.from_matrix(pose_44[:3, :3]).as_euler("xyz")
     etree.SubElement(joint, "origin", xyz=_text(pose_44[:3, 3]), rpy=_text(rpy))
 
 

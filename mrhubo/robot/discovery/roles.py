@@ -18,8 +18,8 @@ from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.leg import read_leg
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
 from mrhubo.robot.discovery.necks import find_necks, is_named
+from mrhubo.robot.discovery.no_arms import no_arms, why_no_arms
 from mrhubo.robot.discovery.symmetry import Pair, alike
-from mrhubo.robot.joint import stuck
 
 _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
@@ -38,10 +38,6 @@ _LIKE = 0.6
 """How long a further pair of limbs is at least that may be arms, as a share of the arms."""
 _MANY = 6
 """Joints of an arm that reaches anywhere in any way; no leg of a four-legged robot has as many."""
-
-
-class NoArms(UserError):
-    """No pair of arms can be told; there may be one arm."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +110,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
-        raise _no_arms(bodies)(
+        raise no_arms(bodies)(
             f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
             f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all), nor one arm beside the middle "
             "of legs, a head or a trunk; of other robots a config is written by hand "
@@ -131,7 +127,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
-            raise _no_arms(bodies)(
+            raise no_arms(bodies)(
                 f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were "
                 f"found{why_no_arms(bodies)}"
             )
@@ -207,49 +203,6 @@ def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
     apart = (pair.mounts_23 - other.mounts_23.mean(0)) @ other.normal_3
     across = abs(float(pair.normal_3 @ other.normal_3)) < _ACROSS
     return across and other.size > pair.size and float(np.abs(apart).max()) < _MIDDLE * bodies.size
-
-
-def _no_arms(bodies: Bodies) -> type[UserError]:
-    """What to raise: where an arm mimics one of another limb, there are two, and neither is the only one."""
-    return UserError if _mimicking(bodies) else NoArms
-
-
-def _mimicking(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, which hides its own; else nothing."""
-    root = bodies.body_of[bodies.description.root]
-    for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
-        mimic = bodies.description.joints[hinge.name].mimic
-        source = next((other for other in bodies.hinges if mimic is not None and other.name == mimic.joint), None)
-        above = {root, *(step.end for step in bodies.path(root, hinge.bodies[0]))}
-        if source is not None and source.bodies[0] not in above:
-            return (
-                f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
-                "take the <mimic> elements of such joints out of the URDF"
-            )
-    return ""
-
-
-def why_no_arms(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, on joints whose limits leave them no way to
-    move, or on fixed ones that have limits; else nothing.
-    """
-    if mimicking := _mimicking(bodies):
-        return mimicking
-    still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint)]
-    if not still:
-        return _fixed_with_limits(bodies)
-    first, more = still[0], f" and {len(still) - 1} more" * (len(still) > 1)
-    ends = f"{first.lower:g} .. {first.upper:g}"
-    return f"; '{first.name}'{more} cannot move, by limits as {ends}: correct them if it can"
-
-
-def _fixed_with_limits(bodies: Bodies) -> str:
-    joints = [joint for joint in bodies.description.joints.values() if joint.kind == "fixed"]
-    named = [j.name for j in joints if j.lower is not None and j.upper is not None and j.lower < j.upper]
-    if not named:
-        return ""
-    more = f" and {len(named) - 1} more" * (len(named) > 1)
-    return f"; '{named[0]}'{more} are fixed, though they have limits: make them revolute if they can move"
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:

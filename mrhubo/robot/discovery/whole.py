@@ -9,9 +9,10 @@ from mrhubo.errors import UserError
 from mrhubo.robot.discovery.bodies import Bodies
 from mrhubo.robot.discovery.lone_arm import LoneArm, find_lone_arm
 from mrhubo.robot.discovery.mirror_image import with_mirror_image
+from mrhubo.robot.discovery.no_arms import NoArms, why_no_arms
 from mrhubo.robot.discovery.reading import read_bodies
 from mrhubo.robot.discovery.result import Question
-from mrhubo.robot.discovery.roles import NoArms, Roles, find_roles, why_no_arms
+from mrhubo.robot.discovery.roles import Roles, find_roles
 from mrhubo.robot.discovery.symmetry import Pair, find_pairs
 from mrhubo.robot.urdf import Description
 
