@@ -17,6 +17,11 @@ ROBOT_COLOR: Color = (0.80, 0.83, 0.87)
 _MARKER = 0.003
 """Size under which a shape is no part of a robot, as a share of it: 5 mm on a human's. Contacts of feet have 10."""
 
+_LARGE_M, _LARGE = 5.0, 10.0
+"""Half of a file's shapes larger than that, and than so many times all links in a row, are in millimetres [m]."""
+_SOME = 4
+"""Shapes of a file at the least for its unit to be told by them."""
+
 Kind = Literal["sphere", "cylinder", "capsule", "box"]
 
 
@@ -43,13 +48,15 @@ def read_geometry(urdf: yourdfpy.URDF, default_color: Color = ROBOT_COLOR) -> li
     """
     shapes: list[LinkGeometry] = []
     colors_of = visual_colors(urdf)
+    seen, solids = (metres_of(urdf, word) for word in ("visuals", "collisions"))
     for link in urdf.robot.links:
         colors = colors_of[link.name]
         named = next((color for color in colors if color is not None), default_color)
         visible = [
-            _shape(link.name, item, color or default_color) for item, color in zip(link.visuals, colors, strict=True)
+            _shape(link.name, item, color or default_color, seen)
+            for item, color in zip(link.visuals, colors, strict=True)
         ]
-        solid = [_shape(link.name, item, named) for item in link.collisions]
+        solid = [_shape(link.name, item, named, solids) for item in link.collisions]
         found = [shape for shape in visible if shape is not None] or [shape for shape in solid if shape is not None]
         shapes.extend(_with_capsules(found))
     return shapes
@@ -66,11 +73,22 @@ def visual_colors(urdf: yourdfpy.URDF) -> dict[str, list[Color | None]]:
 
 def read_collision_geometry(urdf: yourdfpy.URDF) -> list[LinkGeometry]:
     """The shapes of every link's collision elements, as above."""
-    shapes = []
+    shapes, metres = [], metres_of(urdf, "collisions")
     for link in urdf.robot.links:
-        found = [_shape(link.name, element, ROBOT_COLOR) for element in link.collisions]
+        found = [_shape(link.name, element, ROBOT_COLOR, metres) for element in link.collisions]
         shapes += _with_capsules([shape for shape in found if shape is not None])
     return shapes
+
+
+def metres_of(urdf: yourdfpy.URDF, word: Literal["visuals", "collisions"]) -> float:
+    """Metres of the unit in which a file gives its primitive shapes, those that are seen or those that collide: a
+    thousandth where most are far larger than the robot, as where a drawing program wrote them; else 1.
+    """
+    reach = sum(float(np.linalg.norm(joint.origin[:3, 3])) for joint in urdf.robot.joints if joint.origin is not None)
+    elements = (element for link in urdf.robot.links for element in getattr(link, word))
+    sizes = [_extent(shape) for element in elements if (shape := _shape("", element, ROBOT_COLOR)) is not None]
+    large = len(sizes) >= _SOME and reach > 0.0 and float(np.median(sizes)) > max(_LARGE_M, _LARGE * reach)
+    return 1e-3 if large else 1.0
 
 
 def without_markers(shapes: Iterable[LinkGeometry], size: float) -> list[LinkGeometry]:
@@ -122,9 +140,12 @@ def _rgb(material: yourdfpy.urdf.Material | None) -> Color | None:
     return red, green, blue
 
 
-def _shape(link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, color: Color) -> LinkGeometry | None:
+def _shape(
+    link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, color: Color, metres: float = 1.0
+) -> LinkGeometry | None:
     geometry = element.geometry
-    origin_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
+    origin_44 = np.eye(4) if element.origin is None else np.array(element.origin, float)
+    origin_44[:3, 3] *= metres
     if geometry is None:
         return None
     if geometry.sphere is not None:
@@ -136,4 +157,5 @@ def _shape(link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, c
         kind, size = "box", tuple(np.asarray(geometry.box.size, float).tolist())
     else:
         return None
+    size = tuple(metres * length for length in size)
     return LinkGeometry(link, kind, size, origin_44, color) if min(size) > 0.0 else None

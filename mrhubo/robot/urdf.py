@@ -193,8 +193,18 @@ def describe(path: Path) -> Description:
             floating or planar joint anywhere but directly under the root (where it only places the robot in the world,
             and is taken as fixed).
     """
+    return describe_text(path, read_text(path))
+
+
+def describe_text(path: Path, text: bytes) -> Description:
+    """As `describe`, of a text that is in no file.
+
+    Args:
+        path: what sentences about it name.
+        text: a URDF.
+    """
     # Meshes may have changed since the same text was read before.
-    return replace(_described(path, read_text(path)), _read={})
+    return replace(_described(path, text), _read={})
 
 
 @lru_cache(maxsize=_KEPT)

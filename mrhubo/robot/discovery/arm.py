@@ -235,7 +235,8 @@ def _wrist(
             links.append(step.outer_link)
         return Spot(point_3, step.start, tuple(links), cue, sure), twist_at
     last = chain[-1]
-    end_3, how, sure = limb_end(bodies, last, elbow.point_3, elbow.point_3 - shoulder.point_3)
+    upper_3, hinged = elbow.point_3 - shoulder.point_3, elbow_at == len(chain) - 1
+    end_3, how, sure = limb_end(bodies, last, elbow.point_3, upper_3, hinged=hinged)
     if twist_at is not None:
         origin_3 = bodies.position(chain[twist_at].outer_link)
         outward = float((origin_3 - elbow.point_3) @ unit(end_3 - elbow.point_3))

@@ -18,7 +18,6 @@ from mrhubo.robot.discovery.members import Limbs
 from mrhubo.robot.discovery.necks import is_named
 from mrhubo.robot.discovery.questions import Named, coupled, notes, questions
 from mrhubo.robot.discovery.ranges import find_ranges
-from mrhubo.robot.discovery.reading import read_bodies
 from mrhubo.robot.discovery.result import (
     Candidate,
     Discovery,
@@ -27,9 +26,8 @@ from mrhubo.robot.discovery.result import (
     FoundPoint,
     Vector,
 )
-from mrhubo.robot.discovery.roles import find_roles
 from mrhubo.robot.discovery.sole import GuessedSole, guess_sole
-from mrhubo.robot.discovery.symmetry import find_pairs
+from mrhubo.robot.discovery.whole import Whole, complete
 from mrhubo.robot.urdf import Description, describe
 
 SIDES = ("left", "right")
@@ -45,18 +43,18 @@ def discover(robot: Description | Path | str, whole_body: bool = False) -> Disco
             and chains of them are told either way.
 
     Raises:
-        UserError: the file is no robot (as `describe`), or it has no two arms that could be told; says what it has.
+        UserError: the file is no robot (as `describe`), or it has no arms that could be told; says what it has.
     """
     description = robot if isinstance(robot, Description) else describe(Path(robot))
-    return description.once("discovery", lambda: _Finder(description)).found(whole_body)
+    return description.once("discovery", lambda: _Finder(complete(description))).found(whole_body)
 
 
 class _Finder:
     """Puts together what the parts of this package find."""
 
-    def __init__(self, description: Description) -> None:
-        bodies = read_bodies(description)
-        roles = find_roles(bodies, find_pairs(bodies))
+    def __init__(self, whole: Whole) -> None:
+        bodies, roles = whole.bodies, whole.roles
+        self.whole = whole
         arms = read_arms(bodies, roles.arms.chains)
         legs = [
             leg for chain in (roles.legs.chains if roles.legs else ()) if (leg := read_leg(bodies, chain)) is not None
@@ -78,6 +76,10 @@ class _Finder:
                 hands[side] = hand
         self.hands = agreeing_hands(hands, self.heading.left_3)
         self.feet = {side: read_foot(bodies, leg, self.heading) for side, leg in self.legs.items()}
+        for side, arm in list(self.arms.items()):
+            if whole.is_image(arm.chain[0].hinge.name):
+                del self.arms[side]
+                self.hands.pop(side, None)
 
     def found(self, whole_body: bool) -> Discovery:
         """The result; whether legs and waist are to move too."""
@@ -90,6 +92,7 @@ class _Finder:
         ranges = {name: found for name, found in ranges.items() if name in joints}
         held = dict(limbs.held(joints))
         points = dict(self._points(spots))
+        all_asked = (*self.whole.asked(), *questions(limbs, spots, self.feet, soles), *asked, *coupled(limbs))
         return Discovery(
             name=_short_name(self.bodies.description),
             forward=FoundAxis(_vector(self.heading.forward_3), self.heading.forward_sure, self.heading.forward_cue),
@@ -99,11 +102,11 @@ class _Finder:
             chains={name: tuple(step.hinge.name for step in chain) for name, chain in limbs.chains.items()},
             joints=joints,
             held=held,
-            left_out=dict(limbs.left_out({*joints, *held})),
+            left_out={name: why for name, why in limbs.left_out({*joints, *held}) if not self.whole.is_image(name)},
             ranges=ranges,
             key_links=limbs.key_links(),
-            questions=(*questions(limbs, spots, self.feet, soles), *asked, *coupled(limbs)),
-            notes=tuple(notes(limbs, ranges)),
+            questions=tuple(map(self.whole.without_images, all_asked)),
+            notes=(*self.whole.told(self.arms), *notes(limbs, ranges)),
             geometric={name: point for name, point in points.items() if point.confidence >= 0.75},
             whole_body=limbs.whole_body,
         )
@@ -139,11 +142,14 @@ class _Finder:
     def _ends(self, soles: Mapping[str, GuessedSole]) -> Iterator[tuple[str, FoundEnd]]:
         forward_3, up_3, roles = self.heading.forward_3, self.heading.up_3, self.roles
         sure = min(self.heading.forward_sure, self.heading.up_sure)
-        chest = self._main_link(roles.chest, [chain[0] for chain in roles.arms.chains])
+        arms = "both arms" if len(self.arms) == len(SIDES) else "the only arm"
+        # An arm and its image hang on one link, which may be the arm's mount; the neck tells more.
+        from_chest = [chain[0] for chain in roles.arms.chains] + ([] if self.whole.lone is None else [*roles.neck[:1]])
+        chest = self._main_link(roles.chest, from_chest)
         yield (
             "chest",
             self._end(
-                chest, {"forward": forward_3, "up": up_3}, min(sure, roles.sure), "the body that carries both arms"
+                chest, {"forward": forward_3, "up": up_3}, min(sure, roles.sure), f"the body that carries {arms}"
             ),
         )
         if (pelvis := self._pelvis()) is not None:

@@ -13,6 +13,10 @@ from mrhubo.robot.discovery.names import speaks_of
 
 OUT = 1 / 3
 """How long a forearm is at least, as a share of the upper arm."""
+_LONG = 1.5
+"""How long a shin is at most, as a share of its thigh: 0.8 to 1.2 on public humanoids."""
+_TELLS = 0.1
+"""How far out a centre of mass is that tells where a limb ends, as a share of the limb before it."""
 _WRIST = 3
 """Joints of a wrist at most."""
 _ROLLS = 0.02
@@ -32,7 +36,7 @@ def long_branches(bodies: Bodies, chain: Chain, share: float) -> str:
 
 
 def limb_end(
-    bodies: Bodies, last: Step, start_3: np.ndarray, usual_3: np.ndarray, called: str = "wrist"
+    bodies: Bodies, last: Step, start_3: np.ndarray, usual_3: np.ndarray, called: str = "wrist", hinged: bool = False
 ) -> tuple[np.ndarray, str, float]:
     """The end of a limb beyond its last joint (3,), how it was told, and how sure that is.
 
@@ -42,6 +46,7 @@ def limb_end(
         start_3: where the limb starts.
         usual_3: where it should end about, as seen from its start (3,) [m]: as the limb before it goes on.
         called: what the end is called.
+        hinged: whether the last joint is the hinge that bends the limb.
     """
     inside, onward, usual = bodies.links_of[last.end], bodies.onward(last), float(np.linalg.norm(usual_3))
     if called == "wrist" and (held := _held_wrist(bodies, last, start_3, OUT * usual)) is not None:
@@ -74,7 +79,14 @@ def limb_end(
     if far is not None and fixed[far] > OUT * usual:
         return bodies.position(far), f"the farthest fixed link '{far}', as no joint tells the {called}", 0.45
     centre_3 = bodies.centre(last.end)
-    if centre_3 is not None and float(np.linalg.norm(centre_3 - start_3)) > 0.1 * usual:
+    away = 0.0 if centre_3 is None else float(np.linalg.norm(centre_3 - start_3))
+    if centre_3 is not None and called == "ankle" and 2 * away > _LONG * usual:
+        # A heavy foot, or one alone, has its centre there; a shin is about as long as its thigh.
+        way_3 = unit(unit(centre_3 - start_3) + unit(usual_3))
+        return start_3 + usual * way_3, "as far as the thigh is long, as no joint tells the ankle", 0.4
+    # Along the hinge that bends it lies no limb.
+    out = away if centre_3 is None or not hinged else last.hinge.line.distance(centre_3)
+    if centre_3 is not None and min(away, out) > _TELLS * usual:
         return (
             start_3 + 2 * (centre_3 - start_3),
             f"twice as far as the centre of mass, as no joint tells the {called}",

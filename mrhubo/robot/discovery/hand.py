@@ -22,6 +22,8 @@ _STRAIGHT = 0.8
 """Cosine (37 degrees) up to which fingers are taken to go on as the forearm does: bases of fingers are spread."""
 _CLEAR = 0.35
 """Cosine from which on a direction tells a side."""
+_ASIDE = 0.85
+"""Cosine from which on a finger's axis is the direction in which its base lies beside the thumb's (32 degrees)."""
 _ALIKE, _PLANE = 0.98, 0.25
 """Cosine from which on axes are parallel, and how far apart along them jaws begin, as a share of how far across."""
 
@@ -247,6 +249,11 @@ def _jaws(
     across_3 = unit(across_3)
     named = [finger for finger in fingers if finger.named_thumb]
     if len(named) == 1 and len(fingers) == 2:
+        # A finger curls about what runs across the hand; its base may lie nearer to the palm than the thumb's.
+        finger = next(finger for finger in fingers if finger is not named[0])
+        axis_3 = unit(finger.axis_3 - fingers_3 * (fingers_3 @ finger.axis_3))
+        if abs(float(axis_3 @ across_3)) > _ASIDE:
+            across_3 = axis_3
         side = float((named[0].base_3 - np.mean([f.base_3 for f in fingers], axis=0)) @ across_3)
         return (across_3 if side > 0 else -across_3), "the thumb's jaw by its name", 0.8, None
     told = float(across_3 @ rest_3)

@@ -75,7 +75,6 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     if aside_3 is None:
         aside_3 = bodies.position(rotary[knee_at].outer_link)
     knee_3 = lines[knee_at].nearest(aside_3)
-    ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at, knee_3)
     if hip_at is not None and (ball_3 is None or parallel(lines[hip_at], lines[knee_at])):
         between = lines[hip_at + 1 : knee_at]
         crossing = bool(between) and sine(between[-1].axis_3, lines[hip_at].axis_3) > TILTED
@@ -86,6 +85,7 @@ def read_leg(bodies: Bodies, chain: Chain) -> Leg | None:
     else:
         hip_3, cue = _without_pitch(bodies, rotary[:knee_at], lines[knee_at], knee_3)
         sure = GUESS
+    ankle = _ankle(bodies, rotary, lines, knee_at, ankle_at, knee_3, hip_3)
     step = rotary[knee_at]
     links = [step.inner_link]
     for i in reversed(range(hip_at if hip_at is not None else 0, knee_at)):
@@ -175,11 +175,16 @@ def _across(
 
 
 def _ankle(
-    bodies: Bodies, chain: Chain, lines: list[Line], knee_at: int, ankle_at: int | None, knee_3: np.ndarray
+    bodies: Bodies,
+    chain: Chain,
+    lines: list[Line],
+    knee_at: int,
+    ankle_at: int | None,
+    knee_3: np.ndarray,
+    hip_3: np.ndarray,
 ) -> Spot:
     if ankle_at is None:
-        thigh_3 = knee_3 - lines[max(knee_at - 1, 0)].nearest(knee_3)
-        end_3, how, sure = limb_end(bodies, chain[-1], knee_3, thigh_3, "ankle")
+        end_3, how, sure = limb_end(bodies, chain[-1], knee_3, knee_3 - hip_3, "ankle")
         return Spot(end_3, chain[-1].end, (chain[-1].outer_link,), how, sure)
     others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not parallel(lines[i], lines[ankle_at])]
     step = chain[knee_at + 1]

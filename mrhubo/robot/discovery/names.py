@@ -14,6 +14,8 @@ _WORDS = {
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
     "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",
+    "trunk": r"torso|chest|thorax|trunk|spine|breast|upper_?body",
+    "tail": r"(^|[^a-z])tail(?!l)",  # taille is a waist
     "rod": r"rod(_|$|\d)|crank|piston|cylinder|linkage|lever|pushrod|four_?bar|tendon|spring",
     "face": r"jaw|chin|mouth|lip(_|s|$)|brow|eyelid|(^|_)lid|(^|^[lr]|[^a-z])eye|cheek|tongue|antenna|(^|_)ear(_|s|$)",
     "sensor": r"lidar|laser|radar|scanner|spin|rotor|propeller",

@@ -16,6 +16,7 @@ from mrhubo.robot.discovery.result import Candidate, FoundRange, Question
 from mrhubo.robot.discovery.roles import Roles
 from mrhubo.robot.discovery.sole import GuessedSole
 from mrhubo.robot.limits import beyond_turns
+from mrhubo.robot.shapes import metres_of
 
 _SURE = 0.5
 """Confidence under which the user is asked."""
@@ -160,6 +161,12 @@ def notes(limbs: Limbs, ranges: Mapping[str, FoundRange]) -> Iterator[str]:
             f"the limits of most joints, as {joint.lower:g} .. {joint.upper:g} of '{joint.name}', can only be "
             "degrees, where a URDF has radians; robot.ranges holds them in radians, and nothing else need be done "
             "here, but other programs need a URDF with every limit times 0.0174533"
+        )
+    small = [word for word in ("collisions", "visuals") if metres_of(bodies.description.parsed, word) < 1.0]
+    if small:
+        yield (
+            "the sizes of its boxes, cylinders and balls can only be millimetres, where a URDF has metres; they are "
+            "read so here, but other programs need a URDF with a thousandth of them"
         )
     sides = [limbs.arms, limbs.legs] if limbs.whole_body else [limbs.arms]
     pairs = [(found["left"].chain, found["right"].chain) for found in sides if len(found) == 2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,9 +17,9 @@ from mrhubo.robot.discovery.elbow import find_elbow
 from mrhubo.robot.discovery.gripper import without_gripper
 from mrhubo.robot.discovery.leg import read_leg
 from mrhubo.robot.discovery.lines import PARALLEL, measure, sine, unit
-from mrhubo.robot.discovery.necks import find_necks
+from mrhubo.robot.discovery.necks import find_necks, is_named
+from mrhubo.robot.discovery.no_arms import no_arms, why_no_arms
 from mrhubo.robot.discovery.symmetry import Pair, alike
-from mrhubo.robot.joint import stuck
 
 _TINY = 0.1
 """The same of the robot's size: fingers of a single arm."""
@@ -57,7 +58,8 @@ class Roles:
 
     def with_neck(self, neck: Chain) -> Roles:
         """With another neck, or none; what else begins in the middle of a root that is the chest is the waist."""
-        below = next((chain for chain in self.necks if chain is not neck), ())
+        rest = (_trunk(chain) for chain in self.necks if chain is not neck)
+        below = next(iter(sorted(filter(None, rest), key=lambda chain: not is_named(chain, "waist"))), ())
         return replace(self, neck=neck, waist=self.waist or (_reversed(below) if self.legs is None else ()))
 
     @property
@@ -75,6 +77,15 @@ class Roles:
         return self.arms.body
 
 
+def _trunk(chain: Chain) -> Chain:
+    """The joints of a chain before those that names call an arm's or a tail's, and no waist's."""
+
+    def called(step: Step, *kinds: str) -> bool:
+        return any(is_named((step,), kind) for kind in kinds)
+
+    return tuple(itertools.takewhile(lambda step: called(step, "waist") or not called(step, "arm", "tail"), chain))
+
+
 def _reversed(chain: Chain) -> Chain:
     """A chain passed from its other end."""
     return tuple(Step(step.hinge, step.end) for step in reversed(chain))
@@ -84,7 +95,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     """Arms, legs and trunk.
 
     Raises:
-        UserError: no pair of arms can be told; says what the robot has.
+        NoArms: no pair of arms can be told; says what the robot has.
+        UserError: it is no humanoid.
     """
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
@@ -94,13 +106,15 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     armed = [
         pair for pair in armed
         if len(pair.chains[0]) > _CASTER or any(step.hinge.limited for step in pair.chains[0])
+        or _folds(pair.chains[0])
     ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
-        raise UserError(
+        raise no_arms(bodies)(
             f"{path}: no two arms were found: no body of the robot carries two limbs of at least two rotary joints "
-            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all); two arms are needed, or, of a "
-            f"robot with one arm, a config that is written by hand (docs/robots.md){_following(bodies)}"
+            f"that are mirror images ({count} movable joint{'s' * (count != 1)} in all), nor one arm beside the middle "
+            "of legs, a head or a trunk; of other robots a config is written by hand "
+            f"(docs/robots.md){why_no_arms(bodies)}"
         )
     read = {id(pair) for pair in armed}
     # A waist and a neck that are alike, one below the chest and one above, are no limbs.
@@ -113,8 +127,9 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     if len(armed) == 1:
         if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
-            raise UserError(
-                f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were found{_following(bodies)}"
+            raise no_arms(bodies)(
+                f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were "
+                f"found{why_no_arms(bodies)}"
             )
         arms, legs, sure = armed[0], None, 1.0 if legness[id(armed[0])] < 0.5 else 0.6
     elif fronts:
@@ -140,13 +155,13 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
-    if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
-        legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
     # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings, if no name tells.
     spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
     winged = legs is not None and len(legs.chains[0]) < _LEG and not _named_legs(legs)
     if winged or any(pair.size > arms.size for pair in spare):
         sure = min(sure, GUESS)
+    if legs is not None and float(legs.normal_3 @ arms.normal_3) < 0:
+        legs = legs.flipped()  # whichever side is left, both pairs begin with the same one
     start = legs.body if legs is not None else bodies.body_of[bodies.description.root]
     waist = bodies.path(start, arms.body)
     same = [pair for pair in pairs if abs(float(pair.normal_3 @ arms.normal_3)) > 0.95]
@@ -167,6 +182,17 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     return Roles(arms, legs, waist, necks[0] if necks else (), necks, others, sure)
 
 
+def _folds(chain: Chain) -> bool:
+    """Whether all axes of a limb are parallel, as those of a shoulder and an elbow may be; a caster's are not."""
+    lines = lines_of(chain)
+    return all(sine(line.axis_3, lines[0].axis_3) < PARALLEL for line in lines)
+
+
+def looks_like_legs(bodies: Bodies, pair: Pair) -> bool:
+    """Whether a pair of limbs has knees between parallel axes, or is like legs by its axes and names."""
+    return _has_knees(bodies, pair) or _legness(bodies, pair) > 0.0 or _named_legs(pair)
+
+
 def _has_knees(bodies: Bodies, pair: Pair) -> bool:
     """Whether parallel axes tell the knees of both of its limbs."""
     return all((leg := read_leg(bodies, chain)) is not None and leg.straight for chain in pair.chains)
@@ -177,37 +203,6 @@ def _between(bodies: Bodies, pair: Pair, other: Pair) -> bool:
     apart = (pair.mounts_23 - other.mounts_23.mean(0)) @ other.normal_3
     across = abs(float(pair.normal_3 @ other.normal_3)) < _ACROSS
     return across and other.size > pair.size and float(np.abs(apart).max()) < _MIDDLE * bodies.size
-
-
-def _following(bodies: Bodies) -> str:
-    """The end of a sentence on a joint that mimics one of another limb, which hides its own, on joints whose limits
-    leave them no way to move, or on fixed ones that have limits; else nothing.
-    """
-    root = bodies.body_of[bodies.description.root]
-    for hinge in (hinge for hinge in bodies.hinges if hinge.rotary and not hinge.free):
-        mimic = bodies.description.joints[hinge.name].mimic
-        source = next((other for other in bodies.hinges if mimic is not None and other.name == mimic.joint), None)
-        above = {root, *(step.end for step in bodies.path(root, hinge.bodies[0]))}
-        if source is not None and source.bodies[0] not in above:
-            return (
-                f"; '{hinge.name}' mimics '{source.name}' of another limb: if the robot can move both by themselves, "
-                "take the <mimic> elements of such joints out of the URDF"
-            )
-    still = [joint for joint in bodies.description.joints.values() if joint.rotary and stuck(joint)]
-    if not still:
-        return _fixed_with_limits(bodies)
-    first, more = still[0], f" and {len(still) - 1} more" * (len(still) > 1)
-    ends = f"{first.lower:g} .. {first.upper:g}"
-    return f"; '{first.name}'{more} cannot move, by limits as {ends}: correct them if it can"
-
-
-def _fixed_with_limits(bodies: Bodies) -> str:
-    joints = [joint for joint in bodies.description.joints.values() if joint.kind == "fixed"]
-    named = [j.name for j in joints if j.lower is not None and j.upper is not None and j.lower < j.upper]
-    if not named:
-        return ""
-    more = f" and {len(named) - 1} more" * (len(named) > 1)
-    return f"; '{named[0]}'{more} are fixed, though they have limits: make them revolute if they can move"
 
 
 def _legness(bodies: Bodies, pair: Pair) -> float:

@@ -45,7 +45,7 @@ class Humanoid:
     told: frozenset[str]
     """What else is true, for tables: `names`, `legs`, `zero: t`, ..."""
     mappable: bool
-    """Whether it has two arms that move by themselves; else it is to be refused."""
+    """Whether it has arms that move by themselves; else it is to be refused."""
 
 
 def humanoid(seed: int, kind: str | None = None) -> Humanoid:

@@ -158,8 +158,8 @@ def wings(chance: Chance, plan: Plan, places: Places) -> Angles:
 
 
 def one_arm(chance: Chance, plan: Plan, places: Places) -> Angles:
-    """Without the right arm."""
-    _, second = SIDES
+    """Without one of the arms."""
+    second = chance.either(*SIDES)
     gone = {joint.child for joint in plan.joints if joint.role.startswith(second) and _in_arm(joint.role)}
     while more := {joint.child for joint in plan.joints if joint.parent in gone} - gone:
         gone |= more

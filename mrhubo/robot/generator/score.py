@@ -80,7 +80,8 @@ def _joints(found: Discovery, truth: Humanoid) -> Iterator[str]:
 
 def _points(found: Discovery, truth: Humanoid) -> Iterator[str]:
     points = truth.points
-    arm = sum(np.linalg.norm(points[f"left_{end}"] - points["left_elbow"]) for end in ("shoulder", "wrist"))
+    side = "left" if "left_elbow" in points else "right"
+    arm = sum(np.linalg.norm(points[f"{side}_{end}"] - points[f"{side}_elbow"]) for end in ("shoulder", "wrist"))
     near = _NEAR * max(float(arm) / 0.5, 0.25)
     for name, true_3 in points.items():
         if name not in found.points:
@@ -100,8 +101,11 @@ def _hands(found: Discovery, truth: Humanoid, description: Description) -> Itera
     for side in ("left", "right"):
         end = found.ends.get(f"{side}_hand")
         if end is None:
-            if truth.wrist_joints:
+            if truth.wrist_joints and truth.chains[f"{side}_arm"]:
                 yield f"{side}_hand: not found"
+            continue
+        if not truth.chains[f"{side}_arm"]:
+            yield f"{side}_hand: there is none"
             continue
         pose_33 = _turn(description, end.link)
         fingers, thumb = (

@@ -37,7 +37,7 @@ class Strange:
     bare: bool = False
     """Whether links have neither shapes nor masses."""
     mappable: bool = True
-    """Whether it has two arms that move by themselves."""
+    """Whether it has arms that move by themselves."""
 
     def root(self, plan: Plan, usual: int) -> int:
         """The body that becomes the root link."""
@@ -94,7 +94,7 @@ STRANGE: dict[str, Strange] = {
     "a tail": Strange(build=odd_parts.tail),
     "a third arm": Strange(build=odd_parts.third_arm),
     "wings": Strange(build=odd_parts.wings),
-    "one arm": Strange(build=odd_parts.one_arm, mappable=False),
+    "one arm": Strange(build=odd_parts.one_arm),
     "hips askew": Strange(build=odd_legs.askew_hips),
     "knees both ways": Strange(build=odd_legs.free_knees),
     "legs that telescope": Strange(build=odd_legs.telescopes),

@@ -44,6 +44,23 @@ def test_a_knee_is_told_whether_or_not_the_hip_has_a_pitch(
         assert {f"{side}_hip_{word}_joint" for word in hips} | {f"{side}_knee_joint"} <= set(found.joints)
 
 
+@pytest.mark.parametrize("weight", [-0.33, -0.15])
+def test_a_shin_whose_end_masses_tell_is_about_as_long_as_its_thigh(weight: float, tmp_path: Path) -> None:
+    """Whichever axis is the last of the hip, and where the foot is all that weighs something."""
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        link = "chest"
+        for word in ("roll", "pitch", "yaw"):
+            xyz = (0, 0.1 * SIDES[side], -0.1) if link == "chest" else (0, 0, 0)
+            link = made.join(f"{side}_hip_{word}", link, xyz, AXES[word], (-0.8, 0.8))
+        made.join(f"{side}_knee", link, (0, 0, -0.4), Y, (0.0, 2.2))
+        made.parts[-1] = made.parts[-1].replace("0 0 -0.05", f"0 0 {weight}")
+    found = made.found(tmp_path)
+    assert at(found, "left_ankle") == pytest.approx([0, 0.1, -0.5 + (-0.4 if weight < -0.3 else 2 * weight)], abs=1e-3)
+    assert "left_ankle" in about(found)
+
+
 def test_toes_are_no_ankle_where_the_hip_has_no_pitch(tmp_path: Path) -> None:
     made = Made()
     for side in SIDES:

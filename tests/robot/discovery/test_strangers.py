@@ -86,6 +86,63 @@ def test_a_box_of_a_millimetre_tells_no_sole(tmp_path: Path) -> None:
         assert ("left_foot" in about(found)) != known and (found.ends["left_foot"].confidence >= 0.9) == known
 
 
+def test_boxes_in_millimetres_are_read_so(tmp_path: Path) -> None:
+    """As Bez's, whose joints are in metres."""
+    soles = []
+    for unit in (1, 1000):
+        made = Made()
+        for side in SIDES:
+            made.wrist(side, made.forearm(side, made.arm(side)))
+            size, place = (
+                " ".join(f"{unit * length}" for length in box) for box in ((0.2, 0.1, 0.03), (0.04, 0, -0.05))
+            )
+            shape = f"<collision><origin xyz='{place}'/><geometry><box size='{size}'/></geometry></collision>"
+            foot = made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y, (-0.8, 0.8), shape=shape)
+            made.join(f"{side}_toes", foot, (0, 0, 0), Y, None, "fixed", shape=shape)
+        found = made.found(tmp_path)
+        soles.append(at(found, "left_sole"))
+        assert any("millimetres" in note for note in found.notes) == (unit == 1000)
+    assert soles[1] == pytest.approx(soles[0])
+
+
+def test_an_arm_of_two_parallel_axes_without_limits_is_no_caster(tmp_path: Path) -> None:
+    """As Bez's; a caster's two axes are at right angles."""
+    made = Made()
+    for side, sign in SIDES.items():
+        upper = made.join(f"{side}_arm_0", "chest", (0, 0.1 * sign, 0.1), Y, None, "continuous")
+        shape = "<collision><origin xyz='0 0 -0.1'/><geometry><box size='0.05 0.05 0.2'/></geometry></collision>"
+        made.join(f"{side}_arm_1", upper, (0, 0, -0.25), Y, None, "continuous", shape=shape)
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y, None, "continuous")
+    found = made.found(tmp_path)
+    assert at(found, "left_elbow") == pytest.approx([0, 0.1, -0.15]) and {"left_wrist", "right_wrist"} <= about(found)
+
+
+def test_what_lies_on_an_elbows_hinge_tells_no_forearm(tmp_path: Path) -> None:
+    """As the brackets that Dora's elbows carry."""
+    made = Made()
+    for side, sign in SIDES.items():
+        made.join(f"{side}_elbow", made.arm(side), (0, 0, -0.3), Y, (-1.5, 1.5))
+        made.parts[-1] = made.parts[-1].replace("0 0 -0.05", f"0 {0.04 * sign} 0")
+    found = made.found(tmp_path)
+    assert at(found, "left_wrist") == pytest.approx([0, 0.2, -0.2]) and "left_wrist" in about(found)
+    limits = found.ranges["left_elbow_joint"]
+    assert (limits.lower, limits.upper) == pytest.approx((-1.5, 0.0))
+
+
+def test_a_tail_by_its_name_is_no_waist(tmp_path: Path) -> None:
+    """Below a root that is the chest of a robot without legs, the waist is what names do not call otherwise."""
+    for tail, word in (("tail", ""), ("tail", "waist"), ("arm", "waist"), ("tail", "taille")):
+        made, link = Made(), "chest"
+        for side in SIDES:
+            made.wrist(side, made.forearm(side, made.arm(side)))
+        for number in range(3):
+            link = made.join(f"{tail}_{number}", link, (-0.1, 0, 0), Y if number % 2 else Z)
+        if word:
+            made.join(word, "chest", (0, 0, -0.1), Z)
+        found = made.found(tmp_path)
+        assert found.chains["waist"] == ((f"{word}_joint",) if word else ()) and f"{tail}_0_joint" in found.left_out
+
+
 def test_a_wrist_whose_joints_are_fixed_is_where_they_are(tmp_path: Path) -> None:
     """As G1's with its wrists locked, and COMAN's; a hand's link, which lies farther on, is no wrist."""
     made = Made()
@@ -161,6 +218,18 @@ def test_the_thumb_of_three_fingers_is_the_one_that_closes_against_the_others(tm
     # Both palms face left, as the first two fingers close.
     assert found.ends["left_hand"].axes["thumb"] == pytest.approx((-1, 0, 0))
     assert found.ends["right_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
+
+
+def test_the_thumb_beside_one_finger_lies_along_the_axis_about_which_that_curls(tmp_path: Path) -> None:
+    """And not along the way between their bases, which may lie at different heights above the palm."""
+    made = Made()
+    for side, sign in SIDES.items():
+        hand = made.wrist(side, made.forearm(side, made.arm(side)))
+        for word, x, y, axis in (("finger", -0.03, 0, (-sign, 0, 0)), ("thumb", 0.03, -0.02 * sign, (0, sign, 0))):
+            link = made.join(f"{side}_{word}", hand, (x, y, -0.08), axis, (0.0, 1.2))
+            made.join(f"{side}_{word}_tip", link, (0, 0, -0.05), axis, (0.0, 1.2))
+    for side in SIDES:
+        assert made.found(tmp_path).ends[f"{side}_hand"].axes["thumb"] == pytest.approx((1, 0, 0))
 
 
 def test_two_jaws_with_a_rod_beside_each_are_no_four_fingers(tmp_path: Path) -> None:
@@ -265,15 +334,6 @@ def test_a_linkage_without_masses_that_is_drawn_beside_a_leg_is_passed_over(tmp_
     assert at(found, "left_knee") == pytest.approx([0, 0.1, -0.5], abs=1e-3)
 
 
-def test_a_robot_with_one_arm_is_told_what_it_needs(tmp_path: Path) -> None:
-    made = Made()
-    made.wrist("left", made.forearm("left", made.arm("left")))
-    with pytest.raises(
-        UserError, match=r"of a robot with one arm, a config that is written by hand \(docs/robots.md\)"
-    ):
-        made.found(tmp_path)
-
-
 def test_a_shoulder_of_three_axes_in_any_order_is_not_turned_inside_out(tmp_path: Path) -> None:
     """The axis that lies along the arm, which is the first one here, gets half a turn where a file gives no limits."""
     made = Made()
@@ -334,6 +394,16 @@ def test_a_second_pair_of_arms_is_asked_about(tmp_path: Path) -> None:
     for side in SIDES:
         made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
     assert "chest" in about(made.found(tmp_path))
+
+
+def test_legs_that_a_file_lists_from_the_other_side_are_no_second_pair_of_arms(tmp_path: Path) -> None:
+    """The body that carries them carries the arms too, as on a robot without a waist."""
+    made = Made()
+    for side in reversed(SIDES):
+        made.wrist(side, made.forearm(side, made.arm(side)))
+    for side in SIDES:
+        made.join(f"{side}_foot", made.leg(side), (0, 0, -0.4), Y)
+    assert "chest" not in about(made.found(tmp_path))
 
 
 def test_an_arm_without_a_wrist_beside_a_whole_one_is_an_arm(tmp_path: Path) -> None:
