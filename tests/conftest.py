@@ -58,6 +58,14 @@ def _unit(file: str) -> str:
     return next((group[0] for group in _TOGETHER if file.startswith(group)), file)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """A process that crashes ends the run with the name of its test. Another one in its place would begin that test again,
+    and pytest-xdist does not hand whole files to it: the run would hang.
+    """
+    if getattr(config.option, "maxworkerrestart", "no xdist") is None:
+        config.option.maxworkerrestart = "0"
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The files that take longest come first."""
     order = {name: place for place, name in enumerate(_LONGEST)}
