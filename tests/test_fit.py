@@ -368,4 +368,4 @@ def test_runs_are_named_after_what_differs(root: Path) -> None:
     assert run_name(config) == "nao filter=none stages=1"
     config.pairs.count = 10
     assert run_name(config) == "nao filter=none stages=1 count=10"
-    assert run_name(load_config(root / "conf" / "paper" / "reachy.yaml")).endswith(" scale=manual")
+    assert run_name(load_config(root / "conf" / "paper" / "reachy.yaml")).endswith(" scale=manual max_steps=9000")
