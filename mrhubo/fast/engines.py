@@ -114,7 +114,7 @@ class NumpyEngine:
             target, trust = target_BD3[rows], d.trust
             found.q_BN[rows] = self.polish(q_BN[rows], target, polish, avoid)
             placed = robot.place(d.kinematics, found.q_BN[rows].astype(np.float64))
-            own_BD3 = np.moveaxis(robot.seen(d.human.seen_D, placed.view_V33B, placed.direction_D3B), -1, 0)
+            own_BD3 = robot.seen_directions(placed, d.human.seen_D)
             angle_BD = np.degrees(judging.angle_between(own_BD3, target))
             found.error_BM[rows] = angle_BD[:, trust.measured]
             found.collision_B[rows] = collision.collides(d.capsules, placed.rotation_BL33, placed.position_BL3)

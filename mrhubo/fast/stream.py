@@ -20,10 +20,11 @@ from mrhubo.errors import UserError
 from mrhubo.fast.answers import Ground
 from mrhubo.fast.pelvis import Pelvises
 from mrhubo.fast.plain.crossing import Crossing
-from mrhubo.fast.plain.following import Filtered, Followed, Joints, Limits, cross_over, follow_goal, one_euro, room
+from mrhubo.fast.plain.following import Filtered, Followed, cross_over, follow_goal, one_euro, room
 from mrhubo.fast.plain.ground import Base, Seen, Stance
 from mrhubo.fast.plain.human import orthonormal_columns
 from mrhubo.fast.plain.judging import quaternions
+from mrhubo.fast.plain.limits import Joints, Limits
 from mrhubo.fast.plain.root_turn import root_turn
 from mrhubo.fast.poses import check_frame_rate, has_gaps, is_motion, read_poses, refuse, to_array
 from mrhubo.fast.retargeter import POLISH, FastRetargeter

@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.nn.functional import l1_loss, mse_loss
 
 from mrhubo.config import TrainerConfig
-from mrhubo.fitting.muon import make_muon
+from mrhubo.fitting.muon import Muon
 from mrhubo.retargeter.networks import Piece, RetargetNetwork
 from mrhubo.runtime.trainer import stop_at, with_schedule
 
@@ -93,4 +93,4 @@ class RetargetModule(lightning.LightningModule):
         hidden = network.hidden_weights() if settings.optimizer == "muon" else []
         pool = None if self.branch_threads is None else self.branch_threads.pool
         rates = settings.lr, settings.muon_lr, settings.weight_decay
-        return with_schedule(make_muon(network, hidden, *rates, pool), settings.max_steps)
+        return with_schedule(Muon(network.parameters(), hidden, *rates, pool), settings.max_steps)

@@ -45,8 +45,8 @@ class Muon(torch.optim.AdamW):
 
     def __init__(
         self,
-        hidden: Iterable[nn.Parameter],
-        others: Iterable[nn.Parameter],
+        weights: Iterable[nn.Parameter],
+        hidden: Sequence[nn.Parameter],
         lr: float,
         hidden_lr: float,
         weight_decay: float,
@@ -55,14 +55,16 @@ class Muon(torch.optim.AdamW):
         """An optimiser that has not made a step.
 
         Args:
-            hidden: square matrices, Muon's.
-            others: AdamW's.
-            lr: learning rate of those.
+            weights: all that learn.
+            hidden: square matrices among them, Muon's; the others are AdamW's.
+            lr: learning rate of the others.
             hidden_lr: how far the hidden matrices move in a step, as a share of an orthogonal matrix.
             weight_decay: AdamW's.
             pool: threads that find the hidden steps side by side, which does not change them; None: this one does.
         """
-        super().__init__([{"params": [*others]}], lr, weight_decay=weight_decay, fused=True)
+        chosen = {id(weight) for weight in hidden}
+        others = [weight for weight in weights if id(weight) not in chosen]
+        super().__init__([{"params": others}], lr, weight_decay=weight_decay, fused=True)
         self.add_param_group({"params": [*hidden], "lr": hidden_lr, "weight_decay": 0.0})
         self._pool = pool
 
@@ -97,17 +99,3 @@ class Muon(torch.optim.AdamW):
         assert weight.grad is not None
         mean = self.state[weight]["mean"].mul_(MOMENTUM).add_(weight.grad)
         weight.sub_(nearly_orthogonal(torch.add(weight.grad, mean, alpha=MOMENTUM)), alpha=rate)
-
-
-def make_muon(
-    network: nn.Module,
-    hidden: Sequence[nn.Parameter],
-    lr: float,
-    hidden_lr: float,
-    weight_decay: float,
-    pool: ThreadPoolExecutor | None = None,
-) -> Muon:
-    """`Muon` for all weights of a network, of which some matrices are hidden."""
-    chosen = {id(weight) for weight in hidden}
-    others = [weight for weight in network.parameters() if id(weight) not in chosen]
-    return Muon(hidden, others, lr, hidden_lr, weight_decay, pool)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
-from mrhubo.fast.plain.following import Joints, Limits
+from mrhubo.fast.plain.limits import Joints, Limits
 from mrhubo.robot_motion import RobotFacts
 
 _LEAST_STEPS = 2

@@ -13,12 +13,8 @@ from torch import Tensor
 from mrhubo.fast import StreamSettings
 from mrhubo.fast.plain.crossing import LEAST
 from mrhubo.reference.blocks import Blocks
+from mrhubo.streaming.limits import pursuit
 from mrhubo.streaming.people import OfPeople
-
-
-def stopping(distance_BN: Tensor, acceleration: Tensor, passed_B1: Tensor) -> Tensor:
-    """The largest speed [rad/s] of a step after which a joint can still stop within a distance [rad]."""
-    return 2 * distance_BN / (passed_B1 + (passed_B1.square() + 2 * distance_BN / acceleration).sqrt())
 
 
 @dataclass(frozen=True)
@@ -61,9 +57,8 @@ class Crossing(OfPeople):
         """
         passed_B1, crosses_BN = passed_B.double()[:, None], self.left_BN > 0
         q_BN, goal_BN, goal_velocity_BN = q_BN.double(), goal_BN.double(), goal_velocity_BN.double()
-        behind_BN = goal_BN - goal_velocity_BN * passed_B1 - q_BN
-        quickest_BN = stopping(behind_BN.abs(), self.acceleration_BN, passed_B1)
-        wanted_BN, change_BN = goal_velocity_BN + behind_BN.sign() * quickest_BN, self.acceleration_BN * passed_B1
+        wanted_BN = pursuit(q_BN, goal_BN, goal_velocity_BN, self.acceleration_BN, passed_B1)
+        change_BN = self.acceleration_BN * passed_B1
         wanted_BN = torch.minimum(torch.maximum(wanted_BN, speed_BN - change_BN), speed_BN + change_BN)
         on_way_BN = torch.where(crosses_BN, q_BN + wanted_BN * passed_B1, goal_BN)
         return on_way_BN, torch.where(crosses_BN, wanted_BN, goal_velocity_BN)

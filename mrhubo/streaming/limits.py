@@ -20,11 +20,23 @@ import torch
 from torch import Tensor
 
 from mrhubo.robot import Robot
-from mrhubo.streaming.crossing import stopping
 from mrhubo.streaming.people import OfPeople
 
 _WITHIN = 1 - 1e-6
 """Share of the speed limit that is used, so that who works the speed out in float32 again finds none above it."""
+
+
+def pursuit(q_BN: Tensor, goal_BN: Tensor, goal_velocity_BN: Tensor, acceleration: Tensor, passed_B1: Tensor) -> Tensor:
+    """The speed [rad/s] of a step with which joints come to a goal [rad] that moves [rad/s] as soon as they can,
+    without passing by.
+    """
+    behind_BN = goal_BN - goal_velocity_BN * passed_B1 - q_BN
+    return goal_velocity_BN + behind_BN.sign() * _stopping(behind_BN.abs(), acceleration, passed_B1)
+
+
+def _stopping(distance_BN: Tensor, acceleration: Tensor, passed_B1: Tensor) -> Tensor:
+    """The largest speed [rad/s] of a step after which a joint can still stop within a distance [rad]."""
+    return 2 * distance_BN / (passed_B1 + (passed_B1.square() + 2 * distance_BN / acceleration).sqrt())
 
 
 @dataclass(frozen=True)
@@ -61,11 +73,9 @@ class JointLimits:
             passed_B: time since the last state [s], more than 0.
         """
         passed_B1, q_BN = passed_B.double()[:, None], state.q_BN.double()
-        goal_velocity_BN = goal_velocity_BN.double()
-        behind_BN = goal_BN.double() - goal_velocity_BN * passed_B1 - q_BN
-        wanted_BN = goal_velocity_BN + behind_BN.sign() * stopping(behind_BN.abs(), self.acceleration_N, passed_B1)
-        least_BN = -stopping(q_BN - self.lower_N, self.acceleration_N, passed_B1).clamp_max(self.speed_N)
-        most_BN = stopping(self.upper_N - q_BN, self.acceleration_N, passed_B1).clamp_max(self.speed_N)
+        wanted_BN = pursuit(q_BN, goal_BN.double(), goal_velocity_BN.double(), self.acceleration_N, passed_B1)
+        least_BN = -_stopping(q_BN - self.lower_N, self.acceleration_N, passed_B1).clamp_max(self.speed_N)
+        most_BN = _stopping(self.upper_N - q_BN, self.acceleration_N, passed_B1).clamp_max(self.speed_N)
         change_BN = self.acceleration_N * passed_B1
         least_BN = torch.maximum(least_BN, state.velocity_BN - change_BN)
         most_BN = torch.minimum(most_BN, state.velocity_BN + change_BN)

@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from mrhubo.config import load_config
-from mrhubo.fitting.muon import Muon, make_muon, nearly_orthogonal
+from mrhubo.fitting.muon import Muon, nearly_orthogonal
 from mrhubo.retargeter import RetargetNetwork, build_network
 from mrhubo.retargeter.networks import ResidualMLP
 from mrhubo.robot import build_body_map
@@ -41,7 +41,7 @@ def learn(net: nn.Module, optimizer: torch.optim.Optimizer, steps: int, seed: in
 
 
 def muon(net: ResidualMLP, hidden_lr: float = 0.01, pool: ThreadPoolExecutor | None = None) -> Muon:
-    return make_muon(net, hidden_of(net), 0.008, hidden_lr, 1e-6, pool)
+    return Muon(net.parameters(), hidden_of(net), 0.008, hidden_lr, 1e-6, pool)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e4])
@@ -70,7 +70,7 @@ def test_hidden_matrices_move_by_their_rate_and_no_further() -> None:
 def test_all_else_is_adamws() -> None:
     """Without hidden matrices all of it, and of a network with some the rest."""
     one, other = network(), network()
-    learn(one, make_muon(one, [], 0.008, 0.01, 1e-3), 20)
+    learn(one, Muon(one.parameters(), [], 0.008, 0.01, 1e-3), 20)
     learn(other, torch.optim.AdamW(other.parameters(), 0.008, weight_decay=1e-3, fused=True), 20)
     for mine, theirs in zip(one.parameters(), other.parameters(), strict=True):
         assert torch.equal(mine, theirs)
@@ -110,7 +110,7 @@ def test_it_learns_more_in_as_many_steps() -> None:
     def last(seed: int, with_muon: bool) -> float:
         net = network(seed)
         hidden: list[nn.Parameter] = hidden_of(net) if with_muon else []
-        return sum(learn(net, make_muon(net, hidden, 0.008, 0.01, 1e-6), 300)[-30:])
+        return sum(learn(net, Muon(net.parameters(), hidden, 0.008, 0.01, 1e-6), 300)[-30:])
 
     assert max(last(seed, True) for seed in range(3)) < min(last(seed, False) for seed in range(3))
 

@@ -30,22 +30,24 @@ def whole_model(t, work, q_N):
 
 
 @njit(**INNER)
-def aim_at_own(t, work, q_N):
-    """Takes the robot's own directions at joint angles [rad] as the goal, weighed as that in `work` was."""
-    place(t, work, q_N)
+def _aim_at_own(t, work):
+    """Takes the directions of the robot as it is placed as the goal, weighed as that in `work` was."""
     for d in range(size(t, LIMB_D)):
         put(work.goal_D3, d, turn_back(work.view_V33, whole(t, SEEN_D, d), row(work.direction_D3, d)))
 
 
 @njit(**INNER)
-def avoid(t, work, q_N):
-    """Steps away from self-collision, for the goal in `work`; `q_N` are the joint angles before and after [rad].
-    Returns whether none were needed, as all pairs keep their distance.
+def avoid(t, work, q_N, staying):
+    """Steps away from self-collision, for the goal in `work`, or, if `staying`, for the directions that the robot has;
+    `q_N` are the joint angles before and after [rad]. Returns whether none were needed, as all pairs keep their
+    distance.
     """
     place(t, work, q_N)
     near = touches(t, work, True)
     if not some(near):
         return no(near)
+    if staying:
+        _aim_at_own(t, work)
     joints, live = len(q_N), choose(near, alike(work.lower_N[0], 1.0), 0.0)
     damping, cost, steps, stands = alike(live, DAMPING), alike(live, 0.0), 0, True
     for n in range(joints):

@@ -97,9 +97,7 @@ def make_kernels() -> Kernels:
         work = robots.make_work(t)
         for b in range(len(q_BN)):
             steps.aim(t, work, target_BD3, b)
-            if staying:
-                avoidance.aim_at_own(t, work, q_BN[b])
-            avoidance.avoid(t, work, q_BN[b])
+            avoidance.avoid(t, work, q_BN[b], staying)
 
     @njit(cache=True, **tables.COMPILED)
     def retarget(
@@ -132,7 +130,7 @@ def make_kernels() -> Kernels:
                     else:
                         steps.aim(t, work, target_BD3, b)
                     if avoid:
-                        free = avoidance.avoid(t, work, q_N)
+                        free = avoidance.avoid(t, work, q_N, False)
                     for n in range(joints):
                         q_BN[b, n] = q_N[n]
                     free_B[k] = free and tables.whole(t, tables.COUNT_6, tables.APART)

@@ -148,7 +148,7 @@ def avoid_all(t, target_BD3, q_BN, near_B):
             frame_L[lane] = near_F[min(first + lane, near - 1)]
         aim_at(t, work, target_1D3, target_BD3, frame_L)
         _begin(work, q_BN, frame_L)
-        avoid(t, work, work.start_N)
+        avoid(t, work, work.start_N, False)
         for lane in range(min(LANES, near - first)):
             for n in range(joints):
                 q_BN[frame_L[lane], n] = start_NL[n, lane]

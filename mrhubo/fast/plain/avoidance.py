@@ -15,7 +15,7 @@ from mrhubo.fast.plain import steps
 from mrhubo.fast.plain.collision import carries, clearances, distance_jacobian, near
 from mrhubo.fast.plain.contact_steps import REACH, Contacts, foreseeing_step
 from mrhubo.fast.plain.human import norm
-from mrhubo.fast.plain.robot import place, seen
+from mrhubo.fast.plain.robot import place, seen_directions
 from mrhubo.fast.plain.steps import DAMPING, EASIER, HARDER, LEAST, MOST, STUCK, TOLERANCE
 
 CLEARANCE = 0.002
@@ -123,7 +123,6 @@ class Avoidance:
 
     def _own_directions(self, q_BN: np.ndarray, target_BD3: np.ndarray) -> np.ndarray:
         """Targets with the robot's directions in place of the human's, which count as much."""
-        placed, seen_D = place(self._own.kinematics, q_BN), self._own.human.seen_D
-        own_BD3 = np.moveaxis(seen(seen_D, placed.view_V33B, placed.direction_D3B), -1, 0)
-        own_BD3 = own_BD3 * norm(target_BD3[:, : len(seen_D)])[..., None]
-        return np.concatenate((own_BD3, target_BD3[:, len(seen_D) :]), axis=1)
+        own_BD3 = seen_directions(place(self._own.kinematics, q_BN), self._own.human.seen_D)
+        human_BD3, more_BX3 = np.split(target_BD3, [own_BD3.shape[1]], axis=1)
+        return np.concatenate((own_BD3 * norm(human_BD3)[..., None], more_BX3), axis=1)

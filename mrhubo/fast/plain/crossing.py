@@ -19,16 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.fast.plain.limits import pursuit
 from mrhubo.fast.sections import Cost
 from mrhubo.fast.stream_settings import StreamSettings
 
 LEAST = 0.05
 """Share of its full acceleration that a joint has at least, however short its way: the goal moves on meanwhile."""
-
-
-def stopping(distance_N: np.ndarray, acceleration_N: np.ndarray, passed: float) -> np.ndarray:
-    """The largest speed [rad/s] of a step after which a joint can still stop within a distance [rad]."""
-    return 2 * distance_N / (passed + np.sqrt(passed * passed + 2 * distance_N / acceleration_N))
 
 
 @dataclass(frozen=True)
@@ -67,8 +63,7 @@ class Crossing:
         """Where joints are to go in this step [rad], and how fast that moves [rad/s], from where they are and how fast
         they turn: on the way for those that cross over.
         """
-        behind_N = goal_N - goal_velocity_N * passed - q_N
-        wanted_N = goal_velocity_N + np.sign(behind_N) * stopping(np.abs(behind_N), self.acceleration_N, passed)
+        wanted_N = pursuit(q_N, goal_N, goal_velocity_N, self.acceleration_N, passed)
         change_N = self.acceleration_N * passed
         wanted_N = np.minimum(np.maximum(wanted_N, speed_N - change_N), speed_N + change_N)
         crosses_N = self.left_N > 0

@@ -1,6 +1,6 @@
 """What a stream does with a frame beside steps of optimisation, for one person: the One-Euro filter, the two answers
-that are followed, and the limits of speed and acceleration. As `mrhubo.streaming` does it, where the reasons stand
-(`one_euro`, `branches`, `limits`).
+that are followed, and how joints go to them. As `mrhubo.streaming` does it, where the reasons stand (`one_euro`,
+`branches`, `follow`).
 
 Legend: D directions, N joints, C blocks of joints.
 """
@@ -12,16 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrhubo.fast.plain.crossing import Crossing, stopping
+from mrhubo.fast.plain.crossing import Crossing
 from mrhubo.fast.plain.human import norm, normalize
+from mrhubo.fast.plain.limits import Joints, Limits
 from mrhubo.fast.plain.steps import weights
 from mrhubo.fast.sections import Cost
 from mrhubo.fast.stream_settings import StreamSettings
 
 _REFERENCE_RATE = 24.0
 """Frames per second at which `StreamSettings.smoothness` is the pull's weight."""
-_WITHIN = 1 - 1e-6
-"""Share of the speed limit that is used."""
 _SMALL = 1e-9
 HELD = 0.999
 """Share of the longest step that a joint can make from which on its speed is taken to hold it up."""
@@ -47,16 +46,6 @@ class Followed:
     """Since how long [s] the network's answer has been clearly better."""
     goal_N: np.ndarray
     """The kept answer, after steps away from self-collision where it would touch."""
-
-
-@dataclass(frozen=True)
-class Joints:
-    """Where joints are, and how fast they turn."""
-
-    q_N: np.ndarray
-    """Angles [rad] inside the limits, in their precision."""
-    velocity_N: np.ndarray
-    """[rad/s]"""
 
 
 def one_euro(
@@ -114,61 +103,6 @@ def cross_over(
     held_C = (held_N[:, None] * cost.joints_NC).max(axis=0) > 0
     kept_N = np.where(leave_N, both_2N[1], both_2N[0])
     return kept_N, np.where(leave_C, 0.0, worse_C), leave_N, leave_N & ~held_C[cost.block_N]
-
-
-class Limits:
-    """The limits of one robot's joints, kept from step to step whatever is wanted, in the precision of `lower_N`."""
-
-    def __init__(
-        self, lower_N: np.ndarray, upper_N: np.ndarray, speed_N: np.ndarray, acceleration_N: np.ndarray
-    ) -> None:
-        """Limits of angles [rad], speeds [rad/s] and accelerations [rad/s^2]; infinite: acceleration is not limited."""
-        self._lower_N, self._upper_N = lower_N, upper_N
-        self._acceleration_N = acceleration_N
-        self.speed_N = speed_N.astype(np.float64) * _WITHIN
-        """What is used of the speeds [rad/s]."""
-
-    @classmethod
-    def of_cost(cls, cost: Cost, ramp_time: float) -> Limits:
-        """Those of a robot. `ramp_time`: seconds from rest to full speed; 0: acceleration is not limited."""
-        speed_N = cost.velocity_N.astype(np.float64) * _WITHIN
-        acceleration_N = speed_N / ramp_time if ramp_time else np.full_like(speed_N, np.inf)
-        return cls(cost.lower_N.astype(np.float32), cost.upper_N.astype(np.float32), cost.velocity_N, acceleration_N)
-
-    def follow(
-        self,
-        last: Joints,
-        goal_N: np.ndarray,
-        goal_velocity_N: np.ndarray,
-        passed: float,
-        pace_N: np.ndarray | None = None,
-    ) -> Joints:
-        """The joints' next state, some time [s] later: as near to the goal [rad], which has moved there at a velocity
-        [rad/s], as they may come.
-
-        Args:
-            last: the state before.
-            goal_N: where they are to go.
-            goal_velocity_N: how fast that moves.
-            passed: the time.
-            pace_N: no faster than this [rad/s]; who is faster brakes as the limit of acceleration allows.
-        """
-        q_N = last.q_N.astype(np.float64)
-        behind_N = goal_N - goal_velocity_N * passed - q_N
-        wanted_N = goal_velocity_N + np.sign(behind_N) * stopping(np.abs(behind_N), self._acceleration_N, passed)
-        if pace_N is not None:
-            wanted_N = np.minimum(np.maximum(wanted_N, -pace_N), pace_N)
-        least_N = -np.minimum(stopping(q_N - self._lower_N, self._acceleration_N, passed), self.speed_N)
-        most_N = np.minimum(stopping(self._upper_N - q_N, self._acceleration_N, passed), self.speed_N)
-        change_N = self._acceleration_N * passed
-        least_N = np.maximum(least_N, last.velocity_N - change_N)
-        most_N = np.minimum(most_N, last.velocity_N + change_N)
-        wanted_N = np.minimum(np.maximum(wanted_N, least_N), most_N)
-        found_N = (q_N + wanted_N * passed).astype(self._lower_N.dtype)
-        found_N = np.minimum(np.maximum(found_N, self._lower_N), self._upper_N)
-        fast_N = np.abs(found_N - q_N) > self.speed_N * passed
-        found_N = np.where(fast_N, np.nextafter(found_N, last.q_N), found_N)
-        return Joints(found_N, (found_N - q_N) / passed)
 
 
 def follow_goal(

@@ -100,9 +100,13 @@ def turning(kinematics: Kinematics, seen_D: np.ndarray, q_BN: np.ndarray) -> tup
     """Directions (B, D, 3) and their Jacobian (B, D, 3, N) [1/rad], both in the axes of the parts that see them."""
     placed = place(kinematics, q_BN)
     jacobian_D3NB = jacobian(kinematics, placed, q_BN.shape[1])
-    direction_D3B = seen(seen_D, placed.view_V33B, placed.direction_D3B)
     turned_D3NB = np.einsum("dijb,dinb->djnb", placed.view_V33B[seen_D], jacobian_D3NB)
-    return np.moveaxis(direction_D3B, -1, 0), np.ascontiguousarray(np.moveaxis(turned_D3NB, -1, 0))
+    return seen_directions(placed, seen_D), np.ascontiguousarray(np.moveaxis(turned_D3NB, -1, 0))
+
+
+def seen_directions(placed: Placed, seen_D: np.ndarray) -> np.ndarray:
+    """Directions (B, D, 3) of a robot in the axes of the parts that see them."""
+    return np.moveaxis(seen(seen_D, placed.view_V33B, placed.direction_D3B), -1, 0)
 
 
 def _cross(a_Q3B: np.ndarray, b_Q3B: np.ndarray) -> np.ndarray:

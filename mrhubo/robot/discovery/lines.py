@@ -57,6 +57,11 @@ def unit(vector_3: np.ndarray) -> np.ndarray:
     return vector_3 / length if length > 1e-12 else np.zeros(3)
 
 
+def reflection(normal_3: np.ndarray) -> np.ndarray:
+    """Of directions (3, 3), in a plane across a unit normal."""
+    return np.eye(3) - 2 * np.outer(normal_3, normal_3)
+
+
 def feet(one: Line, other: Line) -> tuple[np.ndarray, np.ndarray]:
     """Where the common normal meets two lines; for parallel ones, at the first one's own point."""
     normal_3 = cross(one.axis_3, other.axis_3)

@@ -15,6 +15,7 @@ import numpy as np
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 from scipy.spatial.transform import Rotation
 
+from mrhubo.robot.discovery.lines import reflection
 from mrhubo.robot.tree import read_tree
 from mrhubo.robot.urdf import Description, describe_text
 
@@ -52,7 +53,7 @@ def with_mirror_image(
     for element in [link for link in robot.findall("link") if link.get("name") in links]:
         robot.append(_image_of_link(element, images))
     mirror_44 = np.eye(4)
-    mirror_44[:3, :3] -= 2 * np.outer(normal_3, normal_3)
+    mirror_44[:3, :3] = reflection(normal_3)
     mirror_44[:3, 3] = 2 * float(normal_3 @ middle_3) * normal_3
     for element in inside:
         image = _image_of_joint(element, images)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrhubo.robot.discovery import names
 from mrhubo.robot.discovery.bodies import Bodies, Chain, Step, lines_of
-from mrhubo.robot.discovery.lines import ON, Line, feet, measure, sine
+from mrhubo.robot.discovery.lines import ON, Line, feet, measure, reflection, sine
 from mrhubo.robot.discovery.symmetry import Pair
 
 _PLANE = 0.03
@@ -76,7 +76,7 @@ def _has_twin(step: Step, others: Sequence[Step], normal_3: np.ndarray, middle_3
     lies nearer to the middle than `least` [m].
     """
     line = step.hinge.line
-    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    flip_33 = reflection(normal_3)
     image = Line(middle_3 + flip_33 @ (line.point_3 - middle_3), flip_33 @ line.axis_3)
 
     def miss(other: Line) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mrhubo.robot.discovery.bodies import Chain, Hinge, Step, lines_of
+from mrhubo.robot.discovery.lines import reflection
 
 _SAME = 0.05
 """How far ends of two ranges may be apart that are meant to be the same [rad]."""
@@ -40,7 +41,7 @@ def _mirrored(left: Chain, right: Chain, normal_3: np.ndarray) -> Iterator[tuple
     """
     if not left or not right:
         return
-    mirror_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    mirror_33 = reflection(normal_3)
     ones, others = lines_of(left), lines_of(right)
     middle_3 = 0.5 * (ones[0].point_3 + others[0].point_3)
     size = max(float(np.linalg.norm(a.point_3 - b.point_3)) for a, b in itertools.combinations((*ones, *others), 2))

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrhubo.robot.discovery.bodies import Bodies, Chain, lines_of
 from mrhubo.robot.discovery.limbs import limb
-from mrhubo.robot.discovery.lines import Measures, measure, unit
+from mrhubo.robot.discovery.lines import Measures, measure, reflection, unit
 
 _LENGTH = 0.03
 """How far two lengths may differ, as a share of the chain's: left and right in files that were measured, not drawn."""
@@ -128,7 +128,7 @@ def _mirrors(across_N3: np.ndarray, middles_N3: np.ndarray, normal_3: np.ndarray
 
 def _mirror_share(chains: tuple[Chain, Chain], normal_3: np.ndarray, nodes: Sequence[np.ndarray], count: int) -> float:
     """Share of the joints whose axes are mirror images as the joints stand."""
-    flip_33 = np.eye(3) - 2 * np.outer(normal_3, normal_3)
+    flip_33 = reflection(normal_3)
     good = 0
     for one, other in zip(chains[0][:count], chains[1][:count], strict=True):
         a_3, b_3 = flip_33 @ one.hinge.line.axis_3, other.hinge.line.axis_3
