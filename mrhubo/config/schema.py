@@ -167,6 +167,8 @@ class ModelConfig:
     """2 = human -> links -> joints (the paper), 1 = human -> joints directly."""
     hidden: int = bounded(160, 1, 8_192)
     """Width of the hidden layers, of each branch."""
+    small_hidden: int = bounded(64, 1, 8_192)
+    """The same of branches of three joints at most, such as a head or a waist, where it is less than `hidden`."""
     layers: int = bounded(4, 1, 64)
     """Hidden layers of each network (the paper's text: 1, its authors' code: 2)."""
     residual: bool = True

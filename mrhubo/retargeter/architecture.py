@@ -15,6 +15,8 @@ from mrhubo.universal.weights import open_network
 
 _MAX_WEIGHTS = 100_000_000
 """Weights of all networks together; training takes sixteen bytes for each. The defaults make some hundred thousand."""
+_FEW_JOINTS = 3
+"""Of a branch whose networks are `model.small_hidden` wide: few weights learn two directions, as a head has."""
 
 
 def build_network(config: Config, body_map: BodyMap) -> JointNetwork:
@@ -41,20 +43,14 @@ def build_network(config: Config, body_map: BodyMap) -> JointNetwork:
     else:
         features = DirectionFeatures(body_map, [sorted(directions) for directions, _ in blocks])
         own = [tuple(body_map.direction_names[i] for i in sorted(directions)) for directions, _ in blocks]
-    joints = tuple(range(len(robot.joint_names)))
-    branches = _branches(robot, [joints for _, joints in blocks], own, features.names) if model.branches else []
-    _check_size(model, features, branches or [Branch(tuple(range(len(features.names))), joints)])
-    return RetargetNetwork(
-        features,
-        robot.lower_N,
-        robot.upper_N,
-        model.stages,
-        model.hidden,
-        model.layers,
-        model.bound_output,
-        model.residual,
-        branches,
-    )
+    if model.branches:
+        branches = _branches(model, robot, [joints for _, joints in blocks], own, features.names)
+    else:
+        everything = tuple(range(len(features.names))), tuple(range(len(robot.joint_names)))
+        branches = [Branch(*everything, model.hidden)]
+    _check_size(model, features, branches)
+    settings = model.stages, model.layers, model.bound_output, model.residual
+    return RetargetNetwork(features, robot.lower_N, robot.upper_N, branches, *settings)
 
 
 def _check_size(model: ModelConfig, features: PoseFeatures, branches: Sequence[Branch]) -> None:
@@ -65,8 +61,8 @@ def _check_size(model: ModelConfig, features: PoseFeatures, branches: Sequence[B
         links = 6 * joints
         sizes = [(inputs, links), (links, joints)] if model.stages == 2 else [(inputs, joints)]
         for size_in, size_out in sizes:
-            inner = (model.layers - 1) * model.hidden * (model.hidden + 1)
-            weights += (size_in + 1) * model.hidden + inner + (model.hidden + 1) * size_out
+            inner = (model.layers - 1) * branch.hidden * (branch.hidden + 1)
+            weights += (size_in + 1) * branch.hidden + inner + (branch.hidden + 1) * size_out
     if weights > _MAX_WEIGHTS:
         raise UserError(
             f"model.hidden: {model.hidden:,} units in each of {model.layers} layers make {weights:,} weights in all; at"
@@ -75,11 +71,17 @@ def _check_size(model: ModelConfig, features: PoseFeatures, branches: Sequence[B
 
 
 def _branches(
-    robot: Robot, blocks: Sequence[set[int]], own: Sequence[Sequence[str]], inputs: Sequence[str]
+    model: ModelConfig,
+    robot: Robot,
+    blocks: Sequence[set[int]],
+    own: Sequence[Sequence[str]],
+    inputs: Sequence[str],
 ) -> list[Branch]:
-    """Of each branch its joints and its inputs; an input that belongs to no branch is seen by all.
+    """Of each branch its joints and its inputs, and how wide its networks are; an input that belongs to no branch is
+    seen by all.
 
     Args:
+        model: for the widths.
         robot: for the names of its joints.
         blocks: the joints of each branch.
         own: the inputs that tell about each branch.
@@ -95,5 +97,6 @@ def _branches(
                 f"model.input_joints: nothing tells the angles of {moved}; add one of {', '.join(names)}, or set"
                 " model.branches to false"
             )
-        found.append(Branch(seen, tuple(sorted(joints))))
+        hidden = min(model.hidden, model.small_hidden) if len(joints) <= _FEW_JOINTS else model.hidden
+        found.append(Branch(seen, tuple(sorted(joints)), hidden))
     return found

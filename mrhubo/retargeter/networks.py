@@ -5,7 +5,7 @@ Legend: B batch, I inputs, F numbers of all of them, M robot links, N robot join
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -59,6 +59,8 @@ class Branch:
     """Positions of what it sees among the inputs."""
     joints: tuple[int, ...]
     """Its robot joints, as columns of q."""
+    hidden: int
+    """Width of the hidden layers of its networks."""
 
 
 class Branched(nn.Module):
@@ -68,11 +70,11 @@ class Branched(nn.Module):
         self,
         columns_in: Sequence[Sequence[int]],
         columns_out: Sequence[Sequence[int]],
-        make: Callable[[int, int], nn.Module],
+        made: Sequence[nn.Module],
     ) -> None:
         super().__init__()
         self.columns_in, self.columns_out = columns_in, columns_out
-        self.parts = nn.ModuleList([make(len(a), len(b)) for a, b in zip(columns_in, columns_out, strict=True)])
+        self.parts = nn.ModuleList(made)
         self._names = [f"_columns_{i}" for i in range(len(self.parts))]
         for name, columns in zip(self._names, columns_in, strict=True):
             self.register_buffer(name, torch.tensor(columns), persistent=False)
@@ -171,12 +173,11 @@ class RetargetNetwork(JointNetwork):
         features: PoseFeatures,
         lower_N: Tensor,
         upper_N: Tensor,
+        branches: Sequence[Branch],
         stages: int = 2,
-        hidden: int = 512,
         layers: int = 2,
         bound_output: str = "tanh",
         residual: bool = True,
-        branches: Sequence[Branch] = (),
     ) -> None:
         """Untrained networks.
 
@@ -184,20 +185,19 @@ class RetargetNetwork(JointNetwork):
             features: what they see of a human pose.
             lower_N: lower joint limits [rad].
             upper_N: upper joint limits [rad].
+            branches: a network for each of them; together they have every joint.
             stages: 2 = human -> links -> joints, 1 = human -> joints.
-            hidden: width of the hidden layers (of each branch).
             layers: hidden layers.
             bound_output: `LimitedOutput`'s kind.
             residual: `ResidualMLP` in place of `mlp`.
-            branches: a network for each of them, which together have every joint; none: one for the whole robot.
         """
         super().__init__()
-        self.features, self.stages, joints = features, stages, len(lower_N)
+        self.features, self.stages = features, stages
         net = ResidualMLP if residual else mlp
-        branches = branches or [Branch(tuple(range(len(features.names))), tuple(range(joints)))]
 
         def branched(columns_in: list[list[int]], columns_out: list[list[int]]) -> Branched:
-            return Branched(columns_in, columns_out, lambda a, b: net(a, hidden, layers, b))
+            sizes = zip(columns_in, branches, columns_out, strict=True)
+            return Branched(columns_in, columns_out, [net(len(a), b.hidden, layers, len(c)) for a, b, c in sizes])
 
         inputs = [features.columns(b.inputs) for b in branches]
         links = [[6 * joint + i for joint in b.joints for i in range(6)] for b in branches]

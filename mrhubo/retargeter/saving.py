@@ -28,7 +28,9 @@ from mrhubo.retargeter.networks import JointNetwork
 from mrhubo.robot import BodyMap, Robot, build_body_map
 from mrhubo.robot.solid_urdf import urdf_without_meshes
 
-SCHEMA = "mrhubo.retargeter/5"
+SCHEMA = "mrhubo.retargeter/6"
+_ONE_WIDTH = "mrhubo.retargeter/5"
+"""As now, but for the networks of small branches, which are as wide as all others."""
 _WEIGHTS, _URDF, _CONFIG, _PRIOR = "retargeter.safetensors", "robot.urdf", "config.yaml", "body_prior.safetensors"
 _SKELETON = "skeleton.safetensors"
 _OTHERS = (_URDF, _CONFIG, _PRIOR, _SKELETON)
@@ -90,10 +92,12 @@ def read_package(folder: Path) -> tuple[JointNetwork, BodyMap, BodyPrior, Config
     if not os.path.lexists(folder / _WEIGHTS):
         raise UserError(f"{folder}: is no package of a retargeter: {_WEIGHTS} is missing")
     tensors, metadata = read_tensors(folder / _WEIGHTS)
-    if metadata.get("schema") != SCHEMA:
+    if metadata.get("schema") not in (SCHEMA, _ONE_WIDTH):
         raise UserError(f"{folder / _WEIGHTS}: schema is '{metadata.get('schema')}', expected '{SCHEMA}'")
     check_files(folder, _OTHERS, metadata)
     config = _read_config(folder)
+    if metadata["schema"] == _ONE_WIDTH:
+        config.model.small_hidden = config.model.hidden
     body = config.body
     prior, body_map = open_prior(body), build_body_map(config.robot, build_skeleton(body))
     check_prior(folder, metadata, prior)

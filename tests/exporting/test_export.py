@@ -21,8 +21,14 @@ from mrhubo.robot import build_body_map
 
 KINDS = {
     "nao": ["model.hidden=12"],
-    "coman": ["model.hidden=9", "model.stages=1", "model.residual=false", "model.bound_output=clamp"],
-    "reachy": ["model.hidden=10", "model.branches=false", "model.input_frame=local"],
+    "coman": [
+        "model.hidden=9",
+        "model.stages=1",
+        "model.residual=false",
+        "model.branches=false",
+        "model.bound_output=clamp",
+    ],
+    "reachy": ["model.hidden=10", "model.small_hidden=6", "model.input_frame=local"],
 }
 SAME_RAD = 2e-6
 MOST_LINES = 150

@@ -18,8 +18,14 @@ from mrhubo.robot import build_body_map
 
 MODELS = {
     "nao": ["model.hidden=12"],
-    "coman": ["model.hidden=9", "model.stages=1", "model.residual=false", "model.bound_output=clamp"],
-    "reachy": ["model.hidden=10", "model.branches=false", "model.input_frame=local"],
+    "coman": [
+        "model.hidden=9",
+        "model.stages=1",
+        "model.residual=false",
+        "model.branches=false",
+        "model.bound_output=clamp",
+    ],
+    "reachy": ["model.hidden=10", "model.small_hidden=6", "model.input_frame=local"],
 }
 """Networks of all kinds."""
 

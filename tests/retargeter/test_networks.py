@@ -17,9 +17,12 @@ LOWER, UPPER = torch.tensor([-2.08567, 0.0349066, -3.0]), torch.tensor([2.08567,
 ARM = ("left_shoulder", "left_elbow", "left_wrist")
 
 
-def network(**settings: object) -> RetargetNetwork:
+WHOLE = [Branch((0, 1, 2), (0, 1, 2), 32)]
+
+
+def network(branches: list[Branch] = WHOLE, **settings: object) -> RetargetNetwork:
     torch.manual_seed(0)
-    return RetargetNetwork(RotationFeatures(ARM), LOWER, UPPER, hidden=32, **settings)  # type: ignore[arg-type]
+    return RetargetNetwork(RotationFeatures(ARM), LOWER, UPPER, branches, **settings)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", ["tanh", "clamp"])
@@ -58,8 +61,8 @@ def test_a_residual_network_adds_its_layers() -> None:
 
 @pytest.mark.parametrize("stages", [1, 2])
 def test_a_branch_sees_its_own_human_joints_alone(stages: int) -> None:
-    branches = [Branch((1, 2), (2, 0)), Branch((0,), (1,))]
-    net = network(stages=stages, branches=branches, bound_output="clamp")
+    branches = [Branch((1, 2), (2, 0), 32), Branch((0,), (1,), 8)]
+    net = network(branches, stages=stages, bound_output="clamp")
     features = torch.randn(1, net.features.size, requires_grad=True)
     angles = net.post(net.links(features) if stages == 2 else features)
     for branch in branches:
@@ -69,7 +72,7 @@ def test_a_branch_sees_its_own_human_joints_alone(stages: int) -> None:
 
 
 def test_branches_lie_where_their_columns_say() -> None:
-    branched = Branched([[2], [0, 1]], [[1], [2, 0]], lambda a, b: mlp(a, 4, 1, b))
+    branched = Branched([[2], [0, 1]], [[1], [2, 0]], [mlp(1, 4, 1, 1), mlp(2, 4, 1, 2)])
     x = torch.randn(5, 3)
     first, second = (part(columns) for part, columns in zip(branched.parts, (x[:, [2]], x[:, [0, 1]]), strict=True))
     torch.testing.assert_close(branched(x), torch.stack((second[:, 1], first[:, 0], second[:, 0]), dim=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -19,15 +20,17 @@ from mrhubo.fast import FastRetargeter
 from mrhubo.files.storage import read_tensors, write_tensors
 from mrhubo.motion import Motion
 from mrhubo.reference import OptimizationRetargeter, direction_error
-from mrhubo.retargeter import Retargeter, architecture, build_network
+from mrhubo.retargeter import Retargeter, RetargetNetwork, architecture, build_network
 from mrhubo.retargeter import parts as pose_parts
+from mrhubo.retargeter.integrity import file_checksums
 from mrhubo.robot import build_body_map
+from tests.chain import new_package
 from tests.poses import prior_poses
 
 
 @pytest.fixture(scope="module")
 def made(root: Path) -> Retargeter:
-    config = load_config(root / "conf" / "reachy.yaml", ["model.hidden=24"])
+    config = load_config(root / "conf" / "reachy.yaml", ["model.hidden=24", "model.small_hidden=10"])
     body_map = build_body_map(config.robot)
     torch.manual_seed(0)
     return Retargeter(build_network(config, body_map), body_map, BodyPrior.open(), config, phi_threshold=0.01)
@@ -101,6 +104,34 @@ def test_arms_and_head_have_networks_of_their_own(made: Retargeter) -> None:
         other[:, columns] = turned[:, columns]
         moved = (made.predict(other) - made.predict(pose)).abs().amax(dim=0) > 1e-6
         assert moved.tolist() == [name[0] == parts for name in joints]
+
+
+def test_branches_of_few_joints_have_narrow_networks(root: Path) -> None:
+    def widths(*overrides: str) -> list[int]:
+        config = load_config(root / "conf" / "reachy.yaml", overrides)
+        network = build_network(config, build_body_map(config.robot))
+        assert isinstance(network, RetargetNetwork)
+        return [next(piece.weights()).shape[0] for piece in network.pieces()]
+
+    assert widths() == [160, 160, 64]
+    assert widths("model.hidden=32") == [32, 32, 32]
+    assert widths("model.hidden=32", "model.small_hidden=8") == [32, 32, 8]
+    assert widths("model.hidden=32", "model.small_hidden=8", "model.branches=false") == [32]
+
+
+def test_packages_whose_branches_are_all_as_wide_are_read(root: Path, tmp_path: Path) -> None:
+    """Those of before, whose settings know no other width."""
+    folder = new_package(root / "conf" / "reachy.yaml", tmp_path / "p", "model.hidden=24", "model.small_hidden=24")
+    expected = Retargeter.load(folder).predict(human(5))
+    settings, weights = folder / "config.yaml", folder / "retargeter.safetensors"
+    settings.write_text(re.sub(r" *small_hidden: 24\n", "", settings.read_text()))
+    assert "small_hidden" not in settings.read_text()
+    tensors, header = read_tensors(weights)
+    others = ["robot.urdf", "config.yaml", "body_prior.safetensors", "skeleton.safetensors"]
+    write_tensors(weights, tensors, {**header, **file_checksums(folder, others), "schema": "mrhubo.retargeter/5"})
+    assert torch.equal(Retargeter.load(folder).predict(human(5)), expected)
+    again = Retargeter.load(Retargeter.load(folder).save(tmp_path / "again", {}))
+    assert torch.equal(again.predict(human(5)), expected)
 
 
 def test_a_head_that_no_joint_turns_is_not_looked_at(root: Path) -> None:
@@ -379,7 +410,8 @@ def test_networks_fit_into_memory(root: Path) -> None:
 @pytest.mark.parametrize("branches", ["true", "false"])
 @pytest.mark.parametrize("stages", [1, 2])
 def test_weights_are_counted_right(root: Path, stages: int, branches: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    overrides = [f"model.stages={stages}", f"model.branches={branches}", "model.hidden=7", "model.layers=3"]
+    sizes = ["model.hidden=7", "model.small_hidden=5", "model.layers=3"]
+    overrides = [f"model.stages={stages}", f"model.branches={branches}", *sizes]
     config = load_config(root / "conf" / "reachy.yaml", overrides)
     body_map = build_body_map(config.robot)
     count = sum(weights.numel() for weights in build_network(config, body_map).parameters())
