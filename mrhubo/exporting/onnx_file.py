@@ -67,8 +67,7 @@ def _model(onnx: Any, description: Description, inputs: str) -> Any:
         target = Value(graph, _directions(graph, description, given.name)) if inputs == "poses" else given
         angles = onnx_universal.joint_angles(description, universal, target).cast(np.float32)
         limits = (limit.astype(np.float32) for limit in (description.cost.lower_N, description.cost.upper_N))
-        graph.node("Identity", angles.clip(*limits).name, output="joint_angles")
-        return _finished(onnx, graph, description, inputs, name, shape)
+        return _finished(onnx, graph, description, inputs, name, shape, angles.clip(*limits).name)
     if description.settings.features == "local":
         rows = graph.gather(name, description.features.input_I, 1)
         columns = graph.node("Transpose", graph.gather(rows, [0, 1], 3), perm=[0, 1, 3, 2])
@@ -78,11 +77,16 @@ def _model(onnx: Any, description: Description, inputs: str) -> Any:
     raw = features
     for stage in (description.pre, description.post):
         raw = _branched(graph, stage, raw, description.settings.residual) if stage else raw
-    _limited(graph, description, raw, "joint_angles")
-    return _finished(onnx, graph, description, inputs, name, shape)
+    return _finished(onnx, graph, description, inputs, name, shape, _limited(graph, description, raw))
 
 
-def _finished(onnx: Any, graph: Graph, description: Description, inputs: str, name: str, shape: list[int]) -> Any:
+def _finished(
+    onnx: Any, graph: Graph, description: Description, inputs: str, name: str, shape: list[int], angles: str
+) -> Any:
+    # No runtime can refuse a frame: what is no number makes all of its joints none, or some would be made up.
+    nothing = graph.node("Mul", graph.flat(name, math.prod(shape)), graph.constant(0.0, np.float32))
+    nothing = graph.node("ReduceSum", nothing, graph.numbers([1]), keepdims=1)
+    graph.node("Add", angles, nothing, output="joint_angles")
     helper, single, joints = onnx.helper, onnx.TensorProto.FLOAT, len(description.cost.lower_N)
     made = helper.make_graph(
         graph.nodes, "mrhubo",
@@ -201,13 +205,13 @@ def _gelu(graph: Graph, x: str) -> str:
     return graph.node("Mul", graph.node("Mul", x, twice), graph.constant(0.5))
 
 
-def _limited(graph: Graph, description: Description, raw: str, output: str) -> None:
+def _limited(graph: Graph, description: Description, raw: str) -> str:
     lower_N, upper_N = (limit.astype(np.float32) for limit in (description.cost.lower_N, description.cost.upper_N))
     share = graph.node("Tanh", raw) if description.settings.bound == "tanh" else raw
     angle = graph.node("Mul", share, graph.constant((upper_N - lower_N) / 2))
     angle = graph.node("Add", angle, graph.constant((upper_N + lower_N) / 2))
     angle = graph.node("Max", angle, graph.constant(lower_N))
-    graph.node("Min", angle, graph.constant(upper_N), output=output)
+    return graph.node("Min", angle, graph.constant(upper_N))
 
 
 def _answers(onnx: Any, model: Any, retargeter: Retargeter, inputs: str, given: Tensor) -> np.ndarray:

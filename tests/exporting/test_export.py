@@ -82,6 +82,21 @@ def test_onnx_runtime_reads_it(retargeter: Retargeter, poses: torch.Tensor, tmp_
     np.testing.assert_allclose(found, retargeter.predict(poses).numpy(), atol=1e-5)
 
 
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_what_is_no_number_is_no_answer(
+    retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path, number: float
+) -> None:
+    """Whichever joint it stands at, all of the frame's joints say so, and the other frames answer."""
+    pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    write_onnx(retargeter, tmp_path / "robot.onnx")
+    given = poses.numpy().copy()
+    given[3, 0, 0, 0] = given[5, 17, 1, 2] = number
+    (found,) = runtime.InferenceSession(tmp_path / "robot.onnx").run(None, {"local_rotations": given})
+    assert np.isnan(found).all(1).tolist() == [frame in (3, 5) for frame in range(len(poses))]
+    assert np.isfinite(np.delete(found, (3, 5), 0)).all()
+
+
 def test_numpy(retargeter: Retargeter, poses: torch.Tensor, tmp_path: Path) -> None:
     assert write_numpy(retargeter, tmp_path / "robot.py") < SAME_RAD
     weights = standalone.load(tmp_path / "robot.npz")

@@ -62,6 +62,9 @@ def test_it_answers_as_the_plain_form(retargeter: Retargeter, poses: np.ndarray,
     assert ((found_BN >= lower_N) & (found_BN <= upper_N)).all() and np.ptp(found_BN, axis=0).min() > 0.01
     one_BN = np.concatenate([session.run(None, {name: asked[row : row + 1]})[0] for row in range(4)])
     np.testing.assert_allclose(one_BN, found_BN[:4], atol=SAME_RAD)
+    broken = asked[:4].copy()
+    broken[2, 1, 0] = np.inf
+    assert np.isnan(session.run(None, {name: broken})[0]).all(1).tolist() == [False, False, True, False]
     told = session.get_modelmeta().custom_metadata_map
     assert json.loads(told["joint_names"]) == list(retargeter.joint_names)
     assert told["network"] == "the one for every robot, in five iterations"
