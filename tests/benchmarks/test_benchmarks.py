@@ -40,6 +40,7 @@ SCRIPTS = [
     "discovery",
     "files",
     "headings",
+    "imitation",
     "inference",
     "many_robots",
     "missing_points",
@@ -444,6 +445,14 @@ def test_continuity(run: Run, package: Path, clips: Path) -> None:
     for name, of, jerk, *_ in rows(text, "answers"):
         jerks = [float(row[2]) for row in found if row[1] == name]
         assert float(jerk) == pytest.approx(max(jerks) if of == "highest" else sum(jerks) / 2, abs=0.011)
+
+
+def test_imitation(run: Run, package: Path, clips: Path) -> None:
+    found = rows(run("imitation", package, "--motions", clips), "the networks")
+    assert [row[0] for row in found] == [
+        "the reference", "the reference without speed limits", "each frame's own optimum",
+    ]  # fmt: skip
+    assert all(0 < float(number) < 100 for row in found for number in row[1:])
 
 
 def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
