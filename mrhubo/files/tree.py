@@ -7,7 +7,7 @@ what is not asked for is not made: a node is put together when its array is aske
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -129,6 +129,15 @@ class Tree:
             raise UserError(f"{self.named} is {self.described}; expected one with '{name}'")
         return found
 
+    def renamed(self, names: Mapping[str, str]) -> Tree:
+        """Some entries of a dictionary under other keys.
+
+        Args:
+            names: the other keys, and the dictionary's own.
+        """
+        entries = dict(self._entries())
+        return Tree({name: self._child(own, entries[own]) for name, own in names.items()}, self._source, self.where)
+
     def __len__(self) -> int:
         return len(self._value) if isinstance(self._value, dict | list | tuple) else 0
 
@@ -203,6 +212,8 @@ class Tree:
         return "None" if self.is_none else f"a {type(self._value).__name__}"
 
     def _child(self, name: str, value: Any) -> Tree:
+        if isinstance(value, Tree):  # of `renamed`: it is called by its own name
+            return value
         return Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else shortened(name, 40))
 
     def _entries(self) -> Iterator[tuple[str, Any]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mrhubo.errors import listed, shortened
 from mrhubo.files.packed import is_packed
 from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
@@ -25,7 +26,7 @@ from mrhubo.motion.readers.people import holds_parameters
 from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rows import read_rows
 from mrhubo.motion.readers.sam3d import read_sam3d
-from mrhubo.motion.readers.smpl_names import first_entries
+from mrhubo.motion.readers.smpl_names import first_entries, is_robot
 from mrhubo.motion.readers.soma import read_soma
 from mrhubo.motion.readers.tracks import choose, motion_of
 
@@ -76,6 +77,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         return motion_of_points(path, checked(path, points), options)
     if found is None:
         refuse_frame(tree)
+        _refuse_robot(tree)
         content = Content.open(path)
         what = content.described if content.arrays else f"{content.described} of {tree.described}"
         raise NoMotion(
@@ -102,6 +104,20 @@ def smpl_motion(path: Path, tree: Tree, options: ReadOptions) -> Motion | None:
         arrays = in_world(path, arrays, notes)
     rate = find_rate(path, (*track.homes, *_whole(tree)), options, notes)
     return motion_of(path, arrays, layout.kind, rate, notes)
+
+
+def _refuse_robot(tree: Tree) -> None:
+    """Refuses a robot's motion, or a dictionary of such.
+
+    Raises:
+        NoMotion: it is one; says so.
+    """
+    robot = next((node for node in (tree, *(child for _, child in first_entries(tree))) if is_robot(node)), None)
+    if robot is not None:
+        raise NoMotion(
+            f"{robot.named}: tells the angles of a robot's joints ({shortened(listed(robot.keys), 120)}), and no human"
+            " motion; name the one from which it was made"
+        )
 
 
 def _whole(tree: Tree) -> Iterator[Tree]:

@@ -10,7 +10,8 @@
   `body_bbox_list`, rows of x, y, width and height (https://github.com/facebookresearch/frankmocap,
   mocap_utils/demo_utils.py).
 * Multi-HMR: a list of people with `rotvec` (53, 3) of SMPL-X's joints, the root first, without eyes, `transl_pelvis`
-  (1, 3) and `shape` (https://github.com/naver/multi-hmr, model.py).
+  (1, 3) and `shape` (https://github.com/naver/multi-hmr, model.py); those of its data, and SOKE's
+  (https://github.com/2000ZRL/SOKE), `smplx_root_pose`, `smplx_body_pose`, `smplx_transl` or `cam_trans`.
 * 4D-Humans' HMR2: `pred_smpl_params` with `global_orient` (N, 1, 3, 3) and `body_pose` (N, 23, 3, 3) of N people, and
   beside it `pred_cam_t` (N, 3) (https://github.com/shubham-goel/4D-Humans, hmr2/models/hmr2.py).
 
@@ -31,6 +32,7 @@ from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.family import family_of
+from mrhubo.motion.readers.key_words import by_usual_names, model_named
 from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_form
 from mrhubo.motion.readers.sightings import person_called
 
@@ -116,29 +118,29 @@ def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[
     if {"Rh", "Th", "poses"} <= set(node.keys):
         body = _easymocap(node)
         return None if body is None else [body]
-    inner = next((one for one in _with_children(node) if set(_POSES) & set(one.keys)), None)
-    if inner is None:
+    told = next(((one, found) for one in _with_children(node) if (found := _pose_in(one)) is not None), None)
+    if told is None:
         return None
-    key = next(key for key in _POSES if key in inner.keys)
-    found = _rows(inner[key], most_rows)
+    inner, (key, pose) = told
+    found = _rows(pose, most_rows)
     if found is None:
         return None
     pose_NX, form = found
     count = len(pose_NX)
+    homes = (inner, node, by_usual_names(inner), by_usual_names(node))
 
     def rows(names: tuple[str, ...]) -> np.ndarray | None:
-        told = inner.get(*names)
-        told = node.get(*names) if told is None else told
+        told = next((found for home in homes if (found := home.get(*names)) is not None), None)
         numbers = None if told is None else _numbers(told)
         return None if numbers is None or numbers.size % count else numbers.reshape(count, -1)
 
-    root_NX, place_NX, betas_NX = rows(_ROOTS), rows(_PLACES), rows(("betas", "pred_betas", "shape"))
+    root_NX, place_NX, betas_NX = rows(_ROOTS), rows(_PLACES), rows(("betas", "shape"))
     if root_NX is not None and root_NX.shape[1] not in (3, 9):
         return None
     if root_NX is None and (form.joints not in WITH_ROOT or inner.get(*_ROOTS) is not None):
         return None
     said = around.get("smpl_type") if around.is_mapping else None
-    named, keys = "" if said is None else said.text() or "", {*inner.keys, *node.keys}
+    named, keys = model_named(pose.where) if said is None else said.text() or "", {*inner.keys, *node.keys}
     betas = None if betas_NX is None else betas_NX[0].tolist()
     family = family_of(named, form.joints, keys, betas)
     source = "FrankMocap" if key.startswith("pred_") and around is not node else "SMPL parameters"
@@ -152,6 +154,15 @@ def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[
         )
         for n in range(count)
     ]  # fmt: skip
+
+
+def _pose_in(node: Tree) -> tuple[str, Tree] | None:
+    """What a dictionary has for a pose, and what that is usually called; None where it has none."""
+    for home in (node, by_usual_names(node)):
+        key = next((key for key in _POSES if key in home.keys), None)
+        if key is not None:
+            return key, home[key]
+    return None
 
 
 def _with_children(node: Tree) -> Iterator[Tree]:

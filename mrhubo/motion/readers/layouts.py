@@ -6,7 +6,6 @@ Where each layout is defined is said at its function.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 from mrhubo.files.tree import Tree
@@ -14,6 +13,7 @@ from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
 from mrhubo.motion.readers.frame_lists import read_frame_list, read_numbered, read_pictures
+from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.smpl_names import Found, find_inside, forms_in, search
@@ -22,7 +22,8 @@ from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
 _MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
 """The models of `smplVersion` (https://pypi.org/project/smplcodec, codec.py)."""
-_MODEL = re.compile(r"smpl[xh](?![a-z])")
+_OF_SMPL = (23, 24)
+"""How many joints SMPL's poses have."""
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -89,11 +90,12 @@ _FINDERS = (
 
 def _kind(source: str, found: Found, tree: Tree) -> Kind:
     """What is known of parameters: by their keys whose they are, or else by what the file says."""
-    if "pose_world" in found.node.keys:
+    of_smpl = found.form.joints in _OF_SMPL  # who writes as they do for another model has more joints
+    if of_smpl and "pose_world" in found.node.keys:
         return Kind("WHAM", "smpl", ANY_WORLD)
-    if {"pred_cam", "orig_cam"} & set(found.node.keys):
+    if of_smpl and {"pred_cam", "orig_cam"} & set(found.node.keys):
         return Kind("VIBE or one of its kin", "smpl", CAMERAS)
-    said = next((text for node in (found.node, tree) if (text := _said(node))), "")
+    said = next((text for node in (found.node, tree) if (text := _said(node))), "") or model_named(found.pose.where)
     keys = {*found.node.keys, *tree.keys}
     family = family_of(said, found.form.joints, keys, found.shape())
     # a pose of the body alone may be told beside that of all joints, whose number tells the model
@@ -110,5 +112,4 @@ def _said(node: Tree) -> str:
     model, version = node.get("surface_model_type", "model_type", "smpl_type", "body_model"), node.get("smplVersion")
     if version is not None:
         return _MESHCAPADE.get(int(version.number()), "")
-    called = _MODEL.search(node.where.lower()) if model is None else None
-    return called[0] if called is not None else (model.text() or "") if model is not None else ""
+    return model_named(node.where) if model is None else model.text() or ""
