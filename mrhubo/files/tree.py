@@ -138,6 +138,15 @@ class Tree:
         entries = dict(self._entries())
         return Tree({name: self._child(own, entries[own]) for name, own in names.items()}, self._source, self.where)
 
+    def places(self, count: int) -> Iterator[Tree]:
+        """Of a dictionary of lists, what stands at each of so many places: a dictionary of the entries that are lists
+        as long.
+        """
+        lists = {name: list(child) for name, child in self.items() if len(child) == count and child.is_list}
+        for place in range(count):
+            at = {name: children[place] for name, children in lists.items()}
+            yield Tree(at, self._source, f"{self.where}[{place}]" if self.where else f"[{place}]")
+
     def __len__(self) -> int:
         return len(self._value) if isinstance(self._value, dict | list | tuple) else 0
 

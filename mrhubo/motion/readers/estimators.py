@@ -16,6 +16,7 @@ from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.humanml import read_features
+from mrhubo.motion.readers.interhuman import read_interhuman
 from mrhubo.motion.readers.keypoint_arrays import points_in
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
@@ -26,6 +27,7 @@ from mrhubo.motion.readers.people import holds_parameters
 from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rows import read_rows
 from mrhubo.motion.readers.sam3d import read_sam3d
+from mrhubo.motion.readers.six_rows import read_six_rows
 from mrhubo.motion.readers.smpl_names import first_entries, is_robot
 from mrhubo.motion.readers.soma import read_soma
 from mrhubo.motion.readers.tracks import choose, motion_of
@@ -67,6 +69,8 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         read_rows(tree, options)
         or read_bare_poses(tree, options)
         or read_features(tree, options)
+        or read_interhuman(tree, options)
+        or read_six_rows(tree, options)
         or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)
         or read_nymeria(tree, rate)

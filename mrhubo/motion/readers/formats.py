@@ -80,7 +80,7 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
     if (frames := frame_files(path)) is not None:
         name, reader = ("pose_folders", "read_pose_files") if frames.poses else ("frame_folders", "read_frames")
         module = importlib.import_module(f"mrhubo.motion.readers.{name}")
-        return fill_repeats(getattr(module, reader)(path, frames.files, options))
+        return fill_repeats(getattr(module, reader)(path, frames, options))
     content = Content.open(path)
     row = find_format(content)
     if row is None:

@@ -1,5 +1,7 @@
 """Which folders are motions with a file a frame, of points (`mrhubo.motion.readers.frame_folders` reads them) or SMPL
 parameters (`mrhubo.motion.readers.pose_folders`): told by names and by what the first and the last file hold.
+
+SMPLify-X, and collections that were made with it (PROX, EgoBody, RICH), have a folder a frame, with a file a person.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ _MAX_FRAMES = 100_000
 _POINTS = re.compile(
     rb'\s*+(?:\{.{0,300}?"(?:people|bodies)"\s*:\s*\[|\[\s*(?:\]\s*$|\{(?=.{0,300}?"keypoints3d"))).*', re.DOTALL
 )
+_MOST_PEOPLE = 100
+"""In the folder of a frame."""
 _ENDINGS = (".json", ".npz", ".npy", ".pkl")
 _NUMBER = re.compile(r"[0-9]")
 
@@ -33,6 +37,8 @@ class Frames:
     files: list[Path]
     poses: bool
     """Whether they hold SMPL parameters; else points."""
+    in_folders: bool = False
+    """Whether each frame has a folder of its own, with a file a person."""
 
 
 def frame_files(folder: Path) -> Frames | None:
@@ -40,10 +46,13 @@ def frame_files(folder: Path) -> Frames | None:
     if not os.path.isdir(folder):
         return None
     by_ending: dict[str, list[Path]] = {ending: [] for ending in _ENDINGS}
+    folders: list[Path] = []
     try:
         for file in folder.iterdir():
             if file.suffix.lower() in by_ending and not file.name.startswith("."):
                 by_ending[file.suffix.lower()].append(file)
+            elif _NUMBER.search(file.name) and os.path.isdir(file):
+                folders.append(file)
     except OSError:
         return None
     for files in by_ending.values():
@@ -54,7 +63,25 @@ def frame_files(folder: Path) -> Frames | None:
             return Frames(files, poses=False)
         if _is_pose(files[0]) and _is_pose(files[-1]):
             return Frames(files, poses=True)
-    return None
+    return None if any(by_ending.values()) else _in_folders(sorted(folders, key=lambda inner: inner.name))
+
+
+def _in_folders(folders: list[Path]) -> Frames | None:
+    """The files of folders with one a frame; None where some of the first and the last are no such."""
+    if not 2 <= len(folders) <= _MAX_FRAMES:
+        return None
+    if not all(any(map(_is_pose, _frame_of(folder))) for folder in (folders[0], folders[-1])):
+        return None
+    try:
+        return Frames([file for folder in folders for file in _frame_of(folder)], poses=True, in_folders=True)
+    except OSError:
+        return None
+
+
+def _frame_of(folder: Path) -> list[Path]:
+    """The files of a folder that may be people in one frame; none where there are too many for that."""
+    files = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in _ENDINGS and os.path.isfile(file)]
+    return files if len(files) <= _MOST_PEOPLE else []
 
 
 def read_frame_tree(file: Path) -> Tree:

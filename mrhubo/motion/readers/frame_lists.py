@@ -1,7 +1,9 @@
 """Lists of frames, or dictionaries of them by the names of pictures, each with SMPL parameters of whoever is seen.
 
 So they come from who calls an estimator on each picture of a video and keeps what it answers: Multi-HMR's people,
-4D-Humans' HMR2, NLF. Who is in a frame is read by `mrhubo.motion.readers.frame_bodies`.
+4D-Humans' HMR2, NLF. Who is in a frame is read by `mrhubo.motion.readers.frame_bodies`. NLF itself answers a batch of
+pictures with a dictionary of lists, whose entries have a row for whoever is in each
+(https://github.com/isarandi/nlf, `detect_smpl_batched`).
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ _FEWEST, _NUMBERED = 2, 20
 """Frames of a list, and of a dictionary whose keys are numbers, which may be those of people."""
 _MOST_PEOPLE = 20
 """Along an axis of an array of one frame; more are frames."""
+_ROWS_OF_POSES = ("pose", "poses", "body_pose", "thetas", "smpl_thetas")
 _PICTURE = re.compile(r".*\.(?:jpe?g|png|bmp|webp|tiff?)|.*frame.*[0-9].*", re.IGNORECASE)
 
 
@@ -40,6 +43,25 @@ def read_numbered(tree: Tree) -> Layout | None:
     """The same in a dictionary by numbers."""
     numbered = tree.is_mapping and len(tree) > _NUMBERED and all(map(str.isdecimal, tree.keys))
     return _named(tree) if numbered else None
+
+
+def read_columns(tree: Tree) -> Layout | None:
+    """A dictionary of lists with an entry a frame, whose arrays have a row for each of the people in it, in any order;
+    more than one of them in some frame, or nobody.
+    """
+    poses = next((tree[key] for key in _ROWS_OF_POSES if key in tree.keys), None) if tree.is_mapping else None
+    if poses is None or not poses.is_list or len(poses) < _FEWEST:
+        return None
+    shapes = [pose.shape() for pose in poses]
+    counts = [shape[0] if shape is not None and len(shape) > 1 else -1 for shape in shapes]
+    if min(counts) < 0 or set(counts) == {1} or not 0 < max(counts) < min(len(poses), _MOST_PEOPLE + 1):
+        return None
+    frames = (
+        (number, frame)
+        for number, (frame, count) in enumerate(zip(tree.places(len(poses)), counts, strict=True))
+        if count
+    )
+    return _layout(tree, frames, _MOST_PEOPLE + 1)
 
 
 def _named(tree: Tree) -> Layout | None:

@@ -12,12 +12,13 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
-from mrhubo.motion.readers.frame_lists import read_frame_list, read_numbered, read_pictures
+from mrhubo.motion.readers.frame_lists import read_columns, read_frame_list, read_numbered, read_pictures
 from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
+from mrhubo.motion.readers.rotations import find_form
 from mrhubo.motion.readers.smpl_names import Found, find_inside, forms_in, search
-from mrhubo.motion.readers.tracks import Kind, Layout
+from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
 _MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
@@ -82,9 +83,27 @@ def _single(tree: Tree) -> Layout | None:
     return Layout(_kind("SMPL parameters", found, tree), found.tracks())
 
 
+def _pair(tree: Tree) -> Layout | None:
+    """A pose and a place of the root, as `torch.save((pose, tran), ...)` keeps what TransPose and its kin answer: all
+    joints of SMPL (T, 24, 3) or (T, 24, 3, 3), and (T, 3) (https://github.com/Xinyu-Yi/TransPose).
+    """
+    pair = list(tree) if tree.is_list and len(tree) == 2 else []
+    pose, place = (node.shape() for node in pair) if pair else (None, None)
+    if pose is None or place is None or len(pose) < 2 or place != (pose[0], 3):
+        return None
+    form = find_form(pose, (24,))
+    if form is None:
+        return None
+
+    def read() -> SmplArrays:
+        return SmplArrays(pair[0].where, pair[0].array(), form, 1, None, pair[1].array())
+
+    return Layout(Kind("SMPL's pose and place", "smpl", ANY_WORLD), [Track("", pose[0], read)])
+
+
 _FINDERS = (
-    read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo, _people,
-    _single, read_numbered,
+    read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo,
+    _pair, read_columns, _people, _single, read_numbered,
 )  # fmt: skip
 
 

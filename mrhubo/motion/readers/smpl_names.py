@@ -27,7 +27,7 @@ from mrhubo.motion.readers.tracks import SmplArrays, Track
 
 T = TypeVar("T")
 _ROOTS = ("global_orient", "root_orient", "root_pose", "global_orientation")
-_PLACES = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
+_PLACES = ("trans", "transl", "tran", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
 _ROBOT = {"dof", "dofs", "dof_pos", "dof_positions", "joint_pos", "joint_vel", "dof_vel"}
 """What files of robots call the angles of their joints, or how fast those turn."""
