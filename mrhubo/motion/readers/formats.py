@@ -57,6 +57,7 @@ FORMATS: tuple[Format, ...] = (
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints and SMPL parameters in JSON", "json_file", "is_json", "read_json", ()),
     Format("keypoints in tables (.csv)", "keypoint_table", "is_table", "read_table", ()),
+    Format("keypoints in tables with a line a point", "point_table", "is_point_table", "read_point_table", ()),
     Format("keypoints (.npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     Format("videos (MP4, MOV, MKV, WebM, AVI)", "video", "is_video", "read_video", ()),
     # the last row: whatever else holds arrays in dictionaries

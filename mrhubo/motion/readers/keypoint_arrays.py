@@ -19,8 +19,10 @@ import numpy as np
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.keypoint_fit import NONSENSE, fitting_sets
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import rate_in, rate_of_all
+from mrhubo.motion.readers.sightings import known_points
 from mrhubo.motion.readers.tracks import Person, choose
 
 POINT_KEYS = (
@@ -40,6 +42,10 @@ _SAMPLES, _LENGTHS = "motion", "lengths"
 _BODY, _BODY_KEY = "skel_body", re.compile(r"skel_body[0-9]{1,2}")
 _KINECT_RATE = 30.0
 """Frames a second of NTU RGB+D's motions."""
+_ROTATIONS = (63, 66, 69, 72, 156, 159, 165)
+"""Numbers of a row of SMPL's rotations."""
+_SAMPLED = 256
+"""Frames that are looked at."""
 _MOST_PEOPLE = 20
 """In one array."""
 
@@ -76,14 +82,20 @@ def in_npz(tree: Tree, options: ReadOptions) -> Keypoints:
     return found
 
 
-def in_array(path: Path, tree: Tree, options: ReadOptions) -> Keypoints:
+def in_array(path: Path, tree: Tree, options: ReadOptions, array: np.ndarray | None = None) -> Keypoints:
     """The points that a node is itself, of one of the people in it.
+
+    Args:
+        path: the file, for sentences.
+        tree: the node.
+        options: person.
+        array: of the node, where it is laid out in another way.
 
     Raises:
         NoMotion: it is no points of frames; says what it is.
     """
     notes: list[str] = []
-    array, _ = _of_one(path, tree.array(), "the array", options, notes)
+    array, _ = _of_one(path, tree.array() if array is None else array, "the array", options, notes)
     point_TK3, confidence_TK = _split(path, array, "the array")
     return Keypoints(point_TK3, confidence_TK=confidence_TK, notes=notes)
 
@@ -97,6 +109,9 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
     path = tree.path
     if not tree.is_mapping:
         shape = tree.shape()
+        rows = _points_of_rows(tree, shape) if shape is not None and len(shape) == 2 else None
+        if rows is not None:
+            return in_array(path, tree, options, rows)
         return in_array(path, tree, options) if shape is not None and _may_be_points(shape) else None
     samples = _samples(tree, options)
     if samples is not None:
@@ -122,6 +137,21 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
         found.rate = told[1]
     found.notes += notes
     return found
+
+
+def _points_of_rows(tree: Tree, shape: tuple[int, ...]) -> np.ndarray | None:
+    """Rows of three or four numbers a point as points (T, K, 3 or 4), if those make a body in the order of a set that
+    is known; None of any other, and of rows as long as those of SMPL's rotations, which may make one by chance.
+    """
+    if 0 in shape or shape[1] in _ROTATIONS or (array := tree.array()).dtype.kind not in "fiu":
+        return None
+    for numbers in (3, 4):
+        if shape[1] % numbers == 0:
+            point_TKX = array.reshape(len(array), -1, numbers)
+            fits = fitting_sets(known_points(point_TKX[:: 1 + len(array) // _SAMPLED, :, :3].astype(np.float64)))
+            if fits and fits[0][0] < NONSENSE:
+                return point_TKX
+    return None
 
 
 def _may_be_points(shape: tuple[int, ...]) -> bool:

@@ -31,7 +31,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.tree import tree_of
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_numbers import in_order
-from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, NAME_KEYS, Keypoints, point_key
+from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, LIFT, NAME_KEYS, Keypoints, point_key
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import rate_in
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
@@ -42,6 +42,10 @@ _NUMBERS = ("frame_id", "frame", "frame_idx", "frame_index", "frame_number")
 _PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons")
 _IDS = ("track_id", "body_id", "person_id", "id")
 _SURE = ("visibility", "confidence", "score", "presence")
+_FLAT = 4
+"""Numbers of a single point, at most."""
+_PICTURE = "image_id"
+"""What lists of detections, as COCO has them, call the frame in which somebody was seen."""
 _DIGIT = re.compile(r"[0-9]")
 
 
@@ -101,6 +105,13 @@ def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
     if not isinstance(value, list) or not value:
         raise UserError(f"{path}: {where} is no list of frames")
     check_size(path, where, len(value), 1)
+    pictures = [str(frame.get(_PICTURE, "")) if isinstance(frame, dict) else "" for frame in value]
+    if all(pictures) and len(set(pictures)) < len(pictures):  # an entry is a person, and not a frame
+        people: dict[str, list[Any]] = {}
+        for picture, one in zip(pictures, value, strict=True):
+            people.setdefault(picture, []).append(one)
+        numbered = in_order(path, list(people.items()))
+        return [number for number, _ in numbered], [here for _, here in numbered]
     for key in _NUMBERS:
         given = [frame.get(key) if isinstance(frame, dict) else None for frame in value]
         if all(type(number) is int and number >= 0 for number in given) and len(set(given)) == len(given):
@@ -205,6 +216,9 @@ def _row(path: Path, where: str, number: int, frame: Any) -> _Row:
         names = [str(point["name"]) for point in frame if isinstance(point, dict) and "name" in point]
     if not isinstance(frame, list):
         raise UserError(f"{path}: {where} has no list of points in frame {number}")
+    if len(frame) > _FLAT and all(type(x) in (int, float) for x in frame):  # COCO's way, without an axis for the points
+        width = 3 if len(frame) % 3 == 0 else 4
+        frame = [frame[start : start + width] for start in range(0, len(frame), width)]
     points = []
     for point in frame:
         if isinstance(point, dict):
@@ -213,6 +227,8 @@ def _row(path: Path, where: str, number: int, frame: Any) -> _Row:
         if point is None:
             point = [None, None, None]
         if not isinstance(point, list) or len(point) not in (3, 4):
+            if isinstance(point, list) and len(point) == 2:
+                raise NoMotion(f"{path}: {where} has points in a picture (x and y); {LIFT}")
             what = f"a point of {len(point)} numbers" if isinstance(point, list) else f"'{shortened(point, 30)}'"
             raise UserError(f"{path}: {where} has {what} in frame {number}; expected points, [x, y, z] each")
         points.append([_number(path, where, number, x) for x in point])
