@@ -129,14 +129,22 @@ class Tree:
             raise UserError(f"{self.named} is {self.described}; expected one with '{name}'")
         return found
 
-    def renamed(self, names: Mapping[str, str]) -> Tree:
+    def renamed(self, names: Mapping[str, str], inner: Mapping[str, Mapping[str, str]] | None = None) -> Tree:
         """Some entries of a dictionary under other keys.
 
         Args:
             names: the other keys, and the dictionary's own.
+            inner: the same of dictionaries that are put into it, by their keys.
         """
         entries = dict(self._entries())
-        return Tree({name: self._child(own, entries[own]) for name, own in names.items()}, self._source, self.where)
+
+        def under(chosen: Mapping[str, str], where: str) -> Tree:
+            return Tree({name: self._child(own, entries[own]) for name, own in chosen.items()}, self._source, where)
+
+        found = under(names, self.where)
+        for name, chosen in (inner or {}).items():
+            found._given[name] = under(chosen, f"{self.where}[{name}]" if self.where else name)
+        return found
 
     def places(self, count: int) -> Iterator[Tree]:
         """Of a dictionary of lists, what stands at each of so many places: a dictionary of the entries that are lists

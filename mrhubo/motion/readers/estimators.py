@@ -17,10 +17,12 @@ from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.humanml import read_features
 from mrhubo.motion.readers.interhuman import read_interhuman
+from mrhubo.motion.readers.key_words import nested
 from mrhubo.motion.readers.keypoint_arrays import points_in
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
+from mrhubo.motion.readers.motionstreamer import read_streamed
 from mrhubo.motion.readers.nymeria import read_nymeria
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.people import holds_parameters
@@ -60,7 +62,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         NoMotion: nobody knows it; says what the file holds.
         UserError: the file is damaged, hostile, too large, or what it tells is no motion.
     """
-    tree = read_tree(path)
+    tree = nested(read_tree(path))
 
     def rate(notes: list[str]) -> float:
         return find_rate(path, (tree, *(child for _, child in first_entries(tree))), options, notes)
@@ -71,6 +73,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         or read_features(tree, options)
         or read_interhuman(tree, options)
         or read_six_rows(tree, options)
+        or read_streamed(tree, options)
         or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)
         or read_nymeria(tree, rate)

@@ -9,6 +9,8 @@
 * FrankMocap: `pred_output_list`, an entry a person, `None` or with `pred_body_pose` (1, 72), and `smpl_type` and
   `body_bbox_list`, rows of x, y, width and height (https://github.com/facebookresearch/frankmocap,
   mocap_utils/demo_utils.py).
+* Human3R: `rotvec` (N, 53, 3), `transl` (N, 3) and `shape` of N people in the folder `smpl`
+  (https://github.com/fanegg/Human3R, demo.py).
 * Multi-HMR: a list of people with `rotvec` (53, 3) of SMPL-X's joints, the root first, without eyes, `transl_pelvis`
   (1, 3) and `shape` (https://github.com/naver/multi-hmr, model.py); those of its data, and SOKE's
   (https://github.com/2000ZRL/SOKE), `smplx_root_pose`, `smplx_body_pose`, `smplx_transl` or `cam_trans`.
@@ -23,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -32,7 +35,7 @@ from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.family import family_of
-from mrhubo.motion.readers.key_words import by_usual_names, model_named
+from mrhubo.motion.readers.key_words import by_usual_names, model_named, usual_name, without_world
 from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_form
 from mrhubo.motion.readers.sightings import person_called
 
@@ -42,7 +45,7 @@ _POSES = (
 )  # fmt: skip
 _ROOTS = ("global_orient", "root_pose", "root_orient")
 _PLACES = ("transl_pelvis", "transl", "trans", "pred_cam_t", "cam_t", "cam_trans")
-_IDS = ("id", "personID", "person_id", "track_id")
+_IDS = ("id", "personID", "person_id", "track_id", "smpl_id")
 """What files call a pose, the rotation of its root, where that is, and who it is."""
 _EASYMOCAP = {78: "smplh", 87: "smplx"}
 """How many numbers a pose of EasyMocap has that ends with coefficients, and of which model it is."""
@@ -85,6 +88,10 @@ def bodies_in(tree: Tree, most_rows: int = 1) -> list[Body] | None:
     """
     listed = tree.get("pred_output_list", "annots") if tree.is_mapping else tree if tree.is_list else None
     if listed is None:
+        people = _people(tree)
+        named = [_bodies(child, child, None, 1, name) for name, child in people]
+        if people and all(named):
+            return [body for bodies in named if bodies is not None for body in bodies]
         return _bodies(tree, tree, None, most_rows)
     if not listed.is_list:
         return None
@@ -111,9 +118,32 @@ def refuse_frame(tree: Tree) -> None:
         )
 
 
-def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[Body] | None:
+def _people(frame: Tree) -> list[tuple[str, Tree]]:
+    """Entries of a frame that are a person each, called by a number, or several with parameters, of which none are the
+    same in the world and as a camera sees them, or of another model; none of any other frame.
+    """
+    if not frame.is_mapping or _pose_in(frame) is not None:
+        return []
+    found = [
+        (name, child)
+        for name, child in islice(frame.items(), _MOST)
+        if child.is_mapping and any(_pose_in(one) is not None for one in _with_children(child))
+    ]
+    bare = {without_world(usual_name(name)) for name, _ in found}
+    numbered = bool(found) and all(name.isdecimal() for name, _ in found)
+    return found if numbered or len(bare) == len(found) > 1 else []
+
+
+def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int, called: str | None = None) -> list[Body] | None:
     """Parameters in a dictionary, or in one in it, of somebody, or of several along the first axis of its arrays; None
     where it has none, or those of several frames.
+
+    Args:
+        node: the dictionary.
+        around: what it is in.
+        box: around them in the picture.
+        most_rows: how many people there may be along that axis.
+        called: what the file calls them, where it is not said beside the parameters.
     """
     if {"Rh", "Th", "poses"} <= set(node.keys):
         body = _easymocap(node)
@@ -127,6 +157,8 @@ def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[
         return None
     pose_NX, form = found
     count = len(pose_NX)
+    if not count:
+        return []
     homes = (inner, node, by_usual_names(inner), by_usual_names(node))
 
     def rows(names: tuple[str, ...]) -> np.ndarray | None:
@@ -144,11 +176,11 @@ def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[
     betas = None if betas_NX is None else betas_NX[0].tolist()
     family = family_of(named, form.joints, keys, betas)
     source = "FrankMocap" if key.startswith("pred_") and around is not node else "SMPL parameters"
-    person = _person(node) if count == 1 else None
+    people = _names(node, count)
     middle = _middle(box)
     return [
         Body(
-            person, key, pose_NX[n], form, None if root_NX is None else root_NX[n],
+            people[n] if called is None else called, key, pose_NX[n], form, None if root_NX is None else root_NX[n],
             None if place_NX is None or place_NX.shape[1] != 3 else place_NX[n],
             None if betas_NX is None else betas_NX[n], middle, source, family,
         )
@@ -175,6 +207,9 @@ def _with_children(node: Tree) -> Iterator[Tree]:
 def _rows(node: Tree, most: int) -> tuple[np.ndarray, Form] | None:
     """Rows (N, X) of a pose of each of some people, and their form; None where they are none, or more than `most`."""
     shape = node.shape()
+    if shape is not None and len(shape) > 1 and shape[0] == 0 and math.prod(shape[1:]) <= _LONGEST:
+        form = find_form((1, *shape[1:]), _COUNTS)
+        return None if form is None else (np.zeros((0, form.width)), form)
     if shape is None or len(shape) < 1 or not 0 < math.prod(shape) <= most * _LONGEST:
         return None
     while len(shape) > 1 and shape[0] == 1:
@@ -190,6 +225,15 @@ def _numbers(node: Tree) -> np.ndarray | None:
     if shape is None or not 0 < math.prod(shape) <= _MOST * _LONGEST:
         return None
     return node.array().astype(np.float64).reshape(-1)
+
+
+def _names(node: Tree, count: int) -> list[str | None]:
+    """What a file calls each of some people; None where it does not."""
+    told = node.get(*_IDS)
+    shape = None if told is None else told.shape()
+    if told is not None and count > 1 and shape == (count,):
+        return [person_called(number) for number in told.array().tolist()]
+    return [_person(node) if count == 1 else None] * count
 
 
 def _person(node: Tree) -> str | None:

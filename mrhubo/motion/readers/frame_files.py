@@ -26,6 +26,9 @@ _POINTS = re.compile(
 )
 _MOST_PEOPLE = 100
 """In the folder of a frame."""
+_MANY, _MOST_ROWS = 20, 20
+"""So many files that are called by nothing but a number are frames, whose arrays may be of so many people; fewer may be
+motions of some frames."""
 _ENDINGS = (".json", ".npz", ".npy", ".pkl")
 _NUMBER = re.compile(r"[0-9]")
 
@@ -37,6 +40,8 @@ class Frames:
     files: list[Path]
     poses: bool
     """Whether they hold SMPL parameters; else points."""
+    most_rows: int = 1
+    """How many people arrays in a file may have along their first axis."""
     in_folders: bool = False
     """Whether each frame has a folder of its own, with a file a person."""
 
@@ -61,8 +66,10 @@ def frame_files(folder: Path) -> Frames | None:
         files.sort(key=lambda file: file.name)
         if _is_points(files[0]) and _is_points(files[-1]):
             return Frames(files, poses=False)
-        if _is_pose(files[0]) and _is_pose(files[-1]):
-            return Frames(files, poses=True)
+        numbered = len(files) >= _MANY and all(file.stem.isdecimal() for file in files)
+        rows = _MOST_ROWS if numbered else 1
+        if _is_pose(files[0], rows) and _is_pose(files[-1], rows):
+            return Frames(files, poses=True, most_rows=rows)
     return None if any(by_ending.values()) else _in_folders(sorted(folders, key=lambda inner: inner.name))
 
 
@@ -117,8 +124,8 @@ def _is_points(file: Path) -> bool:
         return False
 
 
-def _is_pose(file: Path) -> bool:
+def _is_pose(file: Path, most_rows: int = 1) -> bool:
     try:
-        return bodies_in(read_frame_tree(file)) is not None
+        return bodies_in(read_frame_tree(file), most_rows) is not None
     except UserError:
         return False

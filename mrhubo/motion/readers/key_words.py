@@ -18,6 +18,7 @@ _FREE = {
 }  # fmt: skip
 """Words without which a name is the usual one: of models, estimators, forms of rotations, and worlds."""
 _MODEL = re.compile(r"smpl[xh](?![a-z])")
+_NESTED = re.compile(r"([A-Za-z][\w-]*)[./]([A-Za-z][\w./-]*)")
 _MOST = 200
 """Entries of a dictionary that has names, and not those of people or frames."""
 
@@ -80,3 +81,17 @@ def _seen_from(key: str) -> int:
     if "world" in words:
         return 0
     return 2 if any(word in words for word in _CAMERA) else 1
+
+
+def nested(node: Tree) -> Tree:
+    """A dictionary whose names have other dictionaries' names before a point or a slash, as in
+    `body_params_global.transl`, with those in it; any other as it is.
+    """
+    keys = node.keys if node.is_mapping else ()
+    parts = {key: match for key in keys if (match := _NESTED.fullmatch(key)) is not None}
+    outer = {match[1] for match in parts.values()}
+    if not parts or len(keys) > _MOST or outer & set(keys):
+        return node
+    own = {key: key for key in keys if key not in parts}
+    inner = {name: {match[2]: key for key, match in parts.items() if match[1] == name} for name in sorted(outer)}
+    return node.renamed(own, inner)

@@ -43,7 +43,7 @@ def read_pose_files(folder: Path, frames: Frames, options: ReadOptions) -> Motio
     seen: list[tuple[int, Body]] = []
     files = frames.files
     for frame, file in zip(_frames(folder, frames), files, strict=True):
-        bodies = bodies_in(read_frame_tree(file))
+        bodies = bodies_in(read_frame_tree(file), frames.most_rows)
         if bodies is None:
             raise UserError(f"{file}: has no SMPL parameters of one frame, as other files of its folder have")
         seen += [(frame, body) for body in bodies]

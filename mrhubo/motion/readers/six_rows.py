@@ -48,7 +48,7 @@ def read_six_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     who, before, joints, family = _KINDS[shape[1]]
     row_TX = tree.array().reshape(shape).astype(np.float64)
     place_T3, six_TJ6 = row_TX[:, before : before + 3], row_TX[:, before + 3 :].reshape(len(row_TX), joints, 6)
-    if not _are_rotations(six_TJ6):
+    if not are_rotations(six_TJ6):
         raise NoMotion(
             f"{tree.path}: has rows of {shape[1]} numbers, as {who} have, whose rotations are none; if they are"
             " normalised, turn them back first"
@@ -59,7 +59,7 @@ def read_six_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     return motion_of(tree.path, arrays, Kind(f"{who} rows (T, {shape[1]})", family, ANY_WORLD), rate, notes)
 
 
-def _are_rotations(six_TJ6: np.ndarray) -> bool:
+def are_rotations(six_TJ6: np.ndarray) -> bool:
     """Whether numbers are two rows of rotations each, but for a few frames."""
     first_TJ3, second_TJ3 = six_TJ6[..., :3], six_TJ6[..., 3:]
     lengths_TJ = np.stack([np.linalg.norm(row_TJ3, axis=-1) for row_TJ3 in (first_TJ3, second_TJ3)])

@@ -94,6 +94,18 @@ def test_robots_whose_links_turn_like_as_many_joints_are_no_people(key: str, joi
             read_motion(path)
 
 
+@pytest.mark.parametrize("sign", [".", "/"])
+def test_dictionaries_in_dictionaries_may_stand_in_names(sign: str, tmp_path: Path) -> None:
+    """As GEM's results do in an .npz file: the world goes before the camera, and each has its own root."""
+    outer = {"body_params_incam": (CAMERA, PLACE * 0), "body_params_global": (ROOT, PLACE)}
+    arrays = {
+        f"{name}{sign}{key}": array
+        for name, (turn, place) in outer.items()
+        for key, array in {"global_orient": turn, "body_pose": BODY, "transl": place}.items()
+    }
+    assert is_whole(written(tmp_path / "clip.npz", **arrays, K_fullimg=np.eye(3)), "smplx")
+
+
 def test_words() -> None:
     assert usual_name("smplxBodyPose") == usual_name("pred_body_pose_cam") == "body_pose"
     assert usual_name("pose_6d") == "pose_6d"  # another form of rotations

@@ -244,3 +244,20 @@ def test_folders_of_clips_are_no_frames(tmp_path: Path) -> None:
         np.savez(tmp_path / clip / "walk.npz", poses=padded(made_up(5), 24), fps=30.0)
     with pytest.raises(UserError, match="is a folder"):
         read_motion(tmp_path, RATE)
+
+
+def test_files_of_whoever_is_in_a_frame(tmp_path: Path) -> None:
+    """As Human3R writes them: rows of people without names, and of nobody in the first frame."""
+    poses = {p: made_up(24, seed=p, camera=True) for p in (0, 1)}
+    for t in range(24):
+        here = [p for p in (0, 1)[:: 1 if t % 2 else -1] if t > 2 * p] if t else []
+        np.savez(
+            tmp_path / f"{t:06}.npz",
+            scores=np.ones(len(here)),
+            msk=np.array(None),
+            shape=np.zeros((len(here), 10)),
+            rotvec=np.array([np.pad(poses[p][t], ((0, 31), (0, 0))) for p in here]).reshape(-1, 53, 3),
+            transl=np.array([[3.0 * p, 0.0, 5.0] for p in here]).reshape(-1, 3),
+        )
+    assert_pose(read_motion(tmp_path, RATE), poses[0], "smplx", list(range(1, 24)))
+    assert_pose(read_motion(tmp_path, ReadOptions(rate=30.0, person="1")), poses[1], "smplx", list(range(3, 24)))
