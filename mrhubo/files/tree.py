@@ -7,7 +7,7 @@ what is not asked for is not made: a node is put together when its array is aske
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -154,6 +154,10 @@ class Tree:
         for place in range(count):
             at = {name: children[place] for name, children in lists.items()}
             yield Tree(at, self._source, f"{self.where}[{place}]" if self.where else f"[{place}]")
+
+    def by_names(self, names: Sequence[str]) -> Tree:
+        """The nodes of a list as a dictionary, under one name each."""
+        return Tree(dict(zip(names, self, strict=True)), self._source, self.where)
 
     def __len__(self) -> int:
         return len(self._value) if isinstance(self._value, dict | list | tuple) else 0

@@ -18,7 +18,7 @@ from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.humanml import read_features
 from mrhubo.motion.readers.interhuman import read_interhuman
 from mrhubo.motion.readers.key_words import nested
-from mrhubo.motion.readers.keypoint_arrays import points_in
+from mrhubo.motion.readers.keypoint_dictionaries import points_in
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout

@@ -45,6 +45,8 @@ _POSES = (
 )  # fmt: skip
 _ROOTS = ("global_orient", "root_pose", "root_orient")
 _PLACES = ("transl_pelvis", "transl", "trans", "pred_cam_t", "cam_t", "cam_trans")
+_LISTS = ("pred_output_list", "annots", "people", "persons", "instances", "humans")
+"""What frames call a list of whoever is in them."""
 _IDS = ("id", "personID", "person_id", "track_id", "smpl_id")
 """What files call a pose, the rotation of its root, where that is, and who it is."""
 _EASYMOCAP = {78: "smplh", 87: "smplx"}
@@ -86,15 +88,13 @@ def bodies_in(tree: Tree, most_rows: int = 1) -> list[Body] | None:
     Raises:
         UserError: there are too many, or something in it is no array that can be used.
     """
-    listed = tree.get("pred_output_list", "annots") if tree.is_mapping else tree if tree.is_list else None
-    if listed is None:
+    listed = tree.get(*_LISTS) if tree.is_mapping else tree if tree.is_list else None
+    if listed is None or (listed is not tree and not listed.is_list):
         people = _people(tree)
         named = [_bodies(child, child, None, 1, name) for name, child in people]
         if people and all(named):
             return [body for bodies in named if bodies is not None for body in bodies]
         return _bodies(tree, tree, None, most_rows)
-    if not listed.is_list:
-        return None
     if len(listed) > _MOST:
         raise UserError(f"{listed.named} has {len(listed):,} people; expected at most {_MOST}")
     boxes = tree.get("body_bbox_list") if tree.is_mapping else None

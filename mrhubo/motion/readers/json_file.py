@@ -23,7 +23,7 @@ from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
 
 _BEGINNING = re.compile(r"\s*+(?:\[\s*+[\[{]|\{\s*+\")")
-_POSES = re.compile(rb'"(?:' + "|".join(sorted(POSE_KEYS)).encode() + rb')"\s*+:')
+_POSES = re.compile(rb'"\w*(?:' + "|".join(sorted(POSE_KEYS)).encode() + rb')"\s*+:')
 _MAX_BYTES = 2**27
 
 

@@ -13,7 +13,8 @@ from mrhubo.errors import UserError
 from mrhubo.files.tree import read_tree
 from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.key_words import usual_name
-from mrhubo.motion.readers.keypoint_arrays import Keypoints, in_array, in_npz, point_key
+from mrhubo.motion.readers.keypoint_arrays import Keypoints, in_array, point_key
+from mrhubo.motion.readers.keypoint_dictionaries import in_npz
 from mrhubo.motion.readers.options import ReadOptions
 
 POSE_KEYS = {

@@ -12,17 +12,20 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
-from mrhubo.motion.readers.frame_lists import read_columns, read_frame_list, read_numbered, read_pictures
+from mrhubo.motion.readers.frame_lists import read_columns, read_frame_list, read_listed, read_numbered, read_pictures
 from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.rotations import find_form
-from mrhubo.motion.readers.smpl_names import Found, find_inside, forms_in, search
+from mrhubo.motion.readers.smpl_names import Found, find_here, find_inside, forms_in, search
 from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
 _MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
 """The models of `smplVersion` (https://pypi.org/project/smplcodec, codec.py)."""
+_TRACKS, _IDS = ("tracks", "people", "persons", "subjects", "tracklets"), ("track_id", "person_id", "id", "name")
+_MOST_TRACKS = 1_000
+"""What files call a list of people, and people themselves."""
 _OF_SMPL = (23, 24)
 """How many joints SMPL's poses have."""
 
@@ -53,6 +56,21 @@ def _people(tree: Tree) -> Layout | None:
     if first.node is not first.outer and first.node.where.endswith(("_cam]", "_incam]")):
         kind = replace(kind, worlds=CAMERAS)
     return Layout(kind, people.tracks, people.notes)
+
+
+def _tracks(tree: Tree) -> Layout | None:
+    """A list of people, itself or under a key, each a dictionary with arrays over the frames in which they are seen."""
+    listed = tree if tree.is_list else tree.get(*_TRACKS) if tree.is_mapping else None
+    if listed is None or not listed.is_list or not 0 < len(listed) <= _MOST_TRACKS:
+        return None
+    people = list(listed)
+    found = [find_here(person) for person in people]
+    if None in found or all(one is None or one.frames < 2 for one in found):  # of single frames, they are of one
+        return None
+    told = [person.get(*_IDS) for person in people]
+    names = ["" if one is None else one.text() or f"{one.number():.0f}" for one in told]
+    unique = all(names) and len(set(names)) == len(names)
+    return _people(listed.by_names(names if unique else [str(number) for number in range(len(names))]))
 
 
 def _single(tree: Tree) -> Layout | None:
@@ -103,7 +121,7 @@ def _pair(tree: Tree) -> Layout | None:
 
 _FINDERS = (
     read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo,
-    _pair, read_columns, _people, _single, read_numbered,
+    _pair, _tracks, read_columns, _people, _single, read_listed, read_numbered,
 )  # fmt: skip
 
 
