@@ -64,6 +64,12 @@ FORMATS: tuple[Format, ...] = (
     Format("what an estimator of human pose writes", "estimators", "is_container", "read_estimated", _PYTHON),
 )
 """The first row that recognises a file reads it."""
+_FOLDERS = {
+    "points": ("frame_folders", "read_frames"),
+    "poses": ("pose_folders", "read_pose_files"),
+    "answers": ("sam3d_folders", "read_sam3d_files"),
+}
+"""The module and its reader of folders with a file a frame, by what is in those."""
 
 
 def find_format(content: Content) -> Format | None:
@@ -79,7 +85,7 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
         UserError: whoever does finds it bad.
     """
     if (frames := frame_files(path)) is not None:
-        name, reader = ("pose_folders", "read_pose_files") if frames.poses else ("frame_folders", "read_frames")
+        name, reader = _FOLDERS[frames.kind]
         module = importlib.import_module(f"mrhubo.motion.readers.{name}")
         return fill_repeats(getattr(module, reader)(path, frames, options))
     content = Content.open(path)

@@ -1,5 +1,6 @@
 """Which folders are motions with a file a frame, of points (`mrhubo.motion.readers.frame_folders` reads them) or SMPL
-parameters (`mrhubo.motion.readers.pose_folders`): told by names and by what the first and the last file hold.
+parameters (`mrhubo.motion.readers.pose_folders`), or of SAM 3D Body's answers (`mrhubo.motion.readers.sam3d_folders`):
+told by names and by what the first and the last file hold.
 
 SMPLify-X, and collections that were made with it (PROX, EgoBody, RICH), have a folder a frame, with a file a person.
 """
@@ -17,6 +18,8 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import check_regular, read_regular
 from mrhubo.files.tree import Tree, read_tree, tree_of
 from mrhubo.motion.readers.frame_bodies import bodies_in
+from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.sam3d import answers_in
 
 MAX_BYTES = 10_000_000
 """Of a frame."""
@@ -31,6 +34,7 @@ _MANY, _MOST_ROWS = 20, 20
 motions of some frames."""
 _ENDINGS = (".json", ".npz", ".npy", ".pkl")
 _NUMBER = re.compile(r"[0-9]")
+_DETECTION = re.compile(r"(.*[0-9].*?)[_-]([0-9]{1,3})")
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class Frames:
     """The files of a folder with one a frame, by name."""
 
     files: list[Path]
-    poses: bool
-    """Whether they hold SMPL parameters; else points."""
+    kind: str
+    """What they hold: `points`, `poses`, which are SMPL parameters, or `answers`, of SAM 3D Body."""
     most_rows: int = 1
     """How many people arrays in a file may have along their first axis."""
     in_folders: bool = False
@@ -65,11 +69,13 @@ def frame_files(folder: Path) -> Frames | None:
             continue
         files.sort(key=lambda file: file.name)
         if _is_points(files[0]) and _is_points(files[-1]):
-            return Frames(files, poses=False)
+            return Frames(files, "points")
         numbered = len(files) >= _MANY and all(file.stem.isdecimal() for file in files)
         rows = _MOST_ROWS if numbered else 1
         if _is_pose(files[0], rows) and _is_pose(files[-1], rows):
-            return Frames(files, poses=True, most_rows=rows)
+            return Frames(files, "poses", most_rows=rows)
+        if _is_answer(files[0]) and _is_answer(files[-1]):
+            return Frames(files, "answers")
     return None if any(by_ending.values()) else _in_folders(sorted(folders, key=lambda inner: inner.name))
 
 
@@ -80,7 +86,7 @@ def _in_folders(folders: list[Path]) -> Frames | None:
     if not all(any(map(_is_pose, _frame_of(folder))) for folder in (folders[0], folders[-1])):
         return None
     try:
-        return Frames([file for folder in folders for file in _frame_of(folder)], poses=True, in_folders=True)
+        return Frames([file for folder in folders for file in _frame_of(folder)], "poses", in_folders=True)
     except OSError:
         return None
 
@@ -129,3 +135,34 @@ def _is_pose(file: Path, most_rows: int = 1) -> bool:
         return bodies_in(read_frame_tree(file), most_rows) is not None
     except UserError:
         return False
+
+
+def _is_answer(file: Path) -> bool:
+    try:
+        return answers_in(read_frame_tree(file)) is not None
+    except UserError:
+        return False
+
+
+def numbers_of_files(folder: Path, frames: Frames) -> list[int]:
+    """The number of each file's frame; several files have the same, where the last number in a name is a person's.
+
+    Raises:
+        UserError: the order of the frames is not known.
+    """
+    if frames.in_folders:
+        return _of_heads(folder, [file.parent.name for file in frames.files])
+    stems = [file.stem for file in frames.files]
+    parts = [_DETECTION.fullmatch(stem) for stem in stems]
+    heads = [part[1] for part in parts if part is not None]
+    tails = {part[2] for part in parts if part is not None}
+    if len(heads) < len(stems) or not 1 < len(set(heads)) >= len(tails) or len(tails) > _MOST_PEOPLE:
+        return frame_numbers_in(folder, stems)
+    return _of_heads(folder, heads)
+
+
+def _of_heads(folder: Path, heads: list[str]) -> list[int]:
+    """The number of each frame of which there are several names alike."""
+    once = sorted(set(heads))
+    numbers = dict(zip(once, frame_numbers_in(folder, once), strict=True))
+    return [numbers[head] for head in heads]
