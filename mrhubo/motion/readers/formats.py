@@ -67,6 +67,7 @@ FORMATS: tuple[Format, ...] = (
 _FOLDERS = {
     "points": ("frame_folders", "read_frames"),
     "poses": ("pose_folders", "read_pose_files"),
+    "others": ("point_folders", "read_point_files"),
     "answers": ("sam3d_folders", "read_sam3d_files"),
 }
 """The module and its reader of folders with a file a frame, by what is in those."""

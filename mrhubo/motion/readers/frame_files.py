@@ -1,6 +1,7 @@
 """Which folders are motions with a file a frame, of points (`mrhubo.motion.readers.frame_folders` reads them) or SMPL
 parameters (`mrhubo.motion.readers.pose_folders`), or of SAM 3D Body's answers (`mrhubo.motion.readers.sam3d_folders`):
-told by names and by what the first and the last file hold.
+or of whatever else has points (`mrhubo.motion.readers.point_folders`): told by names and by what the first and the last
+file hold.
 
 SMPLify-X, and collections that were made with it (PROX, EgoBody, RICH), have a folder a frame, with a file a person.
 """
@@ -19,6 +20,8 @@ from mrhubo.files.regular import check_regular, read_regular
 from mrhubo.files.tree import Tree, read_tree, tree_of
 from mrhubo.motion.readers.frame_bodies import bodies_in
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.keypoint_arrays import NAME_KEYS, point_key
+from mrhubo.motion.readers.keypoint_rows import counts_of_frame
 from mrhubo.motion.readers.sam3d import answers_in
 
 MAX_BYTES = 10_000_000
@@ -32,6 +35,8 @@ _MOST_PEOPLE = 100
 _MANY, _MOST_ROWS = 20, 20
 """So many files that are called by nothing but a number are frames, whose arrays may be of so many people; fewer may be
 motions of some frames."""
+_FEWEST_POINTS, _MOST_NUMBERS = 12, 100_000
+"""Of a body, and in a frame."""
 _ENDINGS = (".json", ".npz", ".npy", ".pkl")
 _NUMBER = re.compile(r"[0-9]")
 _DETECTION = re.compile(r"(.*[0-9].*?)[_-]([0-9]{1,3})")
@@ -43,7 +48,8 @@ class Frames:
 
     files: list[Path]
     kind: str
-    """What they hold: `points`, `poses`, which are SMPL parameters, or `answers`, of SAM 3D Body."""
+    """What they hold: `points`, as OpenPose and its kin lay them out, `poses`, which are SMPL parameters, `answers`, of
+    SAM 3D Body, or `others`, which are points too."""
     most_rows: int = 1
     """How many people arrays in a file may have along their first axis."""
     in_folders: bool = False
@@ -70,12 +76,14 @@ def frame_files(folder: Path) -> Frames | None:
         files.sort(key=lambda file: file.name)
         if _is_points(files[0]) and _is_points(files[-1]):
             return Frames(files, "points")
-        numbered = len(files) >= _MANY and all(file.stem.isdecimal() for file in files)
-        rows = _MOST_ROWS if numbered else 1
+        many = len(files) >= _MANY
+        rows = _MOST_ROWS if many and all(file.stem.isdecimal() for file in files) else 1
         if _is_pose(files[0], rows) and _is_pose(files[-1], rows):
             return Frames(files, "poses", most_rows=rows)
         if _is_answer(files[0]) and _is_answer(files[-1]):
             return Frames(files, "answers")
+        if many and _has_points(files[0]) and _has_points(files[-1]):
+            return Frames(files, "others")
     return None if any(by_ending.values()) else _in_folders(sorted(folders, key=lambda inner: inner.name))
 
 
@@ -142,6 +150,48 @@ def _is_answer(file: Path) -> bool:
         return answers_in(read_frame_tree(file)) is not None
     except UserError:
         return False
+
+
+def _has_points(file: Path) -> bool:
+    try:
+        counts = counts_of_frame(file, plain_frame(file))
+    except UserError:
+        return False
+    return 0 < len(counts) <= _MOST_ROWS and min(counts) >= _FEWEST_POINTS
+
+
+def plain_frame(file: Path) -> Any:
+    """What a file of a frame holds, in dictionaries and lists: of one that is no JSON, its arrays of points.
+
+    Raises:
+        UserError: it is damaged, hostile, or too large.
+    """
+    if file.suffix.lower() == ".json":
+        return _called(read_frame_json(file))
+    tree = read_frame_tree(file)
+    if not tree.is_mapping:
+        return _numbers(tree)
+    key = point_key(tree.keys)
+    if key is not None:
+        return _numbers(tree[key])
+    return [{"id": name, "keypoints": _numbers(child)} for name, child in tree.items()]
+
+
+def _called(frame: Any) -> Any:
+    """A frame in JSON whose points have names in a list beside them, with the points by name; any other as it is."""
+    names = next((frame[key] for key in NAME_KEYS if key in frame), None) if isinstance(frame, dict) else None
+    key = point_key(frame) if isinstance(frame, dict) else None
+    points = None if key is None else frame[key]
+    if not isinstance(names, list) or not isinstance(points, list) or len(set(map(str, names))) != len(points):
+        return frame
+    return dict(zip(map(str, names), points, strict=False))
+
+
+def _numbers(node: Tree) -> Any:
+    array = node.array()
+    if array.ndim not in (2, 3) or array.shape[-1] not in (3, 4) or array.size > _MOST_NUMBERS:
+        raise UserError(f"{node.named} is {node.described}; expected points of a frame")
+    return array.astype(float).tolist()
 
 
 def numbers_of_files(folder: Path, frames: Frames) -> list[int]:
