@@ -26,8 +26,8 @@ _MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
 _TRACKS, _IDS = ("tracks", "people", "persons", "subjects", "tracklets"), ("track_id", "person_id", "id", "name")
 _MOST_TRACKS = 1_000
 """What files call a list of people, and people themselves."""
-_OF_SMPL = (23, 24)
-"""How many joints SMPL's poses have."""
+_OF_SMPL, _OF_BODY = (23, 24), 21
+"""How many joints SMPL's poses have, and those of a body without hands."""
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -55,7 +55,8 @@ def _people(tree: Tree) -> Layout | None:
     kind = _kind("SMPL parameters of people", first, first.node)
     if first.node is not first.outer and first.node.where.endswith(("_cam]", "_incam]")):
         kind = replace(kind, worlds=CAMERAS)
-    return Layout(kind, people.tracks, people.notes)
+    kind, notes = _taken_for(kind, first)
+    return Layout(kind, people.tracks, (*people.notes, *notes))
 
 
 def _tracks(tree: Tree) -> Layout | None:
@@ -98,7 +99,8 @@ def _single(tree: Tree) -> Layout | None:
         return Layout(Kind("HybrIK", "smpl", CAMERAS), found.tracks())
     if "smpl_scaling" in keys:
         return Layout(Kind("AIST++", "smpl", ANY_WORLD), found.tracks())
-    return Layout(_kind("SMPL parameters", found, tree), found.tracks())
+    kind, notes = _taken_for(_kind("SMPL parameters", found, tree), found)
+    return Layout(kind, found.tracks(), notes)
 
 
 def _pair(tree: Tree) -> Layout | None:
@@ -140,6 +142,17 @@ def _kind(source: str, found: Found, tree: Tree) -> Kind:
         (name for form in forms_in(found.node) if (name := family_of("", form.joints, (), None))), ""
     )
     return Kind(source, family, ANY_WORLD)
+
+
+def _taken_for(kind: Kind, found: Found) -> tuple[Kind, tuple[str, ...]]:
+    """The same, of SMPL-X where nothing tells the model of a body's 21 joints under the names of the package smplx, as
+    most estimators that write those are of SMPL-X; and a note that says so.
+    """
+    said = "smpl" in found.pose.where.lower()  # what is called so may be of all models
+    if kind.family or said or found.names.pose != "body_pose" or found.form.joints != _OF_BODY:
+        return kind, ()
+    note = "which body model it is of is not told: 21 joints as 'body_pose' are taken for SMPL-X's"
+    return replace(kind, family="smplx"), (note,)
 
 
 def _said(node: Tree) -> str:
