@@ -81,7 +81,7 @@ def _ntu(path: Path) -> None:
 
 def _features(path: Path) -> None:
     rows = np.zeros((_FRAMES, 263))
-    rows[:, 3], rows[:, 4:67] = 0.9, np.tile(REST_K3[1:22].reshape(63), (_FRAMES, 1))
+    rows[:, 3], rows[:, 4:67] = 0.9, np.tile((REST_K3[1:22] + [0, 0.9, 0]).reshape(63), (_FRAMES, 1))
     np.save(path, rows)
 
 

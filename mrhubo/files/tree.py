@@ -7,7 +7,7 @@ what is not asked for is not made: a node is put together when its array is aske
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -129,6 +129,36 @@ class Tree:
             raise UserError(f"{self.named} is {self.described}; expected one with '{name}'")
         return found
 
+    def renamed(self, names: Mapping[str, str], inner: Mapping[str, Mapping[str, str]] | None = None) -> Tree:
+        """Some entries of a dictionary under other keys.
+
+        Args:
+            names: the other keys, and the dictionary's own.
+            inner: the same of dictionaries that are put into it, by their keys.
+        """
+        entries = dict(self._entries())
+
+        def under(chosen: Mapping[str, str], where: str) -> Tree:
+            return Tree({name: self._child(own, entries[own]) for name, own in chosen.items()}, self._source, where)
+
+        found = under(names, self.where)
+        for name, chosen in (inner or {}).items():
+            found._given[name] = under(chosen, f"{self.where}[{name}]" if self.where else name)
+        return found
+
+    def places(self, count: int) -> Iterator[Tree]:
+        """Of a dictionary of lists, what stands at each of so many places: a dictionary of the entries that are lists
+        as long.
+        """
+        lists = {name: list(child) for name, child in self.items() if len(child) == count and child.is_list}
+        for place in range(count):
+            at = {name: children[place] for name, children in lists.items()}
+            yield Tree(at, self._source, f"{self.where}[{place}]" if self.where else f"[{place}]")
+
+    def by_names(self, names: Sequence[str]) -> Tree:
+        """The nodes of a list as a dictionary, under one name each."""
+        return Tree(dict(zip(names, self, strict=True)), self._source, self.where)
+
     def __len__(self) -> int:
         return len(self._value) if isinstance(self._value, dict | list | tuple) else 0
 
@@ -203,6 +233,8 @@ class Tree:
         return "None" if self.is_none else f"a {type(self._value).__name__}"
 
     def _child(self, name: str, value: Any) -> Tree:
+        if isinstance(value, Tree):  # of `renamed`: it is called by its own name
+            return value
         return Tree(value, self._source, f"{self.where}[{shortened(name, 40)}]" if self.where else shortened(name, 40))
 
     def _entries(self) -> Iterator[tuple[str, Any]]:

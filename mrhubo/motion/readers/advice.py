@@ -16,6 +16,7 @@ _MARKERS = (
     "it has markers, and not joints; solve it for a skeleton first, and export that as BVH, or convert it to SMPL with "
     "MoSh++ or SOMA"
 )
+_VICON = "solve it for a skeleton, and export that as BVH, for instance from Vicon Shogun or Blade"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"glTF", "a GLB file", _BLENDER),
     (r"Kaydara FBX|; FBX", "an FBX file", _BLENDER),
@@ -36,6 +37,19 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"Vocaloid Motion Data", "a VMD file of MikuMikuDance", f"play it on a model, and {_BLENDER}"),
     (r"%YAML.{0,400}AnimationClip:", "an animation clip of Unity", "export the character as BVH or FBX first"),
     (r"//Maya ASCII", "a scene of Maya", "export the skeleton as BVH, over FBX and Blender for instance"),
+    (
+        r"\s*(?:<!DOCTYPE html|<html)",
+        "a web page",
+        "it was downloaded in place of the file, perhaps as that needs a login",
+    ),
+    (
+        r"PK\x03\x04.{26}[\w ./()-]{0,200}?\.(?:bvh|amc|asf|fbx|glb|c3d|trc|csv|json|usdc?|usda)",
+        "a zip archive of files",
+        "unpack it, and name the file in it",
+    ),
+    (r"(?:Joints|Segments|Model Outputs|Trajectories)[,\s]*\n\s*[0-9.]+[,\s]*\n", "a .csv file of Vicon Nexus", _VICON),
+    (r"NO_OF_FRAMES\b", "a .tsv file of Qualisys Track Manager", _MARKERS),
+    (r"Coordinates\s.{0,2000}?endheader", "a .mot file of OpenSim", "name the recording from which it was made"),
     (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH from Motive"),
     (
         r"[^\n]{0,4000}?(?:root_translate|_joint(?:_dof|_pos)?\b|_dof\b)[^\n]*+\n",

@@ -35,7 +35,7 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.family import find_family
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import RATE_KEYS, find_rate
+from mrhubo.motion.readers.rate import RATE_KEYS, TIME_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
 from mrhubo.motion.readers.world import ANY_WORLD, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
@@ -142,7 +142,7 @@ def _read_pose(file: NpzFile) -> tuple[str, Form, np.ndarray]:
 def _rates(file: NpzFile) -> Tree:
     """What may tell the frame rate; `None` in place of what cannot be read, or is pickled."""
     told: dict[str, Any] = {}
-    for key in RATE_KEYS:
+    for key in (*RATE_KEYS, *TIME_KEYS):
         if key in file.keys:
             try:
                 told[key] = file.read_any(key, lambda _: None, _MAX_SMALL)

@@ -11,7 +11,7 @@ from mrhubo.body.joints import PARENTS
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.family import family_of
-from mrhubo.motion.readers.keypoint_sets import NONSENSE, fitting_sets
+from mrhubo.motion.readers.keypoint_fit import NONSENSE, fitting_sets
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate
 from mrhubo.motion.readers.rotations import Form, are_crooked, find_form

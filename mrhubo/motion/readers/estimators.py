@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mrhubo.errors import listed, shortened
 from mrhubo.files.packed import is_packed
 from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
@@ -15,17 +16,21 @@ from mrhubo.motion.readers.camera import in_world
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.humanml import read_features
-from mrhubo.motion.readers.keypoint_arrays import points_in
+from mrhubo.motion.readers.interhuman import read_interhuman
+from mrhubo.motion.readers.key_words import nested
+from mrhubo.motion.readers.keypoint_dictionaries import points_in
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
+from mrhubo.motion.readers.motionstreamer import read_streamed
 from mrhubo.motion.readers.nymeria import read_nymeria
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.people import holds_parameters
 from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rows import read_rows
 from mrhubo.motion.readers.sam3d import read_sam3d
-from mrhubo.motion.readers.smpl_names import first_entries
+from mrhubo.motion.readers.six_rows import read_six_rows
+from mrhubo.motion.readers.smpl_names import first_entries, is_robot
 from mrhubo.motion.readers.soma import read_soma
 from mrhubo.motion.readers.tracks import choose, motion_of
 
@@ -57,7 +62,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         NoMotion: nobody knows it; says what the file holds.
         UserError: the file is damaged, hostile, too large, or what it tells is no motion.
     """
-    tree = read_tree(path)
+    tree = nested(read_tree(path))
 
     def rate(notes: list[str]) -> float:
         return find_rate(path, (tree, *(child for _, child in first_entries(tree))), options, notes)
@@ -66,6 +71,9 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         read_rows(tree, options)
         or read_bare_poses(tree, options)
         or read_features(tree, options)
+        or read_interhuman(tree, options)
+        or read_six_rows(tree, options)
+        or read_streamed(tree, options)
         or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)
         or read_nymeria(tree, rate)
@@ -76,6 +84,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         return motion_of_points(path, checked(path, points), options)
     if found is None:
         refuse_frame(tree)
+        _refuse_robot(tree)
         content = Content.open(path)
         what = content.described if content.arrays else f"{content.described} of {tree.described}"
         raise NoMotion(
@@ -102,6 +111,20 @@ def smpl_motion(path: Path, tree: Tree, options: ReadOptions) -> Motion | None:
         arrays = in_world(path, arrays, notes)
     rate = find_rate(path, (*track.homes, *_whole(tree)), options, notes)
     return motion_of(path, arrays, layout.kind, rate, notes)
+
+
+def _refuse_robot(tree: Tree) -> None:
+    """Refuses a robot's motion, or a dictionary of such.
+
+    Raises:
+        NoMotion: it is one; says so.
+    """
+    robot = next((node for node in (tree, *(child for _, child in first_entries(tree))) if is_robot(node)), None)
+    if robot is not None:
+        raise NoMotion(
+            f"{robot.named}: tells the angles of a robot's joints ({shortened(listed(robot.keys), 120)}), and no human"
+            " motion; name the one from which it was made"
+        )
 
 
 def _whole(tree: Tree) -> Iterator[Tree]:

@@ -57,12 +57,20 @@ FORMATS: tuple[Format, ...] = (
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints and SMPL parameters in JSON", "json_file", "is_json", "read_json", ()),
     Format("keypoints in tables (.csv)", "keypoint_table", "is_table", "read_table", ()),
+    Format("keypoints in tables with a line a point", "point_table", "is_point_table", "read_point_table", ()),
     Format("keypoints (.npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     Format("videos (MP4, MOV, MKV, WebM, AVI)", "video", "is_video", "read_video", ()),
     # the last row: whatever else holds arrays in dictionaries
     Format("what an estimator of human pose writes", "estimators", "is_container", "read_estimated", _PYTHON),
 )
 """The first row that recognises a file reads it."""
+_FOLDERS = {
+    "points": ("frame_folders", "read_frames"),
+    "poses": ("pose_folders", "read_pose_files"),
+    "others": ("point_folders", "read_point_files"),
+    "answers": ("sam3d_folders", "read_sam3d_files"),
+}
+"""The module and its reader of folders with a file a frame, by what is in those."""
 
 
 def find_format(content: Content) -> Format | None:
@@ -78,9 +86,9 @@ def read_any(path: Path, options: ReadOptions) -> Motion:
         UserError: whoever does finds it bad.
     """
     if (frames := frame_files(path)) is not None:
-        name, reader = ("pose_folders", "read_pose_files") if frames.poses else ("frame_folders", "read_frames")
+        name, reader = _FOLDERS[frames.kind]
         module = importlib.import_module(f"mrhubo.motion.readers.{name}")
-        return fill_repeats(getattr(module, reader)(path, frames.files, options))
+        return fill_repeats(getattr(module, reader)(path, frames, options))
     content = Content.open(path)
     row = find_format(content)
     if row is None:

@@ -9,8 +9,11 @@
 * FrankMocap: `pred_output_list`, an entry a person, `None` or with `pred_body_pose` (1, 72), and `smpl_type` and
   `body_bbox_list`, rows of x, y, width and height (https://github.com/facebookresearch/frankmocap,
   mocap_utils/demo_utils.py).
+* Human3R: `rotvec` (N, 53, 3), `transl` (N, 3) and `shape` of N people in the folder `smpl`
+  (https://github.com/fanegg/Human3R, demo.py).
 * Multi-HMR: a list of people with `rotvec` (53, 3) of SMPL-X's joints, the root first, without eyes, `transl_pelvis`
-  (1, 3) and `shape` (https://github.com/naver/multi-hmr, model.py).
+  (1, 3) and `shape` (https://github.com/naver/multi-hmr, model.py); those of its data, and SOKE's
+  (https://github.com/2000ZRL/SOKE), `smplx_root_pose`, `smplx_body_pose`, `smplx_transl` or `cam_trans`.
 * 4D-Humans' HMR2: `pred_smpl_params` with `global_orient` (N, 1, 3, 3) and `body_pose` (N, 23, 3, 3) of N people, and
   beside it `pred_cam_t` (N, 3) (https://github.com/shubham-goel/4D-Humans, hmr2/models/hmr2.py).
 
@@ -22,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -31,6 +35,7 @@ from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.family import family_of
+from mrhubo.motion.readers.key_words import by_usual_names, model_named, usual_name, without_world
 from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_form
 from mrhubo.motion.readers.sightings import person_called
 
@@ -40,7 +45,9 @@ _POSES = (
 )  # fmt: skip
 _ROOTS = ("global_orient", "root_pose", "root_orient")
 _PLACES = ("transl_pelvis", "transl", "trans", "pred_cam_t", "cam_t", "cam_trans")
-_IDS = ("id", "personID", "person_id", "track_id")
+_LISTS = ("pred_output_list", "annots", "people", "persons", "instances", "humans")
+"""What frames call a list of whoever is in them."""
+_IDS = ("id", "personID", "person_id", "track_id", "smpl_id")
 """What files call a pose, the rotation of its root, where that is, and who it is."""
 _EASYMOCAP = {78: "smplh", 87: "smplx"}
 """How many numbers a pose of EasyMocap has that ends with coefficients, and of which model it is."""
@@ -81,11 +88,13 @@ def bodies_in(tree: Tree, most_rows: int = 1) -> list[Body] | None:
     Raises:
         UserError: there are too many, or something in it is no array that can be used.
     """
-    listed = tree.get("pred_output_list", "annots") if tree.is_mapping else tree if tree.is_list else None
-    if listed is None:
+    listed = tree.get(*_LISTS) if tree.is_mapping else tree if tree.is_list else None
+    if listed is None or (listed is not tree and not listed.is_list):
+        people = _people(tree)
+        named = [_bodies(child, child, None, 1, name) for name, child in people]
+        if people and all(named):
+            return [body for bodies in named if bodies is not None for body in bodies]
         return _bodies(tree, tree, None, most_rows)
-    if not listed.is_list:
-        return None
     if len(listed) > _MOST:
         raise UserError(f"{listed.named} has {len(listed):,} people; expected at most {_MOST}")
     boxes = tree.get("body_bbox_list") if tree.is_mapping else None
@@ -109,49 +118,83 @@ def refuse_frame(tree: Tree) -> None:
         )
 
 
-def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int) -> list[Body] | None:
+def _people(frame: Tree) -> list[tuple[str, Tree]]:
+    """Entries of a frame that are a person each, called by a number, or several with parameters, of which none are the
+    same in the world and as a camera sees them, or of another model; none of any other frame.
+    """
+    if not frame.is_mapping or _pose_in(frame) is not None:
+        return []
+    found = [
+        (name, child)
+        for name, child in islice(frame.items(), _MOST)
+        if child.is_mapping and any(_pose_in(one) is not None for one in _with_children(child))
+    ]
+    bare = {without_world(usual_name(name)) for name, _ in found}
+    numbered = bool(found) and all(name.isdecimal() for name, _ in found)
+    return found if numbered or len(bare) == len(found) > 1 else []
+
+
+def _bodies(node: Tree, around: Tree, box: Tree | None, most_rows: int, called: str | None = None) -> list[Body] | None:
     """Parameters in a dictionary, or in one in it, of somebody, or of several along the first axis of its arrays; None
     where it has none, or those of several frames.
+
+    Args:
+        node: the dictionary.
+        around: what it is in.
+        box: around them in the picture.
+        most_rows: how many people there may be along that axis.
+        called: what the file calls them, where it is not said beside the parameters.
     """
     if {"Rh", "Th", "poses"} <= set(node.keys):
         body = _easymocap(node)
         return None if body is None else [body]
-    inner = next((one for one in _with_children(node) if set(_POSES) & set(one.keys)), None)
-    if inner is None:
+    told = next(((one, found) for one in _with_children(node) if (found := _pose_in(one)) is not None), None)
+    if told is None:
         return None
-    key = next(key for key in _POSES if key in inner.keys)
-    found = _rows(inner[key], most_rows)
+    inner, (key, pose) = told
+    found = _rows(pose, most_rows)
     if found is None:
         return None
     pose_NX, form = found
     count = len(pose_NX)
+    if not count:
+        return []
+    homes = (inner, node, by_usual_names(inner), by_usual_names(node))
 
     def rows(names: tuple[str, ...]) -> np.ndarray | None:
-        told = inner.get(*names)
-        told = node.get(*names) if told is None else told
+        told = next((found for home in homes if (found := home.get(*names)) is not None), None)
         numbers = None if told is None else _numbers(told)
         return None if numbers is None or numbers.size % count else numbers.reshape(count, -1)
 
-    root_NX, place_NX, betas_NX = rows(_ROOTS), rows(_PLACES), rows(("betas", "pred_betas", "shape"))
+    root_NX, place_NX, betas_NX = rows(_ROOTS), rows(_PLACES), rows(("betas", "shape"))
     if root_NX is not None and root_NX.shape[1] not in (3, 9):
         return None
     if root_NX is None and (form.joints not in WITH_ROOT or inner.get(*_ROOTS) is not None):
         return None
     said = around.get("smpl_type") if around.is_mapping else None
-    named, keys = "" if said is None else said.text() or "", {*inner.keys, *node.keys}
+    named, keys = model_named(pose.where) if said is None else said.text() or "", {*inner.keys, *node.keys}
     betas = None if betas_NX is None else betas_NX[0].tolist()
     family = family_of(named, form.joints, keys, betas)
     source = "FrankMocap" if key.startswith("pred_") and around is not node else "SMPL parameters"
-    person = _person(node) if count == 1 else None
+    people = _names(node, count)
     middle = _middle(box)
     return [
         Body(
-            person, key, pose_NX[n], form, None if root_NX is None else root_NX[n],
+            people[n] if called is None else called, key, pose_NX[n], form, None if root_NX is None else root_NX[n],
             None if place_NX is None or place_NX.shape[1] != 3 else place_NX[n],
             None if betas_NX is None else betas_NX[n], middle, source, family,
         )
         for n in range(count)
     ]  # fmt: skip
+
+
+def _pose_in(node: Tree) -> tuple[str, Tree] | None:
+    """What a dictionary has for a pose, and what that is usually called; None where it has none."""
+    for home in (node, by_usual_names(node)):
+        key = next((key for key in _POSES if key in home.keys), None)
+        if key is not None:
+            return key, home[key]
+    return None
 
 
 def _with_children(node: Tree) -> Iterator[Tree]:
@@ -164,6 +207,9 @@ def _with_children(node: Tree) -> Iterator[Tree]:
 def _rows(node: Tree, most: int) -> tuple[np.ndarray, Form] | None:
     """Rows (N, X) of a pose of each of some people, and their form; None where they are none, or more than `most`."""
     shape = node.shape()
+    if shape is not None and len(shape) > 1 and shape[0] == 0 and math.prod(shape[1:]) <= _LONGEST:
+        form = find_form((1, *shape[1:]), _COUNTS)
+        return None if form is None else (np.zeros((0, form.width)), form)
     if shape is None or len(shape) < 1 or not 0 < math.prod(shape) <= most * _LONGEST:
         return None
     while len(shape) > 1 and shape[0] == 1:
@@ -179,6 +225,15 @@ def _numbers(node: Tree) -> np.ndarray | None:
     if shape is None or not 0 < math.prod(shape) <= _MOST * _LONGEST:
         return None
     return node.array().astype(np.float64).reshape(-1)
+
+
+def _names(node: Tree, count: int) -> list[str | None]:
+    """What a file calls each of some people; None where it does not."""
+    told = node.get(*_IDS)
+    shape = None if told is None else told.shape()
+    if told is not None and count > 1 and shape == (count,):
+        return [person_called(number) for number in told.array().tolist()]
+    return [_person(node) if count == 1 else None] * count
 
 
 def _person(node: Tree) -> str | None:

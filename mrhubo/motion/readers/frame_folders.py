@@ -20,7 +20,7 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import NoMotion
-from mrhubo.motion.readers.frame_files import read_frame_json
+from mrhubo.motion.readers.frame_files import Frames, read_frame_json
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoints import motion_of_points
@@ -34,12 +34,12 @@ _POINTS = ("keypoints3d", "joints19", "joints26", "pose_keypoints_3d")
 _FLAT = "pose_keypoints_2d"
 
 
-def read_frames(folder: Path, files: list[Path], options: ReadOptions) -> Motion:
+def read_frames(folder: Path, frames: Frames, options: ReadOptions) -> Motion:
     """Reads one of the people in a folder.
 
     Args:
         folder: what the motion is called after.
-        files: of its frames.
+        frames: its files.
         options: person, rate.
 
     Raises:
@@ -47,7 +47,7 @@ def read_frames(folder: Path, files: list[Path], options: ReadOptions) -> Motion
         UserError: a file is damaged, the order of the frames or the frame rate is not known.
     """
     seen: list[Sighting] = []
-    flat = False
+    flat, files = False, frames.files
     for number, file in zip(frame_numbers_in(folder, [file.stem for file in files]), files, strict=True):
         for one in _people(file):
             key = next((key for key in _POINTS if one.get(key)), None)

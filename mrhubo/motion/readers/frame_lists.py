@@ -1,14 +1,19 @@
 """Lists of frames, or dictionaries of them by the names of pictures, each with SMPL parameters of whoever is seen.
 
 So they come from who calls an estimator on each picture of a video and keeps what it answers: Multi-HMR's people,
-4D-Humans' HMR2, NLF. Who is in a frame is read by `mrhubo.motion.readers.frame_bodies`.
+4D-Humans' HMR2, NLF. Who is in a frame is read by `mrhubo.motion.readers.frame_bodies`. NLF itself answers a batch of
+pictures with a dictionary of lists, whose entries have a row for whoever is in each
+(https://github.com/isarandi/nlf, `detect_smpl_batched`).
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import replace
+
+import numpy as np
 
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.body_tracks import body_tracks
@@ -21,14 +26,51 @@ _FEWEST, _NUMBERED = 2, 20
 """Frames of a list, and of a dictionary whose keys are numbers, which may be those of people."""
 _MOST_PEOPLE = 20
 """Along an axis of an array of one frame; more are frames."""
+_FRAMES = (
+    "frame_id", "frame", "frame_idx", "frame_index", "frame_number", "image_id", "img_name", "image_name", "imgname",
+    "img_path", "image_path",
+)  # fmt: skip
+_LISTS = ("frames", "results", "data", "predictions", "outputs")
+"""What entries call the frame that they are of, and files a list of frames."""
+_ROWS_OF_POSES = ("pose", "poses", "body_pose", "thetas", "smpl_thetas")
 _PICTURE = re.compile(r".*\.(?:jpe?g|png|bmp|webp|tiff?)|.*frame.*[0-9].*", re.IGNORECASE)
 
 
 def read_frame_list(tree: Tree) -> Layout | None:
     """A list of frames, each a dictionary with SMPL parameters, perhaps in one deeper, or a list of such. What sees
-    nobody is `None`, or empty.
+    nobody is `None`, or empty. Where all entries tell which frame they are of, several may be people in one.
     """
-    return _layout(tree, enumerate(tree), len(tree)) if tree.is_list and len(tree) >= _FEWEST else None
+    if not tree.is_list or len(tree) < _FEWEST:
+        return None
+    entries = [entry for entry in tree if not entry.is_none]
+    told = [_frame_of(entry) for entry in entries]
+    if None in told or len(told) < _FEWEST:
+        return _layout(tree, ((number, [frame]) for number, frame in enumerate(tree)), len(tree))
+    if any(_here(entry, 2) is None for entry in entries[:_FEWEST]):
+        return None
+    frames: dict[str, list[Tree]] = {}
+    for name, entry in zip(told, entries, strict=True):
+        frames.setdefault(str(name), []).append(entry)
+    return _layout(tree, in_order(tree.path, list(frames.items())), len(frames)) if len(frames) >= _FEWEST else None
+
+
+def read_listed(tree: Tree) -> Layout | None:
+    """The same under a key of a dictionary."""
+    listed = tree.get(*_LISTS) if tree.is_mapping else None
+    return None if listed is None else read_frame_list(listed)
+
+
+def _frame_of(entry: Tree) -> str | None:
+    """What an entry calls the frame that it is of; None where it does not."""
+    told = entry.get(*_FRAMES)
+    if told is None or told.is_none:
+        return None
+    if (text := told.text()) is not None:
+        return text
+    shape = told.shape()
+    if shape is None or math.prod(shape) != 1 or not np.isfinite(told.array()).all():
+        return None
+    return f"{told.number():.0f}"
 
 
 def read_pictures(tree: Tree) -> Layout | None:
@@ -42,20 +84,40 @@ def read_numbered(tree: Tree) -> Layout | None:
     return _named(tree) if numbered else None
 
 
+def read_columns(tree: Tree) -> Layout | None:
+    """A dictionary of lists with an entry a frame, whose arrays have a row for each of the people in it, in any order;
+    more than one of them in some frame, or nobody.
+    """
+    poses = next((tree[key] for key in _ROWS_OF_POSES if key in tree.keys), None) if tree.is_mapping else None
+    if poses is None or not poses.is_list or len(poses) < _FEWEST:
+        return None
+    shapes = [pose.shape() for pose in poses]
+    counts = [shape[0] if shape is not None and len(shape) > 1 else -1 for shape in shapes]
+    if min(counts) < 0 or set(counts) == {1} or not 0 < max(counts) < min(len(poses), _MOST_PEOPLE + 1):
+        return None
+    frames = (
+        (number, [frame])
+        for number, (frame, count) in enumerate(zip(tree.places(len(poses)), counts, strict=True))
+        if count
+    )
+    return _layout(tree, frames, _MOST_PEOPLE + 1)
+
+
 def _named(tree: Tree) -> Layout | None:
     entries = list(tree.items())
     if len(entries) < _FEWEST or not any(_here(frame, len(entries)) for _, frame in entries[:_NUMBERED]):
         return None
-    return _layout(tree, in_order(tree.path, entries), len(entries))
+    return _layout(tree, ((number, [frame]) for number, frame in in_order(tree.path, entries)), len(entries))
 
 
-def _layout(tree: Tree, frames: Iterable[tuple[int, Tree]], count: int) -> Layout | None:
+def _layout(tree: Tree, frames: Iterable[tuple[int, list[Tree]]], count: int) -> Layout | None:
     seen: list[tuple[int, Body]] = []
-    for number, frame in frames:
-        here = _here(frame, count)
-        if here is None and seen:
-            return None
-        seen += [(number, body) for body in here or ()]
+    for number, entries in frames:
+        for entry in entries:
+            here = _here(entry, count)
+            if here is None and seen:
+                return None
+            seen += [(number, body) for body in here or ()]
     if len({number for number, _ in seen}) < _FEWEST:
         return None
     # single frames with SMPL-X's 21 joints and no more are of estimators of SMPL-X

@@ -1,4 +1,4 @@
-"""Motions in JSON: SMPL parameters, or else keypoints.
+"""Motions in JSON: SMPL parameters, or else keypoints; also with a line of JSON a frame.
 
 Fit3D and CHI3D have `transl` (T, 3), `global_orient` (T, 1, 3, 3), `body_pose` (T, 21, 3, 3) and `betas` in lists
 (https://github.com/sminchisescu-research/imar_vision_datasets_tools); others what they would save as .npz.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
@@ -23,7 +24,7 @@ from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
 
 _BEGINNING = re.compile(r"\s*+(?:\[\s*+[\[{]|\{\s*+\")")
-_POSES = re.compile(rb'"(?:' + "|".join(sorted(POSE_KEYS)).encode() + rb')"\s*+:')
+_POSES = re.compile(rb'"\w*(?:' + "|".join(sorted(POSE_KEYS)).encode() + rb')"\s*+:')
 _MAX_BYTES = 2**27
 
 
@@ -43,7 +44,10 @@ def read_json(path: Path, options: ReadOptions) -> Motion:
     try:
         value = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise UserError(f"{path}: is no JSON: {shortened(str(error), 80)}") from error
+        lines = _lines(text)
+        if lines is None:
+            raise UserError(f"{path}: is no JSON: {shortened(str(error), 80)}") from error
+        value = lines
     found = None
     if _POSES.search(text):
         tree = tree_of(value, path, "")
@@ -51,3 +55,12 @@ def read_json(path: Path, options: ReadOptions) -> Motion:
         if found is None:
             refuse_frame(tree)
     return found or motion_of_points(path, checked(path, points_of_json(path, value, options)), options)
+
+
+def _lines(text: bytes) -> list[Any] | None:
+    """What lines of JSON hold; None of any other text."""
+    try:
+        values = [json.loads(line) for line in text.splitlines() if line.strip()]
+    except (ValueError, RecursionError):
+        return None
+    return values if len(values) > 1 and all(isinstance(value, dict | list) for value in values) else None

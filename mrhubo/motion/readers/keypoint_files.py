@@ -12,7 +12,9 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.files.tree import read_tree
 from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.keypoint_arrays import Keypoints, in_array, in_npz, point_key
+from mrhubo.motion.readers.key_words import usual_name
+from mrhubo.motion.readers.keypoint_arrays import Keypoints, in_array, point_key
+from mrhubo.motion.readers.keypoint_dictionaries import in_npz
 from mrhubo.motion.readers.options import ReadOptions
 
 POSE_KEYS = {
@@ -24,7 +26,8 @@ POSE_KEYS = {
 
 def holds_points(content: Content) -> bool:
     """Whether an .npz file has points and no rotations, by the names of its arrays. Does not raise."""
-    return point_key(content.arrays) is not None and not content.arrays & POSE_KEYS
+    names = content.arrays | {usual_name(name) for name in content.arrays}
+    return point_key(content.arrays) is not None and not names & POSE_KEYS
 
 
 def read_keypoints_file(path: Path, options: ReadOptions) -> Keypoints:

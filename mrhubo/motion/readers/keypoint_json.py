@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +31,7 @@ from mrhubo.files.tree import tree_of
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_numbers import in_order
 from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, NAME_KEYS, Keypoints, point_key
+from mrhubo.motion.readers.keypoint_rows import NOTHING, Row, people_of, row_of
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import rate_in
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
@@ -39,9 +39,9 @@ from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one,
 _FRAMES = ("instance_info", "frames", "data")
 """What files call a list of frames that have points."""
 _NUMBERS = ("frame_id", "frame", "frame_idx", "frame_index", "frame_number")
-_PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons")
 _IDS = ("track_id", "body_id", "person_id", "id")
-_SURE = ("visibility", "confidence", "score", "presence")
+_PICTURE = "image_id"
+"""What lists of detections, as COCO has them, call the frame in which somebody was seen."""
 _DIGIT = re.compile(r"[0-9]")
 
 
@@ -61,7 +61,7 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
         if key is not None:
             value, where = value[key], f"'{key}'"
     numbers, frames = _frames(path, where, value)
-    people = [_people(frame) for frame in frames]
+    people = [people_of(frame) for frame in frames]
     if any(here is not None for here in people):
         if isinstance(value, dict) and max(len(here or ()) for here in people) > len(frames):
             raise NoMotion(
@@ -70,7 +70,7 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
             )
         found = _of_one(path, where, list(zip(numbers, frames, people, strict=True)), options)
     else:
-        rows = [_row(path, where, number, frame) for number, frame in zip(numbers, frames, strict=True)]
+        rows = [row_of(path, where, number, frame) for number, frame in zip(numbers, frames, strict=True)]
         found = _placed(path, where, _spread(numbers, rows), _texts(names))
     if confidence is not None:
         found.confidence_TK = _array(path, confidence, "'confidence'")
@@ -101,6 +101,13 @@ def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
     if not isinstance(value, list) or not value:
         raise UserError(f"{path}: {where} is no list of frames")
     check_size(path, where, len(value), 1)
+    pictures = [str(frame.get(_PICTURE, "")) if isinstance(frame, dict) else "" for frame in value]
+    if all(pictures) and len(set(pictures)) < len(pictures):  # an entry is a person, and not a frame
+        people: dict[str, list[Any]] = {}
+        for picture, one in zip(pictures, value, strict=True):
+            people.setdefault(picture, []).append(one)
+        numbered = in_order(path, list(people.items()))
+        return [number for number, _ in numbered], [here for _, here in numbered]
     for key in _NUMBERS:
         given = [frame.get(key) if isinstance(frame, dict) else None for frame in value]
         if all(type(number) is int and number >= 0 for number in given) and len(set(given)) == len(given):
@@ -109,31 +116,19 @@ def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
     return list(range(len(value))), value
 
 
-def _people(frame: Any) -> list[Any] | None:
-    """The people of a frame: dictionaries, or lists of points; None where it is one person's, or nobody's."""
-    if isinstance(frame, dict):
-        found = next((frame[key] for key in _PEOPLE if isinstance(frame.get(key), list)), None)
-        key = point_key(frame)
-        return found if found is not None or key is None else _people(frame[key])
-    first = frame[0] if isinstance(frame, list) and frame else None
-    if isinstance(first, dict):
-        return frame if point_key(first) is not None else None
-    return frame if isinstance(first, list) and first and isinstance(first[0], dict | list) else None
-
-
 def _of_one(
     path: Path, where: str, frames: Sequence[tuple[int, Any, list[Any] | None]], options: ReadOptions
 ) -> Keypoints:
     """The points of one of the people in frames (number, frame, people), told apart by what the file calls them, or
     else followed, in the picture too where there are boxes: points that were lifted from it may be around one origin.
     """
-    rows: list[_Row] = []
+    rows: list[Row] = []
     seen: list[Sighting] = []
     for number, frame, people in frames:
         for one in [frame] * bool(frame) if people is None else people:
             if isinstance(one, dict) and point_key(one) is None:
                 continue
-            row = _row(path, where, number, one)
+            row = row_of(path, where, number, one)
             told = {} if not isinstance(one, dict) else one
             scores = next((told[key] for key in ("keypoint_scores", *CONFIDENCE_KEYS) if key in told), None)
             sure_K = _array(path, scores, "the confidence").reshape(-1) if isinstance(scores, list) else None
@@ -148,7 +143,7 @@ def _of_one(
         raise NoMotion(f"{path}: {where} has nobody with 'keypoints'")
     notes: list[str] = []
     person, places = frames_of_one(path, seen, options, notes)
-    found = _placed(path, where, [_NOTHING if place is None else rows[place] for place in places])
+    found = _placed(path, where, [NOTHING if place is None else rows[place] for place in places])
     points = found.point_TK3.shape[1]
     told = {frame: seen[place].sure_K for frame, place in enumerate(places) if place is not None}
     if all(sure_K is not None and len(sure_K) == points for sure_K in told.values()):
@@ -174,57 +169,13 @@ def _texts(names: Any) -> list[str] | None:
     return [str(name) for name in names] if isinstance(names, list) and names else None
 
 
-@dataclass(frozen=True)
-class _Row:
-    """The points of a frame; none where nothing was seen."""
-
-    points: list[list[float]]
-    names: list[str] | None = None
-    """Where points have them."""
-
-
-_NOTHING = _Row([])
-
-
-def _spread(numbers: Sequence[int], rows: Sequence[_Row]) -> list[_Row]:
+def _spread(numbers: Sequence[int], rows: Sequence[Row]) -> list[Row]:
     """The rows by the numbers of their frames; nothing in frames that are not there."""
     placed = dict(zip(numbers, rows, strict=True))
-    return [placed.get(number, _NOTHING) for number in range(max(numbers) + 1)]
+    return [placed.get(number, NOTHING) for number in range(max(numbers) + 1)]
 
 
-def _row(path: Path, where: str, number: int, frame: Any) -> _Row:
-    """The points of one person in a frame."""
-    key = point_key(frame) if isinstance(frame, dict) else None
-    frame = frame if key is None else frame[key]
-    if frame is None:
-        return _NOTHING
-    names: list[str] = []
-    if isinstance(frame, dict):
-        names, frame = [str(name) for name in frame], list(frame.values())
-    elif isinstance(frame, list):
-        names = [str(point["name"]) for point in frame if isinstance(point, dict) and "name" in point]
-    if not isinstance(frame, list):
-        raise UserError(f"{path}: {where} has no list of points in frame {number}")
-    points = []
-    for point in frame:
-        if isinstance(point, dict):
-            sure = next((point[key] for key in _SURE if key in point), None)
-            point = [point.get("x"), point.get("y"), point.get("z"), *([] if sure is None else [sure])]
-        if point is None:
-            point = [None, None, None]
-        if not isinstance(point, list) or len(point) not in (3, 4):
-            what = f"a point of {len(point)} numbers" if isinstance(point, list) else f"'{shortened(point, 30)}'"
-            raise UserError(f"{path}: {where} has {what} in frame {number}; expected points, [x, y, z] each")
-        points.append([_number(path, where, number, x) for x in point])
-    if len(names) not in (0, len(points)):
-        raise UserError(f"{path}: {where} names {len(names)} of the {len(points)} points in frame {number}; name all")
-    if len(set(names)) < len(names):
-        twice = next(name for place, name in enumerate(names) if name in names[:place])
-        raise UserError(f"{path}: {where} has two points '{shortened(twice, 30)}' in frame {number}")
-    return _Row(points, names or None)
-
-
-def _placed(path: Path, where: str, rows: list[_Row], names: list[str] | None = None) -> Keypoints:
+def _placed(path: Path, where: str, rows: list[Row], names: list[str] | None = None) -> Keypoints:
     """The points of all frames, each in the column of its name, or of its place where points have none.
 
     Args:
@@ -270,11 +221,3 @@ def _array(path: Path, value: Any, where: str) -> np.ndarray:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise UserError(f"{path}: {where} is no number, nor lists of numbers of one length") from error
-
-
-def _number(path: Path, where: str, frame: int, value: Any) -> float:
-    if value is None:
-        return np.nan
-    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e30:
-        raise UserError(f"{path}: {where} has '{shortened(value, 30)}' for a number in frame {frame}")
-    return float(value)

@@ -2,8 +2,9 @@
 
 FreeMoCap's `mediapipe_body_3d_xyz.csv` has `left_shoulder_x`, `left_shoulder_y`, `left_shoulder_z` and so on, in
 millimetres (https://github.com/freemocap/freemocap); who writes landmarks of MediaPipe into a table by hand calls them
-so, or `x1`, `y1`, `z1`, `v1`, or `0_x`. Columns stand between commas, semicolons (numbers then may have decimal commas)
-or tabs.
+so, or `x_left_shoulder`, or `x1`, `y1`, `z1`, `v1`, or `0_x`, or `landmark_0_x`. Columns stand between commas,
+semicolons (numbers then may have decimal commas) or tabs. Tables with a line a point are read by
+`mrhubo.motion.readers.point_table`.
 
 Legend: T frames, K keypoints.
 """
@@ -34,11 +35,15 @@ from mrhubo.robot_motion.clock import find_rate
 _KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3}
 """What stands behind, or before, the name of a point: an axis, or how sure it is."""
 _LAST = re.compile(r"(.+?)[ _.:\-\[(]*(?<![a-z])(" + "|".join(_KINDS) + r")[\])]?(?: *[\[(].*)?", re.IGNORECASE)
-_FIRST = re.compile(r"([xyzv])[ _.]?(\d+)", re.IGNORECASE)
+_FIRST = re.compile(
+    r"([xyzv])[ _.]?(\d+)|(x|y|z|visibility|confidence|conf|score|presence)[ _.]([a-z].*)", re.IGNORECASE
+)
+_NUMBERED = re.compile(r"(.*?)(\d{1,9})")
 _FRAMES, _TIMES = (
     ("frame", "frames", "frameid", "frameindex", "frameidx", "framenumber"),
-    ("time", "timestamp", "times"),
+    ("time", "timestamp", "times", "timestampms", "timems", "timemilliseconds"),
 )
+_MILLISECONDS = re.compile(r"m(?:illi)?s(?:ec\w*)?[\])]?", re.IGNORECASE)
 _NOTHING = ("", "nan", "none", "null", "na")
 _FEWEST = 5
 """Points that a table has at least."""
@@ -93,7 +98,8 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     if frame is not None and np.isfinite(value_TX[:, frame]).all():
         numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, frame]])
     if time is not None and numbers == list(range(len(numbers))):
-        rate = _rate(value_TX[:, time])
+        unit = 1e-3 if _MILLISECONDS.search(header.columns[time][len("time") :]) else 1.0
+        rate = _rate(unit * value_TX[:, time])
     check_size(path, "the table", max(numbers) + 1, len(header.points))
     placed_TK4 = np.full((max(numbers) + 1, *point_TK4.shape[1:]), np.nan)
     placed_TK4[numbers] = point_TK4
@@ -119,17 +125,18 @@ def _read_header(line: str) -> _Header | None:
     points: dict[str, list[int | None]] = {}
     for place, column in enumerate(map(str.strip, columns)):
         first, last = _FIRST.fullmatch(column), _LAST.fullmatch(column)
-        if first is not None:
-            name, kind = first[2], first[1]
-        elif last is not None:
+        if last is not None:
             name, kind = last[1], last[2]
+        elif first is not None:
+            name, kind = first[2] or first[4], first[1] or first[3]
         else:
             continue
         points.setdefault(name, [None] * 4)[_KINDS[kind.lower()]] = place
     points = {name: axes for name, axes in points.items() if None not in axes[:3]}
-    numbered = all(name.isdecimal() for name in points)
+    parts = {name: part for name in points if (part := _NUMBERED.fullmatch(name)) is not None}
+    numbered = len(parts) == len(points) and len({part[1] for part in parts.values()}) == 1
     if numbered:
-        points = dict(sorted(points.items(), key=lambda entry: int(entry[0][:9])))
+        points = dict(sorted(points.items(), key=lambda entry: int(parts[entry[0]][2])))
     enough = len(points) >= _FEWEST and (numbered or by_names(list(points)).keys() >= set(NEEDED))
     return _Header(separator, points, columns) if enough else None
 

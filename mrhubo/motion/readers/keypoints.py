@@ -17,7 +17,8 @@ from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoint_files import holds_points, read_keypoints_file
-from mrhubo.motion.readers.keypoint_sets import NONSENSE, SETS, by_names, fitting_sets
+from mrhubo.motion.readers.keypoint_fit import NONSENSE, fitting_sets
+from mrhubo.motion.readers.keypoint_sets import SETS, by_names
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate

@@ -19,7 +19,8 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.keypoint_arrays import Keypoints, kinect_rate
+from mrhubo.motion.readers.keypoint_arrays import Keypoints
+from mrhubo.motion.readers.keypoint_dictionaries import kinect_rate
 from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions

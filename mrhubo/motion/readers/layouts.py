@@ -6,23 +6,28 @@ Where each layout is defined is said at its function.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
-from mrhubo.motion.readers.frame_lists import read_frame_list, read_numbered, read_pictures
+from mrhubo.motion.readers.frame_lists import read_columns, read_frame_list, read_listed, read_numbered, read_pictures
+from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
-from mrhubo.motion.readers.smpl_names import Found, find_inside, forms_in, search
-from mrhubo.motion.readers.tracks import Kind, Layout
+from mrhubo.motion.readers.rotations import find_form
+from mrhubo.motion.readers.smpl_names import Found, find_here, find_inside, forms_in, search
+from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
 _MESHCAPADE = {0: "smpl", 1: "smplh", 2: "smplx"}
 """The models of `smplVersion` (https://pypi.org/project/smplcodec, codec.py)."""
-_MODEL = re.compile(r"smpl[xh](?![a-z])")
+_TRACKS, _IDS = ("tracks", "people", "persons", "subjects", "tracklets"), ("track_id", "person_id", "id", "name")
+_MOST_TRACKS = 1_000
+"""What files call a list of people, and people themselves."""
+_OF_SMPL, _OF_BODY = (23, 24), 21
+"""How many joints SMPL's poses have, and those of a body without hands."""
 
 
 def find_layout(tree: Tree) -> Layout | None:
@@ -50,7 +55,23 @@ def _people(tree: Tree) -> Layout | None:
     kind = _kind("SMPL parameters of people", first, first.node)
     if first.node is not first.outer and first.node.where.endswith(("_cam]", "_incam]")):
         kind = replace(kind, worlds=CAMERAS)
-    return Layout(kind, people.tracks, people.notes)
+    kind, notes = _taken_for(kind, first)
+    return Layout(kind, people.tracks, (*people.notes, *notes))
+
+
+def _tracks(tree: Tree) -> Layout | None:
+    """A list of people, itself or under a key, each a dictionary with arrays over the frames in which they are seen."""
+    listed = tree if tree.is_list else tree.get(*_TRACKS) if tree.is_mapping else None
+    if listed is None or not listed.is_list or not 0 < len(listed) <= _MOST_TRACKS:
+        return None
+    people = list(listed)
+    found = [find_here(person) for person in people]
+    if None in found or all(one is None or one.frames < 2 for one in found):  # of single frames, they are of one
+        return None
+    told = [person.get(*_IDS) for person in people]
+    names = ["" if one is None else one.text() or f"{one.number():.0f}" for one in told]
+    unique = all(names) and len(set(names)) == len(names)
+    return _people(listed.by_names(names if unique else [str(number) for number in range(len(names))]))
 
 
 def _single(tree: Tree) -> Layout | None:
@@ -78,22 +99,42 @@ def _single(tree: Tree) -> Layout | None:
         return Layout(Kind("HybrIK", "smpl", CAMERAS), found.tracks())
     if "smpl_scaling" in keys:
         return Layout(Kind("AIST++", "smpl", ANY_WORLD), found.tracks())
-    return Layout(_kind("SMPL parameters", found, tree), found.tracks())
+    kind, notes = _taken_for(_kind("SMPL parameters", found, tree), found)
+    return Layout(kind, found.tracks(), notes)
+
+
+def _pair(tree: Tree) -> Layout | None:
+    """A pose and a place of the root, as `torch.save((pose, tran), ...)` keeps what TransPose and its kin answer: all
+    joints of SMPL (T, 24, 3) or (T, 24, 3, 3), and (T, 3) (https://github.com/Xinyu-Yi/TransPose).
+    """
+    pair = list(tree) if tree.is_list and len(tree) == 2 else []
+    pose, place = (node.shape() for node in pair) if pair else (None, None)
+    if pose is None or place is None or len(pose) < 2 or place != (pose[0], 3):
+        return None
+    form = find_form(pose, (24,))
+    if form is None:
+        return None
+
+    def read() -> SmplArrays:
+        return SmplArrays(pair[0].where, pair[0].array(), form, 1, None, pair[1].array())
+
+    return Layout(Kind("SMPL's pose and place", "smpl", ANY_WORLD), [Track("", pose[0], read)])
 
 
 _FINDERS = (
-    read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo, _people,
-    _single, read_numbered,
+    read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo,
+    _pair, _tracks, read_columns, _people, _single, read_listed, read_numbered,
 )  # fmt: skip
 
 
 def _kind(source: str, found: Found, tree: Tree) -> Kind:
     """What is known of parameters: by their keys whose they are, or else by what the file says."""
-    if "pose_world" in found.node.keys:
+    of_smpl = found.form.joints in _OF_SMPL  # who writes as they do for another model has more joints
+    if of_smpl and "pose_world" in found.node.keys:
         return Kind("WHAM", "smpl", ANY_WORLD)
-    if {"pred_cam", "orig_cam"} & set(found.node.keys):
+    if of_smpl and {"pred_cam", "orig_cam"} & set(found.node.keys):
         return Kind("VIBE or one of its kin", "smpl", CAMERAS)
-    said = next((text for node in (found.node, tree) if (text := _said(node))), "")
+    said = next((text for node in (found.node, tree) if (text := _said(node))), "") or model_named(found.pose.where)
     keys = {*found.node.keys, *tree.keys}
     family = family_of(said, found.form.joints, keys, found.shape())
     # a pose of the body alone may be told beside that of all joints, whose number tells the model
@@ -103,6 +144,17 @@ def _kind(source: str, found: Found, tree: Tree) -> Kind:
     return Kind(source, family, ANY_WORLD)
 
 
+def _taken_for(kind: Kind, found: Found) -> tuple[Kind, tuple[str, ...]]:
+    """The same, of SMPL-X where nothing tells the model of a body's 21 joints under the names of the package smplx, as
+    most estimators that write those are of SMPL-X; and a note that says so.
+    """
+    said = "smpl" in found.pose.where.lower()  # what is called so may be of all models
+    if kind.family or said or found.names.pose != "body_pose" or found.form.joints != _OF_BODY:
+        return kind, ()
+    note = "which body model it is of is not told: 21 joints as 'body_pose' are taken for SMPL-X's"
+    return replace(kind, family="smplx"), (note,)
+
+
 def _said(node: Tree) -> str:
     """What a file calls its body model, or the dictionary in it that has the parameters: `smplx`, `smplh_params`, but
     not `smpl`, as those of all models are called.
@@ -110,5 +162,4 @@ def _said(node: Tree) -> str:
     model, version = node.get("surface_model_type", "model_type", "smpl_type", "body_model"), node.get("smplVersion")
     if version is not None:
         return _MESHCAPADE.get(int(version.number()), "")
-    called = _MODEL.search(node.where.lower()) if model is None else None
-    return called[0] if called is not None else (model.text() or "") if model is not None else ""
+    return model_named(node.where) if model is None else model.text() or ""

@@ -46,7 +46,7 @@ def read_six(tree: Tree) -> Layout | None:
     def read() -> SmplArrays:
         six_J6T = theta.array().reshape(-1, 6, frames).astype(np.float64)
         place_3T = six_J6T[-1, :3] if place is None else place.array()
-        matrix_TJ33 = _from_rows(six_J6T[:_JOINTS].transpose(2, 0, 1))
+        matrix_TJ33 = from_rows(six_J6T[:_JOINTS].transpose(2, 0, 1))
         position = place_3T.T if place_3T.shape == (3, frames) else None
         return SmplArrays(where, matrix_TJ33, Form(_JOINTS, True), 1, None, position)
 
@@ -89,7 +89,7 @@ def _rate(time_T: np.ndarray | None) -> float | None:
     return round(1e9 / step, 2) if step > 0 else None
 
 
-def _from_rows(six_TJ6: np.ndarray) -> np.ndarray:
+def from_rows(six_TJ6: np.ndarray) -> np.ndarray:
     """Matrices (T, J, 3, 3) of their first two rows; no rotations where those are 0 or on one line."""
     return orthonormal_columns(six_TJ6.reshape(*six_TJ6.shape[:-1], 2, 3).mT).mT
 

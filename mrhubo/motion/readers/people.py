@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 from mrhubo.errors import listed, shortened
 from mrhubo.files.tree import Tree
-from mrhubo.motion.readers.smpl_names import Found, find_here, first_entries, search, without_world, words_of
+from mrhubo.motion.readers.key_words import without_world, words_of
+from mrhubo.motion.readers.smpl_names import Found, find_here, first_entries, search
 from mrhubo.motion.readers.tracks import Track
 
 _BESIDE = {

@@ -1,12 +1,12 @@
-"""Motions in folders with a file of SMPL parameters a frame, or a file a person and frame.
+"""Motions in folders with a file of SMPL parameters a frame, a file a person and frame, or a folder a frame.
 
 Who writes such folders, and what is in their files, is said in `mrhubo.motion.readers.frame_bodies`. Of `00012_1.npz`
-the first number is that of the frame, and the second that of a person in it, who in the next frame may be another.
+and of `00012/001.pkl` the first number is that of the frame, and the second that of a person in it, who in the next
+frame may be another.
 """
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from mrhubo.errors import UserError
@@ -14,24 +14,19 @@ from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.body_tracks import body_tracks
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_bodies import Body, bodies_in
-from mrhubo.motion.readers.frame_files import read_frame_tree
-from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.frame_files import Frames, numbers_of_files, read_frame_tree
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate
 from mrhubo.motion.readers.tracks import Kind, choose, motion_of
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
 
-_DETECTION = re.compile(r"(.*[0-9].*?)[_-]([0-9]{1,3})")
-_AT_MOST = 100
-"""People in a frame."""
 
-
-def read_pose_files(folder: Path, files: list[Path], options: ReadOptions) -> Motion:
+def read_pose_files(folder: Path, frames: Frames, options: ReadOptions) -> Motion:
     """Reads one of the people in a folder.
 
     Args:
         folder: what the motion is called after.
-        files: of its frames.
+        frames: its files.
         options: person, rate.
 
     Raises:
@@ -40,8 +35,9 @@ def read_pose_files(folder: Path, files: list[Path], options: ReadOptions) -> Mo
     """
     notes: list[str] = []
     seen: list[tuple[int, Body]] = []
-    for frame, file in zip(_frames(folder, [file.stem for file in files]), files, strict=True):
-        bodies = bodies_in(read_frame_tree(file))
+    files = frames.files
+    for frame, file in zip(numbers_of_files(folder, frames), files, strict=True):
+        bodies = bodies_in(read_frame_tree(file), frames.most_rows)
         if bodies is None:
             raise UserError(f"{file}: has no SMPL parameters of one frame, as other files of its folder have")
         seen += [(frame, body) for body in bodies]
@@ -52,15 +48,3 @@ def read_pose_files(folder: Path, files: list[Path], options: ReadOptions) -> Mo
     kind = Kind(f"{first.source}, a file a frame", first.family, worlds)
     arrays = choose(folder, tracks, options, notes).read()
     return motion_of(folder, arrays, kind, asked_rate(folder, options), notes)
-
-
-def _frames(folder: Path, stems: list[str]) -> list[int]:
-    """The number of each file's frame; several files have the same, where the last number in a name is a person's."""
-    parts = [_DETECTION.fullmatch(stem) for stem in stems]
-    heads = [part[1] for part in parts if part is not None]
-    tails = {part[2] for part in parts if part is not None}
-    if len(heads) < len(stems) or not 1 < len(set(heads)) >= len(tails) or len(tails) > _AT_MOST:
-        return frame_numbers_in(folder, stems)
-    once = sorted(set(heads))
-    numbers = dict(zip(once, frame_numbers_in(folder, once), strict=True))
-    return [numbers[head] for head in heads]

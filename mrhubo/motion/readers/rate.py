@@ -6,12 +6,25 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
+from mrhubo.robot_motion.clock import find_rate as find_even_rate
 
-RATE_KEYS = ("mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "frameRate", "fps")
+RATE_KEYS = (
+    "mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "frameRate", "fps", "FPS", "video_fps",
+    "motion_fps", "mocap_fps",
+)  # fmt: skip
 """What files call it; the first two are AMASS's."""
+TIME_KEYS = ("timestamps", "timestamps_s", "timestamps_ms", "timestamps_us", "timestamps_ns", "timestamp", "times",
+             "time", "frame_times", "frame_timestamps")  # fmt: skip
+"""What files call the times of their frames."""
+_UNITS = (1.0, 1e-3, 1e-6, 1e-9)
+"""Seconds, and what else times are told in: of a usual rate, in each unit steps are of another size."""
+_NUMBERS = 8.0
+"""Whole steps that are smaller may be between numbers of frames."""
 
 
 def find_rate(path: Path, nodes: Iterable[Tree], options: ReadOptions, notes: list[str]) -> float:
@@ -57,8 +70,33 @@ def rate_in(node: Tree, notes: list[str]) -> tuple[str, float] | None:
             if number is not None:
                 return key, number
             open_ones.append(f"'{key}' tells no frame rate{_in_words(node[key])}")
+    for key in TIME_KEYS:
+        number = rate_of_times(node[key]) if key in keys else None
+        if number is not None:
+            return key, number
     notes += open_ones
     return None
+
+
+def rate_of_times(node: Tree) -> float | None:
+    """Frames per second of evenly spaced times, in seconds, milli-, micro- or nanoseconds; None of any other."""
+    try:
+        array = node.array() if node.text() is None else np.zeros(0)
+    except UserError:
+        return None
+    time_T = np.ravel(array)
+    if array.dtype.kind not in "fiu" or len(time_T) < 3 or len(time_T) != max(array.shape):
+        return None
+    step_T = np.diff(time_T - time_T[0] if array.dtype.kind == "f" else time_T.astype(np.int64) - int(time_T[0]))
+    step = float(np.median(step_T))
+    low, high = RATES
+    unit = next((unit for unit in _UNITS if 1 / high < step * unit < 1 / low), None)
+    if not np.isfinite(step_T).all() or unit is None or (step < _NUMBERS and step == round(step)):
+        return None
+    try:
+        return find_even_rate(unit * np.concatenate([[0.0], np.cumsum(step_T)]), lambda frame_T, rate: frame_T / rate)
+    except UserError:  # not evenly spaced
+        return None
 
 
 def number_told(node: Tree) -> float | None:

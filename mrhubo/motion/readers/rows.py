@@ -1,5 +1,5 @@
-"""Motions in a single array whose rows are known by their length: those of Motion-X, of TalkSHOW, of PHUMA, and SMPL's
-`body_pose`.
+"""Motions in a single array whose rows are known by their length: those of Motion-X, of TalkSHOW, of PHUMA, SMPL's
+`body_pose`, and SMPL's pose with the shape.
 
 Legend: T frames, X numbers of a row.
 """
@@ -16,7 +16,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, rate_of_all
 from mrhubo.motion.readers.rotations import Form, to_matrices
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, motion_of
-from mrhubo.motion.readers.world import ANY_WORLD, find_up
+from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, find_up
 
 _MOTION_X = 322
 _MOTION_X_RATE = 30.0
@@ -25,6 +25,7 @@ _TALKSHOW_RATE = 30.0
 _PHUMA = (69, 73, 79)
 """Without more, with how much each foot touches the ground, with the body's shape."""
 _CONTACTS = 73
+_WITH_SHAPE = 85
 _BODY, _WITH_HANDS = Form(21, False), Form(23, False)
 _STIFF = tuple(joint - 1 for joint in (3, 6, 9, 12, 13, 14, 15))
 """Joints of spine, neck, collars and head, which turn less than those of limbs."""
@@ -42,8 +43,8 @@ _UPRIGHT = 0.5
 
 
 def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
-    """Reads SMPL's or SMPL-X's parameters from rows of 322, 265, 69, 73 or 79 numbers, (T, X) or (1, T, X); None of
-    anything else.
+    """Reads SMPL's or SMPL-X's parameters from rows of 322, 265, 69, 73, 79 or 85 numbers, (T, X) or (1, T, X); None
+    of anything else.
 
     Motion-X's rows are the root's rotation (3), the body's (63), hands, jaw, face, then at 309 the place of the root
     (3) and the body's shape (10); it says of all its motions that they have 30 frames a second
@@ -51,7 +52,8 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     (63), hands and face; its motions have 30 frames a second (https://github.com/yhw-yhw/TalkSHOW, scripts/demo.py).
     PHUMA's are the place of the root (3), its rotation (3) and the body's (63), then perhaps more
     (https://github.com/DAVIAN-Robotics/PHUMA). SMPL's `body_pose`, 23 joints without the root, is as wide, and with the
-    shape as wide as PHUMA's with it; which it is, is told by what is in it.
+    shape as wide as PHUMA's with it; which it is, is told by what is in it. Rows of 85 are SMPL's pose (72), place and
+    shape, as MotionStreamer's recovered ones, or a camera (3), pose and shape, as HMR's.
 
     Raises:
         UserError: the numbers are no motion, or may be of either kind; or the frame rate is not known.
@@ -59,7 +61,7 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     shape = tree.shape()
     if shape is not None and len(shape) == 3 and shape[0] == 1:
         shape = shape[1:]
-    if shape is None or len(shape) != 2 or not shape[0] or shape[1] not in (_MOTION_X, _TALKSHOW, *_PHUMA):
+    if shape is None or len(shape) != 2 or not shape[0] or shape[1] not in (_MOTION_X, _TALKSHOW, _WITH_SHAPE, *_PHUMA):
         return None
     rows_TX, notes = tree.array().reshape(shape), options.of_one()
     if shape[1] == _MOTION_X:
@@ -72,6 +74,16 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
         arrays = SmplArrays("rows", rows_TX[:, 12:75], _BODY, 0, rows_TX[:, 9:12])
         rate = rate_of_all(_TALKSHOW_RATE, "TalkSHOW's motions have", options, notes)
         return motion_of(tree.path, arrays, Kind("TalkSHOW's rows (T, 265)", "smplx", ANY_WORLD), rate, notes)
+    if shape[1] == _WITH_SHAPE:
+        pose_at = _pose_at(rows_TX)
+        if pose_at is None:  # any features may have as many numbers
+            return None
+        place_T3 = rows_TX[:, 72:75] if pose_at == 0 else None
+        arrays = SmplArrays(
+            "rows", rows_TX[:, pose_at : pose_at + 72], Form(24, False), 1, None, place_T3, rows_TX[:, 75:]
+        )
+        kind = Kind("rows (T, 85) of SMPL's pose and shape", "smpl", ANY_WORLD if pose_at == 0 else CAMERAS)
+        return motion_of(tree.path, arrays, kind, asked_rate(tree.path, options), notes)
     betas = rows_TX[:, 69:] if shape[1] == max(_PHUMA) else None
     if shape[1] == _CONTACTS or _is_phuma(tree, rows_TX):
         arrays = SmplArrays("rows", rows_TX[:, 6:69], _BODY, 0, rows_TX[:, 3:6], rows_TX[:, :3], betas)
@@ -104,6 +116,14 @@ def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:
         " body_pose (23 joints, no root), and its numbers fit neither clearly; save an .npz with 'transl',"
         " 'global_orient' and 'body_pose' (frames, 63), or with 'body_pose' (frames, 69) alone"
     )
+
+
+def _pose_at(rows_TX: np.ndarray) -> int | None:
+    """Where in rows (T, 85) the pose begins: at once, or after a camera; None where neither is clear."""
+    first, second = (stiff_turn(rows_TX[:, start : start + 63].astype(np.float64)) + _NEARLY_STILL for start in (3, 6))
+    if not min(first, second) < STIFF_TURN or max(first, second) < _CLEARLY * min(first, second):
+        return None
+    return 0 if first < second else 3
 
 
 def stiff_turn(body_TX: np.ndarray) -> float:

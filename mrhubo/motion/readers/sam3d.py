@@ -13,6 +13,7 @@ Legend: T frames, K = 70 points.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -33,7 +34,9 @@ from mrhubo.motion.readers.smpl_names import search
 from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.motion.readers.world import ANY_WORLD, find_up
 
-_KEY, _CAMERA = "pred_keypoints_3d", "pred_cam_t"
+KEY, CAMERA = "pred_keypoints_3d", "pred_cam_t"
+_LISTS = ("data", "outputs", "results")
+"""What files of a frame call their list of answers."""
 _POINTS = 70
 _REACH = 1.0
 """How far anybody gets from one frame to the next [m], with the noise of a depth that is guessed."""
@@ -80,19 +83,30 @@ def read_sam3d(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]]
     seen = people[chosen.person][1]()
     points_TK3 = seen.points.astype(np.float64)
     if not (np.abs(np.nan_to_num(points_TK3)) < FARTHEST_M).all():
-        raise UserError(f"{tree.path}: '{_KEY}' holds infinite numbers, or some beyond {FARTHEST_M:g} m")
+        raise UserError(f"{tree.path}: '{KEY}' holds infinite numbers, or some beyond {FARTHEST_M:g} m")
     if seen.camera is not None:
         points_TK3 = points_TK3 + seen.camera.astype(np.float64)[:, None]
     up_T3 = points_TK3[:, [5, 6]].mean(axis=1) - points_TK3[:, [9, 10]].mean(axis=1)
     known_T = np.isfinite(up_T3).all(-1)
     if not known_T.any():
-        raise UserError(f"{tree.path}: in no frame of '{_KEY}' are both shoulders and hips known")
+        raise UserError(f"{tree.path}: in no frame of '{KEY}' are both shoulders and hips known")
     up, turn_33 = find_up(up_T3[known_T], ANY_WORLD)
     points_TK3 = points_TK3 @ turn_33.T
     points = {name: points_TK3[:, list(places)].mean(axis=1) for name, places in _PLACES.items()}
     body = BodyPoints(points, hinges={f"{side}_shoulder": _hinge(points_TK3, points, side) for side in SIDES})
-    source = f"SAM 3D Body's points, '{_KEY}', {up}"
+    source = f"SAM 3D Body's points, '{KEY}', {up}"
     return motion_from_points(body, motion_name(tree.path), find_rate(notes), source, tuple(notes))
+
+
+def answers_in(frame: Tree) -> list[Tree] | None:
+    """The answers of a frame that is a file of its own: it is one itself, or has a list of them; None of any other, and
+    of those of several frames in arrays.
+    """
+    listed = frame if frame.is_list else frame.get(*_LISTS) if frame.is_mapping else None
+    people = [frame] if listed is None or not listed.is_list else list(listed)
+    if (not people and listed is frame) or not all(map(_is_person, people)):
+        return None
+    return people if all(math.prod(person[KEY].shape() or ()) == 3 * _POINTS for person in people) else None
 
 
 def _hinge(points_TK3: np.ndarray, points: dict[str, np.ndarray], side: str) -> np.ndarray:
@@ -128,34 +142,34 @@ def _people(tree: Tree, notes: list[str]) -> dict[str, tuple[int, Callable[[], _
 
 def _is_person(node: Tree) -> bool:
     """Whether somebody has points of this name that may be these: 4D-Humans' HMR2 calls its 44 so."""
-    shape = node[_KEY].shape() if _KEY in node.keys else None
+    shape = node[KEY].shape() if KEY in node.keys else None
     return shape is not None and (len(shape) < 2 or shape[-2] == _POINTS)
 
 
 def _place(person: Tree) -> np.ndarray:
     """Where somebody is, (3,); the origin where it is not told."""
-    place = person.find_array(_CAMERA)
+    place = person.find_array(CAMERA)
     return place.reshape(3).astype(np.float64) if place is not None and place.size == 3 else np.zeros(3)
 
 
 def _stacked(node: Tree) -> _Seen | None:
     """Points of one person that are in a single array."""
-    shape = node[_KEY].shape() if _KEY in node.keys else None
+    shape = node[KEY].shape() if KEY in node.keys else None
     if shape is None or shape[-2:] != (_POINTS, 3) or len(shape) not in (3, 4) or (len(shape) == 4 and shape[1] != 1):
         return None
-    points = node[_KEY].array().reshape(-1, _POINTS, 3)
-    place = node.find_array(_CAMERA)
+    points = node[KEY].array().reshape(-1, _POINTS, 3)
+    place = node.find_array(CAMERA)
     if not 0 < len(points) <= MAX_FRAMES:
-        raise UserError(f"{node.path}: '{_KEY}' has {len(points):,} frames; expected 1 to {MAX_FRAMES:,}")
+        raise UserError(f"{node.path}: '{KEY}' has {len(points):,} frames; expected 1 to {MAX_FRAMES:,}")
     return _Seen(points, place.reshape(-1, 3) if place is not None and place.size == 3 * len(points) else None)
 
 
 def _gathered(found: dict[int, Tree], frames: int) -> _Seen:
     points, camera = np.full((frames, _POINTS, 3), np.nan), np.full((frames, 3), np.nan)
     for number, person in found.items():
-        array = person[_KEY].array()
+        array = person[KEY].array()
         if array.size != _POINTS * 3:
-            raise UserError(f"{person.named}: '{_KEY}' has shape {array.shape}; expected ({_POINTS}, 3)")
+            raise UserError(f"{person.named}: '{KEY}' has shape {array.shape}; expected ({_POINTS}, 3)")
         points[number] = array.reshape(_POINTS, 3)
         camera[number] = _place(person)
     return _Seen(points, camera)

@@ -6,13 +6,14 @@ package smplx (https://github.com/vchoutas/smplx), `pose_body` AMASS, `poses_bod
 (https://github.com/eth-ait/emdb), `pose_aa` PHC (https://github.com/ZhengyiLuo/PHC), `fullpose` GRAB
 (https://github.com/otaheri/GRAB), `smpl_pose` GLAMR (https://github.com/NVlabs/GLAMR), `local_rot_mats` Kimodo,
 `rotvec` Multi-HMR (https://github.com/naver/multi-hmr), `body_pose_axis` TalkSHOW
-(https://github.com/yhw-yhw/TalkSHOW), `bodyPose` Meshcapade's .smpl (https://pypi.org/project/smplcodec), `poses` and
-`pose` everybody.
+(https://github.com/yhw-yhw/TalkSHOW), `bodyPose` Meshcapade's .smpl (https://pypi.org/project/smplcodec),
+`pose_est_fullposes` SAMP (https://samp.is.tue.mpg.de), `local_rot_aa` CHOIS
+(https://github.com/lijiaman/chois_release), `poses` and `pose` everybody. Names with words of a model or an estimator
+in them, such as `smplx_pose`, are told by `mrhubo.motion.readers.key_words`.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -20,18 +21,19 @@ from typing import TypeVar
 import numpy as np
 
 from mrhubo.files.tree import Tree
+from mrhubo.motion.readers.key_words import by_usual_names, in_world, rank
 from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_form
 from mrhubo.motion.readers.tracks import SmplArrays, Track
 
 T = TypeVar("T")
-_ROOTS = ("global_orient", "root_orient", "root_pose")
-_PLACES = ("trans", "transl", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
+_ROOTS = ("global_orient", "root_orient", "root_pose", "global_orientation")
+_PLACES = ("trans", "transl", "tran", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
+_ROBOT = {"dof", "dofs", "dof_pos", "dof_positions", "joint_pos", "joint_vel", "dof_vel"}
+"""What files of robots call the angles of their joints, or how fast those turn."""
 _ENTRIES = 50
 _DEEPEST = 3
 """Dictionaries in dictionaries."""
-_WORLD, _CAMERA = ("global", "world"), ("incam", "cam", "camera")
-"""Words in the names of parameters in the world, which are preferred, and of those that a camera sees."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,8 @@ _NAMES = (
     _Names("rotvec", position=("transl_pelvis", "transl")),
     _Names("bodyPose", position=("bodyTranslation",), betas=("shapeParameters",)),
     _Names("local_rot_mats", position=("root_positions",)),
+    _Names("pose_est_fullposes", position=("pose_est_trans",), betas=("shape_est_betas",)),
+    _Names("local_rot_aa"),
 )
 
 
@@ -90,13 +94,18 @@ class Found:
     outer: Tree | None = None
     """The dictionary around it, if that is the person's."""
 
+    @property
+    def pose(self) -> Tree:
+        """The rotations."""
+        own = self.node.get(self.names.pose)
+        return by_usual_names(self.node)[self.names.pose] if own is None else own
+
     def read(self, person: int | None = None) -> SmplArrays:
         """The arrays, of one of the people where there are several."""
-        node, names = self.node, self.names
-        pose = node[names.pose]
+        node, names, pose = self.node, self.names, self.pose
         array = pose.array() if person is None else pose.array().take(person, 0 if self.people_first else 1)
         first = 1 if self.form.joints in WITH_ROOT else 0
-        roots = names.root or (() if first else _ROOTS)
+        roots = names.root or (() if first and in_world(node).get(*_ROOTS) is None else _ROOTS)
         root, position, betas = (self._array(keys, person) for keys in (roots, names.position, names.betas))
         frames = self._array(_FRAMES, person)
         if frames is None and self.outer is not None:
@@ -109,7 +118,7 @@ class Found:
 
     def shape(self) -> list[float] | None:
         """The body's shape, of the first of the people or frames that have one; None where there is none."""
-        betas = self.node.find_array(*self.names.betas)
+        betas = self._find(self.names.betas)
         if betas is None or betas.ndim == 0 or not betas.size:
             return None
         return betas.reshape(-1, betas.shape[-1])[0].tolist()
@@ -122,21 +131,34 @@ class Found:
         return [Track(str(n), self.frames, lambda n=n: self.read(n), homes) for n in range(self.people)]
 
     def _array(self, keys: tuple[str, ...], person: int | None) -> np.ndarray | None:
-        array = self.node.find_array(*keys)
+        array = self._find(keys)
         if array is None or person is None or array.ndim < 2:
             return array
         axes = (0,) if self.people_first else (1, 0)  # a shape has people alone
         axis = next((axis for axis in axes if array.shape[axis] == self.people), None)
         return array if axis is None else array.take(person, axis)
 
+    def _find(self, keys: tuple[str, ...]) -> np.ndarray | None:
+        """The array that is called by one of some names; that in the world, where pose or root are told in it."""
+        world = in_world(self.node)
+        pose_told = self.names.pose in world.keys and self.node.get(self.names.pose) is None
+        homes = (world,) if pose_told or world.get(*_ROOTS) is not None else ()
+        found = (home.find_array(*keys) for home in (*homes, self.node, by_usual_names(self.node)))
+        return next((array for array in found if array is not None), None)
+
 
 def find_here(node: Tree) -> Found | None:
     """SMPL parameters that are entries of a dictionary; None where there are none."""
-    if not node.is_mapping:
+    if not node.is_mapping or is_robot(node):
         return None
-    keys = set(node.keys)
+    return _found(node, node) or _found(by_usual_names(node), node)
+
+
+def _found(named: Tree, node: Tree) -> Found | None:
+    """The parameters of a dictionary, by names that are its own or the usual ones of its own."""
+    keys = set(named.keys)
     for names in _NAMES:
-        shape = node[names.pose].shape() if names.pose in keys else None
+        shape = named[names.pose].shape() if names.pose in keys else None
         if shape is None or len(shape) < 2:
             continue
         counts = WITH_ROOT + WITHOUT_ROOT
@@ -148,6 +170,13 @@ def find_here(node: Tree) -> Found | None:
             people, frames = sorted(shape[:2])
             return Found(node, names, form, frames, people, people_first=shape[0] == people)
     return None
+
+
+def is_robot(node: Tree) -> bool:
+    """Whether a dictionary is of a robot's motion: its joints are told by angles. What such files call `pose_aa` turns
+    the robot's links, as many as some person's joints (https://github.com/LeCAR-Lab/human2humanoid).
+    """
+    return bool(_ROBOT & set(node.keys))
 
 
 def forms_in(node: Tree) -> Iterator[Form]:
@@ -170,7 +199,7 @@ def search(node: Tree, find: Callable[[Tree], T | None], deepest: int = _DEEPEST
     if found is not None or deepest == 0:
         return found
     entries = [(name, child) for name, child in first_entries(node) if child.is_mapping]
-    for _, child in sorted(entries, key=lambda entry: _rank(entry[0])):
+    for _, child in sorted(entries, key=lambda entry: rank(entry[0])):
         found = search(child, find, deepest - 1)
         if found is not None:
             return found
@@ -183,20 +212,3 @@ def first_entries(node: Tree) -> Iterator[tuple[str, Tree]]:
         if number == _ENTRIES:
             return
         yield entry
-
-
-def without_world(name: str) -> str:
-    """A name without the words that tell whether its parameters are in the world or as a camera sees them."""
-    return "_".join(word for word in words_of(name) if word not in (*_WORLD, *_CAMERA))
-
-
-def _rank(name: str) -> int:
-    words = words_of(name)
-    if any(word in words for word in _WORLD):
-        return 0
-    return 2 if any(word in words for word in _CAMERA) else 1
-
-
-def words_of(name: str) -> list[str]:
-    """The words of a name in small letters: of `smpl_params-incam` and `smplParamsIncam` the same."""
-    return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower())

@@ -384,6 +384,36 @@ def nlf(path: Path, people: dict[int, np.ndarray]) -> None:
     joblib.dump(content, path)
 
 
+def nlf_batch(path: Path, people: dict[int, np.ndarray]) -> None:
+    """What NLF answers to a batch of pictures: lists with an array a frame, which has a row a person, in any order."""
+    frames = max(map(len, people.values()))
+    here = [[p for p in list(people)[:: 1 if t % 2 else -1] if t < len(people[p])] for t in range(frames)]
+    content = {
+        "boxes": [torch.zeros(len(those), 5) for those in here],
+        "pose": [
+            torch.from_numpy(np.concatenate([padded(people[p][t : t + 1], 24) for p in those]))
+            for t, those in enumerate(here)
+        ],
+        "betas": [torch.zeros(len(those), 10) for those in here],
+        "trans": [torch.tensor([[1.0, 3.0 * (p - max(people)), 0.0] for p in those]) for those in here],
+        "joints3d": [torch.zeros(len(those), 24, 3) for those in here],
+    }
+    torch.save(content, path)
+
+
+def transpose(path: Path, people: dict[int, np.ndarray]) -> None:
+    ((_, pose),) = people.items()
+    turned = matrices(padded(pose, 24).reshape(len(pose), 24, 3))
+    torch.save((torch.from_numpy(turned), torch.ones(len(pose), 3)), path)
+
+
+def finedance(path: Path, people: dict[int, np.ndarray], contacts: bool = False) -> None:
+    ((_, pose),) = people.items()
+    six = matrices(padded(pose, 52).reshape(len(pose), 52, 3))[:, :, :2].reshape(len(pose), 312)
+    with path.open("wb") as file:
+        np.save(file, np.concatenate([np.ones((len(pose), 7 if contacts else 3), np.float32), six], axis=1))
+
+
 def talkshow_data(path: Path, people: dict[int, np.ndarray]) -> None:
     ((_, pose),) = people.items()
     content = {
@@ -502,6 +532,9 @@ WRITERS: dict[str, Writer] = {
     "multi_hmr": Writer(multi_hmr, ".pt", "SMPL parameters, frame by frame", "smplx", camera=True, many=True),
     "hmr2_pictures": Writer(hmr2_pictures, ".pkl", "SMPL parameters, frame by frame", "smpl", camera=True, many=True),
     "nlf": Writer(nlf, ".pkl", "SMPL parameters of people", "smplx", camera=True, many=True),
+    "nlf_batch": Writer(nlf_batch, ".pt", "SMPL parameters", "smpl", camera=True, many=True),
+    "transpose": Writer(transpose, ".pt", "SMPL's pose and place", "smpl"),
+    "finedance": Writer(finedance, ".npy", "FineDance's rows", "smplx"),
     "talkshow_data": Writer(talkshow_data, ".pkl", "SMPL parameters", "smplx"),
     "meshcapade": Writer(meshcapade, ".smpl", "SMPL parameters", "smplx"),
     "mdm": Writer(mdm, ".npy", "MDM's or MoMask's SMPL parameters", "smpl"),

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from pathlib import Path
 
 import pytest
 
 import mrhubo
 from mrhubo.motion import NoMotion
+
+
+def _zipped(name: str) -> bytes:
+    written = io.BytesIO()
+    with zipfile.ZipFile(written, "w") as archive:
+        archive.writestr(name, "HIERARCHY")
+    return written.getvalue()
+
 
 _FILES = {
     "GLB": (b"glTF\x02\0\0\0", "Blender"),
@@ -28,6 +38,12 @@ _FILES = {
     "robot's joints": (b"time [s],left_knee_joint [rad],right_knee_joint [rad]\n0,0,1\n", "human motion"),
     "without a header": (b"0.1,-0.2,1e-3," * 12 + b"0.5\n" + b"0,0,0," * 12 + b"0.5\n", "first line"),
     "COLLADA": (b'<?xml version="1.0"?>\n<COLLADA xmlns="x">', "Blender"),
+    "web page": (b"<!DOCTYPE html><html><head><title>Sign in</title>", "downloaded"),
+    "zip archive": (_zipped("clips/walk 01.bvh"), "unpack it"),
+    "Vicon": (b"Trajectories\n100\n,,a:LFHD,,,a:RFHD\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n", "BVH"),
+    "a .csv file of Vicon": (b"Joints,,\r\n120,,\r\n,,Hips,,,\r\n", "BVH"),
+    "Qualisys": (b"NO_OF_FRAMES\t100\nNO_OF_CAMERAS\t8\n", "markers"),
+    "OpenSim": (b"Coordinates\nversion=1\nnRows=2\nendheader\ntime\tpelvis_tilt\n", "recording"),
     r"\.asf": (b"# a comment\n:version 1.10\n:name VICON\n", "amc"),
 }
 

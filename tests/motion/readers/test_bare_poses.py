@@ -54,7 +54,7 @@ def test_points_stay_points(matrices: np.ndarray, tmp_path: Path) -> None:
     for size, noise in ((1.0, 0.0), (1.0, 0.02), (0.1, 0.002), (100.0, 2.0)):
         array = size * place_TJ3 + rng.normal(0, noise, place_TJ3.shape)
         assert "keypoints" in read_motion(saved(tmp_path, array), RATE).source
-        with pytest.raises(UserError, match="no human motion that is known"):  # nobody says that a row is of points
+        with pytest.raises(UserError, match="no human motion that is known"):  # rows may be rotations
             read_motion(saved(tmp_path, array.reshape(len(array), -1)), RATE)
 
 

@@ -31,6 +31,7 @@ from tests.motion.readers.estimator_files import (
     made_up,
     matrices,
     multi_hmr,
+    nlf_batch,
     padded,
     phalp,
     pymaf,
@@ -67,7 +68,7 @@ def test_what_each_writes_is_read(tmp_path: Path, name: str) -> None:
     assert (motion.root_position_T3 is None) == (writer.position is None)
     if motion.root_position_T3 is not None:
         assert float(motion.root_position_T3[-1, 0]) == pytest.approx(writer.position)
-    if name not in ("phc", "interhuman", "egoallo"):
+    if name not in ("phc", "interhuman", "egoallo", "finedance"):
         with pytest.raises(UserError, match="--rate"):
             read_motion(path)
 
@@ -118,7 +119,7 @@ def test_features_of_humanml3d_tell_where_joints_are(tmp_path: Path) -> None:
         read_motion(tmp_path / "walk.npy")
 
 
-FOLLOWED = ("pymaf", "cliff", "multi_hmr", "hmr2_pictures")
+FOLLOWED = ("pymaf", "cliff", "multi_hmr", "hmr2_pictures", "nlf_batch")
 """Writers that do not say who is who."""
 
 
@@ -245,7 +246,7 @@ def test_phalps_tracks_are_called_by_whole_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "write", [pymaf, cliff, multi_hmr, hmr2_pictures, lambda path, people: romp(path, people, tracked=False)]
+    "write", [pymaf, cliff, multi_hmr, hmr2_pictures, nlf_batch, lambda path, people: romp(path, people, tracked=False)]
 )
 def test_people_whom_a_file_does_not_track_are_followed_by_where_they_are(tmp_path: Path, write) -> None:
     """They come in turns: in the first frame the second person first."""
@@ -364,7 +365,9 @@ def entries_of(value: Any) -> list[tuple[Any, Any]]:
     return [place for key, child in pairs for place in ((value, key), *entries_of(child))]
 
 
-@pytest.mark.parametrize("name", [name for name, writer in WRITERS.items() if writer.ending in (".pkl", ".pk", ".npy")])
+@pytest.mark.parametrize(
+    "name", [name for name, writer in WRITERS.items() if writer.ending in (".pkl", ".pk") or name in ("tram", "mdm")]
+)
 def test_odd_values_anywhere_are_read_or_refused_by_name(tmp_path: Path, name: str) -> None:
     WRITERS[name].write(tmp_path / "good", {1: made_up(3, camera=WRITERS[name].camera)})
     good = (

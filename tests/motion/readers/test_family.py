@@ -106,3 +106,22 @@ def test_what_the_dictionary_is_called_and_how_long_the_shape_is(
 def test_a_shape_a_frame_is_the_mean_of_them(tmp_path: Path) -> None:
     motion = read_motion(save(tmp_path / "a.npz", pose_body=POSE_T63, betas=np.tile([[0.1], [0.3]], (3, 10))))
     assert motion.betas == pytest.approx([0.2] * 10) and not motion.notes
+
+
+@pytest.mark.parametrize(
+    ("arrays", "family"),
+    [
+        ({"body_pose": np.zeros((4, 63)), "global_orient": np.zeros((4, 3))}, "smplx"),
+        ({"body_pose": np.zeros((4, 63)), "betas": np.full(16, 0.1)}, "smplh"),
+        ({"body_pose": np.zeros((4, 69)), "global_orient": np.zeros((4, 3))}, "smpl"),
+        ({"smpl_body_pose": np.zeros((4, 63))}, ""),
+        ({"poses_body": np.zeros((4, 63))}, ""),
+    ],
+)
+def test_21_joints_by_the_names_of_the_package_smplx_are_those_of_smplx(
+    arrays: dict[str, np.ndarray], family: str, tmp_path: Path
+) -> None:
+    """As most estimators that write them are of it; a note says so."""
+    np.savez(tmp_path / "a.npz", fps=30.0, **arrays)
+    motion = read_motion(tmp_path / "a.npz")
+    assert motion.family == family and any("taken for SMPL-X" in note for note in motion.notes) == (family == "smplx")

@@ -108,7 +108,7 @@ def test_a_person_who_is_asked_for_where_there_is_one_is_said(name: str, tmp_pat
         np.save(path, np.zeros((4, 322)))
     elif name == "features.npy":
         rows = np.zeros((4, 263))
-        rows[:, 3], rows[:, 4:67] = 0.9, np.tile(REST_K3[1:22].reshape(63), (4, 1))
+        rows[:, 3], rows[:, 4:67] = 0.9, np.tile((REST_K3[1:22] + [0, 0.9, 0]).reshape(63), (4, 1))
         np.save(path, rows)
     elif name == "joints.npy":
         np.save(path, np.tile(REST_K3[:22], (4, 1, 1)))

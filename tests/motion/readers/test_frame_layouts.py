@@ -13,10 +13,13 @@ import torch
 
 import mrhubo.rotation
 from mrhubo import UserError
+from mrhubo.body.rest_directions import from_family
 from mrhubo.motion.load import read_motion
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.options import ReadOptions
 from tests.motion.readers.estimator_files import made_up, matrices, padded
+
+FRAMES = 9
 
 RATE = ReadOptions(rate=30.0)
 NUMBERS = [*range(3), *range(43, 46)]
@@ -116,3 +119,33 @@ def test_phalp_may_see_nobody_in_the_first_frames(tmp_path: Path) -> None:
         pickle.dumps({"000000.jpg": nobody, **{f"{k + 1:06}.jpg": f for k, f in enumerate(frames.values())}})
     )
     assert len(read_motion(path, RATE)) in (6, 7)
+
+
+@pytest.mark.parametrize("called", [("1", "2"), ("anna", "ben"), (7,), (1, 2)])
+@pytest.mark.parametrize("deeper", [False, True])
+def test_frames_that_have_people_by_name(called: tuple, deeper: bool, tmp_path: Path) -> None:
+    poses = {name: made_up(FRAMES, seed=seed) for seed, name in enumerate(called)}
+    frames = []
+    for t in range(FRAMES):
+        people = {}
+        for name, pose in poses.items():
+            one = {"global_orient": pose[t, 0], "body_pose": pose[t, 1:].reshape(63), "betas": np.zeros(10)}
+            people[name] = {"smplx_params": one, "bbox": np.zeros(4)} if deeper else one
+        frames.append(people)
+    for content in (frames, {f"{t:06}.jpg": people for t, people in enumerate(frames)}):
+        (tmp_path / "a.pkl").write_bytes(pickle.dumps(content))
+        for name, pose in poses.items():
+            motion = read_motion(tmp_path / "a.pkl", ReadOptions(rate=30, person=str(name)))
+            np.testing.assert_allclose(motion.arrays.local_TJ33, from_family(matrices(pose[:, 1:]), "smplx"), atol=1e-5)
+
+
+def test_one_body_in_two_models_or_worlds_is_one(tmp_path: Path) -> None:
+    pose = made_up(FRAMES)
+    for names in (("smpl_params", "smplx_params"), ("params_incam", "params_global")):
+        frames = [
+            {name: {"global_orient": pose[t, 0], "body_pose": pose[t, 1:].reshape(63)} for name in names}
+            for t in range(FRAMES)
+        ]
+        (tmp_path / "a.pkl").write_bytes(pickle.dumps(frames))
+        motion = read_motion(tmp_path / "a.pkl", ReadOptions(rate=30))
+        assert len(motion) == FRAMES and not any("there are" in note for note in motion.notes)

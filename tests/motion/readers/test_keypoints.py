@@ -530,6 +530,8 @@ def _table(point_TK3: np.ndarray, columns: str, separator: str = ",", point: str
         ("NAME AXIS", "\t", ".", "by their names"),
         ("AXISNUMBER", ",", ".", "as MediaPipe has them"),
         ("NUMBER_AXIS", ",", ".", "as MediaPipe has them"),
+        ("landmark_NUMBER_AXIS", ",", ".", "as MediaPipe has them"),
+        ("AXIS_NAME", ",", ".", "by their names"),
     ],
 )
 def test_tables(
@@ -557,6 +559,8 @@ def test_tables_tell_their_rate_and_their_gaps(
     path = tmp_path / "a.csv"
     header, *rows = _table(array_of(points, SETS["MediaPipe"]), "NAME_AXIS").splitlines()
     path.write_text("\n".join([f"time [s],{header}", *(f"{t / 30:.4f},{row}" for t, row in enumerate(rows))]))
+    assert mrhubo.read_motion(path).frame_rate == 30
+    path.write_text("\n".join([f"timestamp_ms,{header}", *(f"{t / 0.03:.3f},{row}" for t, row in enumerate(rows))]))
     assert mrhubo.read_motion(path).frame_rate == 30
     path.write_text("\n".join([f"time,{header}", *(f"{t * 33.3:.1f},{row}" for t, row in enumerate(rows))]))
     with pytest.raises(UserError, match="--rate"):  # milliseconds, or so it seems
@@ -645,3 +649,51 @@ def test_named_points_may_stand_in_rows(points: dict[str, np.ndarray], pose: tor
     np.savez(tmp_path / "a.npz", joints=np.random.default_rng(0).normal(size=(FRAMES, 66)), fps=30)
     with pytest.raises(UserError, match="fit no body"):
         mrhubo.read_motion(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("name", ["MediaPipe", "Human3.6M", "Kinect 2", "COCO"])
+@pytest.mark.parametrize("fourth", [False, True])
+def test_points_in_rows_without_a_name(
+    name: str, fourth: bool, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    array = array_of(points, SETS[name])
+    array = np.pad(array, ((0, 0), (0, 0), (0, int(fourth))), constant_values=0.9)
+    np.save(tmp_path / "a.npy", array.reshape(FRAMES, -1))
+    found = mrhubo.read_motion(tmp_path / "a.npy", RATE)
+    assert bone_error(found, pose) < 0.2 and f"as {name} has them" in found.source
+    np.save(tmp_path / "a.npy", np.random.default_rng(0).normal(size=(FRAMES, array[0].size)))
+    with pytest.raises(UserError, match="no human motion"):
+        mrhubo.read_motion(tmp_path / "a.npy", RATE)
+
+
+def test_lists_of_detections_are_people_of_pictures(
+    points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """As COCO has them: an entry is a person in a picture, and points stand in a row."""
+    array, path = array_of(points, SETS["COCO"]), tmp_path / "a.json"
+    entries = [
+        {"image_id": f"{t}.jpg", "category_id": 1, "keypoints": (array[t] + [shift, 0, 0]).reshape(-1).tolist()}
+        for t in range(FRAMES)
+        for shift in ((0.0, 3.0) if t % 2 else (3.0, 0.0))
+    ]
+    path.write_text(json.dumps(entries))
+    for person in ("0", "1"):
+        found = mrhubo.read_motion(path, ReadOptions(rate=30.0, person=person))
+        assert len(found) == FRAMES and bone_error(found, pose) < 0.2
+        assert found.root_position_T3 is not None and float(found.root_position_T3[:, 0].std()) < 0.1
+    flat = array * [300.0, 300.0, 0.0] + [400.0, 500.0, 0.8]
+    path.write_text(json.dumps([{"image_id": 7, "keypoints": row.reshape(-1).tolist()} for row in flat]))
+    with pytest.raises(UserError, match="points in a picture"):
+        mrhubo.read_motion(path, RATE)
+    path.write_text(json.dumps([{"keypoints": row[:, :2].tolist()} for row in flat]))
+    with pytest.raises(UserError, match="points in a picture"):
+        mrhubo.read_motion(path, RATE)
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours"),
+    [("SPINE_NAVAL", "spine1"), ("SPINE_CHEST", "spine2"), ("SPINE_1", "spine1"), ("spine3", "spine3"),
+     ("SpineBase", "pelvis"), ("CLAVICLE_LEFT", "left_collar"), ("NAVAL_SPINE", "spine1")],
+)  # fmt: skip
+def test_names_of_the_spine(theirs: str, ours: str) -> None:
+    assert our_name(theirs) == ours

@@ -81,6 +81,25 @@ def frankmocap(folder: Path, people: People, places: People, frames: range) -> N
         (folder / f"{t:05}_prediction_result.pkl").write_bytes(pickle.dumps(content))
 
 
+def smplifyx(folder: Path, people: People, places: People, frames: range) -> None:
+    """A folder a frame, with a file a person, whose number is now one and now another's."""
+    for t in frames:
+        inner = folder / f"s001_frame_{t + 1:05}__00.00.00.{33 * t:03}"
+        inner.mkdir()
+        for number, person in enumerate(list(people)[:: 1 if t % 2 else -1]):
+            pose = people[person][t : t + 1]
+            content = {
+                "camera_translation": np.zeros((1, 3)),
+                "betas": np.full((1, 10), 0.5),
+                "global_orient": pose[:, 0],
+                "body_pose": pose[:, 1:].reshape(1, 63),
+                "jaw_pose": np.zeros((1, 3)),
+                "left_hand_pose": np.zeros((1, 12)),
+                "transl": places[person][t : t + 1],
+            }
+            (inner / f"{number:03}.pkl").write_bytes(pickle.dumps(content))
+
+
 WRITERS: dict[str, tuple[Callable[..., None], str, bool]] = {
     "EasyMocap": (easymocap, "smpl", False),
     "SMPL parameters": (smplerx, "smplx", True),
@@ -200,3 +219,45 @@ def test_motions_of_three_frames_are_no_frames(tmp_path: Path) -> None:
     for number in range(3):
         np.savez(tmp_path / f"{number}.npz", global_orient=np.zeros((3, 3)), body_pose=np.zeros((3, 63)), fps=30.0)
     assert [len(motion) for motion in read_folder(tmp_path)] == [3, 3, 3]
+
+
+@pytest.mark.parametrize("people", [1, 2])
+def test_folders_of_frames_with_a_file_a_person(people: int, tmp_path: Path) -> None:
+    """Two frames are missing, and people are in any order."""
+    poses = {p: made_up(12, seed=p) for p in range(people)}
+    places = {p: np.tile([4.0 * p, 0.9, 0.0], (12, 1)) for p in poses}
+    smplifyx(tmp_path, poses, places, range(4))
+    smplifyx(tmp_path, poses, places, range(6, 12))
+    known = [t for t in range(12) if t not in (4, 5)]
+    for number, person in enumerate(poses):
+        asked = ReadOptions(rate=30.0, person=str(people - 1 - number) if people > 1 else None)
+        motion = read_motion(tmp_path, asked)
+        assert_pose(motion, poses[person], "smplx", known)
+        assert motion.confidence_TJ is not None and len(motion) == 12 and motion.root_position_T3 is not None
+        assert motion.root_position_T3.std(0).max() < 1e-4
+    assert [found.name for found in read_folder(tmp_path, RATE)] == [tmp_path.name]
+
+
+def test_folders_of_clips_are_no_frames(tmp_path: Path) -> None:
+    for clip in ("subject_1", "subject_2"):
+        (tmp_path / clip).mkdir()
+        np.savez(tmp_path / clip / "walk.npz", poses=padded(made_up(5), 24), fps=30.0)
+    with pytest.raises(UserError, match="is a folder"):
+        read_motion(tmp_path, RATE)
+
+
+def test_files_of_whoever_is_in_a_frame(tmp_path: Path) -> None:
+    """As Human3R writes them: rows of people without names, and of nobody in the first frame."""
+    poses = {p: made_up(24, seed=p, camera=True) for p in (0, 1)}
+    for t in range(24):
+        here = [p for p in (0, 1)[:: 1 if t % 2 else -1] if t > 2 * p] if t else []
+        np.savez(
+            tmp_path / f"{t:06}.npz",
+            scores=np.ones(len(here)),
+            msk=np.array(None),
+            shape=np.zeros((len(here), 10)),
+            rotvec=np.array([np.pad(poses[p][t], ((0, 31), (0, 0))) for p in here]).reshape(-1, 53, 3),
+            transl=np.array([[3.0 * p, 0.0, 5.0] for p in here]).reshape(-1, 3),
+        )
+    assert_pose(read_motion(tmp_path, RATE), poses[0], "smplx", list(range(1, 24)))
+    assert_pose(read_motion(tmp_path, ReadOptions(rate=30.0, person="1")), poses[1], "smplx", list(range(3, 24)))

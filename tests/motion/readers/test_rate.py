@@ -112,3 +112,26 @@ def test_what_tells_no_number(value: Any) -> None:
 @pytest.mark.parametrize("value", TOLD.values())
 def test_what_tells_a_number(value: Any) -> None:
     assert number_told(tree_of(value, Path("a"), "")) == 29.97
+
+
+@pytest.mark.parametrize("kind", ["npz", "pickle", "points", "json"])
+@pytest.mark.parametrize("unit", [1.0, 1e3, 1e6, 1e9])
+@pytest.mark.parametrize("rate", [15.0, 29.97002997002997, 60.0, 120.0])
+def test_evenly_spaced_times_tell_the_rate(kind: str, unit: float, rate: float, tmp_path: Path) -> None:
+    """In seconds, milli-, micro- or nanoseconds, from wherever a clock began."""
+    time = np.arange(len(POSES)) / rate * unit + (0 if unit == 1 else 1e4 * unit)
+    written = time if unit < 1e6 else np.round(time).astype(np.int64)
+    write(kind, tmp_path / "a", timestamps=written.tolist() if kind == "json" else written)
+    assert read_motion(tmp_path / "a").frame_rate == pytest.approx(rate, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [[0, 1, 2, 3, 4], [0, 5, 10, 15, 20], [0.0, 0.1, 0.4, 0.5, 0.6], [4, 3, 2, 1, 0], [0.0] * 5, "now", [0.0, np.nan, 1, 2, 3]],
+)  # fmt: skip
+def test_numbers_of_frames_and_uneven_times_tell_none(times: Any, tmp_path: Path) -> None:
+    write("pickle", tmp_path / "a", timestamps=times)
+    with pytest.raises(UserError, match="--rate"):
+        read_motion(tmp_path / "a")
+    write("pickle", tmp_path / "a", timestamps=times, video_fps=25)
+    assert read_motion(tmp_path / "a").frame_rate == 25

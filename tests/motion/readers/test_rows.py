@@ -115,3 +115,18 @@ def test_talkshows_rows_begin_with_jaw_and_eyes(tmp_path: Path, axes: tuple[int,
 def test_other_rows_as_wide_as_talkshows_are_none(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no human motion"):
         read(tmp_path / "a.npy", np.random.default_rng(0).normal(size=(FRAMES, 265)))
+
+
+def test_rows_of_pose_place_and_shape(tmp_path: Path) -> None:
+    body, row = walk(), np.zeros((FRAMES, 85))
+    row[:, 1], row[:, 3:66], row[:, 72:75], row[:, 75:] = 0.4, body.reshape(FRAMES, 63), [1.0, 0.9, 2.0], 0.5
+    expected = from_family(matrices(body), "smpl")
+    motion = read(tmp_path / "a.npy", row)
+    np.testing.assert_allclose(motion.arrays.local_TJ33, expected, atol=1e-4)
+    assert motion.family == "smpl" and motion.betas == (0.5,) * 10
+    np.testing.assert_allclose(motion.arrays.root_position_T3, np.tile([1.0, 0.9, 2.0], (FRAMES, 1)), atol=1e-5)
+    seen = read(tmp_path / "b.npy", np.concatenate([np.ones((FRAMES, 3)), row[:, :72], row[:, 75:]], axis=1))
+    np.testing.assert_allclose(seen.arrays.local_TJ33, expected, atol=1e-4)
+    assert seen.root_position_T3 is None
+    with pytest.raises(UserError, match="no human motion"):
+        read(tmp_path / "c.npy", np.random.default_rng(0).normal(size=(FRAMES, 85)))

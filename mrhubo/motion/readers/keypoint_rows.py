@@ -1,0 +1,100 @@
+"""Points of one frame in JSON: those of each of the people in it, by name or by place.
+
+Legend: K keypoints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrhubo.errors import UserError, shortened
+from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.keypoint_arrays import LIFT, point_key
+
+_PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons")
+_SURE = ("visibility", "confidence", "score", "presence")
+_FLAT = 4
+"""Numbers of a single point, at most."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """The points of a frame; none where nothing was seen."""
+
+    points: list[list[float]]
+    names: list[str] | None = None
+    """Where points have them."""
+
+
+NOTHING = Row([])
+
+
+def counts_of_frame(path: Path, frame: Any) -> list[int]:
+    """How many points each of the people in a frame has, which is a file of its own.
+
+    Raises:
+        UserError: it has no points.
+    """
+    people = people_of(frame)
+    return [len(row_of(path, "the file", 0, one).points) for one in ([frame] if people is None else people)]
+
+
+def people_of(frame: Any) -> list[Any] | None:
+    """The people of a frame: dictionaries, or lists of points; None where it is one person's, or nobody's."""
+    if isinstance(frame, dict):
+        found = next((frame[key] for key in _PEOPLE if isinstance(frame.get(key), list)), None)
+        key = point_key(frame)
+        return found if found is not None or key is None else people_of(frame[key])
+    first = frame[0] if isinstance(frame, list) and frame else None
+    if isinstance(first, dict):
+        return frame if point_key(first) is not None else None
+    return frame if isinstance(first, list) and first and isinstance(first[0], dict | list) else None
+
+
+def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
+    """The points of one person in a frame."""
+    key = point_key(frame) if isinstance(frame, dict) else None
+    frame = frame if key is None else frame[key]
+    if frame is None:
+        return NOTHING
+    names: list[str] = []
+    if isinstance(frame, dict):
+        names, frame = [str(name) for name in frame], list(frame.values())
+    elif isinstance(frame, list):
+        names = [str(point["name"]) for point in frame if isinstance(point, dict) and "name" in point]
+    if not isinstance(frame, list):
+        raise UserError(f"{path}: {where} has no list of points in frame {number}")
+    if len(frame) > _FLAT and all(type(x) in (int, float) for x in frame):  # COCO's way, without an axis for the points
+        width = 3 if len(frame) % 3 == 0 else 4
+        frame = [frame[start : start + width] for start in range(0, len(frame), width)]
+    points = []
+    for point in frame:
+        if isinstance(point, dict):
+            sure = next((point[key] for key in _SURE if key in point), None)
+            point = [point.get("x"), point.get("y"), point.get("z"), *([] if sure is None else [sure])]
+        if point is None:
+            point = [None, None, None]
+        if not isinstance(point, list) or len(point) not in (3, 4):
+            if isinstance(point, list) and len(point) == 2:
+                raise NoMotion(f"{path}: {where} has points in a picture (x and y); {LIFT}")
+            what = f"a point of {len(point)} numbers" if isinstance(point, list) else f"'{shortened(point, 30)}'"
+            raise UserError(f"{path}: {where} has {what} in frame {number}; expected points, [x, y, z] each")
+        points.append([_number(path, where, number, x) for x in point])
+    if len(names) not in (0, len(points)):
+        raise UserError(f"{path}: {where} names {len(names)} of the {len(points)} points in frame {number}; name all")
+    if len(set(names)) < len(names):
+        twice = next(name for place, name in enumerate(names) if name in names[:place])
+        raise UserError(f"{path}: {where} has two points '{shortened(twice, 30)}' in frame {number}")
+    return Row(points, names or None)
+
+
+def _number(path: Path, where: str, frame: int, value: Any) -> float:
+    if value is None:
+        return np.nan
+    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e30:
+        raise UserError(f"{path}: {where} has '{shortened(value, 30)}' for a number in frame {frame}")
+    return float(value)
