@@ -1,7 +1,6 @@
-"""Which folders are motions with a file a frame, of points (`mrhubo.motion.readers.frame_folders` reads them) or SMPL
-parameters (`mrhubo.motion.readers.pose_folders`), or of SAM 3D Body's answers (`mrhubo.motion.readers.sam3d_folders`):
-or of whatever else has points (`mrhubo.motion.readers.point_folders`): told by names and by what the first and the last
-file hold.
+"""Which folders are motions with a file a frame: of points as OpenPose lays them out, which `frame_folders` reads, of
+SMPL parameters (`pose_folders`), of SAM 3D Body's answers (`sam3d_folders`), or of other points (`point_folders`); told
+by names, and by what the first and the last file hold.
 
 SMPLify-X, and collections that were made with it (PROX, EgoBody, RICH), have a folder a frame, with a file a person.
 """
