@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from mrhubo.robot.discovery import discover
+from tests.robot.discovery.made import SIDES, Made, X, Y, at
 
 ARM = (("pitch", "0 0.08 0", "0 1 0"), ("roll", "0.002 0.07 -0.01", "1 0 0"), ("twist", "0 0.04 0", "0 1 0"),
        ("elbow", "0 0.12 0", "0 0 1"))  # fmt: skip
@@ -41,3 +42,22 @@ def test_joints_without_limits_are_arms_too(tmp_path: Path) -> None:
     file = tmp_path / "t.urdf"
     file.write_text(robot('<limit lower="0" upper="0" effort="1" velocity="1"/>').replace("revolute", "continuous"))
     assert len(discover(file).chains["left_arm"]) == len(ARM)
+
+
+@pytest.mark.parametrize("across", [X, Y], ids=["across", "parallel"])
+def test_an_elbow_has_the_shoulders_axes_before_it_and_not_a_clavicles(across, tmp_path: Path) -> None:
+    """A shoulder of two axes, an elbow and a wrist with a hand longer than the forearm: the wrist was taken for the
+    elbow, as three joints are before it.
+    """
+    made = Made()
+    hand = "<collision><origin xyz='0 0 -0.125'/><geometry><box size='0.05 0.05 0.25'/></geometry></collision>"
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_one", "chest", (0, 0.2 * sign, 0.4), Y, (-2.5, 2.5))
+        link = made.join(f"{side}_two", link, (0, 0, 0), X)
+        link = made.join(f"{side}_three", link, (0, 0, -0.25), Y, (-2.3, 0))
+        made.join(f"{side}_four", link, (0, 0, -0.15), across, (-1, 1), shape=hand)
+        made.leg(side)
+    found = made.found(tmp_path)
+    assert at(found, "left_shoulder") == pytest.approx([0, 0.2, 0.4], abs=1e-6)
+    assert at(found, "left_elbow") == pytest.approx([0, 0.2, 0.15], abs=1e-6)
+    assert at(found, "left_wrist") == pytest.approx([0, 0.2, 0.0], abs=1e-6)

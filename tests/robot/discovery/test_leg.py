@@ -92,6 +92,7 @@ def test_a_knee_of_two_hinges_ends_no_leg(apart: float, toes: bool, tmp_path: Pa
     found = made.found(tmp_path)
     assert at(found, "left_hip") == pytest.approx([0, 0.1, -0.1], abs=1e-6)
     assert at(found, "left_ankle") == pytest.approx([0, 0.1, -0.67 - apart], abs=1e-6)
+    assert found.points["left_ankle"].link in ("left_knee_too", "left_ankle", "left_ankle_roll")  # not above the knee
     assert {"left_knee_joint", "left_knee_too_joint", "left_ankle_joint", "left_ankle_roll_joint"} <= set(found.joints)
     assert {"left_knee", "right_knee"} <= about(found)
 
