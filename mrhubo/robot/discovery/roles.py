@@ -155,6 +155,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
+    if _are_fingers(arms):
+        raise UserError(
+            f"{path}: the limbs that are like arms are fingers by their names, as a hand alone has; a humanoid is "
+            f"needed{why_no_arms(bodies)}"
+        )
     # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings, if no name tells.
     spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
     winged = legs is not None and len(legs.chains[0]) < _LEG and not _named_legs(legs)
@@ -238,6 +243,11 @@ def _named_legs(pair: Pair) -> bool:
     """Whether names speak of legs, and not of arms."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     return names.share(called, "leg") > 0.25 and names.share(called, "arm") == 0
+
+
+def _are_fingers(pair: Pair) -> bool:
+    """Whether the names of all joints of both limbs speak of what moves in a hand."""
+    return all(names.speaks_of(step.hinge.name, "hand") for chain in pair.chains for step in chain)
 
 
 def _stands(bodies: Bodies, pair: Pair) -> bool:
