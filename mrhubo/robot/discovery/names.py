@@ -11,6 +11,7 @@ _WORDS = {
     "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|tip",
     "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
     "wrist": r"wrist|wrj",
+    "elbow": r"elbow|(^|[^a-z])elb|ellbogen|coude|codo|hiji",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
     "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",

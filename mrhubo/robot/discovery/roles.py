@@ -125,7 +125,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     fronts = _fronts(armed)
     if len(armed) == 1:
-        if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
+        stands = legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0]) and not _named_arms(armed[0])
+        if stands or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
             raise no_arms(bodies)(
                 f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were "
@@ -243,6 +244,12 @@ def _named_legs(pair: Pair) -> bool:
     """Whether names speak of legs, and not of arms."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     return names.share(called, "leg") > 0.25 and names.share(called, "arm") == 0
+
+
+def _named_arms(pair: Pair) -> bool:
+    """Whether most names speak of arms, and none of legs, as of arms that hang lower than what carries them."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    return names.share(called, "arm") > 0.5 and names.share(called, "leg") == 0
 
 
 def _are_fingers(pair: Pair) -> bool:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from mrhubo.errors import UserError
 from mrhubo.robot.discovery import discover
-from tests.robot.discovery.made import SIDES, Made, X, Y, at
+from tests.robot.discovery.made import SIDES, Made, X, Y, Z, about, at
 
 ARM = (("pitch", "0 0.08 0", "0 1 0"), ("roll", "0.002 0.07 -0.01", "1 0 0"), ("twist", "0 0.04 0", "0 1 0"),
        ("elbow", "0 0.12 0", "0 0 1"))  # fmt: skip
@@ -61,3 +62,34 @@ def test_an_elbow_has_the_shoulders_axes_before_it_and_not_a_clavicles(across, t
     assert at(found, "left_shoulder") == pytest.approx([0, 0.2, 0.4], abs=1e-6)
     assert at(found, "left_elbow") == pytest.approx([0, 0.2, 0.15], abs=1e-6)
     assert at(found, "left_wrist") == pytest.approx([0, 0.2, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("called", ["elbow", "joint"])
+def test_a_joint_that_is_called_an_elbow_and_was_not_taken_for_it_is_asked_about(called: str, tmp_path: Path) -> None:
+    """A lesson's arm in a T whose only shoulder joint turns about the arm: its upper arm has no length by the axes."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_shoulder", "chest", (0, 0.2 * sign, 0.4), Y, (-3, 1))
+        link = made.join(f"{side}_{called}", link, (0, 0.25 * sign, 0), Z, (-2.3, 0) if sign > 0 else (0, 2.3))
+        link = made.join(f"{side}_wrist_yaw", link, (0, 0.25 * sign, 0), Y)
+        made.join(f"{side}_wrist_pitch", link, (0, 0, 0), Z)
+        made.join(f"{side}_ankle", made.leg(side), (0, 0, -0.4), Y, (-0.6, 0.6))
+    found = made.found(tmp_path)
+    assert ({"left_elbow", "right_elbow", "left_shoulder"} <= about(found)) == (called == "elbow")
+
+
+@pytest.mark.parametrize("called", ["arm", "limb"])
+def test_arms_that_hang_lower_than_all_else_are_no_legs_if_names_say_so(called: str, tmp_path: Path) -> None:
+    """An upper body on a plate whose wrist, elbow and shoulder turn about parallel axes."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_{called}_one", "chest", (0, 0.2 * sign, 0.2), Y, (-2.5, 2.5))
+        link = made.join(f"{side}_{called}_two", link, (0, 0, 0), X)
+        link = made.join(f"{side}_{called}_three", link, (0, 0, -0.25), Y, (-2.3, 0))
+        link = made.join(f"{side}_{called}_four", link, (0, 0, -0.25), X, (-1, 1))
+        made.join(f"{side}_{called}_five", link, (0, 0, 0), Y, (-1, 1))
+    if called == "arm":
+        assert at(made.found(tmp_path), "left_elbow") == pytest.approx([0, 0.2, -0.05], abs=1e-6)
+    else:
+        with pytest.raises(UserError, match="looks like legs"):
+            made.found(tmp_path)
