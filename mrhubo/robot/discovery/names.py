@@ -53,3 +53,12 @@ def sides(names: Iterable[tuple[str, str]]) -> float:
     """-1..1: mean of `side` over pairs of names."""
     found = [side(name, other) for name, other in names]
     return sum(found) / len(found) if found else 0.0
+
+
+def twins(name: str, other: str) -> bool:
+    """Whether two names differ by `left` and `right`, or by an l and an r, alone."""
+    name, other = name.lower(), other.lower()
+    if name != other and name.replace("left", "right") == other.replace("left", "right"):
+        return True
+    different = [{a, b} for a, b in zip(name, other, strict=False) if a != b]
+    return len(name) == len(other) and different == [{"l", "r"}]

@@ -106,7 +106,7 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     armed = [
         pair for pair in armed
         if len(pair.chains[0]) > _CASTER or any(step.hinge.limited for step in pair.chains[0])
-        or _folds(pair.chains[0])
+        or _folds(pair.chains[0]) or _named_arms(pair)
     ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
