@@ -7,11 +7,11 @@ from collections.abc import Iterable
 
 _WORDS = {
     "leg": r"leg|hip|knee|ankle|ankel|thigh|shin|calf|foot|feet|toe|crotch|crus|tibia|femur|sole|shank",
-    "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar",
+    "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar|(^|_)(sho|el)(_|$)",
     "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|tip",
     "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
     "wrist": r"wrist|wrj",
-    "elbow": r"elbow|(^|[^a-z])elb|ellbogen|coude|codo|hiji",
+    "elbow": r"elbow|(^|[^a-z])elb|(^|_)el(_|$)|ellbogen|coude|codo|hiji",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
     "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",

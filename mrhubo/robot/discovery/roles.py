@@ -100,7 +100,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     """
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
-    large = [pair for pair in pairs if pair.size > least]
+    # By shapes too, as those of a forearm beyond an elbow that is the last joint.
+    large = [pair for pair in pairs if max(pair.size, min(bodies.span(chain[0]) for chain in pair.chains)) > least]
     armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
     # Casters have two joints too, but none of them has limits; nor has any joint of some files, or of some legs.
     armed = [

@@ -480,3 +480,16 @@ def test_arms_of_two_crossed_axes_without_limits_are_no_casters_if_names_say_so(
     else:
         with pytest.raises(UserError, match="no arms were found"):
             made.found(tmp_path)
+
+
+def test_short_arms_are_as_long_as_their_forearms_shapes(tmp_path: Path) -> None:
+    """A lesson's arms end at the elbow, a quarter as far out as its legs reach; their forearms are boxes."""
+    made = Made()
+    box = "<collision><origin xyz='0 0 -0.1'/><geometry><box size='0.06 0.06 0.2'/></geometry></collision>"
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_one", "chest", (0, 0.2 * sign, 0.4), Y, (-2.5, 1.0), shape=box)
+        made.join(f"{side}_two", link, (0, 0, -0.18), Y, (-2.3, 0), shape=box)
+        made.join(f"{side}_ankle", made.leg(side), (0, 0, -0.4), Y, (-0.6, 0.6))
+    found = made.found(tmp_path)
+    assert found.chains["left_arm"] == ("left_one_joint", "left_two_joint")
+    assert found.chains["left_leg"][-1] == "left_ankle_joint"
