@@ -56,11 +56,19 @@ def _best(chain: Chain, scores: np.ndarray) -> int:
     near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
     if len(near) == 1:
         return near[0]
-    gap_N = np.diff(measure(lines_of(chain)).out_N)
-    # Of those about as good, one with a whole shoulder before it, and no more beyond it than a wrist has.
-    return max(
-        near, key=lambda i: (min(_swings(gap_N, i), 2), min(i, _BEFORE), len(scores) - i - 1 <= WRIST_JOINTS, scores[i])
-    )
+    out_N = measure(lines_of(chain)).out_N
+    gap_N = np.diff(out_N)
+
+    def fitness(i: int) -> tuple[bool, int, int, bool, float]:
+        swings = _swings(gap_N, i)
+        # An arm of more joints than a human's may begin with a boom.
+        short = len(scores) > _BEFORE + 1 + WRIST_JOINTS or float(out_N[i - swings]) < gap_N[i - 1]
+        whole = len(scores) - i - 1 <= WRIST_JOINTS
+        return short, min(swings, 2), min(i, _BEFORE), whole, float(scores[i])
+
+    # Of those about as good, one whose clavicle is shorter than its upper arm, with a whole shoulder before it, and no
+    # more beyond it than a wrist has.
+    return max(near, key=fitness)
 
 
 def _swings(gap_N: np.ndarray, elbow_at: int) -> int:

@@ -93,3 +93,40 @@ def test_arms_that_hang_lower_than_all_else_are_no_legs_if_names_say_so(called: 
     else:
         with pytest.raises(UserError, match="looks like legs"):
             made.found(tmp_path)
+
+
+def test_no_clavicle_is_longer_than_the_upper_arm_behind_it(tmp_path: Path) -> None:
+    """Six joints of an industrial arm on each side of a table: pan, lift, elbow, and a wrist with a long tool, which was
+    taken for the elbow, with the upper arm for a clavicle.
+    """
+    made = Made()
+    tool = "<collision><origin xyz='0 0 0.18'/><geometry><box size='0.05 0.05 0.36'/></geometry></collision>"
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_one", "chest", (0, 0.3 * sign, 0.2), Z, (-2.5, 2.5))
+        link = made.join(f"{side}_two", link, (0, 0, 0.2), Y, (-2, 2))
+        link = made.join(f"{side}_three", link, (0, 0, 0.41), Y, (-2.5, 0))
+        link = made.join(f"{side}_four", link, (0.01, 0, 0), Z, (-2.5, 2.5))
+        link = made.join(f"{side}_five", link, (0, 0, 0.31), Y, (-2, 2))
+        made.join(f"{side}_six", link, (0, 0, 0), Z, (-3, 3), shape=tool)
+    found = made.found(tmp_path)
+    assert at(found, "left_elbow")[2] == pytest.approx(0.81, abs=1e-6)
+    assert at(found, "left_shoulder") == pytest.approx([0, 0.3, 0.4], abs=1e-6)
+
+
+@pytest.mark.parametrize("turns", [2.0, 6.28])
+def test_what_turns_all_the_way_round_is_no_jaw(turns: float, tmp_path: Path) -> None:
+    """The last joint of an industrial arm, parallel at zero to the one that swings its wrist already."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_pan", "chest", (0, 0.3 * sign, 0.2), Z, (-6.28, 6.28))
+        for name, z, axis, most in (
+            ("lift", 0.1, Y, 6.28), ("elbow", 0.42, Y, 3.14), ("wrist_1", 0.39, Y, 6.28), ("wrist_2", 0.09, Z, 6.28)
+        ):  # fmt: skip
+            link = made.join(f"{side}_{name}", link, (0, 0.13 if name == "wrist_2" else 0, z), axis, (-most, most))
+        made.parts.append(f"<link name='{side}_flange'/>")
+        made.parts.append(
+            f"<joint name='{side}_last_joint' type='revolute'><parent link='{link}'/><child link='{side}_flange'/>"
+            f"<origin xyz='0 0.08 0.09'/><axis xyz='0 1 0'/><limit lower='-{turns}' upper='{turns}' effort='1' "
+            "velocity='1'/></joint>"
+        )
+    assert ("left_last_joint" in made.found(tmp_path).joints) == (turns > 3)
