@@ -23,6 +23,7 @@ _WORDS = {
     "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
     "tool": r"tool|tcp|(^|_)ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
 }
+_SIDES = re.compile(r"left|right")
 _PATTERNS = {kind: re.compile(text, re.IGNORECASE) for kind, text in _WORDS.items()}
 
 
@@ -58,7 +59,7 @@ def sides(names: Iterable[tuple[str, str]]) -> float:
 def twins(name: str, other: str) -> bool:
     """Whether two names differ by `left` and `right`, or by an l and an r, alone."""
     name, other = name.lower(), other.lower()
-    if name != other and name.replace("left", "right") == other.replace("left", "right"):
+    if name != other and all(map(_SIDES.search, (name, other))) and _SIDES.sub("", name) == _SIDES.sub("", other):
         return True
     different = [{a, b} for a, b in zip(name, other, strict=False) if a != b]
     return len(name) == len(other) and different == [{"l", "r"}]
