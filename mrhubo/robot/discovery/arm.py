@@ -99,6 +99,7 @@ def read_arm(bodies: Bodies, chain: Chain, by_origin: bool = True) -> Arm | None
     if found is None:
         return None
     elbow_at, other = found
+    other = other or _named_elbow(chain, elbow_at)
     lines = lines_of(chain)
     twist_at = _twist(lines, elbow_at)
     shoulder, clavicles = _shoulder(chain, lines, elbow_at, twist_at)
@@ -128,6 +129,15 @@ def read_arm(bodies: Bodies, chain: Chain, by_origin: bool = True) -> Arm | None
     if branches:
         shoulder, elbow, wrist = (doubted(spot, branches) for spot in (shoulder, elbow, wrist))
     return Arm(chain, elbow_at, twist_at, clavicles, shoulder, elbow, hinge_3, wrist, forearm_twist_at, left_out)
+
+
+def _named_elbow(chain: Chain, elbow_at: int) -> str | None:
+    """The joint that is called an elbow where the one that was taken for it is called none, as where an upper arm lies
+    along the only axis of its shoulder, and so has no length.
+    """
+    if speaks_of(chain[elbow_at].hinge.name, "elbow"):
+        return None
+    return next((step.hinge.name for step in chain if speaks_of(step.hinge.name, "elbow")), None)
 
 
 def _without_slides(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, str], ...]]:

@@ -20,6 +20,8 @@ _CROSSING = 0.1
 """How near two axes pass each other that cross, as a share of the longest stretch."""
 _CLOSE = 0.8
 """Second axis's share of the elbow's stretches from which on it may be the elbow as well."""
+_BALL = 0.5
+"""How far apart axes of one shoulder are, as a share of the upper arm; what lies farther off is a clavicle's."""
 _BEFORE, _FEW = 3, 0.8
 """Joints before the elbow of an arm with many, and what an elbow loses for each that is missing: it may be a shoulder
 below a clavicle."""
@@ -30,7 +32,7 @@ def find_elbow(bodies: Bodies, chain: Chain) -> int | None:
     chain is too short to have one.
     """
     scores = _elbow_scores(bodies, chain)
-    return None if scores is None else _best(scores)
+    return None if scores is None else _best(chain, scores)
 
 
 def elbow_and_rival(bodies: Bodies, chain: Chain) -> tuple[int, str | None] | None:
@@ -41,7 +43,7 @@ def elbow_and_rival(bodies: Bodies, chain: Chain) -> tuple[int, str | None] | No
     scores = _elbow_scores(bodies, chain)
     if scores is None:
         return None
-    elbow_at = _best(scores)
+    elbow_at = _best(chain, scores)
     if elbow_at >= _BEFORE and len(chain) - elbow_at - 1 <= WRIST_JOINTS:
         scores[elbow_at + 1 :] = 0.0
     best = float(scores[elbow_at])
@@ -50,10 +52,31 @@ def elbow_and_rival(bodies: Bodies, chain: Chain) -> tuple[int, str | None] | No
     return elbow_at, chain[other].hinge.name if scores[other] > _CLOSE * best else None
 
 
-def _best(scores: np.ndarray) -> int:
+def _best(chain: Chain, scores: np.ndarray) -> int:
     near = [i for i, score in enumerate(scores) if score > _CLOSE * scores.max()]
-    # Of those about as good, one with a whole shoulder before it, and no more beyond it than a wrist has.
-    return max(near, key=lambda i: (min(i, _BEFORE), len(scores) - i - 1 <= WRIST_JOINTS, scores[i]))
+    if len(near) == 1:
+        return near[0]
+    out_N = measure(lines_of(chain)).out_N
+    gap_N = np.diff(out_N)
+
+    def fitness(i: int) -> tuple[bool, int, int, bool, float]:
+        swings = _swings(gap_N, i)
+        # An arm of more joints than a human's may begin with a boom.
+        short = len(scores) > _BEFORE + 1 + WRIST_JOINTS or float(out_N[i - swings]) < gap_N[i - 1]
+        whole = len(scores) - i - 1 <= WRIST_JOINTS
+        return short, min(swings, 2), min(i, _BEFORE), whole, float(scores[i])
+
+    # Of those about as good, one whose clavicle is shorter than its upper arm, with a whole shoulder before it, and no
+    # more beyond it than a wrist has.
+    return max(near, key=fitness)
+
+
+def _swings(gap_N: np.ndarray, elbow_at: int) -> int:
+    """How many axes before an elbow are its shoulder's, near each other."""
+    near = 1
+    while near < elbow_at and gap_N[elbow_at - 1 - near] < _BALL * gap_N[elbow_at - 1]:
+        near += 1
+    return near
 
 
 def elbow_reach(bodies: Bodies, chain: Chain) -> float:

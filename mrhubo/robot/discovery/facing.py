@@ -30,6 +30,8 @@ _OPPOSED = 0.3
 """How much all other votes must speak against the names of the sides to make them doubtful."""
 _TRUNK = 0.6
 """How long a trunk is, as a share of the arm, that tells more than the legs."""
+_LEANING, _LIGHT = 0.8, 1.0
+"""Cosine of how far legs lean from the trunk that do not stand at the zero pose (37 degrees), and what they count."""
 _AGAINST, _HEAVY, _DOUBTED = 0.3, 2.0, 0.45
 """Cosine under which a cue speaks against where up is, how much one has to count, and how sure up is then at most."""
 _SAME = 0.9986
@@ -134,6 +136,7 @@ def _up(
     bodies: Bodies, roles: Roles, arms: list[Arm], legs: list[Leg], normal_3: np.ndarray
 ) -> tuple[np.ndarray, float, str]:
     cues: list[tuple[str, np.ndarray, float]] = []
+    leaning = False
     shoulders_3 = np.mean([arm.shoulder.point_3 for arm in arms], axis=0)
     if legs:
         hips_3 = np.mean([leg.hip.point_3 for leg in legs], axis=0)
@@ -141,7 +144,9 @@ def _up(
         # A long trunk tells where the chest is up whatever the legs do, which may sit, or end in a loop.
         trunk_3 = shoulders_3 - hips_3
         long = min(1.0, float(np.linalg.norm(trunk_3)) / (_TRUNK * arms[0].length))
-        cues += [("the legs", hips_3 - ankles_3, 3.0), ("hips and shoulders", trunk_3, 2.0 + 2.0 * long)]
+        legs_3 = hips_3 - ankles_3
+        leaning = long == 1.0 and float(unit(legs_3) @ unit(trunk_3)) < _LEANING
+        cues += [("the legs", legs_3, _LIGHT if leaning else 3.0), ("hips and shoulders", trunk_3, 2.0 + 2.0 * long)]
     else:
         for what, at_3, weight in _below(bodies, roles):
             near = float(np.linalg.norm(at_3 - shoulders_3)) / (0.3 * arms[0].length)
@@ -167,6 +172,8 @@ def _up(
     value = sum(w * float(best @ v) for _, v, w in flat) / total
     told = [what for what, v, _ in flat if float(best @ v) > 0.5]
     against = [what for what, v, w in flat if float(best @ v) < _AGAINST and w >= _HEAVY]
+    if leaning:
+        against.append("the legs, which lean from the trunk")
     if not legs and bodies.body_of[bodies.description.root] in _hanging(bodies, roles):
         against.append("that the file begins at a hand or a head, so that its frame tells nothing")
     sure, cue = float(np.clip(value, 0.0, 1.0)), ", ".join(told) or "joint axes"

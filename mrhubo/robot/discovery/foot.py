@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrhubo.robot.discovery.arm import GUESS, Spot
-from mrhubo.robot.discovery.bodies import Bodies
+from mrhubo.robot.discovery.bodies import Bodies, lines_of
 from mrhubo.robot.discovery.facing import Heading
 from mrhubo.robot.discovery.leg import Leg
+from mrhubo.robot.discovery.leg_axes import parallel
 from mrhubo.robot.discovery.lines import cross, unit
+from mrhubo.robot.discovery.motion import straight_angle
 
 _FLAT, _TILTED = 0.9, 0.9998
 """Cosines of how far the flat of a foot's box may be from the robot's up to be its sole (25 degrees), and within which
 it stands flat at the zero pose (1 degree)."""
-_AHEAD = 0.85
-"""Cosine of how far from the robot's front a foot may point (30 degrees)."""
+_ACROSS = 0.3
+"""Cosine of how far from left and right an ankle's axis may lie at the zero pose that tells where a foot points: a leg
+may be turned there."""
 _STANDING = 0.8
 """Cosine of how far from downwards a leg may run at the zero pose for its foot to stand on a floor there."""
 _SPREAD = 0.2
 """Sine of how far outwards or inwards it may run there for its foot to be flat (12 degrees)."""
+_BEYOND = 0.35
+"""How far beyond its limits an ankle may have to turn [rad] for the foot to be flat below an upright shin."""
 _HEIGHT, _HEEL = 0.165, 0.32
 """Where an ankle is that has no joint: how high above the sole, as a share of the knee's height, and how far before the
 heel, as a share of the foot's length. Both are medians of fifteen public humanoids whose ankles have joints, of which
@@ -47,14 +53,15 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
     """The foot at the end of a leg."""
     last = leg.chain[-1]
     link = last.outer_link
-    up_3, how, sure = _up(bodies, last.end, _upright(bodies, leg, heading))
+    up_3, how, sure = _up(bodies, leg, _upright(bodies, leg, heading))
     up_3 = heading.up_3 if how is None else up_3
     doubt = None
     along_3 = unit(leg.ankle.point_3 - leg.hip.point_3)
     down, aside = -float(along_3 @ heading.up_3), abs(float(along_3 @ heading.left_3))
     if how is None:
         how, sure = "as it stands at the zero pose", 0.7
-        if down < _STANDING or aside > _SPREAD or leg.ankle_at is None:
+        stands = _stands(leg, up_3)
+        if down < _STANDING or aside > _SPREAD or leg.ankle_at is None or not stands:
             sure = 0.4
             why = "the leg is spread at zero" if aside > _SPREAD else "the leg does not stand at zero"
             why = "no joint turns it against the shin" if leg.ankle_at is None else why
@@ -62,11 +69,11 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
             doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
     forward_3 = heading.forward_3
     if leg.straight and leg.ankle_at is not None:
+        # By left and right, which no foot that hangs at zero changes.
         axis_3 = leg.chain[leg.ankle_at].hinge.line.axis_3
-        ahead_3 = unit(cross(axis_3, up_3))
-        ahead_3 = ahead_3 * np.sign(ahead_3 @ heading.forward_3)
-        if float(ahead_3 @ heading.forward_3) > _AHEAD:
-            forward_3, how = ahead_3, f"{how}; across the ankle's pitch axis"
+        left = float(axis_3 @ heading.left_3)
+        if abs(left) > _ACROSS:
+            forward_3, how = unit(cross(np.sign(left) * axis_3, up_3)), f"{how}; across the ankle's pitch axis"
     forward_3 = unit(forward_3 - up_3 * (up_3 @ forward_3))
     return Foot(link, forward_3, up_3, sure, how, doubt)
 
@@ -79,7 +86,7 @@ def with_fixed_ankle(bodies: Bodies, leg: Leg, heading: Heading) -> Leg:
     if leg.ankle_at is not None or leg.wheeled or not bodies.shapes_of[foot]:
         return leg
     knee_3 = leg.knee.point_3
-    up_3 = _up(bodies, foot, _upright(bodies, leg, heading))[0]
+    up_3 = _up(bodies, leg, _upright(bodies, leg, heading))[0]
     ahead_3 = unit(heading.forward_3 - up_3 * (up_3 @ heading.forward_3))
     corners = [bodies.shape_corners(shape) - knee_3 for shape in bodies.shapes_of[foot]]
     tall = -min(float((corners_83 @ up_3).min()) for corners_83 in corners)
@@ -106,16 +113,37 @@ def _upright(bodies: Bodies, leg: Leg, heading: Heading) -> np.ndarray:
     return unit(leg.knee.point_3 - lowest.mean(0))
 
 
-def _up(bodies: Bodies, foot: int, up_3: np.ndarray) -> tuple[np.ndarray, str | None, float]:
+def _up(bodies: Bodies, leg: Leg, up_3: np.ndarray) -> tuple[np.ndarray, str | None, float]:
     """Where a foot's sole faces away from, by its largest box: a given up_3 itself, and no cue, where there is none
-    near it.
+    near it. Of a foot that hangs at the zero pose, the only side with which the ankle can stand tells.
     """
-    boxes = [shape for shape in bodies.shapes_of[foot] if shape.kind == "box"]
+    boxes = [shape for shape in bodies.shapes_of[leg.chain[-1].end] if shape.kind == "box"]
     if boxes:
         box = max(boxes, key=lambda shape: float(np.prod(shape.size)))
         axes_33 = (bodies.pose_44[box.link] @ box.origin_44)[:3, :3].T
-        near = max((sign * axis_3 for axis_3 in axes_33 for sign in (1.0, -1.0)), key=lambda a_3: float(a_3 @ up_3))
+        sides = [sign * axis_3 for axis_3 in axes_33 for sign in (1.0, -1.0)]
+        near = max(sides, key=lambda side_3: float(side_3 @ up_3))
         cosine = float(near @ up_3)
-        if cosine > _FLAT:
+        if cosine > _FLAT and _stands(leg, near):
             return (up_3 if cosine > _TILTED else unit(near)), "flat as its box is", 0.9
+        standing = [side_3 for side_3 in sides if _stands(leg, side_3)]
+        if len(standing) == 1:
+            return unit(standing[0]), "flat as its box is, on the only side on which the ankle lets it stand", 0.7
     return up_3, None, 0.0
+
+
+def _stands(leg: Leg, up_3: np.ndarray) -> bool:
+    """Whether the ankle's limits let a foot whose sole faces away from up_3 stand below an upright shin."""
+    if leg.ankle_at is None or not leg.chain[leg.ankle_at].hinge.limited:
+        return True
+    step, lines = leg.chain[leg.ankle_at], lines_of(leg.chain)
+    lower, upper = float(step.hinge.lower or 0.0) - _BEYOND, float(step.hinge.upper or 0.0) + _BEYOND
+    axis_3 = step.sign * step.hinge.line.axis_3
+    if abs(float(axis_3 @ up_3)) > _FLAT:
+        return False
+    # The shin begins at the knee, or at the second one of its hinges.
+    knee_at = next(
+        i for i in reversed(range(leg.ankle_at)) if i == leg.knee_at or parallel(lines[i], lines[leg.ankle_at])
+    )
+    angle = straight_angle(axis_3, up_3, lines[knee_at].nearest(leg.ankle.point_3) - leg.ankle.point_3)
+    return any(lower <= angle + turn <= upper for turn in (-math.tau, 0.0, math.tau))

@@ -22,6 +22,8 @@ _MEET = 0.005
 """How near two axes pass each other that are meant to cross, as a share of the arm: 2 mm on half a metre."""
 _LONGER = 1.5
 """How many times longer the shorter one of upper arm and forearm must be with a driven joint than without it."""
+_ROUND = 5.5
+"""From what range on a joint is no jaw's [rad]."""
 _SHORT = 4
 """Joints of an arm of which even one that others mimic is no gripper: a bar beside the elbow follows it."""
 
@@ -50,7 +52,7 @@ def without_hand(bodies: Bodies, chain: Chain) -> tuple[Chain, tuple[tuple[str, 
             continue
         break
     if end == len(chain) and elbow_at and not bodies.onward(chain[-1]):
-        if end > first + 1 and _is_jaw(chain, elbow_at) and not _rolls(bodies, chain):
+        if end > first + 1 and _is_jaw(chain, elbow_at) and not (_rolls(bodies, chain) or _turns_round(chain)):
             end, why = end - 1, "its axis lies beside the hand's, as a jaw's does"
         elif end == first + 1 and _is_lone_jaw(bodies, chain, elbow_at):
             end, why = end - 1, "its axis lies beside the forearm's middle and it carries no more than a finger: a jaw"
@@ -94,6 +96,14 @@ def _is_jaw(chain: Chain, elbow_at: int) -> bool:
         return False  # two axes that cross are a wrist, wherever the forearm's twist passes them
     twists = [line for line in lines[first:-1] if line not in before and sine(line.axis_3, hinge.axis_3) > 0.95]
     return bool(twists) and float(np.linalg.norm(np.subtract(*feet(twists[0], last)))) > _BESIDE * arm
+
+
+def _turns_round(chain: Chain) -> bool:
+    """Whether the last joint turns all the way round, as no jaw does: by its limits, or as the only one without any."""
+    hinge = chain[-1].hinge
+    if hinge.lower is None or hinge.upper is None:
+        return any(step.hinge.limited for step in chain)
+    return hinge.upper - hinge.lower > _ROUND
 
 
 def _rolls(bodies: Bodies, chain: Chain) -> bool:

@@ -187,7 +187,6 @@ def _ankle(
         end_3, how, sure = limb_end(bodies, chain[-1], knee_3, knee_3 - hip_3, "ankle")
         return Spot(end_3, chain[-1].end, (chain[-1].outer_link,), how, sure)
     others = [i for i in range(knee_at + 1, len(lines)) if i != ankle_at and not parallel(lines[i], lines[ankle_at])]
-    step = chain[knee_at + 1]
     if others:
         point_3, cue, sure = (
             feet(lines[ankle_at], lines[others[0]])[0],
@@ -196,8 +195,12 @@ def _ankle(
         )
     else:
         point_3, cue, sure = lines[ankle_at].nearest(knee_3), "the ankle axis's point nearest to the knee", 0.8
+    # A second hinge of the knee moves the ankle, and is none of its joints.
+    hinges = (i for i in range(knee_at + 1, ankle_at) if parallel(lines[i], lines[ankle_at]))
+    first = max(hinges, default=knee_at) + 1
+    step = chain[first]
     links = [step.inner_link]
-    for i in range(knee_at + 1, len(lines)):
+    for i in range(first, len(lines)):
         if lines[i].distance(point_3) > ON * bodies.size:
             break
         links.append(chain[i].outer_link)

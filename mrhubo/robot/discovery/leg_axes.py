@@ -43,11 +43,12 @@ def _three(lines: list[Line]) -> tuple[int, int, int] | None:
         max(one.distance(other.point_3) for one, other in itertools.combinations(lines, 2)) if len(lines) > 2 else 0.0
     )
     for j in range(1, len(lines)):
-        # The next parallel axis some way off is the ankle's; toes have one more.
+        # The next parallel axis some way off is the ankle's; toes have one more, and a knee of two hinges one between.
         shanks = {
             k: lines[j].distance(lines[k].point_3) for k in range(j + 1, len(lines)) if parallel(lines[j], lines[k])
         }
-        k = next((k for k, shank in shanks.items() if shank > _APART * length), None)
+        most = max(shanks.values(), default=0.0)
+        k = next((k for k, shank in shanks.items() if shank > max(_APART * length, _SHORT * most)), None)
         if k is None:
             continue
         shank = shanks[k]
@@ -59,6 +60,8 @@ def _three(lines: list[Line]) -> tuple[int, int, int] | None:
         ]
         if not above:
             continue
+        longest = max(thighs[i] for i in above)
+        above = [i for i in above if thighs[i] > _SHORT * longest]
         i = min(above, key=lambda i: (round(sine(lines[i].axis_3, lines[j].axis_3), 2), -i))
         if min(thighs[i], shank) > best:
             best, found = min(thighs[i], shank), (i, j, k)

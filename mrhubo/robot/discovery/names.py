@@ -7,10 +7,11 @@ from collections.abc import Iterable
 
 _WORDS = {
     "leg": r"leg|hip|knee|ankle|ankel|thigh|shin|calf|foot|feet|toe|crotch|crus|tibia|femur|sole|shank",
-    "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar",
+    "arm": r"arm|shoulder|elbow|wrist|hand|forearm|humer|bicep|gripper|finger|clavic|collar|(^|_)(sho|el)(_|$)",
     "hand": r"finger|thumb|gripper|jaw|claw|knuckle|index|pinky|little|middle_(?!lumb|abdo)|ring_|tip",
     "turn": r"yaw|pitch|roll|rot|twist|wrist|flex",
     "wrist": r"wrist|wrj",
+    "elbow": r"elbow|(^|[^a-z])elb|(^|_)el(_|$)|ellbogen|coude|codo|hiji",
     "camera": r"cam(?!b)|eye|face|nose|imager|optical|realsense|kinect|zed|stereo|rgb|d435|xtion|vision",
     "head": r"head|neck|skull",
     "waist": r"waist|torso|spine|lumbar|trunk|lift|column|pelvis|abdomen",
@@ -22,6 +23,7 @@ _WORDS = {
     "sole": r"sole|(foot|ankle)_?(contact|center|base|ground)",
     "tool": r"tool|tcp|(^|_)ee(_|$)|end_?eff|tip|palm|hand|gripper|grasp",
 }
+_SIDES = re.compile(r"left|right")
 _PATTERNS = {kind: re.compile(text, re.IGNORECASE) for kind, text in _WORDS.items()}
 
 
@@ -52,3 +54,12 @@ def sides(names: Iterable[tuple[str, str]]) -> float:
     """-1..1: mean of `side` over pairs of names."""
     found = [side(name, other) for name, other in names]
     return sum(found) / len(found) if found else 0.0
+
+
+def twins(name: str, other: str) -> bool:
+    """Whether two names differ by `left` and `right`, or by an l and an r, alone."""
+    name, other = name.lower(), other.lower()
+    if name != other and all(map(_SIDES.search, (name, other))) and _SIDES.sub("", name) == _SIDES.sub("", other):
+        return True
+    different = [{a, b} for a, b in zip(name, other, strict=False) if a != b]
+    return len(name) == len(other) and different == [{"l", "r"}]

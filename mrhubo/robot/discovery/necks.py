@@ -37,6 +37,8 @@ def find_necks(bodies: Bodies, arms: Pair, used: set[str]) -> tuple[Chain, ...]:
     for step in bodies.steps_from[arms.body]:
         if step.hinge.name in used or not step.hinge.rotary or _is_sensor(bodies, step):
             continue
+        if any(names.twins(step.hinge.name, other.hinge.name) for other in bodies.steps_from[arms.body]):
+            continue  # one of two legs that a file has not alike
         chain: list[Step] = []
         todo, beside = [step], bodies.steps_from[arms.body]
         while todo:

@@ -55,6 +55,8 @@ class _Bend:
     """Where it rather goes than the other way, row by row, where it goes neither there nor away from there."""
     least: float
     """How far it must bend the other way."""
+    twisted: bool
+    """Whether a joint before it twists the upper limb, so that where the lower one goes at zero tells nothing."""
 
     @property
     def what(self) -> str:
@@ -183,12 +185,13 @@ def _bends(arms: Mapping[str, Arm], legs: Mapping[str, Leg], heading: Heading) -
         inward_3 = -heading.left_3 if side == "left" else heading.left_3
         ways_33 = np.stack((heading.up_3, inward_3, forward_3))
         yield _Bend(
-            f"{side}_elbow", arm.chain[arm.elbow_at], ends[1] - ends[0], ends[2] - ends[1], forward_3, ways_33, _ELBOW
+            f"{side}_elbow", arm.chain[arm.elbow_at], ends[1] - ends[0], ends[2] - ends[1], forward_3, ways_33, _ELBOW,
+            _twist(arm) is not None,
         )  # fmt: skip
     for side, leg in legs.items():
         ends = [spot.point_3 for spot in (leg.hip, leg.knee, leg.ankle)]
         step, back_3 = leg.chain[leg.knee_at], -forward_3
-        yield _Bend(f"{side}_knee", step, ends[1] - ends[0], ends[2] - ends[1], back_3, back_3[None], _KNEE)
+        yield _Bend(f"{side}_knee", step, ends[1] - ends[0], ends[2] - ends[1], back_3, back_3[None], _KNEE, False)
 
 
 def _gear(bodies: Bodies, step: Step, moving: Collection[str]) -> Mimic | None:
@@ -229,10 +232,11 @@ def _human_range(
     share = bend_side(lower, upper, straight)
     goes_3 = cross(axis_3, upper_3) / max(float(np.linalg.norm(upper_3)), 1e-9)
     ahead = float(goes_3 @ bend.human_3)
-    if bend.what == "knee" and share * ahead < 0 and min(abs(share), abs(ahead)) > _CLEAR:
+    if not bend.twisted and share * ahead < 0 and min(abs(share), abs(ahead)) > _CLEAR:
+        way, other, limb = ("forwards", "backwards", "leg") if bend.what == "knee" else ("backwards", "forwards", "arm")
         return None, Question(
-            bend.about, f"'{name}' bends further forwards than backwards, as no human knee does: either its limits are "
-            "wrong, or the robot faces the other way, or its leg is no human's", (name,),
+            bend.about, f"'{name}' bends further {way} than {other}, as no human {bend.what} does: either its limits "
+            f"are wrong, or the robot faces the other way, or its {limb} is no human's", (name,),
         )  # fmt: skip
     if min(straight - lower, upper - straight) < bend.least:
         return None, None

@@ -100,13 +100,14 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     """
     path = bodies.description.path
     least = max(_SMALL * max((pair.size for pair in pairs), default=0.0), _TINY * bodies.size)
-    large = [pair for pair in pairs if pair.size > least]
+    # By shapes too, as those of a forearm beyond an elbow that is the last joint.
+    large = [pair for pair in pairs if max(pair.size, min(bodies.span(chain[0]) for chain in pair.chains)) > least]
     armed = [pair for pair in large if all(read_arm(bodies, chain) is not None for chain in pair.chains)]
     # Casters have two joints too, but none of them has limits; nor has any joint of some files, or of some legs.
     armed = [
         pair for pair in armed
         if len(pair.chains[0]) > _CASTER or any(step.hinge.limited for step in pair.chains[0])
-        or _folds(pair.chains[0])
+        or _folds(pair.chains[0]) or _named_arms(pair)
     ]  # fmt: skip
     if not armed:
         count = len(bodies.hinges)
@@ -125,7 +126,8 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
     legness = {id(pair): _legness(bodies, pair) for pair in armed}
     fronts = _fronts(armed)
     if len(armed) == 1:
-        if (legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0])) or _named_legs(armed[0]):
+        stands = legness[id(armed[0])] > 0.0 and _stands(bodies, armed[0]) and not _named_arms(armed[0])
+        if stands or _named_legs(armed[0]):
             joints = ", ".join(f"'{step.hinge.name}'" for step in armed[0].chains[0])
             raise no_arms(bodies)(
                 f"{path}: the only pair of limbs looks like legs ({joints}), and no arms were "
@@ -155,6 +157,11 @@ def find_roles(bodies: Bodies, pairs: Sequence[Pair]) -> Roles:
             raise UserError(
                 f"{path}: has {len(armed)} pairs of limbs that all look like legs, and no arms; a humanoid is needed"
             )
+    if _are_fingers(arms):
+        raise UserError(
+            f"{path}: the limbs that are like arms are fingers by their names, as a hand alone has; a humanoid is "
+            f"needed{why_no_arms(bodies)}"
+        )
     # A third pair beside the arms, and longer, may be the arms; legs of few joints may be wings, if no name tells.
     spare = [pair for pair in armed if pair is not arms and pair is not legs and pair.body == arms.body]
     winged = legs is not None and len(legs.chains[0]) < _LEG and not _named_legs(legs)
@@ -238,6 +245,17 @@ def _named_legs(pair: Pair) -> bool:
     """Whether names speak of legs, and not of arms."""
     called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
     return names.share(called, "leg") > 0.25 and names.share(called, "arm") == 0
+
+
+def _named_arms(pair: Pair) -> bool:
+    """Whether most names speak of arms, and none of legs, as of arms that hang lower than what carries them."""
+    called = [name for chain in pair.chains for step in chain for name in (step.hinge.name, step.outer_link)]
+    return names.share(called, "arm") > 0.5 and names.share(called, "leg") == 0
+
+
+def _are_fingers(pair: Pair) -> bool:
+    """Whether the names of all joints of both limbs speak of what moves in a hand."""
+    return all(names.speaks_of(step.hinge.name, "hand") for chain in pair.chains for step in chain)
 
 
 def _stands(bodies: Bodies, pair: Pair) -> bool:

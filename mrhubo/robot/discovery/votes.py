@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import bend_side, mean_sign, reach_middle, straight_angle, turned, usual_range
 from mrhubo.robot.discovery.roles import Roles
 
+_BENT = 0.3
+"""How far a hinge without limits is bent at the zero pose at least [rad] that tells which way it bends."""
 NAMES = "the names of the sides"
 """What the vote of the names is called."""
 
@@ -87,15 +90,19 @@ def _bend(
     chain: Chain, at: int, start_3: np.ndarray, middle_3: np.ndarray, end_3: np.ndarray, up_3: np.ndarray,
     forward_3: np.ndarray,
 ) -> float:  # fmt: skip
-    """-1..1: how far forward a limb's end goes when its hinge bends, with the upper part hanging."""
+    """-1..1: how far forward a limb's end goes when its hinge bends, with the upper part hanging. Of a hinge without
+    limits the zero pose tells, if it is bent there.
+    """
     step = chain[at]
-    if not step.hinge.limited:
-        return 0.0
     axis_3 = step.sign * step.hinge.line.axis_3
     upper_3, lower_3 = middle_3 - start_3, end_3 - middle_3
     straight = straight_angle(axis_3, lower_3, upper_3)
-    lower, upper = usual_range(step.hinge)
-    side = bend_side(lower, upper, straight)
+    if step.hinge.limited:
+        side = bend_side(*usual_range(step.hinge), straight)
+    elif _BENT < abs(straight) < math.pi - _BENT:
+        side = -math.copysign(1.0, straight)
+    else:
+        return 0.0
     moved_3 = unit(cross(axis_3, turned(lower_3, axis_3, straight))) * np.sign(side)
     # Where forward is once the upper part hangs down: turned back from where it points, the short way.
     down_3, upper_3 = -up_3, unit(upper_3)

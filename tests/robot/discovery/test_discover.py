@@ -178,9 +178,26 @@ def _leg(side: str, y: float) -> str:
     return "".join(parts)
 
 
+def _finger(name: str, y: float) -> str:
+    parts, parent = [], "palm"
+    for joint, at in (("proximal", f"0.1 {y} 0"), ("intermediate", "0.04 0 0"), ("distal", "0.03 0 0")):
+        link = f"{name}_{joint}"
+        parts.append(
+            f'<link name="{link}"><inertial><origin xyz="0.02 0 0"/><mass value="0.01"/></inertial></link>'
+            f'<joint name="{link}_joint" type="revolute"><parent link="{parent}"/><child link="{link}"/>'
+            f'<origin xyz="{at}"/><axis xyz="0 1 0"/><limit lower="0" upper="1.6" effort="1" velocity="1"/></joint>'
+        )
+        parent = link
+    return "".join(parts)
+
+
+FINGERS = "<robot name='hand'><link name='palm'/>" + _finger("index", 0.02) + _finger("ring", -0.02) + "</robot>"
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
+        (FINGERS, "fingers by their names"),
         (LEGS.format(""), "no two arms were found"),
         (LEGS.format(_leg("left", 0.1)), "no two arms were found"),
         (LEGS.format(_leg("left", 0.1) + _leg("right", -0.1)), "the only pair of limbs looks like legs"),

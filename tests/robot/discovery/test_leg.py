@@ -72,6 +72,31 @@ def test_toes_are_no_ankle_where_the_hip_has_no_pitch(tmp_path: Path) -> None:
     assert at(made.found(tmp_path), "left_ankle") == pytest.approx([0, 0.1, -0.85], abs=1e-6)
 
 
+@pytest.mark.parametrize("toes", [False, True], ids=["no toes", "toes"])
+@pytest.mark.parametrize("apart", [0.05, 0.12, 0.15])
+def test_a_knee_of_two_hinges_ends_no_leg(apart: float, toes: bool, tmp_path: Path) -> None:
+    """Two shells that roll on each other, each hinge with a motor of its own: the second one was taken for the ankle."""
+    made = Made()
+    for side in SIDES:
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        link = "chest"
+        for word in ("yaw", "roll", "pitch"):
+            xyz = (0, 0.1 * SIDES[side], -0.1) if link == "chest" else (0, 0, 0)
+            link = made.join(f"{side}_hip_{word}", link, xyz, AXES[word], (-0.8, 0.8))
+        link = made.join(f"{side}_knee", link, (0, 0, -0.32), Y, (-0.1, 1.5))
+        link = made.join(f"{side}_knee_too", link, (0, 0, -apart), Y, (-0.1, 1.5))
+        link = made.join(f"{side}_ankle", link, (0, 0, -0.25), Y, (-0.6, 0.6), shape=FOOT)
+        link = made.join(f"{side}_ankle_roll", link, (0, 0, 0), X, (-0.4, 0.4), shape=FOOT)
+        if toes:
+            made.join(f"{side}_toes", link, (0.1, 0, -0.04), Y, (-0.6, 0.6))
+    found = made.found(tmp_path)
+    assert at(found, "left_hip") == pytest.approx([0, 0.1, -0.1], abs=1e-6)
+    assert at(found, "left_ankle") == pytest.approx([0, 0.1, -0.67 - apart], abs=1e-6)
+    assert found.points["left_ankle"].link in ("left_knee_too", "left_ankle", "left_ankle_roll")  # not above the knee
+    assert {"left_knee_joint", "left_knee_too_joint", "left_ankle_joint", "left_ankle_roll_joint"} <= set(found.joints)
+    assert {"left_knee", "right_knee"} <= about(found)
+
+
 def test_a_hip_that_turns_about_the_thigh_alone_is_asked_about(tmp_path: Path) -> None:
     assert {"left_hip", "right_hip"} <= about(found_of(["yaw"], ["pitch"], tmp_path))
 

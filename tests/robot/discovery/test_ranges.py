@@ -10,6 +10,7 @@ import pytest
 
 from mrhubo.errors import UserError
 from mrhubo.robot.discovery import Discovery, discover
+from tests.robot.discovery.made import SIDES, Made, X, Y, Z, about
 
 _LIMIT = re.compile(r'<limit lower="[^"]*" upper="[^"]*"')
 
@@ -93,3 +94,33 @@ def test_no_joint_winds_up(root: Path, tmp_path: Path) -> None:
 def test_a_robot_with_limits_is_not_said_to_have_none(root: Path) -> None:
     found = discover(root / "data/robots/coman/coman.urdf", whole_body=True)
     assert not any("limits" in note for note in found.notes) and not any(ends.guessed for ends in found.ranges.values())
+
+
+@pytest.mark.parametrize("twisted", [False, True], ids=["no twist", "twist"])
+def test_an_elbow_that_bends_backwards_is_asked_about_where_nothing_twists_the_upper_arm(
+    twisted: bool, tmp_path: Path
+) -> None:
+    """As of a lesson's robot: limits of 0 .. 3 about the axis that points left."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_shoulder_pitch", "chest", (0, 0.2 * sign, 0.4), Y, (-2.8, 1.2))
+        link = made.join(f"{side}_shoulder_roll", link, (0, 0, 0), X)
+        link = made.join(f"{side}_shoulder_yaw", link, (0, 0, 0), Z) if twisted else link
+        link = made.join(f"{side}_elbow", link, (0, 0, -0.3), Y, (0, 3.0))
+        made.wrist(side, made.join(f"{side}_forearm", link, (0, 0, -0.1), Z))
+        made.join(f"{side}_ankle", made.leg(side), (0, 0, -0.4), Y, (-0.6, 0.6))
+    found = made.found(tmp_path)
+    assert found.forward.root_3 == pytest.approx((1, 0, 0), abs=1e-6)
+    assert ({"left_elbow", "right_elbow"} <= about(found)) != twisted
+
+
+def test_elbows_without_limits_tell_by_how_they_are_bent_at_zero_where_the_robot_faces(tmp_path: Path) -> None:
+    """Two-jointed arms on a cart, bent forwards, and names as somebody sees the sides who stands before it."""
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_shoulder", "chest", (0, -0.2 * sign, 0.4), Y, None, "continuous")
+        link = made.join(f"{side}_elbow", link, (0, 0, -0.3), Y, None, "continuous", rpy=(0, -0.9, 0))
+        made.join(f"{side}_hand", link, (0, 0, -0.25), Y, None, "fixed")
+    found = made.found(tmp_path)
+    assert any("speaks: the elbows bend forward" in note for note in found.notes)
+    assert "forward" in about(found)

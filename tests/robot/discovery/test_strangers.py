@@ -453,3 +453,43 @@ def test_random_robots_that_were_wrong_are_right(seed: int, kind: str | None, tm
     truth, path = humanoid(seed, kind), tmp_path / "made.urdf"
     path.write_text(truth.urdf)
     assert not mistakes(discover(path, whole_body=True), truth, path)
+
+
+def test_a_leg_that_a_file_has_not_as_the_other_is_no_waist(tmp_path: Path) -> None:
+    """Legs drawn by eye, whose knees are askew on one side: none was found, and one was taken for the waist."""
+    made = Made()
+    for side, sign in SIDES.items():
+        made.wrist(side, made.forearm(side, made.arm(side)))
+        link = made.join(f"Torso_Thigh_{side}", "chest", (0, 0.01 * sign + 0.005, -0.2), X)
+        knee = (0.01, 1.0, -0.04) if sign > 0 else (-0.4, 0.9, -0.05)
+        link = made.join(f"Thigh_Calf_{side}", link, (0.05 + 0.03 * sign, 0.0, -0.32), knee)
+        made.join(f"Calf_Feet_{side}", link, (0.02, 0, -0.2), knee)
+    found = made.found(tmp_path)
+    assert not found.chains["waist"] and not any("Thigh" in joint for joint in found.joints)
+
+
+@pytest.mark.parametrize("called", ["arm", "part"])
+def test_arms_of_two_crossed_axes_without_limits_are_no_casters_if_names_say_so(called: str, tmp_path: Path) -> None:
+    made = Made()
+    for side, sign in SIDES.items():
+        link = made.join(f"{called}_{side}_one", "chest", (0, 0.2 * sign, 0.4), X, None, "continuous")
+        made.join(f"{called}_{side}_two", link, (0.03, 0, -0.3), Y, None, "continuous")
+        made.join(f"{side}_ankle", made.leg(side), (0, 0, -0.4), Y, (-0.6, 0.6))
+    if called == "arm":
+        assert made.found(tmp_path).chains["left_arm"] == ("arm_left_one_joint", "arm_left_two_joint")
+    else:
+        with pytest.raises(UserError, match="no arms were found"):
+            made.found(tmp_path)
+
+
+def test_short_arms_are_as_long_as_their_forearms_shapes(tmp_path: Path) -> None:
+    """A lesson's arms end at the elbow, a quarter as far out as its legs reach; their forearms are boxes."""
+    made = Made()
+    box = "<collision><origin xyz='0 0 -0.1'/><geometry><box size='0.06 0.06 0.2'/></geometry></collision>"
+    for side, sign in SIDES.items():
+        link = made.join(f"{side}_one", "chest", (0, 0.2 * sign, 0.4), Y, (-2.5, 1.0), shape=box)
+        made.join(f"{side}_two", link, (0, 0, -0.18), Y, (-2.3, 0), shape=box)
+        made.join(f"{side}_ankle", made.leg(side), (0, 0, -0.4), Y, (-0.6, 0.6))
+    found = made.found(tmp_path)
+    assert found.chains["left_arm"] == ("left_one_joint", "left_two_joint")
+    assert found.chains["left_leg"][-1] == "left_ankle_joint"
