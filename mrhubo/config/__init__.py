@@ -1,6 +1,7 @@
 """Settings: YAML plus ``key.sub=value`` -> typed dataclasses; every mistake is one sentence."""
 
 from mrhubo.config.arguments import CommandParser, nonempty, number, parse_arguments, whole_number
+from mrhubo.config.baseline import BaselineConfig, S3LEConfig
 from mrhubo.config.command import print_error, run_command
 from mrhubo.config.entries import (
     ConstantEntry,
@@ -22,7 +23,6 @@ from mrhubo.config.places import places_named, where, with_places
 from mrhubo.config.plain import changed_settings, fingerprint, flow_yaml, to_plain, to_yaml, without_paths
 from mrhubo.config.prior import SHIPPED_PRIOR, PriorConfig
 from mrhubo.config.schema import (
-    BaselineConfig,
     BodyConfig,
     Config,
     EvaluationConfig,
@@ -30,7 +30,6 @@ from mrhubo.config.schema import (
     ModelConfig,
     PairsConfig,
     RobotConfig,
-    S3LEConfig,
     ScaleSearchConfig,
     TrackingConfig,
     TrainerConfig,

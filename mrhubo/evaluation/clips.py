@@ -6,7 +6,9 @@ Legend: T frames, J = 21 human joints, N robot joints.
 
 from __future__ import annotations
 
+import itertools
 import os
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +27,7 @@ from mrhubo.reference import OptimizationRetargeter
 from mrhubo.robot import BodyMap
 from mrhubo.runtime.locations import default_motions
 from mrhubo.runtime.progress import SILENT, Reporter
+from mrhubo.runtime.threads import each_in_a_thread
 
 REFERENCE_SCHEMA = "mrhubo.reference/4"
 _NAME = 80
@@ -128,23 +131,32 @@ def solve_references(
         "smoothness": repr(config.evaluation.smoothness),
     }
     retargeter = OptimizationRetargeter(body_map, smoothness=config.evaluation.smoothness)
-    everything, clips = motions.all, []
+
+    def answers(motion: Motion) -> Clip:
+        header = {**common, "motion_xxh3": motion.checksum}
+        short = os.fsencode(motion.name)[:_NAME].decode(errors="ignore")
+        path = folder / f"{config.robot.name}-{short}-{fingerprint(header)}.safetensors"
+        try:
+            tensors, found = read_tensors(path)
+            known = [tensors["q"], tensors["optimum"]] if found == header else []
+        except (DamagedFile, KeyError):
+            known = []
+        shape = (len(motion), len(body_map.robot.joint_names))
+        if not known or any(answer.shape != shape for answer in known):
+            known = [q.float() for q in retargeter.motion_and_optima(motion.local_TJ33, motion.frame_rate)]
+            write_tensors(path, dict(zip(("q", "optimum"), known, strict=True)), header)
+        return Clip(motion, *known)
+
+    everything, lock, done = motions.all, threading.Lock(), itertools.count(1)
     with report.step("reference", len(everything), "clips") as progress:
-        for done, motion in enumerate(everything):
-            progress.update(done, motion.name)
-            header = {**common, "motion_xxh3": motion.checksum}
-            short = os.fsencode(motion.name)[:_NAME].decode(errors="ignore")
-            path = folder / f"{config.robot.name}-{short}-{fingerprint(header)}.safetensors"
-            try:
-                tensors, found = read_tensors(path)
-                answers = [tensors["q"], tensors["optimum"]] if found == header else []
-            except (DamagedFile, KeyError):
-                answers = []
-            shape = (len(motion), len(body_map.robot.joint_names))
-            if not answers or any(answer.shape != shape for answer in answers):
-                answers = [q.float() for q in retargeter.motion_and_optima(motion.local_TJ33, motion.frame_rate)]
-                write_tensors(path, dict(zip(("q", "optimum"), answers, strict=True)), header)
-            clips.append(Clip(motion, *answers))
-        progress.update(len(everything))
+        progress.update(0)
+
+        def told(motion: Motion) -> Clip:
+            clip = answers(motion)
+            with lock:
+                progress.update(next(done), motion.name)
+            return clip
+
+        clips = each_in_a_thread(told, everything)
     count = len(motions.validation)
     return clips[:count], clips[count:]

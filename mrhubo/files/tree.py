@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,62 +24,24 @@ from mrhubo.files.records import RecordedObject, UnreadablePickle
 from mrhubo.files.regular import MAX_BYTES as MAX_FILE
 from mrhubo.files.regular import check_regular, naming, open_regular
 from mrhubo.files.safe_pickle import MAX_BYTES
+from mrhubo.files.tree_source import Member, Source
 from mrhubo.files.values import from_record, name_of, to_float, unwrapped
 
-_MAX_MADE = 2**26
-"""Numbers that lists of arrays are put together to, in one file."""
 _DEEPEST = 4
 """Lists of lists of numbers."""
 _NPY = b"\x93NUMPY"
 
 
-@dataclass(frozen=True)
-class _Member:
-    """An array of an .npz file that is read when it is asked for."""
-
-    key: str
-
-
-@dataclass
-class _Source:
-    """What the nodes of a tree share. What it made arrays of lives as long as it does, so that each is made once."""
-
-    path: Path
-    storages: dict[str, bytes] = field(default_factory=dict)
-    members: dict[str, Any] = field(default_factory=dict)
-    made: dict[int, np.ndarray] = field(default_factory=dict)
-    left: int = _MAX_MADE
-
-    def member(self, key: str) -> Any:
-        """What a member of the .npz file holds.
-
-        Raises:
-            UserError: it is damaged, hostile, or too large.
-        """
-        if key not in self.members:
-            with open_npz(self.path) as file:
-                self.members[key] = file.read_any(key, load_pickle, MAX_BYTES)
-        return self.members[key]
-
-    def count(self, numbers: int) -> None:
-        """Some more numbers that lists are put together to."""
-        self.left -= numbers
-        if self.left < 0:
-            raise UserError(
-                f"{self.path}: its lists make arrays of more than {_MAX_MADE:,} numbers, as those of no motion do"
-            )
-
-
 class Tree:
     """A node: a dictionary, a list, or something that may be an array, a number or a text."""
 
-    def __init__(self, value: Any, source: _Source, where: str = "") -> None:
+    def __init__(self, value: Any, source: Source, where: str = "") -> None:
         self._given, self._source, self.where = value, source, where
 
     @cached_property
     def _value(self) -> Any:
         given = self._given
-        return unwrapped(self._source.member(given.key) if isinstance(given, _Member) else given)
+        return unwrapped(self._source.member(given.key) if isinstance(given, Member) else given)
 
     @property
     def path(self) -> Path:
@@ -279,7 +240,7 @@ class Tree:
 
 def tree_of(value: Any, path: Path, where: str) -> Tree:
     """The node of something that was read of a file already, and where in that it is."""
-    return Tree(value, _Source(path), where)
+    return Tree(value, Source(path), where)
 
 
 def read_tree(path: Path) -> Tree:
@@ -298,9 +259,9 @@ def read_tree(path: Path) -> Tree:
         with open_unpacked(path, MAX_BYTES, MAX_FILE) as handle:
             if start.startswith(_NPY):
                 size = check_regular(path, MAX_BYTES)
-                return Tree(read_member(handle, size, load_pickle), _Source(path))
+                return Tree(read_member(handle, size, load_pickle), Source(path))
             try:
-                return Tree(load_pickle(handle), _Source(path))
+                return Tree(load_pickle(handle), Source(path))
             except UnreadablePickle as error:
                 if not is_packed(start):
                     raise
@@ -311,6 +272,6 @@ def _read_zip(path: Path) -> Tree:
     with open_npz(path) as file:
         keys = sorted(file.keys)
     if keys:
-        return Tree({key: _Member(key) for key in keys}, _Source(path))
+        return Tree({key: Member(key) for key in keys}, Source(path))
     content, storages = read_torch(path, MODULES, steps_of(check_regular(path)))
-    return Tree(content, _Source(path, storages))
+    return Tree(content, Source(path, storages))

@@ -37,6 +37,7 @@ from mrhubo.reference.standing import has_root
 from mrhubo.retargeter import POLISH, Retargeter
 from mrhubo.robot import Robot
 from mrhubo.runtime.progress import Reporter
+from mrhubo.runtime.threads import each_in_a_thread
 from mrhubo.streaming import Stream
 
 _STILL_RAD, _MOVING_RAD = 1e-5, 0.1
@@ -62,8 +63,8 @@ class Way:
 _FRAMES, _CLIPS, _STREAM, _REFERENCE = "frame by frame", "whole clips", "stream", "reference"
 _WAYS: Mapping[str, Way] = {
     "networks": Way("", lambda r, motions: [r.predict(m.local_TJ33) for m in motions]),
-    _FRAMES: Way("retarget", lambda r, motions: [_polished(r, m, None) for m in motions]),
-    _CLIPS: Way("clip", lambda r, motions: [_polished(r, m, m.frame_rate) for m in motions]),
+    _FRAMES: Way("retarget", lambda r, motions: each_in_a_thread(lambda m: _polished(r, m, None), motions)),
+    _CLIPS: Way("clip", lambda r, motions: each_in_a_thread(lambda m: _polished(r, m, m.frame_rate), motions)),
     _STREAM: Way("stream", lambda r, motions: _streamed(r, motions)),
 }
 """None avoids self-collision, nor stands on a floor, as the reference, which they are measured against, does not."""

@@ -6,12 +6,16 @@ never tried out for speed, and whoever wants another number sets OMP_NUM_THREADS
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence, Sized
 from contextlib import contextmanager
+from typing import TypeVar
 
 import torch
 
-from mrhubo.fast.side_by_side import wanted_threads
+from mrhubo.fast.side_by_side import side_by_side, wanted_threads
+
+_Item = TypeVar("_Item", bound=Sized)
+_Result = TypeVar("_Result")
 
 
 @contextmanager
@@ -23,3 +27,21 @@ def use_threads(count: int | None = None) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
+
+
+def each_in_a_thread(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """The results of torch's work on each item, in their order: each in one thread, as many side by side as torch works
+    with now, the longest first. Two threads that share small products of matrices wait for each other, and those that
+    have an item each do not; and what comes out does not depend on how many there are.
+    """
+    longest = sorted(range(len(items)), key=lambda place: -len(items[place]))
+
+    def alone(place: int) -> _Result:
+        torch.set_num_threads(1)  # each thread has a number of its own
+        return work(items[place])
+
+    if torch.get_num_threads() == 1:
+        return [work(item) for item in items]
+    with use_threads(1):
+        found = dict(zip(longest, side_by_side(alone, longest), strict=True))
+    return [found[place] for place in range(len(items))]

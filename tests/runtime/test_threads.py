@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 import torch
 
 from mrhubo.fast.side_by_side import available_cores, wanted_threads
-from mrhubo.runtime.threads import use_threads
+from mrhubo.runtime.threads import each_in_a_thread, use_threads
 
 
 @pytest.mark.parametrize(
@@ -33,3 +35,29 @@ def test_what_torchrun_sets_by_itself_does_not(monkeypatch: pytest.MonkeyPatch) 
     assert wanted_threads() == available_cores()
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     assert wanted_threads() == 3
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_items_are_worked_on_side_by_side_with_one_thread_each(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", str(threads))
+    met = threading.Barrier(threads, timeout=20)
+
+    def work(item: str) -> tuple[str, int]:
+        met.wait()  # as many at once as there are threads, or nobody goes on
+        return item.upper(), torch.get_num_threads()
+
+    before = torch.get_num_threads()
+    with use_threads(threads):
+        assert each_in_a_thread(work, ["a", "bbb", "cc"]) == [("A", 1), ("BBB", 1), ("CC", 1)]
+        assert torch.get_num_threads() == threads
+    assert torch.get_num_threads() == before
+
+
+def test_what_fails_in_a_thread_fails() -> None:
+    def work(item: str) -> str:
+        if item == "bb":
+            raise ValueError(item)
+        return item
+
+    with use_threads(2), pytest.raises(ValueError, match="bb"):
+        each_in_a_thread(work, ["a", "bb", "ccc"])
