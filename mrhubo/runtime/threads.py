@@ -30,9 +30,10 @@ def use_threads(count: int | None = None) -> Iterator[None]:
 
 
 def each_in_a_thread(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
-    """The results of torch's work on each item, in their order: each in one thread, as many side by side as torch works
-    with now, the longest first. Two threads that share small products of matrices wait for each other, and those that
-    have an item each do not; and what comes out does not depend on how many there are.
+    """The results of torch's work on each item, in their order: each in one thread, `wanted_threads` of them side by
+    side, the longest first. Two threads that share small products of matrices wait for each other, and those that have
+    an item each do not; and what comes out does not depend on how many there are. Where torch works with one thread, so
+    does this.
     """
     longest = sorted(range(len(items)), key=lambda place: -len(items[place]))
 
