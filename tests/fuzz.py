@@ -35,7 +35,10 @@ from tests.motion.readers import (
     test_amc,
     test_keypoints,
     test_nymeria,
+    test_point_folders,
+    test_point_table,
     test_pose_folders,
+    test_sam3d_folders,
     test_soma_and_points,
 )
 from tests.robot_motion.motions import standing
@@ -118,10 +121,30 @@ def _easymocap_points_folder(folder: Path) -> None:
         (folder / f"{frame:06}.json").write_text(json.dumps(people, indent=1))
 
 
+def _points_folder(write: test_point_folders.Write) -> Callable[[Path], None]:
+    def write_all(folder: Path) -> None:
+        for frame in range(test_point_folders.FRAMES):
+            write(folder, frame)
+
+    return write_all
+
+
+def _answers_folder(form: str) -> Callable[[Path], None]:
+    return lambda folder: test_sam3d_folders.write(folder, form, second=False)
+
+
+def _point_table(path: Path) -> None:
+    rows = test_point_table.lines(test_point_table.places())
+    path.write_text("\n".join(["frame,landmark_id,x,y,z,visibility", *rows]) + "\n")
+
+
 FOLDERS: dict[str, Callable[[Path], None]] = {
     **{f"folder of {name}": _pose_folder(name) for name in test_pose_folders.WRITERS},
     "folder of OpenPose": _openpose_folder,
     "folder of points": _easymocap_points_folder,
+    **{f"folder of points, {name}": _points_folder(write) for name, write in test_point_folders.ALONE.items()},
+    **{f"folder of SAM 3D Body's {form}": _answers_folder(form) for form in ("data", "lists", "files")},
+    **{f"folder of people, {name}": _points_folder(write) for name, write in test_point_folders.BOTH.items()},
 }
 """What writes a good folder with a file a frame, a reader."""
 
@@ -135,6 +158,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "skeleton": ("damaged.skeleton", _ntu),
     "features": ("damaged.npy", _features),
     "nymeria": ("damaged.npz", lambda path: test_nymeria.write(path, *test_nymeria.body())),
+    "points, a line each": ("damaged.csv", _point_table),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
