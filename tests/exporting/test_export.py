@@ -18,25 +18,15 @@ from mrhubo.errors import UserError
 from mrhubo.exporting import standalone, write_numpy, write_onnx
 from mrhubo.retargeter import Retargeter, build_network
 from mrhubo.robot import build_body_map
+from tests.model_kinds import MODELS
 
-KINDS = {
-    "nao": ["model.hidden=12"],
-    "coman": [
-        "model.hidden=9",
-        "model.stages=1",
-        "model.residual=false",
-        "model.branches=false",
-        "model.bound_output=clamp",
-    ],
-    "reachy": ["model.hidden=10", "model.small_hidden=6", "model.input_frame=local"],
-}
 SAME_RAD = 2e-6
 MOST_LINES = 150
 
 
-@pytest.fixture(scope="module", params=KINDS)
+@pytest.fixture(scope="module", params=MODELS)
 def retargeter(root: Path, request: pytest.FixtureRequest) -> Retargeter:
-    config = load_config(root / "conf" / f"{request.param}.yaml", KINDS[request.param])
+    config = load_config(root / "conf" / f"{request.param}.yaml", MODELS[request.param])
     body_map = build_body_map(config.robot)
     torch.manual_seed(0)
     return Retargeter(build_network(config, body_map), body_map, BodyPrior(hidden=8).eval(), config, phi_threshold=0.01)

@@ -15,19 +15,7 @@ from mrhubo.body.skeleton import POSED_JOINT_NAMES
 from mrhubo.config import load_config
 from mrhubo.retargeter import Retargeter, RetargetNetwork, build_network
 from mrhubo.robot import build_body_map
-
-MODELS = {
-    "nao": ["model.hidden=12"],
-    "coman": [
-        "model.hidden=9",
-        "model.stages=1",
-        "model.residual=false",
-        "model.branches=false",
-        "model.bound_output=clamp",
-    ],
-    "reachy": ["model.hidden=10", "model.small_hidden=6", "model.input_frame=local"],
-}
-"""Networks of all kinds."""
+from tests.model_kinds import MODELS
 
 
 @pytest.fixture(scope="session")

@@ -44,7 +44,8 @@ _FRAMES, _TIMES = (
     ("time", "timestamp", "times", "timestampms", "timems", "timemilliseconds"),
 )
 _MILLISECONDS = re.compile(r"m(?:illi)?s(?:ec\w*)?[\])]?", re.IGNORECASE)
-_NOTHING = ("", "nan", "none", "null", "na")
+NOTHING = ("", "nan", "none", "null", "na")
+"""Words of a table for what is not there, in small letters."""
 _FEWEST = 5
 """Points that a table has at least."""
 _MAX_BYTES, _MAX_COLUMNS = 2**28, 10_000
@@ -61,8 +62,7 @@ class _Header:
 
     def find(self, names: Sequence[str]) -> int | None:
         """The column that is called so, whatever signs and units are in its name."""
-        plain = [re.sub(r"[\[(].*|[^a-z]", "", column.lower()) for column in self.columns]
-        return next((plain.index(name) for name in names if name in plain), None)
+        return find_column(self.columns, names)
 
 
 def is_table(content: Content) -> bool:
@@ -109,17 +109,37 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     return motion_of_points(path, checked(path, found), options)
 
 
+def split_header(line: str) -> tuple[str, list[str]]:
+    """What stands between the columns of a table, and their names; none where the line is no header."""
+    separator = max("\t;,", key=line.count)
+    try:
+        return separator, next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return separator, []
+
+
+def find_column(columns: Sequence[str], names: Sequence[str]) -> int | None:
+    """The column that is called by the first of some names that there is, whatever signs and units are in it."""
+    plain = [re.sub(r"[\[(].*|[^a-z]", "", column.lower()) for column in columns]
+    return next((plain.index(name) for name in names if name in plain), None)
+
+
+def number_of(word: str, separator: str) -> float:
+    """A number, with a decimal comma where columns stand between other signs.
+
+    Raises:
+        ValueError: it is none.
+    """
+    return float(word.replace(",", ".") if separator != "," else word)
+
+
 def _lines(text: str) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def _read_header(line: str) -> _Header | None:
     """The columns of a table of points in space; None of any other line."""
-    separator = max("\t;,", key=line.count)
-    try:
-        columns = next(csv.reader([line], delimiter=separator), [])
-    except csv.Error:
-        return None
+    separator, columns = split_header(line)
     if not 3 * _FEWEST <= len(columns) <= _MAX_COLUMNS:
         return None
     points: dict[str, list[int | None]] = {}
@@ -149,9 +169,9 @@ def _numbers(path: Path, header: _Header, number: int, row: Sequence[str]) -> np
     found = np.full(len(row), np.nan)
     for place, word in enumerate(row):
         try:
-            found[place] = float(word.replace(",", ".") if header.separator != "," else word)
+            found[place] = number_of(word, header.separator)
         except ValueError:
-            if place in needed and word.strip().lower() not in _NOTHING:
+            if place in needed and word.strip().lower() not in NOTHING:
                 column = shortened(header.columns[place], 40)
                 raise UserError(
                     f"{path}: frame {number} holds '{shortened(word, 30)}' under '{column}', no number"

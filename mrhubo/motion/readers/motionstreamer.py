@@ -19,6 +19,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.other_rotations import from_rows
 from mrhubo.motion.readers.rate import rate_of_all
 from mrhubo.motion.readers.rotations import Form
+from mrhubo.motion.readers.rows import rows_in
 from mrhubo.motion.readers.six_rows import are_rotations
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, motion_of
 from mrhubo.motion.readers.world import Y_UP
@@ -35,12 +36,10 @@ def read_streamed(tree: Tree, options: ReadOptions) -> Motion | None:
         NoMotion: the numbers are no rotations, as those of rows that were normalised.
         UserError: they are no motion.
     """
-    shape = tree.shape()
-    if shape is not None and len(shape) == 3 and shape[0] == 1:
-        shape = shape[1:]
-    if shape is None or len(shape) != 2 or not shape[0] or shape[1] != _WIDTH:
+    row_TX = rows_in(tree, (_WIDTH,))
+    if row_TX is None:
         return None
-    row_TX = tree.array().reshape(shape).astype(np.float64)
+    row_TX = row_TX.astype(np.float64)
     six_TJ6, heading_T6 = row_TX[:, _TURNS].reshape(len(row_TX), _JOINTS, 6), row_TX[:, _HEADING]
     if not are_rotations(six_TJ6) or not are_rotations(heading_T6[:, None]):
         raise NoMotion(

@@ -24,6 +24,7 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
+from mrhubo.motion.readers.keypoint_table import NOTHING, find_column, number_of, split_header
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one
@@ -40,7 +41,6 @@ _COLUMNS = {
 }  # fmt: skip
 """What columns are called, without signs and in small letters, the best name first."""
 _NEEDED = ("frame", "point", "x", "y", "z")
-_NOTHING = ("", "nan", "none", "null", "na")
 _MAX_BYTES = 2**28
 
 
@@ -51,12 +51,8 @@ class _Header:
     """Columns, by the keys of `_COLUMNS`."""
 
 
-@dataclass
-class _Lines:
-    """The lines of one person in one frame."""
-
-    points: dict[str, tuple[float, float, float, float]]
-    """x, y, z and how sure, by the point."""
+_Points = dict[str, tuple[float, float, float, float]]
+"""x, y, z and how sure, by the point."""
 
 
 def is_point_table(content: Content) -> bool:
@@ -80,7 +76,7 @@ def read_point_table(path: Path, options: ReadOptions) -> Motion:
         raise UserError(f"{path}: is no table: {shortened(error, 80)}") from error
     if not seen:
         raise UserError(f"{path}: has a header and no points")
-    names = list(dict.fromkeys(name for one in seen.values() for name in one.points))
+    names = list(dict.fromkeys(name for one in seen.values() for name in one))
     numbered = all(re.fullmatch(r"[0-9]{1,9}(?:\.0)?", name) for name in names)
     names = sorted(names, key=float) if numbered else names
     once = sorted({frame for frame, _ in seen}, key=float)
@@ -89,7 +85,7 @@ def read_point_table(path: Path, options: ReadOptions) -> Motion:
     unsure = "sure" not in header.places
     sightings = []
     for (frame, person), one in seen.items():
-        row_K4 = np.array([one.points.get(name, (np.nan,) * 4) for name in names])
+        row_K4 = np.array([one.get(name, (np.nan,) * 4) for name in names])
         sightings.append(Sighting(numbers[frame], person, row_K4[:, :3], None if unsure else row_K4[:, 3]))
     notes: list[str] = []
     people = {one.person for one in sightings}
@@ -111,23 +107,15 @@ def read_point_table(path: Path, options: ReadOptions) -> Motion:
 
 def _read_header(line: str) -> _Header | None:
     """The columns of such a table; None of any other line."""
-    separator = max("\t;,", key=line.count)
-    try:
-        columns = next(csv.reader([line.lstrip("\ufeff")], delimiter=separator), [])
-    except csv.Error:
-        return None
-    plain = [re.sub(r"[\[(].*|[^a-z]", "", column.lower()) for column in columns]
-    places = {
-        key: plain.index(name)
-        for key, names in _COLUMNS.items()
-        if (name := next((name for name in names if name in plain), None)) is not None
-    }
+    separator, columns = split_header(line.lstrip("\ufeff"))
+    found = {key: find_column(columns, names) for key, names in _COLUMNS.items()}
+    places = {key: place for key, place in found.items() if place is not None}
     return _Header(separator, places) if all(key in places for key in _NEEDED) else None
 
 
-def _read_lines(path: Path, header: _Header, lines: Sequence[str]) -> dict[tuple[str, str | None], _Lines]:
+def _read_lines(path: Path, header: _Header, lines: Sequence[str]) -> dict[tuple[str, str | None], _Points]:
     """Whoever is in the lines, by frame and person, as they come."""
-    seen: dict[tuple[str, str | None], _Lines] = {}
+    seen: dict[tuple[str, str | None], _Points] = {}
     most = max(header.places.values())
     for number, row in enumerate(csv.reader(lines, delimiter=header.separator), start=2):
         if not any(word.strip() for word in row):
@@ -137,21 +125,21 @@ def _read_lines(path: Path, header: _Header, lines: Sequence[str]) -> dict[tuple
         word = {key: row[place].strip() for key, place in header.places.items()}
         frame = word["frame"]
         _number(path, header, number, frame, "frame")
-        one = seen.setdefault((frame, word.get("person") or None), _Lines({}))
+        one = seen.setdefault((frame, word.get("person") or None), {})
         name = word["point"]
-        if name in one.points:
+        if name in one:
             raise UserError(f"{path}: line {number} tells '{shortened(name, 30)}' of frame {frame} once more")
         x, y, z, sure = (_number(path, header, number, word.get(key, "1"), key) for key in ("x", "y", "z", "sure"))
-        one.points[name] = (x, y, z, sure)
+        one[name] = (x, y, z, sure)
     return seen
 
 
 def _number(path: Path, header: _Header, line: int, word: str, what: str) -> float:
     """What a word tells; NaN where it says that it tells nothing."""
-    if what != "frame" and word.lower() in _NOTHING:
+    if what != "frame" and word.lower() in NOTHING:
         return float("nan")
     try:
-        number = float(word.replace(",", ".") if header.separator != "," else word)
+        number = number_of(word, header.separator)
         if what != "frame" or abs(number) < 1e15:  # NaN is no number of a frame
             return number
     except ValueError:

@@ -6,6 +6,8 @@ Legend: T frames, X numbers of a row.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from mrhubo.errors import UserError
@@ -58,23 +60,21 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
     Raises:
         UserError: the numbers are no motion, or may be of either kind; or the frame rate is not known.
     """
-    shape = tree.shape()
-    if shape is not None and len(shape) == 3 and shape[0] == 1:
-        shape = shape[1:]
-    if shape is None or len(shape) != 2 or not shape[0] or shape[1] not in (_MOTION_X, _TALKSHOW, _WITH_SHAPE, *_PHUMA):
+    rows_TX = rows_in(tree, (_MOTION_X, _TALKSHOW, _WITH_SHAPE, *_PHUMA))
+    if rows_TX is None:
         return None
-    rows_TX, notes = tree.array().reshape(shape), options.of_one()
-    if shape[1] == _MOTION_X:
+    width, notes = rows_TX.shape[1], options.of_one()
+    if width == _MOTION_X:
         arrays = SmplArrays("rows", rows_TX[:, 3:66], _BODY, 0, rows_TX[:, :3], rows_TX[:, 309:312], rows_TX[:, 312:])
         rate = rate_of_all(_MOTION_X_RATE, "Motion-X says of all its motions", options, notes)
         return motion_of(tree.path, arrays, Kind("Motion-X rows (T, 322)", "smplx", ANY_WORLD), rate, notes)
-    if shape[1] == _TALKSHOW:
+    if width == _TALKSHOW:
         if not stiff_turn(rows_TX[:, 12:75].astype(np.float64)) < STIFF_TURN:  # any features may have as many numbers
             return None
         arrays = SmplArrays("rows", rows_TX[:, 12:75], _BODY, 0, rows_TX[:, 9:12])
         rate = rate_of_all(_TALKSHOW_RATE, "TalkSHOW's motions have", options, notes)
         return motion_of(tree.path, arrays, Kind("TalkSHOW's rows (T, 265)", "smplx", ANY_WORLD), rate, notes)
-    if shape[1] == _WITH_SHAPE:
+    if width == _WITH_SHAPE:
         pose_at = _pose_at(rows_TX)
         if pose_at is None:  # any features may have as many numbers
             return None
@@ -84,18 +84,28 @@ def read_rows(tree: Tree, options: ReadOptions) -> Motion | None:
         )
         kind = Kind("rows (T, 85) of SMPL's pose and shape", "smpl", ANY_WORLD if pose_at == 0 else CAMERAS)
         return motion_of(tree.path, arrays, kind, asked_rate(tree.path, options), notes)
-    betas = rows_TX[:, 69:] if shape[1] == max(_PHUMA) else None
-    if shape[1] == _CONTACTS or _is_phuma(tree, rows_TX):
+    betas = rows_TX[:, 69:] if width == max(_PHUMA) else None
+    if width == _CONTACTS or _is_phuma(tree, rows_TX):
         arrays = SmplArrays("rows", rows_TX[:, 6:69], _BODY, 0, rows_TX[:, 3:6], rows_TX[:, :3], betas)
-        kind = Kind(f"PHUMA rows (T, {shape[1]})", "smplx", ANY_WORLD)
+        kind = Kind(f"PHUMA rows (T, {width})", "smplx", ANY_WORLD)
     else:
         arrays = SmplArrays("rows", rows_TX[:, :69], _WITH_HANDS, 0, betas=betas)
-        kind = Kind(f"rows (T, {shape[1]}) of SMPL's body_pose", "smpl", ANY_WORLD)
+        kind = Kind(f"rows (T, {width}) of SMPL's body_pose", "smpl", ANY_WORLD)
         notes.append(
             "taken for SMPL's body_pose, without a root: as PHUMA's rows, which are as wide, the first numbers were no"
             " place of a pelvis, and spine and neck turned as arms and legs do"
         )
     return motion_of(tree.path, arrays, kind, asked_rate(tree.path, options), notes)
+
+
+def rows_in(tree: Tree, widths: Collection[int]) -> np.ndarray | None:
+    """The rows (T, X) of an array (T, X) or (1, T, X) that are as wide as one of some widths; None of anything else."""
+    shape = tree.shape()
+    if shape is not None and len(shape) == 3 and shape[0] == 1:
+        shape = shape[1:]
+    if shape is None or len(shape) != 2 or not shape[0] or shape[1] not in widths:
+        return None
+    return tree.array().reshape(shape)
 
 
 def _is_phuma(tree: Tree, rows_TX: np.ndarray) -> bool:

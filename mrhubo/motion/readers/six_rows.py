@@ -19,6 +19,7 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.other_rotations import from_rows
 from mrhubo.motion.readers.rate import rate_of_all
 from mrhubo.motion.readers.rotations import Form
+from mrhubo.motion.readers.rows import rows_in
 from mrhubo.motion.readers.tracks import Kind, SmplArrays, motion_of
 from mrhubo.motion.readers.world import ANY_WORLD
 
@@ -40,23 +41,21 @@ def read_six_rows(tree: Tree, options: ReadOptions) -> Motion | None:
         NoMotion: the numbers are no rotations, as those of rows that were normalised.
         UserError: they are no motion.
     """
-    shape = tree.shape()
-    if shape is not None and len(shape) == 3 and shape[0] == 1:
-        shape = shape[1:]
-    if shape is None or len(shape) != 2 or not shape[0] or shape[1] not in _KINDS:
+    row_TX = rows_in(tree, _KINDS)
+    if row_TX is None:
         return None
-    who, before, joints, family = _KINDS[shape[1]]
-    row_TX = tree.array().reshape(shape).astype(np.float64)
+    width, row_TX = row_TX.shape[1], row_TX.astype(np.float64)
+    who, before, joints, family = _KINDS[width]
     place_T3, six_TJ6 = row_TX[:, before : before + 3], row_TX[:, before + 3 :].reshape(len(row_TX), joints, 6)
     if not are_rotations(six_TJ6):
         raise NoMotion(
-            f"{tree.path}: has rows of {shape[1]} numbers, as {who} have, whose rotations are none; if they are"
+            f"{tree.path}: has rows of {width} numbers, as {who} have, whose rotations are none; if they are"
             " normalised, turn them back first"
         )
     notes = options.of_one()
     rate = rate_of_all(_RATE, f"all of {who} motions have", options, notes)
     arrays = SmplArrays("rows", from_rows(six_TJ6), Form(joints, True), 1, None, place_T3)
-    return motion_of(tree.path, arrays, Kind(f"{who} rows (T, {shape[1]})", family, ANY_WORLD), rate, notes)
+    return motion_of(tree.path, arrays, Kind(f"{who} rows (T, {width})", family, ANY_WORLD), rate, notes)
 
 
 def are_rotations(six_TJ6: np.ndarray) -> bool:
