@@ -4,7 +4,7 @@ that means "look at this"; and what sentences are made of.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 
 class UserError(Exception):
@@ -21,7 +21,9 @@ class InputWarning(UserWarning):
     """Something in a config or a file that is odd but may be meant: one sentence, and the work goes on."""
 
 
-def unknown_name(kind: str, name: str, available: Iterable[str], where: str = "") -> str:
+def unknown_name(
+    kind: str, name: str, available: Iterable[str], where: str = "", telling: Callable[[str], str] = str
+) -> str:
     """One sentence: ``link 'Hed' does not exist in nao.urdf; nearest: 'Head'``, or what is available where no name is
     near.
 
@@ -30,12 +32,14 @@ def unknown_name(kind: str, name: str, available: Iterable[str], where: str = ""
         name: the name that does not exist.
         available: those that do.
         where: what was searched, if that has to be said, for instance ``nao.urdf``.
+        telling: function of a name that gives what tells it from others, for instance of a path its stem.
     """
     names = sorted(available)
     missing = f"{kind} '{name}' does not exist" + (f" in {where}" if where else "")
-    near = nearest(name, names)
+    of = {telling(other): other for other in names}
+    near = nearest(telling(name), of)
     if near is not None:
-        return f"{missing}; nearest: '{near}'"
+        return f"{missing}; nearest: '{of[near]}'"
     return f"{missing}; available: {listed(names)}"
 
 
@@ -84,12 +88,10 @@ def nearest(name: str, available: Iterable[str]) -> str | None:
     close = [other for other, distance in distances.items() if distance <= allowed]
     if close:
         return min(close, key=lambda other: (distances[other], other))
-    if len(wanted) < 3:
-        return None
     words = name.lower().replace("-", "_")
     for test in (
-        lambda other: _bare(other).startswith(wanted),
-        lambda other: f"_{words}_" in f"_{other.lower()}_",
+        lambda other: len(wanted) >= 3 and _bare(other).startswith(wanted),
+        lambda other: len(wanted) >= 2 and f"_{words}_" in f"_{other.lower().replace('-', '_')}_",
         lambda other: len(other) >= 3 and words.startswith(f"{other.lower()}_"),
     ):
         found = [other for other in names if test(other)]

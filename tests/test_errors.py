@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,6 +39,8 @@ KEYS = [
         ("maxsteps", KEYS, "max_steps"),
         ("seed_of_it", KEYS, "seed"),
         ("lr", ["dir", "uri"], None),
+        ("g1", ["nao", "g1-whole-body", "pepper"], "g1-whole-body"),
+        ("g1", ["g1-arms", "g1-legs"], None),
         ("", KEYS, None),
         ("x", [], None),
     ],
@@ -71,4 +75,8 @@ def test_what_is_suggested_exists(name: str, names: list[str]) -> None:
 def test_sentences() -> None:
     assert unknown_name("link", "Hed", ["Head"], "nao.urdf") == "link 'Hed' does not exist in nao.urdf; nearest: 'Head'"
     assert unknown_name("link", "Foot", ["Head", "Arm"]) == "link 'Foot' does not exist; available: Arm, Head"
+    said = unknown_name(
+        "file", "conf/g1.yaml", ["conf/nao.yaml", "conf/g1-legs.yaml"], telling=lambda path: Path(path).stem
+    )
+    assert said == "file 'conf/g1.yaml' does not exist; nearest: 'conf/g1-legs.yaml'"
     assert unknown_name("link", "Foot", []) == "link 'Foot' does not exist; available: none"

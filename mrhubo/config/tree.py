@@ -270,4 +270,4 @@ def _missing_file(file: Path) -> str:
         others = [str(folder / other.name) for other in folder.iterdir() if other.suffix in (".yaml", ".yml")]
     except OSError:
         return f"config file '{file}' does not exist, nor does its folder"
-    return unknown_name("config file", str(file), others)
+    return unknown_name("config file", str(file), others, telling=lambda path: Path(path).stem)

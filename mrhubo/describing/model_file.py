@@ -10,7 +10,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from mrhubo.errors import UserError, first_line, shortened
+from mrhubo.config.shipped import shipped_configs
+from mrhubo.errors import UserError, first_line, nearest, shortened
 
 _DESCRIPTIONS = "robot_descriptions"
 _PATHS = ("URDF_PATH", "MJCF_PATH")
@@ -31,7 +32,7 @@ def find_model(word: str) -> Path:
         return path
     if importlib.util.find_spec(_DESCRIPTIONS) is None:
         raise UserError(
-            f"'{word}' is no file; a robot of the package robot_descriptions can be named too, where it is installed: "
+            f"{_no_file(word)}; a robot of the package robot_descriptions can be named too, where it is installed: "
             "pip install robot_descriptions"
         )
     return _described(word)
@@ -42,7 +43,7 @@ def _described(word: str) -> Path:
     names = [word] if word.endswith("_description") else [f"{word}_description", f"{word}_mj_description", word]
     known = [name for name in names if importlib.util.find_spec(f"{_DESCRIPTIONS}.{name}") is not None]
     if not known:
-        raise UserError(f"'{word}' is no file, and no robot of the package robot_descriptions")
+        raise UserError(f"{_no_file(word)}, and no robot of the package robot_descriptions")
     try:
         module = importlib.import_module(f"{_DESCRIPTIONS}.{known[0]}")
     except Exception as error:  # git, the network, the disk: whatever fetching runs into
@@ -53,6 +54,11 @@ def _described(word: str) -> Path:
     if found is None:
         raise UserError(f"{known[0]}: robot_descriptions has neither a URDF nor a MuJoCo model of it")
     return Path(found)
+
+
+def _no_file(word: str) -> str:
+    near = nearest(word, shipped_configs())
+    return f"'{word}' is no file" + (f" (a config that ships with mrhubo: '{near}')" if near is not None else "")
 
 
 @contextlib.contextmanager

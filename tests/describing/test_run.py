@@ -159,7 +159,10 @@ def test_limits_that_nobody_gives_are_told_where_no_config_holds_them(urdf: Path
 
 def test_robots_of_the_package_are_found_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UserError, match="'g1' is no file; .* pip install robot_descriptions"):
+    with pytest.raises(
+        UserError,
+        match="'g1' is no file .a config that ships with mrhubo: 'g1-whole-body'.; .* pip install robot_descriptions",
+    ):
         read_model("g1")
     package = tmp_path / "lib" / "robot_descriptions"
     package.mkdir(parents=True)
