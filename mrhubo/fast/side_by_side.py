@@ -76,12 +76,11 @@ def in_parts(frames: int, work: Callable[[slice], Result]) -> list[Result]:
     return side_by_side(work, [slice(first, first + length) for first in range(0, frames, length)])
 
 
-_pools: dict[int, ThreadPoolExecutor] = {}
-"""By process: a fork has none of its parent's threads."""
+_pools: dict[tuple[int, int], ThreadPoolExecutor] = {}
+"""By process, as a fork has none of its parent's threads, and by how many threads are wanted beside the caller's."""
 
 
 def _pool() -> ThreadPoolExecutor:
-    process = os.getpid()
-    pool = _pools.get(process)
+    key = os.getpid(), max(1, wanted_threads() - 1)
     # Of two threads that come first, one's pool is taken; the other's has begun no thread.
-    return pool or _pools.setdefault(process, ThreadPoolExecutor(max(1, wanted_threads() - 1), "mrhubo"))
+    return _pools.get(key) or _pools.setdefault(key, ThreadPoolExecutor(key[1], "mrhubo"))
