@@ -37,6 +37,7 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, TIME_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
+from mrhubo.motion.readers.smpl_names import PLACES, ROOTS
 from mrhubo.motion.readers.world import ANY_WORLD, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
@@ -47,7 +48,7 @@ _ITS_OWN = {"dmpls", "markers_latent", "latent_labels"}
 """Keys of AMASS's own files alone: of the soft tissue beside SMPL-H, or of the markers beside SMPL-X, of which files
 that others wrote with its keys have none.
 """
-_OTHER_NAMES = {"root_orient": {"global_orient", "root_pose"}, "trans": {"transl", "translation", "root_trans"}}
+_OTHER_NAMES = {"root_orient": {*ROOTS} - {"root_orient"}, "trans": {*PLACES} - {"trans"}}
 """What else files call what AMASS calls so; such files are read by `mrhubo.motion.readers.smpl_names`."""
 _JOINTS = {
     "pose_body": {21: "body without root", 23: "SMPL without root"},

@@ -11,7 +11,8 @@ which 4D-Humans keeps the first 44; the 45, 73, 127 and 144 of the package smplx
 SMPL, SMPL-H and SMPL-X; Stereolabs' ZED with 34 and 38 https://www.stereolabs.com/docs/body-tracking; Kinect 1
 https://learn.microsoft.com/previous-versions/windows/kinect-1.8/jj131025(v=ieb.10); NVIDIA Maxine
 https://docs.nvidia.com/maxine/ar/latest/Appendix/B3DBodyPoseKeypointFormat.html; LSP
-http://sam.johnson.io/research/lsp.html; MPII http://human-pose.mpi-inf.mpg.de. FreeMoCap and others put MediaPipe's
+http://sam.johnson.io/research/lsp.html; KIT-ML as HumanML3D's authors have it
+https://github.com/EricGuo5513/HumanML3D; MPII http://human-pose.mpi-inf.mpg.de. FreeMoCap and others put MediaPipe's
 points of hands and face after those of the body, EasyMocap and SMPLify-X OpenPose's.
 """
 
@@ -110,6 +111,8 @@ SETS: dict[str, tuple[str, ...]] = {
         "MPI-INF-3DHP with 28": "- - spine2 - pelvis neck - head_top left_collar left_shoulder left_elbow left_wrist - "
         "right_collar right_shoulder right_elbow right_wrist - left_hip left_knee left_ankle left_foot left_toe "
         "right_hip right_knee right_ankle right_foot right_toe",
+        "KIT-ML": f"pelvis spine1 spine2 neck - {_RIGHT_LEFT_ARMS} {_RIGHT_LEG} right_foot right_toe {_LEFT_LEG} "
+        "left_foot left_toe",
         "Halpe 26": _HALPE,
         "Halpe 136": f"{_HALPE}{' -' * 68} {_HANDS}",
         "MediaPipe": _MEDIAPIPE,

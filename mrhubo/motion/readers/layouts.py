@@ -12,7 +12,14 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
-from mrhubo.motion.readers.frame_lists import read_columns, read_frame_list, read_listed, read_numbered, read_pictures
+from mrhubo.motion.readers.frame_lists import (
+    read_clips,
+    read_columns,
+    read_frame_list,
+    read_listed,
+    read_numbered,
+    read_pictures,
+)
 from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
@@ -124,6 +131,7 @@ def _pair(tree: Tree) -> Layout | None:
 _FINDERS = (
     read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo,
     _pair, _tracks, read_columns, _people, _single, read_listed, read_numbered,
+    read_clips,
 )  # fmt: skip
 
 

@@ -30,6 +30,8 @@ _LYING_M, _LYING_LOW_M, _STANDING_LOW_M = (0.07, 0.45), (-0.06, 0.12), (-0.6, 0.
 it: of CMU's clips that stand, one has its floor at -0.4 m."""
 _AT_ORIGIN_M = 0.1
 """So near to height 0 is a pelvis that somebody put there."""
+_FLAT_M = 0.5
+"""How far the joints of who lies are above each other."""
 _STEADY_M = 0.15
 """How much the lowest joint's height varies of who lies."""
 _STANDING = math.cos(math.radians(25.0))
@@ -105,6 +107,12 @@ def find_world(
         and any(_lies(near_TK3, turns[world]) for near_TK3 in placed)
     ]
     if upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
+        if not lying and joints_TK3 is not None and upright > _UPRIGHT:
+            others = [w for w in worlds if w in WORLDS and abs(float((body_up_T3 @ turns[w][1]).mean())) < _FLAT]
+            tried = (np.zeros(3), *map(np.array, origins))
+            low = [w for w in others if any(_may_lie(joints_TK3 + at_3, turns[w], turn_33) for at_3 in tried)]
+            said = f"the body stands with {up}, which is taken; with {low[0]} it would lie" if low else ""
+            return up, turn_33, f"{said}, and the root, which stays at height 0, does not tell" if low else ""
         if len(lying) != 1 or upright <= _UPRIGHT:
             return up, turn_33, ""
         if any(_has_floor(near_TK3, turn_33) for near_TK3 in placed):
@@ -143,6 +151,15 @@ def _has_floor(joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:
     height_TK = joints_TK3 @ turn_33[1]
     lowest, pelvis = float(np.median(height_TK.min(axis=1))), float(np.median(height_TK[:, 0]))
     return low < lowest < high or abs(pelvis) < _AT_ORIGIN_M
+
+
+def _may_lie(joints_TK3: np.ndarray, turn_33: np.ndarray, upright_33: np.ndarray) -> bool:
+    """Whether somebody whose pelvis is put at height 0, in a world in which they stand as in one in which they are
+    flat, may lie.
+    """
+    height_TK = joints_TK3 @ turn_33[1]
+    pelvis = np.quantile([height_TK[:, 0], joints_TK3[:, 0] @ upright_33[1]], _MOST_TIMES)
+    return bool(np.abs(pelvis).max() < _AT_ORIGIN_M and np.median(np.ptp(height_TK, axis=1)) < _FLAT_M)
 
 
 def _lies(joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:

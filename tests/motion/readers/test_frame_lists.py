@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion import Motion, ReadOptions, read_motion
+from mrhubo.motion.readers.content import NoMotion
 from tests.motion.readers.estimator_files import made_up, matrices, padded
 
 FRAMES = 12
@@ -95,3 +96,36 @@ def test_lists_of_people(called: str | None, key: str | None, ending: str, tmp_p
 def test_a_list_of_somebody_in_one_frame_is_no_track(tmp_path: Path) -> None:
     with pytest.raises(Exception, match="single frame"):
         read(tmp_path / "a.pkl", [{"poses": padded(POSES["4"][:1], 24), "id": 0}])
+
+
+def clips(frames: int, step: int = 1) -> dict[str, Any]:
+    """Clips as NeuralAnnot has them: by action, take and number of the frame."""
+
+    def clip(seed: int, frames: int) -> dict[str, Any]:
+        row_TX = padded(made_up(frames, seed), 24)
+        return {
+            str(step * t): {"pose": row.tolist(), "shape": [0.1] * 10, "trans": [seed, 0.9, t / 50]}
+            for t, row in enumerate(row_TX)
+        }
+
+    return {"2": {"1": clip(1, frames), "2": clip(2, frames + 3)}, "3": {"1": clip(3, frames)}}
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_clips_of_frames_by_numbers(step: int, tmp_path: Path) -> None:
+    for person, seed in ((None, 2), ("2/1", 1), ("3/1", 3)):
+        motion = read(tmp_path / "a.json", clips(24, step), person)
+        place_T3 = motion.arrays.root_position_T3
+        assert place_T3 is not None and round(float(place_T3[0, 0])) == seed
+        assert len(motion) == 24 + 3 * (seed == 2) and motion.family == "smpl"
+    motion = read(tmp_path / "a.json", clips(24, step)["2"], "1")
+    assert len(motion) == 24
+
+
+def test_people_of_different_pictures_are_no_motion(tmp_path: Path) -> None:
+    generator = np.random.default_rng(0)
+    people = {
+        str(n): {"smpl_param": {"pose": generator.normal(0, 1.5, 72).tolist(), "trans": [0, 0, 3]}} for n in range(40)
+    }
+    with pytest.raises(NoMotion, match="different pictures"):
+        read(tmp_path / "a.json", people)

@@ -109,3 +109,14 @@ def test_who_stands_on_a_floor_that_is_off_as_recordings_have_it_stands(low: flo
     up_T3 = np.tile([0.0, 1.0, 0.0], (FRAMES, 1))
     found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
     assert found == "y up" and "with z up it would lie on a floor" in said
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("walks", [False, True])
+def test_who_is_put_at_height_0_and_may_lie_is_told_of(world: str, walks: bool) -> None:
+    body = np.array([(0, 0, 0), (0.2, 0.4, 0), (-0.2, 0.4, 0), (0.3, 0, 0.1), (-0.3, 0, 0.1), (0, -0.9, -0.1)])
+    way_T13 = walks * np.linspace(0, 2, FRAMES)[:, None, None] * [0, 0, 1]
+    joints_TK3 = (np.tile(body, (FRAMES, 1, 1)) + way_T13) @ TO_Y_UP[world]
+    up_T3 = np.tile([0.0, 1.0, 0.0] @ TO_Y_UP[world], (FRAMES, 1))
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == world and ("it would lie" in said) is not walks
