@@ -26,9 +26,9 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
-from mrhubo.motion.readers.keypoint_sets import by_names
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
 from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.point_names import by_names
 from mrhubo.motion.readers.sightings import check_size
 from mrhubo.robot_motion.clock import find_rate
 

@@ -18,9 +18,10 @@ from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoint_files import holds_points, read_keypoints_file
 from mrhubo.motion.readers.keypoint_fit import NONSENSE, fitting_sets
-from mrhubo.motion.readers.keypoint_sets import SETS, by_names
+from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.point_names import by_names
 from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.sightings import check_size, known_points
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up

@@ -71,7 +71,8 @@ def read_parameter_table(path: Path, options: ReadOptions) -> Motion:
         raise UserError(f"{path}: is no table: {shortened(error, 80)}") from error
     words = [row for row in words if any(word.strip() for word in row)]
     value_TX = np.array([_numbers(path, header, number, row) for number, row in enumerate(words)])
-    seen_T = np.isfinite(value_TX[:, header.places[header.pose]]).any(axis=1) if len(words) else np.zeros(0, bool)
+    value_TX = value_TX.reshape(len(words), len(header.columns))
+    seen_T = np.asarray(np.isfinite(value_TX[:, header.places[header.pose]]).any(axis=1))
     if not seen_T.any():
         raise UserError(f"{path}: has a header and no frames")
     people = find_column(header.columns, PEOPLE)

@@ -41,6 +41,7 @@ _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
 _ROBOT = {"dof", "dofs", "dof_pos", "dof_positions", "joint_pos", "joint_vel", "dof_vel"}
 """What files of robots call the angles of their joints, or how fast those turn."""
 _ENTRIES = 50
+_MOST_CLIPS = 100_000
 _DEEPEST = 3
 """Dictionaries in dictionaries."""
 
@@ -97,6 +98,7 @@ _NAMES = (
     _Names("local_rot_mats", position=("root_positions",)),
     _Names("pose_est_fullposes", position=("pose_est_trans",), betas=("shape_est_betas",)),
     _Names("local_rot_aa"),
+    *map(_Names, ("full_pose", "body_poses", "theta", "rotmats", "rot_mats", "gt")),
 )
 
 
@@ -210,6 +212,18 @@ def forms_in(node: Tree) -> Iterator[Form]:
         form = None if shape is None or len(shape) < 2 else find_form(shape, WITH_ROOT + WITHOUT_ROOT)
         if form is not None:
             yield form
+
+
+def clips_in(node: Tree) -> list[Found]:
+    """SMPL parameters of several clips, of a dictionary whose entries are lists with an array a clip, as those of
+    HumanAct12 and UESTC are (https://github.com/Mathux/ACTOR); none of any other.
+    """
+    keys = set(node.keys) if node.is_mapping else set()
+    key = next((names.pose for names in _NAMES if names.pose in keys and node[names.pose].is_list), None)
+    if key is None or not 0 < len(node[key]) <= _MOST_CLIPS:
+        return []
+    found = [find_here(place) for place in node.places(len(node[key]))]
+    return [one for one in found if one is not None] if None not in found else []
 
 
 def find_inside(node: Tree) -> Found | None:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mrhubo.body.joints import REST_K3
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion import Motion, ReadOptions, read_motion
 from mrhubo.motion.readers.content import NoMotion
@@ -129,3 +130,24 @@ def test_people_of_different_pictures_are_no_motion(tmp_path: Path) -> None:
     }
     with pytest.raises(NoMotion, match="different pictures"):
         read(tmp_path / "a.json", people)
+
+
+@pytest.mark.parametrize("extra", [{}, {"joints3D": [np.zeros((FRAMES, 24, 3)), np.zeros((FRAMES - 3, 24, 3))]}])
+def test_lists_with_an_array_a_clip(extra: dict[str, Any], tmp_path: Path) -> None:
+    rows = [padded(POSES["4"], 24), padded(POSES["9"], 24)[:-3]]
+    for person, name, frames in ((None, "4", FRAMES), ("1", "9", FRAMES - 3)):
+        motion = read(tmp_path / "a.pkl", {"poses": rows, "y": [1, 2], **extra}, person)
+        assert is_it(motion, name, list(range(frames)))
+
+
+def test_what_alphapose_writes(tmp_path: Path) -> None:
+    """Points in a picture, and beside them those of HybrIK in space, one a line of the list."""
+    rest = REST_K3[:22].astype(np.float64) * [1, -1, -1] / 2.2
+    picture = {"category_id": 1, "keypoints": [5.0, 6.0, 0.9] * 17, "score": 2.5}
+    rows = [
+        {"image_id": f"{t}.jpg", **picture, "pred_xyz_jts": rest.reshape(-1).tolist(), "idx": 1} for t in range(FRAMES)
+    ]
+    motion = read(tmp_path / "a.json", rows)
+    assert len(motion) == FRAMES and "SMPL's body" in motion.source
+    root_T33 = motion.arrays.root_rotation_T33
+    assert root_T33 is not None and np.allclose(root_T33[:, 1, 1], 1, atol=0.01)
