@@ -20,10 +20,10 @@ import numpy as np
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.files.tree import Tree, tree_of
+from mrhubo.motion.far_places import kept_places
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.readers.assemble import (
     BLOCK,
-    FARTHEST_M,
     LARGEST_BETA,
     MAX_FRAMES,
     MAX_ROOT_TURN,
@@ -176,10 +176,7 @@ def _read_root(
             notes.append("'trans' is left out: without the root's rotation its up axis is not known")
             return None, None
         position_T3 = _read_rows(file, "trans", frames, (3,), notes)
-        if position_T3 is not None and not (np.abs(position_T3) <= FARTHEST_M).all():
-            notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
-            position_T3 = None
-    return rotation_T33, None if position_T3 is None else position_T3.astype(np.float32)
+    return rotation_T33, None if position_T3 is None else kept_places(position_T3, "'trans'", notes)
 
 
 def _read_contacts(file: NpzFile, frames: int, notes: list[str]) -> np.ndarray | None:
