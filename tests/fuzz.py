@@ -33,8 +33,11 @@ from tests.motion.damage import altered_words, damaged_by, read_or_refused
 from tests.motion.readers import (
     estimator_files,
     test_amc,
+    test_frame_lists,
+    test_humanml,
     test_keypoints,
     test_nymeria,
+    test_parameter_table,
     test_point_folders,
     test_point_table,
     test_pose_folders,
@@ -138,6 +141,14 @@ def _point_table(path: Path) -> None:
     path.write_text("\n".join(["frame,landmark_id,x,y,z,visibility", *rows]) + "\n")
 
 
+def _rows(width: int) -> Callable[[Path], None]:
+    return lambda path: np.save(path, test_humanml.rows(width).astype(np.float32))
+
+
+def _parameter_table(path: Path) -> None:
+    path.write_text(test_parameter_table.table(test_parameter_table.columns(0, "flat", 24), rows=[*range(_FRAMES)]))
+
+
 FOLDERS: dict[str, Callable[[Path], None]] = {
     **{f"folder of {name}": _pose_folder(name) for name in test_pose_folders.WRITERS},
     "folder of OpenPose": _openpose_folder,
@@ -158,6 +169,9 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "skeleton": ("damaged.skeleton", _ntu),
     "features": ("damaged.npy", _features),
     "nymeria": ("damaged.npz", lambda path: test_nymeria.write(path, *test_nymeria.body())),
+    **{f"features, {width}": ("damaged.npy", _rows(width)) for width in test_humanml.ORDERS},
+    "parameters, a line each": ("damaged.csv", _parameter_table),
+    "clips.json": ("damaged.json", lambda path: path.write_text(json.dumps(test_frame_lists.clips(24)))),
     "points, a line each": ("damaged.csv", _point_table),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),

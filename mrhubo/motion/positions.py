@@ -32,6 +32,7 @@ from mrhubo.fast.rotations import (
     turned,
 )
 from mrhubo.motion.completion import Bone, complete
+from mrhubo.motion.far_places import kept_places
 from mrhubo.motion.gaps import fill_directions, fill_numbers, fill_rotations
 from mrhubo.motion.hinges import hinge_axes
 from mrhubo.motion.motion import Motion
@@ -136,7 +137,8 @@ def motion_from_points(
     if {"left_hip", "right_hip"} <= build.points.keys():
         middle_T3, offset_3 = ((at["left_hip"] + at["right_hip"]) / 2 for at in (build.points, build.rest))
         position_T3 = fill_numbers(middle_T3, known_frames(middle_T3)) - pelvis_T33 @ offset_3
-        position_T3 = position_T3.astype(np.float32) if np.isfinite(position_T3).all() else None
+        finite = np.isfinite(position_T3).all()
+        position_T3 = kept_places(position_T3, "where the root goes", build.notes) if finite else None
     return Motion.of(
         name=name,
         local_TJ33=orthonormal(local_TJ33).astype(np.float32),

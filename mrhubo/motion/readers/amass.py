@@ -20,10 +20,10 @@ import numpy as np
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.npz import NpzFile, open_npz
 from mrhubo.files.tree import Tree, tree_of
+from mrhubo.motion.far_places import kept_places
 from mrhubo.motion.motion import SOLE_POINTS, Motion
 from mrhubo.motion.readers.assemble import (
     BLOCK,
-    FARTHEST_M,
     LARGEST_BETA,
     MAX_FRAMES,
     MAX_ROOT_TURN,
@@ -37,6 +37,7 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import RATE_KEYS, TIME_KEYS, find_rate
 from mrhubo.motion.readers.rotations import Form, find_form, read_local, to_matrices
+from mrhubo.motion.readers.smpl_names import PLACES, ROOTS
 from mrhubo.motion.readers.world import ANY_WORLD, Z_UP
 from mrhubo.motion.writers.amass import CONTACT_KEY
 
@@ -47,7 +48,7 @@ _ITS_OWN = {"dmpls", "markers_latent", "latent_labels"}
 """Keys of AMASS's own files alone: of the soft tissue beside SMPL-H, or of the markers beside SMPL-X, of which files
 that others wrote with its keys have none.
 """
-_OTHER_NAMES = {"root_orient": {"global_orient", "root_pose"}, "trans": {"transl", "translation", "root_trans"}}
+_OTHER_NAMES = {"root_orient": {*ROOTS} - {"root_orient"}, "trans": {*PLACES} - {"trans"}}
 """What else files call what AMASS calls so; such files are read by `mrhubo.motion.readers.smpl_names`."""
 _JOINTS = {
     "pose_body": {21: "body without root", 23: "SMPL without root"},
@@ -175,10 +176,7 @@ def _read_root(
             notes.append("'trans' is left out: without the root's rotation its up axis is not known")
             return None, None
         position_T3 = _read_rows(file, "trans", frames, (3,), notes)
-        if position_T3 is not None and not (np.abs(position_T3) <= FARTHEST_M).all():
-            notes.append(f"'trans' is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
-            position_T3 = None
-    return rotation_T33, None if position_T3 is None else position_T3.astype(np.float32)
+    return rotation_T33, None if position_T3 is None else kept_places(position_T3, "'trans'", notes)
 
 
 def _read_contacts(file: NpzFile, frames: int, notes: list[str]) -> np.ndarray | None:

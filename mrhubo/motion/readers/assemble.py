@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
-from mrhubo.body.joints import OFFSETS_J3, PARENTS
+from mrhubo.body.joints import JOINT_NAMES, OFFSETS_J3, PARENTS
 from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import FAMILIES, from_family
 from mrhubo.motion.motion import Motion
@@ -33,6 +33,12 @@ _LOOKS = 30.0
 """How often a second it is looked whether feet stand: more often, those that swing would seem to."""
 _UPRIGHT_M = 0.6
 """How far an ankle is under the pelvis of who stands [m], and not sits or lies."""
+_FEET = (JOINT_NAMES.index("left_foot"), JOINT_NAMES.index("right_foot"))
+"""Where toes begin, of all joints."""
+_FEWEST_STEPS, _MOST_STEPS = 10, 2_000
+"""Frames that tell whether feet slide."""
+_SLIDES, _STEADIER = 0.1, 0.6
+"""Speed [m/s] of the lower foot, in half of the frames, of who slides; and by what that is smaller of who does not."""
 _LEVEL = math.radians(1.0)
 """Tilts of elbows' axes up to this stay: an angle that says nothing."""
 
@@ -75,10 +81,29 @@ def in_metres(motion: Motion, where: str, beyond: float = 0.0) -> Motion:
     """
     place_T3 = motion.arrays.root_position_T3
     unit = None if place_T3 is None else find_unit(place_T3, motion.frame_rate, beyond)
-    if place_T3 is None or unit is None:
+    if place_T3 is None or unit is None or _steps_in_metres(motion, unit[1]):
         return motion
     note = f"{where} is in {unit[0]}, by how fast or how high the root is: told in metres"
     return motion.changed(root_position_T3=place_T3 * np.float32(unit[1]), notes=(*motion.notes, note))
+
+
+def _steps_in_metres(motion: Motion, unit: float) -> bool:
+    """Whether the lower foot of somebody who walks keeps still if places are in metres, and slides if they are in a
+    smaller unit [m]: who walks high above a floor at 0 is told from who stands on it.
+    """
+    root_T33, place_T3 = motion.arrays.root_rotation_T33, motion.arrays.root_position_T3
+    if root_T33 is None or place_T3 is None or len(motion) < _FEWEST_STEPS:
+        return False
+    few = slice(0, _MOST_STEPS)
+    foot_TF3 = _joints(root_T33[few], motion.arrays.local_TJ33[few])[:, _FEET]
+    lower_T = foot_TF3[:-1, :, 1].argmin(axis=1)
+    seen_T3 = np.diff(foot_TF3, axis=0)[np.arange(len(lower_T)), lower_T]
+    step_T3 = np.diff(place_T3[few], axis=0)
+    as_metres, as_unit = (
+        float(np.median(np.linalg.norm((seen_T3 + metres * step_T3)[:, [0, 2]], axis=1))) * motion.frame_rate
+        for metres in (1.0, unit)
+    )
+    return as_unit > _SLIDES and as_metres < _STEADIER * as_unit
 
 
 def upright(motion: Motion, worlds: tuple[str, ...], rest: str) -> Motion:

@@ -19,6 +19,7 @@ import numpy as np
 
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import open_regular
+from mrhubo.motion.far_places import compact
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
 from mrhubo.robot_motion.clock import rate_of_step, usual_rates
 
@@ -182,7 +183,7 @@ def _rates(step: str) -> tuple[float, ...]:
 
 
 def _read_numbers(path: Path, handle: BinaryIO, columns: int, promised: int | None) -> tuple[np.ndarray, list[str]]:
-    """The frames (T, C), float32, block by block; those that the file does not hold whole are left out, with a note.
+    """The frames (T, C), block by block; those that the file does not hold whole are left out, with a note.
 
     Raises:
         UserError: something is no number, or numbers are missing in the middle of the frames, or too many.
@@ -267,12 +268,12 @@ def _check_lines(path: Path, ends: np.ndarray, columns: int, frames: int) -> Non
 
 
 def _numbers(text: bytes) -> tuple[np.ndarray, bytes | None]:
-    """The numbers, float32, with which a block of text begins, and what follows from a word that is none, if there is
+    """The numbers with which a block of text begins, and what follows from a word that is none, if there is
     one.
     """
     try:
         with warnings.catch_warnings(action="error"):
-            return np.fromstring(text.decode("latin1"), dtype=np.float64, sep=" ").astype(np.float32), None
+            return compact(np.fromstring(text.decode("latin1"), dtype=np.float64, sep=" ")), None
     except (ValueError, DeprecationWarning, RuntimeWarning):
         numbers, after, words = [], None, text.split()
         for place, word in enumerate(words):
@@ -281,8 +282,7 @@ def _numbers(text: bytes) -> tuple[np.ndarray, bytes | None]:
             except ValueError:
                 after = b" ".join(words[place:])
                 break
-        with np.errstate(over="ignore"):
-            return np.array(numbers, np.float64).astype(np.float32), after
+        return compact(np.array(numbers, np.float64)), after
 
 
 def _number(path: Path, line: str, word: str) -> float:

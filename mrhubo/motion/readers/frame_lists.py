@@ -3,24 +3,31 @@
 So they come from who calls an estimator on each picture of a video and keeps what it answers: Multi-HMR's people,
 4D-Humans' HMR2, NLF. Who is in a frame is read by `mrhubo.motion.readers.frame_bodies`. NLF itself answers a batch of
 pictures with a dictionary of lists, whose entries have a row for whoever is in each
-(https://github.com/isarandi/nlf, `detect_smpl_batched`).
+(https://github.com/isarandi/nlf, `detect_smpl_batched`). NeuralAnnot's clips are dictionaries of such by action and
+take, or subject and sequence, each frame with `pose`, `shape` and `trans` or SMPL-X's parameters; its pictures, by
+their numbers, are no motion (https://github.com/mks0601/NeuralAnnot_RELEASE).
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
+from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
+from mrhubo.motion.readers.assemble import MAX_ROOT_TURN
 from mrhubo.motion.readers.body_tracks import body_tracks
+from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_bodies import Body, bodies_in
 from mrhubo.motion.readers.frame_numbers import in_order
-from mrhubo.motion.readers.tracks import Kind, Layout
-from mrhubo.motion.readers.world import CAMERAS
+from mrhubo.motion.readers.rotations import Form, rows_of, to_matrices
+from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
+from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS
 
 _FEWEST, _NUMBERED = 2, 20
 """Frames of a list, and of a dictionary whose keys are numbers, which may be those of people."""
@@ -33,6 +40,10 @@ _FRAMES = (
 _LISTS = ("frames", "results", "data", "predictions", "outputs")
 """What entries call the frame that they are of, and files a list of frames."""
 _ROWS_OF_POSES = ("pose", "poses", "body_pose", "thetas", "smpl_thetas")
+_DEEPEST, _MOST_CLIPS = 2, 10_000
+"""Dictionaries above that of a clip's frames, and clips."""
+_RESTLESS = 0.7
+"""Nobody turns by so much [rad] from one frame to the next in half of them, as people in different pictures do."""
 _PICTURE = re.compile(r".*\.(?:jpe?g|png|bmp|webp|tiff?)|.*frame.*[0-9].*", re.IGNORECASE)
 
 
@@ -80,8 +91,45 @@ def read_pictures(tree: Tree) -> Layout | None:
 
 def read_numbered(tree: Tree) -> Layout | None:
     """The same in a dictionary by numbers."""
-    numbered = tree.is_mapping and len(tree) > _NUMBERED and all(map(str.isdecimal, tree.keys))
-    return _named(tree) if numbered else None
+    return _named(tree) if tree.is_mapping and _are_numbered(tree) else None
+
+
+def _are_numbered(tree: Tree) -> bool:
+    return len(tree) > _NUMBERED and all(map(str.isdecimal, tree.keys))
+
+
+def read_clips(tree: Tree) -> Layout | None:
+    """Dictionaries of clips, by action and take say, each a dictionary of frames by numbers."""
+    clips = dict(_clips(tree, _DEEPEST)) if tree.is_mapping else {}
+    first = next(iter(clips.values()), None)
+    layout = None if first is None else read_numbered(first)
+    if layout is None:
+        return None
+    tracks = [Track(name, len(clip), lambda clip=clip: _read_clip(clip)) for name, clip in clips.items()]
+    return Layout(replace(layout.kind, source="SMPL parameters of clips, frame by frame", worlds=ANY_WORLD), tracks)
+
+
+def _clips(tree: Tree, deepest: int, before: str = "") -> Iterator[tuple[str, Tree]]:
+    """Dictionaries of frames by numbers, and their names, in dictionaries up to some deep."""
+    for name, child in islice(tree.items(), _MOST_CLIPS):
+        if not child.is_mapping:
+            continue
+        if _are_numbered(child):
+            yield before + name, child
+        elif deepest > 1:
+            yield from _clips(child, deepest - 1, f"{before}{name}/")
+
+
+def _read_clip(clip: Tree) -> SmplArrays:
+    """Whoever is seen longest in a clip.
+
+    Raises:
+        UserError: there is nobody.
+    """
+    layout = read_numbered(clip)
+    if layout is None:
+        raise UserError(f"{clip.named} holds no SMPL parameters of frames")
+    return max(layout.tracks, key=lambda track: track.length).read()
 
 
 def read_columns(tree: Tree) -> Layout | None:
@@ -107,7 +155,28 @@ def _named(tree: Tree) -> Layout | None:
     entries = list(tree.items())
     if len(entries) < _FEWEST or not any(_here(frame, len(entries)) for _, frame in entries[:_NUMBERED]):
         return None
-    return _layout(tree, ((number, [frame]) for number, frame in in_order(tree.path, entries)), len(entries))
+    layout = _layout(tree, ((number, [frame]) for number, frame in in_order(tree.path, entries)), len(entries))
+    if layout is not None and len(layout.tracks) == 1:
+        _refuse_pictures(tree, layout.tracks[0].read())
+    return layout
+
+
+def _refuse_pictures(tree: Tree, arrays: SmplArrays) -> None:
+    """Refuses people of different pictures, in place of frames that follow each other.
+
+    Raises:
+        NoMotion: somebody turns more than anybody does.
+    """
+    root_SX = rows_of(arrays.pose if arrays.root is None else arrays.root)[:, : arrays.form.numbers]
+    turn_S33 = to_matrices(root_SX, Form(1, root_SX.shape[1] == 9), MAX_ROOT_TURN)
+    if turn_S33 is None or len(turn_S33) < _NUMBERED:
+        return
+    cosine_S = (np.trace(turn_S33[:-1, 0].mT @ turn_S33[1:, 0], axis1=-2, axis2=-1) - 1) / 2
+    if np.median(np.arccos(np.clip(cosine_S, -1, 1))) > _RESTLESS:
+        raise NoMotion(
+            f"{tree.named}: holds SMPL parameters by number, in which people turn from one to the next as those in"
+            " different pictures do, and no motion"
+        )
 
 
 def _layout(tree: Tree, frames: Iterable[tuple[int, list[Tree]]], count: int) -> Layout | None:

@@ -22,7 +22,8 @@ from mrhubo.motion.readers.tracks import Person, choose
 POINT_KEYS = (
     "keypoints3d_optim", "keypoints_3d", "kpts_3d", "joints_3d", "positions_3d", "pose_3d", "world_landmarks",
     "pose_world_landmarks", "pose_world_3d_landmarks", "reconstruction", "joint_positions", "pred_joints", "j3d",
-    "human_joints", "joints_world", "global_positions", "jpos", "smpl_joints",
+    "human_joints", "joints_world", "global_positions", "jpos", "smpl_joints", "pred_xyz_jts", "keypoints_xyz",
+    "pred_joints_3d", "joint_locations", "world_positions", "global_joints", "joints_positions",
     "annotation_3d", "keypoints", "keypoint", "kpts",
     "joints", "positions", "points", "landmarks", "pose_landmarks", "skeleton",
 )  # fmt: skip

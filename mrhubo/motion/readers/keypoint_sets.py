@@ -1,4 +1,4 @@
-"""Which point of a body each keypoint is: by its name, or by its place in a set that is known.
+"""Which point of a body each keypoint is by its place in a set that is known.
 
 Orders of the sets: COCO https://cocodataset.org/#format-data; OpenPose's BODY_25 and COCO-18
 https://cmu-perceptual-computing-lab.github.io/openpose/web/html/doc/md_doc_02_output.html; MediaPipe
@@ -11,16 +11,14 @@ which 4D-Humans keeps the first 44; the 45, 73, 127 and 144 of the package smplx
 SMPL, SMPL-H and SMPL-X; Stereolabs' ZED with 34 and 38 https://www.stereolabs.com/docs/body-tracking; Kinect 1
 https://learn.microsoft.com/previous-versions/windows/kinect-1.8/jj131025(v=ieb.10); NVIDIA Maxine
 https://docs.nvidia.com/maxine/ar/latest/Appendix/B3DBodyPoseKeypointFormat.html; LSP
-http://sam.johnson.io/research/lsp.html; MPII http://human-pose.mpi-inf.mpg.de. FreeMoCap and others put MediaPipe's
+http://sam.johnson.io/research/lsp.html; KIT-ML as HumanML3D's authors have it
+https://github.com/EricGuo5513/HumanML3D; MPII http://human-pose.mpi-inf.mpg.de. FreeMoCap and others put MediaPipe's
 points of hands and face after those of the body, EasyMocap and SMPLify-X OpenPose's.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-
-from mrhubo.body.joints import JOINT_NAMES, KEYPOINT_NAMES, SIDES
+from mrhubo.body.joints import JOINT_NAMES, SIDES
 
 _FACE = "nose left_eye right_eye left_ear right_ear"
 _LIMBS = " ".join(f"left_{n} right_{n}" for n in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
@@ -110,6 +108,8 @@ SETS: dict[str, tuple[str, ...]] = {
         "MPI-INF-3DHP with 28": "- - spine2 - pelvis neck - head_top left_collar left_shoulder left_elbow left_wrist - "
         "right_collar right_shoulder right_elbow right_wrist - left_hip left_knee left_ankle left_foot left_toe "
         "right_hip right_knee right_ankle right_foot right_toe",
+        "KIT-ML": f"pelvis spine1 spine2 neck - {_RIGHT_LEFT_ARMS} {_RIGHT_LEG} right_foot right_toe {_LEFT_LEG} "
+        "left_foot left_toe",
         "Halpe 26": _HALPE,
         "Halpe 136": f"{_HALPE}{' -' * 68} {_HANDS}",
         "MediaPipe": _MEDIAPIPE,
@@ -120,54 +120,3 @@ SETS: dict[str, tuple[str, ...]] = {
     }.items()
 }  # fmt: skip
 """Our names of the points of each set, in its order."""
-
-_PARTS = {
-    "shoulder": "shoulder sho shldr upperarm uparm", "elbow": "elbow elb forearm lowerarm", "wrist": "wrist wri",
-    "hip": "hip upleg upperleg thigh", "knee": "knee kne lowerleg shin calf", "ankle": "ankle ank", "heel": "heel",
-    "toe": "toe bigtoe footindex toes", "foot": "foot toebase ball", "index": "index indexfinger",
-    "pinky": "pinky pinkyfinger little", "thumb": "thumb", "middle": "middle middlefinger", "ear": "ear", "eye": "eye",
-    "collar": "collar clavicle",
-}  # fmt: skip
-_CENTRAL = {
-    "pelvis": "pelvis root midhip hips hip spinebase", "spine1": "spinenaval spinenavel navalspine",
-    "spine2": "spine torso belly spinemid spinechest chestspine", "neck": "neck", "nose": "nose",
-    "head_top": "headtop tophead top",
-}  # fmt: skip
-_SPINE = ("spine1", "spine2", "spine3")
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
-_LEFT, _RIGHT = ("left", "l", "lft"), ("right", "r", "rgt")
-
-
-def our_name(name: str) -> str | None:
-    """Our name of a point that somebody calls `LShoulder`, `left shoulder`, `RIGHT_FOOT_INDEX`; None where there is
-    none.
-    """
-    bare = name.rpartition(":")[2].strip()
-    plain = bare.lower().replace(" ", "_").replace("-", "_")
-    if plain in KEYPOINT_NAMES:
-        return plain
-    if plain.replace("_", "") in _SPINE:
-        return plain.replace("_", "")
-    words = [word.lower() for word in _WORD.findall(bare)]
-    side = next((our for our, theirs in (("left", _LEFT), ("right", _RIGHT)) if set(words) & set(theirs)), None)
-    rest = "".join(word for word in words if word not in (*_LEFT, *_RIGHT) and not word.isdigit())
-    if side is None:
-        central = next((our for our, theirs in _CENTRAL.items() if rest in theirs.split()), None)
-        if central is not None or not rest or rest[0] not in "lr":
-            return central
-        side, rest = {"l": "left", "r": "right"}[rest[0]], rest[1:]
-    part = next((our for our, theirs in _PARTS.items() if rest in theirs.split()), None)
-    return None if part is None else f"{side}_{part}"
-
-
-def by_names(names: Sequence[str]) -> dict[str, int]:
-    """Our points among named ones, by place; feet where there are no ankles, as in Human3.6M, are the ankles."""
-    found: dict[str, int] = {}
-    for place, name in enumerate(names):
-        ours = our_name(name)
-        if ours is not None:
-            found.setdefault(ours, place)
-    for side in SIDES:
-        if f"{side}_ankle" not in found and f"{side}_foot" in found:
-            found[f"{side}_ankle"] = found.pop(f"{side}_foot")
-    return found

@@ -26,9 +26,9 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
-from mrhubo.motion.readers.keypoint_sets import by_names
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
 from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.point_names import by_names
 from mrhubo.motion.readers.sightings import check_size
 from mrhubo.robot_motion.clock import find_rate
 
@@ -39,10 +39,11 @@ _FIRST = re.compile(
     r"([xyzv])[ _.]?(\d+)|(x|y|z|visibility|confidence|conf|score|presence)[ _.]([a-z].*)", re.IGNORECASE
 )
 _NUMBERED = re.compile(r"(.*?)(\d{1,9})")
-_FRAMES, _TIMES = (
+FRAMES, TIMES = (
     ("frame", "frames", "frameid", "frameindex", "frameidx", "framenumber"),
     ("time", "timestamp", "times", "timestampms", "timems", "timemilliseconds"),
 )
+"""What tables call the number of a frame, and its time, without signs and in small letters."""
 _MILLISECONDS = re.compile(r"m(?:illi)?s(?:ec\w*)?[\])]?", re.IGNORECASE)
 NOTHING = ("", "nan", "none", "null", "na")
 """Words of a table for what is not there, in small letters."""
@@ -94,7 +95,7 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     value_TX = np.hstack([value_TX, empty_T1])  # the last column is that of what is not there
     point_TK4 = value_TX[:, [-1 if column is None else column for column in wanted]].reshape(len(value_TX), -1, 4)
     numbers, rate = list(range(len(point_TK4))), None
-    frame, time = header.find(_FRAMES), header.find(_TIMES)
+    frame, time = header.find(FRAMES), header.find(TIMES)
     if frame is not None and np.isfinite(value_TX[:, frame]).all():
         numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, frame]])
     if time is not None and numbers == list(range(len(numbers))):

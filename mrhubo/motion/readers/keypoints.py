@@ -18,9 +18,10 @@ from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import LIFT, Keypoints
 from mrhubo.motion.readers.keypoint_files import holds_points, read_keypoints_file
 from mrhubo.motion.readers.keypoint_fit import NONSENSE, fitting_sets
-from mrhubo.motion.readers.keypoint_sets import SETS, by_names
+from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.point_names import by_names
 from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.sightings import check_size, known_points
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
@@ -162,7 +163,7 @@ def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
 @np.errstate(all="ignore")
 def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str, np.ndarray], str]:
     """The points with y up, right-handed, in metres."""
-    if _forward(points) < -_LEFT_HANDED:
+    if way_forward(points) < -_LEFT_HANDED:
         points = {name: point_T3 * [-1.0, 1.0, 1.0] for name, point_T3 in points.items()}
         notes.append("nose and feet point backward: the file's axes are taken to be left-handed, and x is mirrored")
     low = next((joint for joint in ("ankle", "knee", "hip") if _seen(points, joint)), "hip")
@@ -197,7 +198,7 @@ def _is_centred(points: Mapping[str, np.ndarray]) -> bool:
     return any(len(known_T) > 1 and known_T.max() < _CENTRED for known_T in far)
 
 
-def _forward(points: Mapping[str, np.ndarray]) -> float:
+def way_forward(points: Mapping[str, np.ndarray]) -> float:
     """How far nose and toes point forward, -1 to 1, for a body whose left is where the names say; 0 where nothing
     tells.
     """

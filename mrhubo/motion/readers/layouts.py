@@ -12,12 +12,19 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.detections import read_cliff, read_pymaf
 from mrhubo.motion.readers.family import family_of
 from mrhubo.motion.readers.frame_layouts import read_phalp, read_romp
-from mrhubo.motion.readers.frame_lists import read_columns, read_frame_list, read_listed, read_numbered, read_pictures
+from mrhubo.motion.readers.frame_lists import (
+    read_clips,
+    read_columns,
+    read_frame_list,
+    read_listed,
+    read_numbered,
+    read_pictures,
+)
 from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.rotations import find_form
-from mrhubo.motion.readers.smpl_names import Found, find_here, find_inside, forms_in, search
+from mrhubo.motion.readers.smpl_names import Found, clips_in, find_here, find_inside, forms_in, search
 from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
 
@@ -103,6 +110,15 @@ def _single(tree: Tree) -> Layout | None:
     return Layout(kind, found.tracks(), notes)
 
 
+def _clips(tree: Tree) -> Layout | None:
+    """Lists with an array a clip, which go by their numbers."""
+    found = clips_in(tree)
+    if len(found) < 2 or any(one.frames < 2 for one in found):  # of single frames, they are of one
+        return None
+    kind, notes = _taken_for(_kind("SMPL parameters of clips", found[0], tree), found[0])
+    return Layout(kind, [track for number, one in enumerate(found) for track in one.tracks(str(number))], notes)
+
+
 def _pair(tree: Tree) -> Layout | None:
     """A pose and a place of the root, as `torch.save((pose, tran), ...)` keeps what TransPose and its kin answer: all
     joints of SMPL (T, 24, 3) or (T, 24, 3, 3), and (T, 3) (https://github.com/Xinyu-Yi/TransPose).
@@ -123,7 +139,8 @@ def _pair(tree: Tree) -> Layout | None:
 
 _FINDERS = (
     read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo,
-    _pair, _tracks, read_columns, _people, _single, read_listed, read_numbered,
+    _pair, _tracks, read_columns, _clips, _people, _single, read_listed, read_numbered,
+    read_clips,
 )  # fmt: skip
 
 

@@ -29,13 +29,15 @@ from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one
 
+PEOPLE = ("person", "personid", "trackid", "bodyid", "poseid")
+"""What tables call whoever a line is of, without signs and in small letters."""
 _COLUMNS = {
     "frame": ("frame", "frameid", "frameindex", "frameidx", "framenumber", "frameno"),
     "point": (
         "landmark", "landmarkname", "keypoint", "keypointname", "joint", "jointname", "bodypart", "point", "pointname",
         "name", "marker", "landmarkid", "keypointid", "jointid", "landmarkindex", "keypointindex", "jointindex",
     ),
-    "person": ("person", "personid", "trackid", "bodyid", "poseid"),
+    "person": PEOPLE,
     "x": ("x",), "y": ("y",), "z": ("z",),
     "sure": ("visibility", "confidence", "conf", "score", "presence"),
 }  # fmt: skip

@@ -26,12 +26,22 @@ from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, Form, find_
 from mrhubo.motion.readers.tracks import SmplArrays, Track
 
 T = TypeVar("T")
-_ROOTS = ("global_orient", "root_orient", "root_pose", "global_orientation")
-_PLACES = ("trans", "transl", "tran", "translation", "root_trans", "root_trans_offset", "trans_orig", "global_t")
+ROOTS = (
+    "global_orient", "root_orient", "root_pose", "global_orientation", "root_orientation", "root_rotation", "root_rot",
+    "root_aa", "global_rot", "global_rotation", "global_root_orient", "pose_root", "poses_root", "orient",
+)  # fmt: skip
+PLACES = (
+    "trans", "transl", "tran", "translation", "translations", "root_trans", "root_transl", "root_translation",
+    "root_trans_offset", "trans_orig", "global_t", "global_trans", "global_transl", "global_translation",
+    "root_position", "root_positions", "root_pos",
+)  # fmt: skip
+_BETAS = ("betas", "beta", "shape")
+"""What files call the rotation of the root, its place, and the body's shape."""
 _FRAMES = ("frame_ids", "frame_id", "frame", "frames", "frame_idx")
 _ROBOT = {"dof", "dofs", "dof_pos", "dof_positions", "joint_pos", "joint_vel", "dof_vel"}
 """What files of robots call the angles of their joints, or how fast those turn."""
 _ENTRIES = 50
+_MOST_CLIPS = 100_000
 _DEEPEST = 3
 """Dictionaries in dictionaries."""
 
@@ -42,13 +52,27 @@ class _Names:
 
     pose: str
     root: tuple[str, ...] = ()
-    """Empty: it is in the pose, or else called as usual."""
-    position: tuple[str, ...] = _PLACES
-    betas: tuple[str, ...] = ("betas", "beta", "shape")
+    """Before the usual names."""
+    position: tuple[str, ...] = ()
+    """Before the usual names."""
+    betas: tuple[str, ...] = ()
+    """Before the usual names."""
+    alone: bool = False
+    """Whether the usual names of the place are those of something else."""
+
+    @property
+    def positions(self) -> tuple[str, ...]:
+        """All names of the place."""
+        return self.position if self.alone else (*self.position, *PLACES)
+
+    @property
+    def shapes(self) -> tuple[str, ...]:
+        """All names of the shape."""
+        return (*self.betas, *_BETAS)
 
 
 _NAMES = (
-    _Names("pose_world", position=("trans_world",)),
+    _Names("pose_world", position=("trans_world",), alone=True),
     _Names("smpl_poses", position=("smpl_trans",)),
     _Names("smpl_thetas", position=("cam_trans",), betas=("smpl_betas",)),
     _Names("pred_rotmat", position=("pred_trans",), betas=("pred_shape",)),
@@ -74,6 +98,7 @@ _NAMES = (
     _Names("local_rot_mats", position=("root_positions",)),
     _Names("pose_est_fullposes", position=("pose_est_trans",), betas=("shape_est_betas",)),
     _Names("local_rot_aa"),
+    *map(_Names, ("full_pose", "body_poses", "theta", "rotmats", "rot_mats", "gt")),
 )
 
 
@@ -105,8 +130,9 @@ class Found:
         node, names, pose = self.node, self.names, self.pose
         array = pose.array() if person is None else pose.array().take(person, 0 if self.people_first else 1)
         first = 1 if self.form.joints in WITH_ROOT else 0
-        roots = names.root or (() if first and in_world(node).get(*_ROOTS) is None else _ROOTS)
-        root, position, betas = (self._array(keys, person) for keys in (roots, names.position, names.betas))
+        in_pose = first and in_world(node).get(*ROOTS) is None
+        roots = names.root if in_pose else (*names.root, *ROOTS)
+        root, position, betas = (self._array(keys, person) for keys in (roots, names.positions, names.shapes))
         frames = self._array(_FRAMES, person)
         if frames is None and self.outer is not None:
             frames = replace(self, node=self.outer)._array(_FRAMES, person)
@@ -118,7 +144,7 @@ class Found:
 
     def shape(self) -> list[float] | None:
         """The body's shape, of the first of the people or frames that have one; None where there is none."""
-        betas = self._find(self.names.betas)
+        betas = self._find(self.names.shapes)
         if betas is None or betas.ndim == 0 or not betas.size:
             return None
         return betas.reshape(-1, betas.shape[-1])[0].tolist()
@@ -142,7 +168,7 @@ class Found:
         """The array that is called by one of some names; that in the world, where pose or root are told in it."""
         world = in_world(self.node)
         pose_told = self.names.pose in world.keys and self.node.get(self.names.pose) is None
-        homes = (world,) if pose_told or world.get(*_ROOTS) is not None else ()
+        homes = (world,) if pose_told or world.get(*ROOTS) is not None else ()
         found = (home.find_array(*keys) for home in (*homes, self.node, by_usual_names(self.node)))
         return next((array for array in found if array is not None), None)
 
@@ -186,6 +212,18 @@ def forms_in(node: Tree) -> Iterator[Form]:
         form = None if shape is None or len(shape) < 2 else find_form(shape, WITH_ROOT + WITHOUT_ROOT)
         if form is not None:
             yield form
+
+
+def clips_in(node: Tree) -> list[Found]:
+    """SMPL parameters of several clips, of a dictionary whose entries are lists with an array a clip, as those of
+    HumanAct12 and UESTC are (https://github.com/Mathux/ACTOR); none of any other.
+    """
+    keys = set(node.keys) if node.is_mapping else set()
+    key = next((names.pose for names in _NAMES if names.pose in keys and node[names.pose].is_list), None)
+    if key is None or not 0 < len(node[key]) <= _MOST_CLIPS:
+        return []
+    found = [find_here(place) for place in node.places(len(node[key]))]
+    return [one for one in found if one is not None] if None not in found else []
 
 
 def find_inside(node: Tree) -> Found | None:

@@ -19,8 +19,9 @@ from mrhubo.errors import UserError
 from mrhubo.fast.plain.human import normalize
 from mrhubo.fast.rotations import orthonormal, shortest_turn
 from mrhubo.files.tree import Tree
+from mrhubo.motion.far_places import kept_places
 from mrhubo.motion.motion import Motion
-from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES, MAX_ROOT_TURN, upright
+from mrhubo.motion.readers.assemble import MAX_FRAMES, MAX_ROOT_TURN, upright
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rotations import find_form, rows_of, to_matrices
@@ -221,7 +222,7 @@ def _root(arrays: _Arrays, frames: int, notes: list[str]) -> np.ndarray | None:
     if root is None:
         return None
     rows_TX = rows_of(root)
-    if rows_TX.shape != (frames, 3) or not (np.abs(rows_TX) < FARTHEST_M).all():
-        notes.append(f"where the root goes is left out: its shape is {root.shape}, or it holds no finite numbers")
+    if rows_TX.shape != (frames, 3):
+        notes.append(f"where the root goes is left out: its shape is {root.shape}")
         return None
-    return rows_TX.astype(np.float32)
+    return kept_places(rows_TX, "where the root goes", notes)

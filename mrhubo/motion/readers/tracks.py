@@ -14,11 +14,11 @@ import numpy as np
 
 from mrhubo.errors import UserError, nearest, shortened
 from mrhubo.files.tree import Tree
+from mrhubo.motion.far_places import kept_places
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import (
     BLOCK,
-    FARTHEST_M,
     LARGEST_BETA,
     MAX_FRAMES,
     MAX_ROOT_TURN,
@@ -219,10 +219,7 @@ def _position(arrays: SmplArrays, notes: list[str]) -> np.ndarray | None:
     if len(rows_SX) != len(arrays.pose) or rows_SX.shape[1] != 3:
         notes.append(f"where the root goes is left out: its shape is {arrays.position.shape}")
         return None
-    if not (np.abs(rows_SX) <= FARTHEST_M).all():
-        notes.append(f"where the root goes is left out: it holds NaN, infinite numbers, or some beyond {FARTHEST_M:g}")
-        return None
-    return rows_SX.astype(np.float32)
+    return kept_places(rows_SX, "where the root goes", notes)
 
 
 def _betas(arrays: SmplArrays, notes: list[str]) -> tuple[float, ...] | None:

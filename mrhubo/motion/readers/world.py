@@ -30,6 +30,8 @@ _LYING_M, _LYING_LOW_M, _STANDING_LOW_M = (0.07, 0.45), (-0.06, 0.12), (-0.6, 0.
 it: of CMU's clips that stand, one has its floor at -0.4 m."""
 _AT_ORIGIN_M = 0.1
 """So near to height 0 is a pelvis that somebody put there."""
+_FLAT_M = 0.5
+"""How far the joints of who lies are above each other."""
 _STEADY_M = 0.15
 """How much the lowest joint's height varies of who lies."""
 _STANDING = math.cos(math.radians(25.0))
@@ -38,6 +40,10 @@ _A_WHILE = 0.03
 """Share of the frames in which somebody stands who does so for a while."""
 _RISES_M = 0.2
 """How much more the lowest joint's height varies [m] in a world that is not the file's, to tell so."""
+_HANDS, _HANDS_M = (20, 21), 0.15
+"""Wrists, of joints in SMPL's order, and how far they are from the floor on which somebody stands on the hands."""
+_CLIMBS_M = 1.0
+"""How much the pelvis rises of who climbs, or lies and goes on along the body."""
 Place = tuple[float, float, float]
 WORLDS = ("y up", "z up")
 """Of files of motion capture; where both fit alike, the first is taken."""
@@ -96,6 +102,16 @@ def find_world(
     upright = float((body_up_T3 @ turn_33[1]).mean())
     if len(worlds) == 1:
         return up, turn_33, ""
+    if upright > _UPRIGHT and joints_TK3 is not None:
+        hands = [w for w in worlds if w in WORLDS and w != up and _is_on_hands(body_up_T3, joints_TK3, turns[w])]
+        if len(hands) == 1:
+            said = (
+                f"the body would stand on no floor with {up}, and stands on its hands with {hands[0]}, which is taken"
+            )
+            return hands[0], turns[hands[0]], said
+        level = [w for w in worlds if w in WORLDS and w != up and _goes_level(body_up_T3, joints_TK3, turns[w])]
+        if level and float(np.ptp(joints_TK3[:, 0] @ turn_33[1])) > _CLIMBS_M:
+            return up, turn_33, f"the body stands with {up}, which is taken, and climbs; with {level[0]} it would lie"
     placed = [] if joints_TK3 is None else [joints_TK3 + np.array(origin, joints_TK3.dtype) for origin in origins]
     lying = [
         world
@@ -105,6 +121,12 @@ def find_world(
         and any(_lies(near_TK3, turns[world]) for near_TK3 in placed)
     ]
     if upright > _UPRIGHT or _stands(body_up_T3 @ turn_33[1]):
+        if not lying and joints_TK3 is not None and upright > _UPRIGHT:
+            others = [w for w in worlds if w in WORLDS and abs(float((body_up_T3 @ turns[w][1]).mean())) < _FLAT]
+            tried = (np.zeros(3), *map(np.array, origins))
+            low = [w for w in others if any(_may_lie(joints_TK3 + at_3, turns[w], turn_33) for at_3 in tried)]
+            said = f"the body stands with {up}, which is taken; with {low[0]} it would lie" if low else ""
+            return up, turn_33, f"{said}, and the root, which stays at height 0, does not tell" if low else ""
         if len(lying) != 1 or upright <= _UPRIGHT:
             return up, turn_33, ""
         if any(_has_floor(near_TK3, turn_33) for near_TK3 in placed):
@@ -127,6 +149,22 @@ def find_world(
     return worlds[0], turns[worlds[0]], f"{said}, and nothing tells which way is up: {worlds[0]} is taken"
 
 
+def _is_on_hands(body_up_T3: np.ndarray, joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:
+    """Whether somebody is upside down, and a hand is on a floor at height 0 in nearly all frames."""
+    if joints_TK3.shape[1] <= max(_HANDS) or float((body_up_T3 @ turn_33[1]).mean()) > -_UPRIGHT:
+        return False
+    height_TK = joints_TK3 @ turn_33[1]
+    low, high = np.quantile(height_TK[:, _HANDS].min(axis=1), _MOST_TIMES)
+    lowest = np.isin(height_TK.argmin(axis=1), _HANDS).mean() > _MOST_TIMES[1]
+    return bool(lowest and abs(low) < _HANDS_M and abs(high) < _HANDS_M)
+
+
+def _goes_level(body_up_T3: np.ndarray, joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:
+    """Whether somebody who is flat keeps their height."""
+    flat = abs(float((body_up_T3 @ turn_33[1]).mean())) < _FLAT
+    return flat and float(np.ptp(joints_TK3[:, 0] @ turn_33[1])) < _RISES_M
+
+
 def _stands(height_T: np.ndarray) -> bool:
     return float((height_T > _STANDING).mean()) > _A_WHILE
 
@@ -143,6 +181,15 @@ def _has_floor(joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:
     height_TK = joints_TK3 @ turn_33[1]
     lowest, pelvis = float(np.median(height_TK.min(axis=1))), float(np.median(height_TK[:, 0]))
     return low < lowest < high or abs(pelvis) < _AT_ORIGIN_M
+
+
+def _may_lie(joints_TK3: np.ndarray, turn_33: np.ndarray, upright_33: np.ndarray) -> bool:
+    """Whether somebody whose pelvis is put at height 0, in a world in which they stand as in one in which they are
+    flat, may lie.
+    """
+    height_TK = joints_TK3 @ turn_33[1]
+    pelvis = np.quantile([height_TK[:, 0], joints_TK3[:, 0] @ upright_33[1]], _MOST_TIMES)
+    return bool(np.abs(pelvis).max() < _AT_ORIGIN_M and np.median(np.ptp(height_TK, axis=1)) < _FLAT_M)
 
 
 def _lies(joints_TK3: np.ndarray, turn_33: np.ndarray) -> bool:

@@ -12,8 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mrhubo.body.joints import REST_K3
 from mrhubo.body.rest_directions import from_family
 from mrhubo.motion import Motion, ReadOptions, read_motion
+from mrhubo.motion.readers.content import NoMotion
 from tests.motion.readers.estimator_files import made_up, matrices, padded
 
 FRAMES = 12
@@ -95,3 +97,57 @@ def test_lists_of_people(called: str | None, key: str | None, ending: str, tmp_p
 def test_a_list_of_somebody_in_one_frame_is_no_track(tmp_path: Path) -> None:
     with pytest.raises(Exception, match="single frame"):
         read(tmp_path / "a.pkl", [{"poses": padded(POSES["4"][:1], 24), "id": 0}])
+
+
+def clips(frames: int, step: int = 1) -> dict[str, Any]:
+    """Clips as NeuralAnnot has them: by action, take and number of the frame."""
+
+    def clip(seed: int, frames: int) -> dict[str, Any]:
+        row_TX = padded(made_up(frames, seed), 24)
+        return {
+            str(step * t): {"pose": row.tolist(), "shape": [0.1] * 10, "trans": [seed, 0.9, t / 50]}
+            for t, row in enumerate(row_TX)
+        }
+
+    return {"2": {"1": clip(1, frames), "2": clip(2, frames + 3)}, "3": {"1": clip(3, frames)}}
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_clips_of_frames_by_numbers(step: int, tmp_path: Path) -> None:
+    for person, seed in ((None, 2), ("2/1", 1), ("3/1", 3)):
+        motion = read(tmp_path / "a.json", clips(24, step), person)
+        place_T3 = motion.arrays.root_position_T3
+        assert place_T3 is not None and round(float(place_T3[0, 0])) == seed
+        assert len(motion) == 24 + 3 * (seed == 2) and motion.family == "smpl"
+    motion = read(tmp_path / "a.json", clips(24, step)["2"], "1")
+    assert len(motion) == 24
+
+
+def test_people_of_different_pictures_are_no_motion(tmp_path: Path) -> None:
+    generator = np.random.default_rng(0)
+    people = {
+        str(n): {"smpl_param": {"pose": generator.normal(0, 1.5, 72).tolist(), "trans": [0, 0, 3]}} for n in range(40)
+    }
+    with pytest.raises(NoMotion, match="different pictures"):
+        read(tmp_path / "a.json", people)
+
+
+@pytest.mark.parametrize("extra", [{}, {"joints3D": [np.zeros((FRAMES, 24, 3)), np.zeros((FRAMES - 3, 24, 3))]}])
+def test_lists_with_an_array_a_clip(extra: dict[str, Any], tmp_path: Path) -> None:
+    rows = [padded(POSES["4"], 24), padded(POSES["9"], 24)[:-3]]
+    for person, name, frames in ((None, "4", FRAMES), ("1", "9", FRAMES - 3)):
+        motion = read(tmp_path / "a.pkl", {"poses": rows, "y": [1, 2], **extra}, person)
+        assert is_it(motion, name, list(range(frames)))
+
+
+def test_what_alphapose_writes(tmp_path: Path) -> None:
+    """Points in a picture, and beside them those of HybrIK in space, one a line of the list."""
+    rest = REST_K3[:22].astype(np.float64) * [1, -1, -1] / 2.2
+    picture = {"category_id": 1, "keypoints": [5.0, 6.0, 0.9] * 17, "score": 2.5}
+    rows = [
+        {"image_id": f"{t}.jpg", **picture, "pred_xyz_jts": rest.reshape(-1).tolist(), "idx": 1} for t in range(FRAMES)
+    ]
+    motion = read(tmp_path / "a.json", rows)
+    assert len(motion) == FRAMES and "SMPL's body" in motion.source
+    root_T33 = motion.arrays.root_rotation_T33
+    assert root_T33 is not None and np.allclose(root_T33[:, 1, 1], 1, atol=0.01)

@@ -58,6 +58,21 @@ def test_words_of_models_and_estimators_may_be_anywhere(
     assert is_whole(motion, model_named(prefix) if "smpl" in prefix.lower() else "smplx"), names
 
 
+@given(
+    pose=st.sampled_from(
+        ("body_pose", "pose_body", "smpl_pose", "poses_body", "pose_aa", "pose", "thetas", "rotations")
+    ),
+    root=st.sampled_from(("global_orient", "root_orient", "poses_root", "root_rotation", "global_rot", "pose_root")),
+    place=st.sampled_from(("transl", "trans", "root_translation", "root_position", "global_transl")),
+)
+def test_roots_are_read_whatever_the_pose_is_called(
+    pose: str, root: str, place: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("roots") / "clip.npz"
+    motion = written(path, **{pose: BODY, root: ROOT, place: PLACE})
+    assert is_whole(motion, motion.family), (pose, root, place)
+
+
 def test_what_is_in_the_world_goes_before_what_a_camera_sees(tmp_path: Path) -> None:
     for body in ({"body_pose": BODY}, {"body_pose_cam": BODY, "body_pose_world": BODY}):
         for plain in ("global_orient_cam", "global_orient"):

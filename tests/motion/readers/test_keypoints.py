@@ -17,8 +17,9 @@ import mrhubo.rotation
 from mrhubo import UserError
 from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, POSED_JOINT_NAMES, SIDES, Skeleton
 from mrhubo.motion.orientations import rest_points
-from mrhubo.motion.readers.keypoint_sets import SETS, our_name
+from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.point_names import our_name
 from tests.motion.damage import Step, accidents, damaged, read_or_refused
 
 RATE = ReadOptions(rate=30.0)

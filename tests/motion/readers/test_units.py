@@ -52,3 +52,31 @@ def test_depths_that_jump_near_a_camera_are_no_units() -> None:
     steady_T3 = way(1.0, 0.2) * [0.1, 1.0, 0.1] + [0.0, 0.0, 4.0]
     assert find_unit(1000 * steady_T3, 60.0, beyond=100.0) == ("millimetres", 0.001)
     assert find_unit(steady_T3, 60.0, beyond=100.0) is None
+
+
+@pytest.mark.parametrize("height", [0.0, 120.0])
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_who_walks_high_above_the_origin_in_metres_is_not_in_centimetres(
+    unit: float, height: float, tmp_path: Path
+) -> None:
+    """The legs tell: a planted foot keeps still."""
+    if unit < 1 and height:
+        return  # nobody's floor
+    frames, swing = 120, np.sin(np.arange(120) / 60 * 2 * np.pi)
+    body = np.zeros((frames, 21, 3))
+    body[:, 0, 0], body[:, 1, 0] = -0.4 * swing, 0.4 * swing  # the hips
+    leg = 0.85
+    low = np.stack([np.sin(0.4 * swing), -np.sin(0.4 * swing)], axis=1) * leg
+    planted = np.where(np.gradient(low[:, 0]) < 0, 0, 1)
+    step = -np.diff(low, axis=0)[np.arange(frames - 1), planted[:-1]]
+    place = np.stack(
+        [np.zeros(frames), np.full(frames, 0.95 + height), np.concatenate([[0.0], np.cumsum(step)])], axis=1
+    )
+    np.savez(
+        tmp_path / "walk.npz", pose_body=body.reshape(frames, 63), root_orient=np.zeros((frames, 3)),
+        trans=place / unit, mocap_frame_rate=60,
+    )  # fmt: skip
+    motion = read_motion(tmp_path / "walk.npz")
+    found = motion.arrays.root_position_T3
+    assert found is not None
+    np.testing.assert_allclose(np.ptp(found[:, 2]), np.ptp(place[:, 2]), rtol=0.01)

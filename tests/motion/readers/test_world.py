@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from mrhubo.body.joints import REST_K3
 from mrhubo.motion import read_motion
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, WORLDS, find_up, find_world
 
@@ -109,3 +110,37 @@ def test_who_stands_on_a_floor_that_is_off_as_recordings_have_it_stands(low: flo
     up_T3 = np.tile([0.0, 1.0, 0.0], (FRAMES, 1))
     found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
     assert found == "y up" and "with z up it would lie on a floor" in said
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("walks", [False, True])
+def test_who_is_put_at_height_0_and_may_lie_is_told_of(world: str, walks: bool) -> None:
+    body = np.array([(0, 0, 0), (0.2, 0.4, 0), (-0.2, 0.4, 0), (0.3, 0, 0.1), (-0.3, 0, 0.1), (0, -0.9, -0.1)])
+    way_T13 = walks * np.linspace(0, 2, FRAMES)[:, None, None] * [0, 0, 1]
+    joints_TK3 = (np.tile(body, (FRAMES, 1, 1)) + way_T13) @ TO_Y_UP[world]
+    up_T3 = np.tile([0.0, 1.0, 0.0] @ TO_Y_UP[world], (FRAMES, 1))
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == world and ("it would lie" in said) is not walks
+
+
+@pytest.mark.parametrize("planted", [True, False])
+def test_who_is_on_the_hands_throughout_is_so(planted: bool) -> None:
+    """Upside down with y up, and upright with y down: the hands on the floor tell, where they stay there."""
+    joints_TK3 = np.tile(-(REST_K3[:22].astype(np.float64)), (FRAMES, 1, 1))
+    joints_TK3[:, [20, 21]] = [[0.2, -1.2, 0], [-0.2, -1.2, 0]]  # arms overhead
+    joints_TK3 = (
+        joints_TK3 + [0.3, 1.2, 0.1] + (not planted) * np.linspace(-0.5, 0.5, FRAMES)[:, None, None] * [0, 1, 0]
+    )
+    up_T3 = np.tile([0.0, -1.0, 0.0], (FRAMES, 1))
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert (found == "y up" and "on its hands" in said) is planted
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_who_goes_on_along_the_body_may_swim(world: str) -> None:
+    joints_TK3 = np.tile(REST_K3[:22].astype(np.float64), (FRAMES, 1, 1))
+    joints_TK3 = joints_TK3 + np.linspace(0, 2, FRAMES)[:, None, None] * [0, 1, 0]
+    up_T3 = np.tile([0.0, 1.0, 0.0] @ TO_Y_UP[world], (FRAMES, 1))
+    joints_TK3 = joints_TK3 @ TO_Y_UP[world]
+    found, _, said = find_world(up_T3, joints_TK3[:, 0], ANY_WORLD, joints_TK3)
+    assert found == world and "and climbs; with" in said
