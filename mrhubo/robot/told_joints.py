@@ -10,6 +10,7 @@ Legend: B random poses, D directions, N joints.
 from __future__ import annotations
 
 import itertools
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -38,8 +39,9 @@ _TURN, _TURNED = 0.5, 0.1
 axis of the forearm's twist."""
 _MOST_NAMED = 24
 """Joints that a sentence names: all of two arms, a neck and a waist, and not a thousand."""
-_ASIDE_M = 1e-3
-"""How far the axis of a gear's play may be from the motor's."""
+_ASIDE_M, _LESS = 1e-3, 0.5
+"""How far the axis of a gear's play, or of a spring, may be from the motor's, and how much of its range it turns at
+most."""
 _NOTHING = 1e-4
 """Change of a unit direction that counts as none."""
 
@@ -125,7 +127,7 @@ def name_unlisted(body_map: BodyMap) -> None:
             f"robot.keypoints, but limits as {ends} leave {which} no way to move; correct these in the URDF if they "
             f"are wrong, or say that this is meant: hold: {{{_angles(robot, still[:_MOST_NAMED])}}}"
         )
-    missing = (joint for joint in free if not stuck(joint) and _turns(body_map, joint))
+    missing = (joint for joint in free if not (stuck(joint) or _is_play(body_map, joint)) and _turns(body_map, joint))
     if missing := list(itertools.islice(missing, _MOST_NAMED + 1)):
         names = [joint.name for joint in missing[:_MOST_NAMED]]
         angles = _angles(robot, missing[:_MOST_NAMED])
@@ -143,12 +145,19 @@ def _angles(robot: Robot, joints: Sequence[Joint]) -> str:
 
 
 def _is_play(body_map: BodyMap, joint: Joint) -> bool:
-    """Whether a joint that cannot move is the play of the gear of a listed one next to it, about the same axis."""
+    """Whether a joint is the play of a listed one's gear, or the spring behind it: about the same axis, and less."""
     robot, standing = body_map.robot, StandingRobot(body_map.robot.description, {})
     axis = standing.line(joint)
-    beside = (robot.description.joints[name] for name in robot.joint_names)
+    beside = (
+        other for name in robot.joint_names if _turn(joint) < _LESS * _turn(other := robot.description.joints[name])
+    )
     lines = (standing.line(other) for other in beside if other.child == joint.parent or other.parent == joint.child)
     return any(sine(line.axis_3, axis.axis_3) < PARALLEL and line.distance(axis.point_3) < _ASIDE_M for line in lines)
+
+
+def _turn(joint: Joint) -> float:
+    """How far it turns [rad]."""
+    return math.inf if joint.lower is None or joint.upper is None else joint.upper - joint.lower
 
 
 def _turns(body_map: BodyMap, joint: Joint) -> bool:

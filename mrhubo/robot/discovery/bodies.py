@@ -8,6 +8,7 @@ Legend: all poses in the root link's frame with every joint at 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,6 +21,8 @@ from mrhubo.robot.urdf import Description
 
 FULL_TURN = 6.2
 """Range of a joint that is no limit, as about a full turn is none [rad]."""
+_AWAY = 1.0
+"""How far from all joints that move a link lies that is none of the robot's, in lengths of the box around these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +115,8 @@ class Bodies:
     """Whether the file's limits are in degrees; those of the hinges are in radians all the same."""
     gains: Mapping[str, float] = field(default_factory=dict)
     """By hinge: how much farther a limb turns than its joint, where a second hinge follows; 1 for all others."""
+    springs: Mapping[str, str] = field(default_factory=dict)
+    """Joints taken as fixed that give way a little about the axis of a hinge next to them; by name, that hinge's."""
     _extents: dict[tuple[int, str], float] = field(default_factory=dict, repr=False, compare=False)
     nexts: dict[tuple[int, str], Step | None] = field(default_factory=dict, repr=False, compare=False)
     _branches: dict[tuple[int, str], tuple[set[int], list[Hinge]]] = field(
@@ -275,8 +280,15 @@ class Bodies:
 
     @cached_property
     def size(self) -> float:
-        """Longest distance between two link origins [m], about that of a box around them."""
+        """Longest distance between two link origins [m], about that of a box around them; without those of a room or a
+        map, far from all that moves.
+        """
         points = np.stack([self.position(link) for link in self.body_of])
+        if self.hinges:
+            moving = np.stack([hinge.line.point_3 for hinge in self.hinges])
+            low_3, high_3 = moving.min(0), moving.max(0)
+            away = np.linalg.norm(points - np.clip(points, low_3, high_3), axis=-1)
+            points = np.vstack([moving, points[away < max(_AWAY * math.dist(low_3, high_3), 1e-6)]])
         return max(float(np.linalg.norm(points.max(0) - points.min(0))), 1e-6)
 
 

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.robot.discovery.agreement import agreeing_arms, agreeing_hands, read_arms
+from mrhubo.robot.discovery.arm import GUESS
 from mrhubo.robot.discovery.bodies import Step
 from mrhubo.robot.discovery.facing import Heading, choose_neck, find_heading
 from mrhubo.robot.discovery.foot import read_foot, with_fixed_ankle
 from mrhubo.robot.discovery.hand import Hand, read_hand
 from mrhubo.robot.discovery.leg import Leg, read_leg, read_sole
 from mrhubo.robot.discovery.members import Limbs
-from mrhubo.robot.discovery.necks import is_named
-from mrhubo.robot.discovery.questions import Named, coupled, notes, questions
+from mrhubo.robot.discovery.necks import aside, is_named, turned_back
+from mrhubo.robot.discovery.questions import Named, asked_of_neck, coupled, notes, questions
 from mrhubo.robot.discovery.ranges import find_ranges
 from mrhubo.robot.discovery.result import (
     Candidate,
@@ -69,6 +70,11 @@ class _Finder:
             legs = legs[::-1]
         legs = [with_fixed_ankle(bodies, leg, self.heading) for leg in legs]
         self.legs: dict[str, Leg] = dict(zip(SIDES, legs, strict=False))
+        # How far the neck's joints turn until the head stands straight.
+        self.aside = aside(bodies, roles.neck, self.heading.left_3, roles.arms.mounts_23.mean(0)) or []
+        self.turned_aside = [
+            step.hinge.name for step, (_, angle) in zip(roles.neck, self.aside, strict=False) if abs(angle) > 0
+        ]
         hands: dict[str, Hand] = {}
         for sign, (side, arm) in zip((1.0, -1.0), self.arms.items(), strict=True):
             hand = read_hand(bodies, arm, sign, self.heading.left_3, self.heading.forward_3)
@@ -92,7 +98,10 @@ class _Finder:
         ranges = {name: found for name, found in ranges.items() if name in joints}
         held = dict(limbs.held(joints))
         points = dict(self._points(spots))
-        all_asked = (*self.whole.asked(), *questions(limbs, spots, self.feet, soles), *asked, *coupled(limbs))
+        all_asked = (
+            *self.whole.asked(), *questions(limbs, spots, self.feet, soles), *asked_of_neck(self.turned_aside), *asked,
+            *coupled(limbs),
+        )  # fmt: skip
         return Discovery(
             name=_short_name(self.bodies.description),
             forward=FoundAxis(_vector(self.heading.forward_3), self.heading.forward_sure, self.heading.forward_cue),
@@ -157,9 +166,11 @@ class _Finder:
             yield "pelvis", self._end(pelvis, {"forward": forward_3, "up": up_3}, sure, cue)
         if roles.neck:
             link = roles.neck[-1].outer_link
-            cue = "the end of the longest chain in the middle above the chest; it faces ahead at the zero pose"
-            named = 0.9 if is_named(roles.neck) else 0.7
-            yield "head", self._end(link, {"forward": forward_3, "up": up_3}, min(sure, named), cue)
+            cue = "the end of the longest chain in the middle above the chest; it faces ahead "
+            cue += "once the neck is turned straight" if self.turned_aside else "at the zero pose"
+            named = GUESS if self.turned_aside else 0.9 if is_named(roles.neck) else 0.7
+            axes = {word: turned_back(axis_3, self.aside) for word, axis_3 in (("forward", forward_3), ("up", up_3))}
+            yield "head", self._end(link, axes, min(sure, named), cue)
         for side, hand in self.hands.items():
             axes = {"fingers": hand.fingers_3, "thumb": hand.thumb_3}
             yield f"{side}_hand", self._end(hand.link, axes, hand.confidence, hand.cue)

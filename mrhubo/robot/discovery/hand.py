@@ -239,6 +239,11 @@ def _jaws(
         across_3 = fingers[1].base_3 - fingers[0].base_3
         if np.linalg.norm(across_3) < 1e-4:
             across_3 = fingers[1].tip_3 - fingers[0].tip_3
+        one, other = (finger.axis_3 for finger in fingers)
+        if not (fingers[0].slides or fingers[1].slides) and abs(float(one @ other)) > _ALIKE:
+            # Where along their axes a file puts two parallel hinges says nothing.
+            beside_3 = across_3 - one * float(one @ across_3)
+            across_3 = beside_3 if np.linalg.norm(beside_3) > 1e-4 else cross(one, fingers_3)
     elif fingers[0].slides:
         across_3 = fingers[0].axis_3
     else:

@@ -78,7 +78,10 @@ class Limbs:
         return float(np.linalg.norm(net_3)) < _STILL
 
     def held(self, moved: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-        """The other joints of the chains, and why they do not move."""
+        """The other joints of the chains, springs among them, and why they do not move."""
+        for name, motor in self.bodies.springs.items():
+            if motor in {step.hinge.name for chain in self.chains.values() for step in chain}:
+                yield name, f"it turns about the axis of '{motor}', and less: a spring"
         for name, chain in self.chains.items():
             for step in (step for step in chain if step.hinge.name not in moved):
                 yield step.hinge.name, self._why_held(name, step)

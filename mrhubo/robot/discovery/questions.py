@@ -87,6 +87,14 @@ def questions(
                        "which may be a tail or an arm", turning)  # fmt: skip
 
 
+def asked_of_neck(aside: Sequence[str]) -> Iterator[Question]:
+    """About a head that stands turned aside at the zero pose, by these joints."""
+    if aside:
+        names = " and ".join(f"'{name}'" for name in aside)
+        yield Question("head", f"at the zero pose {names} holds the head turned aside; taken: that it faces ahead "
+                       "where the axes of the neck are straight again", tuple(aside))  # fmt: skip
+
+
 def _below_shoulders(limbs: Limbs) -> bool:
     up_3, head_3 = limbs.heading.up_3, limbs.bodies.middle(limbs.roles.neck[-1].end)
     return all(float((head_3 - arm.shoulder.point_3) @ up_3) < 0 for arm in limbs.arms.values())

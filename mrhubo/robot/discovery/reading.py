@@ -17,6 +17,10 @@ from mrhubo.robot.urdf import Description, moved
 
 _LIMB = 0.1
 """How far a limb reaches beyond the second of two hinges that turn as one, as a share of the robot; no finger does."""
+_SPRING, _GIVES = 0.5, 1.0
+"""Range of a spring behind a motor about the same axis at the most, as a share of the motor's, and in radians."""
+_ALONG = 1e-3
+"""How far apart two axes are at most that are one, as a share of the robot."""
 _MOTOR = 2.5
 """How many times farther what a motor drives reaches than the motor itself; jaws reach as far as each other."""
 
@@ -27,11 +31,13 @@ def read_bodies(description: Description) -> Bodies:
     the joint that it drives is no branch.
     """
     bodies = _read(description, {})
+    if springs := _find_springs(bodies):
+        bodies = _read(description, {}, springs, springs=springs)
     motors = _find_motors(bodies)
-    bodies = _read(description, {}, motors=motors) if motors else bodies
+    bodies = _read(description, {}, springs, motors, springs) if motors else bodies
     turning = {hinge.name: hinge for hinge in bodies.hinges}
     gains: dict[str, float] = {}
-    seconds: set[str] = set()
+    seconds: set[str] = {*springs}
     for step in (Step(hinge, hinge.bodies[0]) for hinge in bodies.hinges if not hinge.free and hinge.rotary):
         mimic = description.joints[step.hinge.name].mimic
         first = turning.get(mimic.joint) if mimic is not None else None
@@ -47,7 +53,31 @@ def read_bodies(description: Description) -> Bodies:
             gains[first.name] = gains.get(first.name, 1.0) + along * mimic.multiplier
             seconds.add(step.hinge.name)
     gains = {name: gain for name, gain in gains.items() if gain > 0.0}
-    return _read(description, gains, seconds, motors) if gains else bodies
+    return _read(description, gains, seconds, motors, springs) if gains else bodies
+
+
+def _find_springs(bodies: Bodies) -> dict[str, str]:
+    """Of two joints one after the other about one axis, with nothing between them that moves otherwise, the one that
+    turns far less: a spring behind a motor, or a motor's play. By name, the other one's.
+    """
+    found: dict[str, str] = {}
+    for steps in bodies.steps_from:
+        if len(steps) != 2 or not all(step.hinge.rotary and step.hinge.free for step in steps):
+            continue
+        # Where both go out from the body, it carries two limbs.
+        if steps[0].hinge.bodies[1] == steps[1].hinge.bodies[1] or steps[0].hinge.bodies[0] == steps[1].hinge.bodies[0]:
+            continue
+        less, more = sorted((step.hinge for step in steps), key=_turn)
+        one, other = less.line, more.line
+        near = sine(one.axis_3, other.axis_3) < PARALLEL and other.distance(one.point_3) < _ALONG * bodies.size
+        if near and _turn(less) < min(_GIVES, _SPRING * _turn(more)) and not less.drives:
+            found[less.name] = more.name
+    return found
+
+
+def _turn(hinge: Hinge) -> float:
+    """How far a joint turns [rad]; a full turn if nothing limits it."""
+    return float((hinge.upper or 0.0) - (hinge.lower or 0.0)) if hinge.limited else FULL_TURN
 
 
 def _find_motors(bodies: Bodies) -> dict[str, str]:
@@ -72,7 +102,7 @@ def _find_motors(bodies: Bodies) -> dict[str, str]:
 
 def _read(
     description: Description, gains: Mapping[str, float], fixed: Collection[str] = (),
-    motors: Mapping[str, str] | None = None,
+    motors: Mapping[str, str] | None = None, springs: Mapping[str, str] | None = None,
 ) -> Bodies:  # fmt: skip
     below: dict[str, list[str]] = {}
     for joint in description.joints.values():
@@ -103,7 +133,7 @@ def _read(
                 name, line, joint.rotary, (body_of[link], body_of[joint.child]), limits[0], limits[1],
                 joint.mimic is None, name in sources, (link, joint.child), (motors or {}).get(name),
             ))  # fmt: skip
-    return Bodies(description, pose_44, body_of, tuple(hinges), degrees, gains)
+    return Bodies(description, pose_44, body_of, tuple(hinges), degrees, gains, springs or {})
 
 
 def _limits(description: Description, joint: Joint) -> tuple[float | None, float | None]:
