@@ -23,8 +23,6 @@ MAX_FRAMES = 2_000_000
 """Longest motion that is read (four and a half hours at 120 frames a second, 1.5 GB as matrices)."""
 MAX_ROOT_TURN = 8 * math.pi
 """No root's axis-angle number is that large [rad]: a person may turn round some times; degrees are larger."""
-FARTHEST_M = 1e5
-"""No root is that far from the origin [m]."""
 LARGEST_BETA = 1e6
 """No number of a body's shape is that large."""
 _SEEN = 500

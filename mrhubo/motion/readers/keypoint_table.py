@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,10 +61,6 @@ class _Header:
     """Columns of x, y, z and the confidence, by the names of points."""
     columns: list[str]
 
-    def find(self, names: Sequence[str]) -> int | None:
-        """The column that is called so, whatever signs and units are in its name."""
-        return find_column(self.columns, names)
-
 
 def is_table(content: Content) -> bool:
     """Whether a text begins with a header of points in space."""
@@ -86,16 +82,16 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
         raise UserError(f"{path}: has a header and no frames")
     check_size(path, "the table", len(rows), len(header.points))
     try:
-        words = csv.reader(rows, delimiter=header.separator)
-        value_TX = np.stack([_numbers(path, header, number, row) for number, row in enumerate(words)])
+        words = [*csv.reader(rows, delimiter=header.separator)]
     except csv.Error as error:
         raise UserError(f"{path}: is no table: {shortened(error, 80)}") from error
     wanted = [column for columns in header.points.values() for column in columns]
+    value_TX = numbers_of(path, words, header.separator, header.columns, {*wanted})
     empty_T1 = np.full((len(value_TX), 1), np.nan)
     value_TX = np.hstack([value_TX, empty_T1])  # the last column is that of what is not there
     point_TK4 = value_TX[:, [-1 if column is None else column for column in wanted]].reshape(len(value_TX), -1, 4)
     numbers, rate = list(range(len(point_TK4))), None
-    frame, time = header.find(FRAMES), header.find(TIMES)
+    frame, time = find_column(header.columns, FRAMES), find_column(header.columns, TIMES)
     if frame is not None and np.isfinite(value_TX[:, frame]).all():
         numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, frame]])
     if time is not None and numbers == list(range(len(numbers))):
@@ -134,6 +130,32 @@ def number_of(word: str, separator: str) -> float:
     return float(word.replace(",", ".") if separator != "," else word)
 
 
+def numbers_of(
+    path: Path, rows: Sequence[Sequence[str]], separator: str, columns: Sequence[str], needed: Collection[int | None]
+) -> np.ndarray:
+    """The lines of a table as numbers (T, X), of X columns; NaN for what is empty, and in columns that are not needed
+    for what is no number.
+
+    Raises:
+        UserError: a line has more columns than the header, or fewer, or holds no number where one is needed.
+    """
+    found: list[np.ndarray] = []  # a few lines under a long header take little
+    for number, row in enumerate(rows):
+        if len(row) != len(columns):
+            raise UserError(f"{path}: frame {number} has {len(row)} columns, and the header {len(columns)}")
+        found.append(np.full(len(row), np.nan))
+        for place, word in enumerate(row):
+            try:
+                found[-1][place] = number_of(word, separator)
+            except ValueError:
+                if place in needed and word.strip().lower() not in NOTHING:
+                    column = shortened(columns[place], 40)
+                    raise UserError(
+                        f"{path}: frame {number} holds '{shortened(word, 30)}' under '{column}', no number"
+                    ) from None
+    return np.array(found).reshape(len(rows), len(columns))
+
+
 def _lines(text: str) -> list[str]:
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
@@ -160,24 +182,6 @@ def _read_header(line: str) -> _Header | None:
         points = dict(sorted(points.items(), key=lambda entry: int(parts[entry[0]][2])))
     enough = len(points) >= _FEWEST and (numbered or by_names(list(points)).keys() >= set(NEEDED))
     return _Header(separator, points, columns) if enough else None
-
-
-def _numbers(path: Path, header: _Header, number: int, row: Sequence[str]) -> np.ndarray:
-    """A line of the table; NaN for what is empty, and in columns that are not needed for what is no number."""
-    if len(row) != len(header.columns):
-        raise UserError(f"{path}: frame {number} has {len(row)} columns, and the header {len(header.columns)}")
-    needed = {column for columns in header.points.values() for column in columns}
-    found = np.full(len(row), np.nan)
-    for place, word in enumerate(row):
-        try:
-            found[place] = number_of(word, header.separator)
-        except ValueError:
-            if place in needed and word.strip().lower() not in NOTHING:
-                column = shortened(header.columns[place], 40)
-                raise UserError(
-                    f"{path}: frame {number} holds '{shortened(word, 30)}' under '{column}', no number"
-                ) from None
-    return found
 
 
 def _rate(time_T: np.ndarray) -> float | None:

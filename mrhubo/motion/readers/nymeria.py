@@ -15,9 +15,10 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
+from mrhubo.motion.far_places import FARTHEST
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
-from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES
+from mrhubo.motion.readers.assemble import MAX_FRAMES
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.other_rotations import from_quaternions
 
@@ -55,8 +56,8 @@ def read_nymeria(tree: Tree, find_rate: Callable[[list[str]], float]) -> Motion 
     if turn.shape() not in ((frames, 4 * count), (frames, count, 4)) or not 0 < frames <= MAX_FRAMES:
         return None
     place_TS3 = place.array().astype(np.float64).reshape(frames, count, 3)
-    if not (np.abs(np.nan_to_num(place_TS3, nan=np.inf)) < FARTHEST_M).all():
-        raise UserError(f"{tree.path}: '{_PLACES}' holds NaN, infinite numbers, or some beyond {FARTHEST_M:g} m")
+    if not (np.abs(np.nan_to_num(place_TS3, nan=np.inf)) < FARTHEST).all():
+        raise UserError(f"{tree.path}: '{_PLACES}' holds NaN, infinite numbers, or some beyond {FARTHEST:g} m")
     turn_TS33 = from_quaternions(turn.array().astype(np.float64).reshape(frames, count, 4))
     at = {joint: segment for segment, joint in enumerate(_SEGMENTS) if joint != "-"}
     points = {joint: place_TS3[:, segment] @ _HUMAN_33.T for joint, segment in at.items()}

@@ -25,7 +25,7 @@ from mrhubo.motion.readers.estimators import smpl_motion
 from mrhubo.motion.readers.frame_numbers import frame_numbers_in
 from mrhubo.motion.readers.key_words import usual_name
 from mrhubo.motion.readers.keypoint_files import POSE_KEYS
-from mrhubo.motion.readers.keypoint_table import FRAMES, NOTHING, TIMES, find_column, number_of, split_header
+from mrhubo.motion.readers.keypoint_table import FRAMES, TIMES, find_column, numbers_of, split_header
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_table import PEOPLE
 from mrhubo.motion.readers.rotations import WITH_ROOT, WITHOUT_ROOT, find_form
@@ -70,8 +70,7 @@ def read_parameter_table(path: Path, options: ReadOptions) -> Motion:
     except csv.Error as error:
         raise UserError(f"{path}: is no table: {shortened(error, 80)}") from error
     words = [row for row in words if any(word.strip() for word in row)]
-    value_TX = np.array([_numbers(path, header, number, row) for number, row in enumerate(words)])
-    value_TX = value_TX.reshape(len(words), len(header.columns))
+    value_TX = numbers_of(path, words, header.separator, header.columns, {*header.places[header.pose]})
     seen_T = np.asarray(np.isfinite(value_TX[:, header.places[header.pose]]).any(axis=1))
     if not seen_T.any():
         raise UserError(f"{path}: has a header and no frames")
@@ -111,20 +110,3 @@ def _read_header(line: str) -> _Header | None:
     forms = {name: find_form((1, len(those)), WITH_ROOT + WITHOUT_ROOT) for name, those in places.items()}
     poses = [name for name, form in forms.items() if form is not None and {name, usual_name(name)} & POSE_KEYS]
     return _Header(separator, columns, places, poses[0]) if poses else None
-
-
-def _numbers(path: Path, header: _Header, number: int, row: list[str]) -> list[float]:
-    """A line of the table; NaN for what is empty, and in columns that are not needed for what is no number."""
-    if len(row) != len(header.columns):
-        raise UserError(f"{path}: frame {number} has {len(row)} columns, and the header {len(header.columns)}")
-    found = [np.nan] * len(row)
-    for place, word in enumerate(row):
-        try:
-            found[place] = number_of(word, header.separator)
-        except ValueError:
-            if place in header.places[header.pose] and word.strip().lower() not in NOTHING:
-                column = shortened(header.columns[place], 40)
-                raise UserError(
-                    f"{path}: frame {number} holds '{shortened(word, 30)}' under '{column}', no number"
-                ) from None
-    return found

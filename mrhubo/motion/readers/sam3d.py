@@ -23,9 +23,10 @@ from mrhubo.body.joints import SIDES
 from mrhubo.errors import UserError
 from mrhubo.fast.plain.human import cross, normalize
 from mrhubo.files.tree import Tree
+from mrhubo.motion.far_places import FARTHEST
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
-from mrhubo.motion.readers.assemble import FARTHEST_M, MAX_FRAMES
+from mrhubo.motion.readers.assemble import MAX_FRAMES
 from mrhubo.motion.readers.frame_numbers import in_order
 from mrhubo.motion.readers.linking import LINKED, link_in
 from mrhubo.motion.readers.names import motion_name
@@ -82,8 +83,8 @@ def read_sam3d(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]]
     chosen = choose(tree.path, tracks, options, notes)
     seen = people[chosen.person][1]()
     points_TK3 = seen.points.astype(np.float64)
-    if not (np.abs(np.nan_to_num(points_TK3)) < FARTHEST_M).all():
-        raise UserError(f"{tree.path}: '{KEY}' holds infinite numbers, or some beyond {FARTHEST_M:g} m")
+    if not (np.abs(np.nan_to_num(points_TK3)) < FARTHEST).all():
+        raise UserError(f"{tree.path}: '{KEY}' holds infinite numbers, or some beyond {FARTHEST:g} m")
     if seen.camera is not None:
         points_TK3 = points_TK3 + seen.camera.astype(np.float64)[:, None]
     up_T3 = points_TK3[:, [5, 6]].mean(axis=1) - points_TK3[:, [9, 10]].mean(axis=1)
