@@ -127,7 +127,8 @@ def contact_topics(names: Sequence[str]) -> list[str]:
     """The topic of each foot."""
     topics: list[str] = []
     for name in names:
-        topic = _CONTACT + re.sub(r"\W", "_", name, flags=re.ASCII)
+        token = re.sub(r"\W", "_", name, flags=re.ASCII)
+        topic = _CONTACT + (f"_{token}" if token[:1].isdigit() else token)  # ROS 2 has no name that begins so
         topics.append(topic if topic not in topics else f"{topic}_{len(topics)}")
     return topics
 

@@ -1,16 +1,13 @@
-"""Bags that outlive a killed process, ROS 2's messages, and the robot in simulation."""
+"""Bags that outlive a killed process, messages of trajectories, and the robot in simulation."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 import re
-import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,26 +21,12 @@ from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.file import FileSink
 from mrhubo.live.sinks.mcap import McapSink
 from mrhubo.live.sinks.mujoco import MujocoSink
-from mrhubo.live.sinks.ros2 import Ros2Sink
 from mrhubo.live.sinks.trajectory import trajectory
 from mrhubo.robot_motion import FollowingJoint, RobotFacts
-from tests.live.messages import message
-from tests.live.robots import NAMES, UPPER, make_robot
-from tests.live.walkers import drive, make_legged, poses_of
-from tests.reference.standing.steppers import walk
+from tests.live.robots import NAMES, make_robot
 from tests.reference.walkers import write_urdf
 
 CONFIG = LiveConfig(ramp_time=0.0)
-
-
-@pytest.fixture
-def outputs() -> list[Output]:
-    """A robot on its way up."""
-    pilot, found = Pilot(make_robot(lambda pose, time: UPPER), CONFIG, True), []
-    for step in range(60):
-        pilot.inbox.offer(message(step, time=step / 60), "a", step / 60)
-        found.append(pilot.tick(step / 60))
-    return found
 
 
 def test_a_bag_of_a_session_is_its_motion(tmp_path: Path, outputs: list[Output]) -> None:
@@ -72,14 +55,6 @@ def test_a_bag_of_a_session_is_its_motion(tmp_path: Path, outputs: list[Output])
     path.write_bytes(as_killed[:60])
     with pytest.raises(UserError):
         mrhubo.read_robot_motion(path)
-
-
-@pytest.fixture(scope="module")
-def walking(tmp_path_factory: pytest.TempPathFactory) -> tuple[LiveRobot, list[Output]]:
-    """A robot with legs, which walks."""
-    pilot, sent = drive(make_legged(tmp_path_factory.mktemp("legged")), poses_of(walk(40)), CONFIG)
-    assert np.ptp(sent.place_T3[:, 0]) > 0.1 and len({str(output.standing) for output in sent.outputs}) == 40
-    return pilot.robot, sent.outputs
 
 
 @pytest.mark.parametrize("kind", [FileSink, McapSink])
@@ -184,61 +159,6 @@ def test_a_trajectory_ends_where_the_robot_would_stand(outputs: list[Output]) ->
             point["time_from_start"]["sec"] + 1e-9 * point["time_from_start"]["nanosec"] for point in (first, second)
         ]
         assert times[0] == pytest.approx(1 / 60) and 2 / 60 - 1e-6 <= times[1] <= 0.2
-
-
-def test_ros2_publishes_the_same(monkeypatch: pytest.MonkeyPatch, outputs: list[Output]) -> None:
-    sent: list[Any] = []
-    node = SimpleNamespace(
-        create_publisher=lambda kind, topic, depth: SimpleNamespace(publish=lambda told: sent.append((topic, told))),
-        destroy_node=lambda: sent.append("destroyed"),
-    )
-    rclpy = SimpleNamespace(ok=lambda: True, create_node=lambda name: node)
-    messages = SimpleNamespace(
-        JointTrajectory=lambda: SimpleNamespace(joint_names=[], points=[]),
-        JointTrajectoryPoint=lambda: SimpleNamespace(time_from_start=SimpleNamespace(sec=0, nanosec=0)),
-    )
-    monkeypatch.setitem(sys.modules, "rclpy", None)
-    with pytest.raises(UserError, match="rclpy"):
-        Ros2Sink()
-    monkeypatch.setitem(sys.modules, "rclpy", rclpy)
-    monkeypatch.setitem(sys.modules, "trajectory_msgs.msg", messages)
-    sink = Ros2Sink("/arm")
-    sink.open(make_robot(), CONFIG)
-    sink.send(outputs[-1])
-    sink.close()
-    sink.close()
-    (topic, told), end = sent
-    assert topic == "/arm" and end == "destroyed" and told.joint_names == list(NAMES)
-    wanted = trajectory(outputs[-1], 1 / 60, 0.0)["points"]
-    assert [point.positions for point in told.points] == [point["positions"] for point in wanted]
-    assert [point.time_from_start.nanosec for point in told.points] == [
-        point["time_from_start"]["nanosec"] for point in wanted
-    ]
-
-
-def test_ros2_publishes_the_base_too(monkeypatch: pytest.MonkeyPatch, walking: tuple[LiveRobot, list[Output]]) -> None:
-    robot, outputs = walking
-    sent: dict[str, Any] = {}
-    node = SimpleNamespace(
-        create_publisher=lambda kind, topic, depth: SimpleNamespace(publish=lambda told: sent.update({topic: told})),
-        destroy_node=lambda: None,
-    )
-    point = lambda: SimpleNamespace(time_from_start=SimpleNamespace())  # noqa: E731
-    pose = lambda: SimpleNamespace(  # noqa: E731
-        header=SimpleNamespace(), pose=SimpleNamespace(position=SimpleNamespace(), orientation=SimpleNamespace())
-    )
-    trajectories = SimpleNamespace(JointTrajectory=lambda: SimpleNamespace(points=[]), JointTrajectoryPoint=point)
-    monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace(ok=lambda: True, create_node=lambda name: node))
-    monkeypatch.setitem(sys.modules, "trajectory_msgs.msg", trajectories)
-    monkeypatch.setitem(sys.modules, "geometry_msgs.msg", SimpleNamespace(PoseStamped=pose))
-    sink = Ros2Sink()
-    sink.open(robot, CONFIG)
-    sink.send(outputs[-1])
-    told, standing = sent["/base_pose"], outputs[-1].standing
-    assert standing is not None and told.header.frame_id == "world" and set(sent) == {"/base_pose", "/joint_trajectory"}
-    turn = told.pose.orientation
-    assert [turn.w, turn.x, turn.y, turn.z] == standing.base.quaternion_wxyz_4.tolist()
-    assert told.pose.position.z == standing.base.position_3[2]
 
 
 @pytest.fixture(scope="module")
