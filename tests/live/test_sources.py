@@ -318,30 +318,60 @@ def test_pico_an_sdk_that_fails_is_one_sentence(monkeypatch: pytest.MonkeyPatch)
         source.read(Inbox(0.25), 0.0)
 
 
-def test_pico_is_asked_as_its_documentation_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[str] = []
-    state = {"tracked": True, "stamp": 5}
-    sdk = SimpleNamespace(
-        init=lambda: calls.append("init"),
-        close=lambda: calls.append("close"),
-        is_body_data_available=lambda: state["tracked"],
-        get_body_timestamp_ns=lambda: state["stamp"],
-        get_body_joints_pose=lambda: rows(torch.eye(3).expand(21, 3, 3)).tolist(),
-    )
+class PicoSdk:
+    """The SDK 1.1 as it was seen to behave, beside a service that sends what the app in the headset does: a body is told
+    for ever after the first one, and never a body's own time, unless the app gives it."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+        self.body: list[list[float]] | None = None
+        self.stamp, self.joint_stamps = 0, [0] * 24
+
+    def init(self) -> None:
+        self.calls.append("init")
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+    def is_body_data_available(self) -> bool:
+        return self.body is not None
+
+    def get_body_joints_pose(self) -> list[list[float]]:
+        return [list(row) for row in self.body or [[0.0] * 7] * 24]
+
+    def get_body_timestamp_ns(self) -> int:
+        return self.stamp
+
+    def get_body_joints_timestamp(self) -> list[int]:
+        return list(self.joint_stamps)
+
+
+def test_pico_is_followed_as_long_as_the_headset_tells_something_new(monkeypatch: pytest.MonkeyPatch) -> None:
+    sdk = PicoSdk()
     monkeypatch.setitem(sys.modules, "xrobotoolkit_sdk", sdk)
     source, inbox = PicoSource(), Inbox(0.25)
+    now = iter(np.arange(100) / 60)
     source.open()
-    for now in (0.0, 0.1, 0.2):
-        source.read(inbox, now)
-    assert inbox.counts["frames"] == 1 and isinstance(inbox.take_frame(), Landmarks)
-    state["stamp"] = 6
-    source.read(inbox, 0.3)
-    state["tracked"] = False
-    source.read(inbox, 0.4)
+    source.read(inbox, next(now))
     assert isinstance(inbox.take_frame(), Nobody)
+    seen = rows(torch.eye(3).expand(21, 3, 3))
+    for step in range(5):  # without any time of the body
+        sdk.body = (seen + 1e-6 * step).tolist()
+        source.read(inbox, next(now))
+        frame = inbox.take_frame()
+        assert isinstance(frame, Landmarks) and frame.points["pelvis"][0] == seen[0, 0] + 1e-6 * step
+    before = inbox.counts["frames"]
+    for _ in range(5):  # the headset has gone
+        source.read(inbox, next(now))
+    assert inbox.counts["frames"] == before
+    sdk.joint_stamps[3] += 1  # who stands still to the last digit is seen yet
+    source.read(inbox, next(now))
+    sdk.stamp += 1
+    source.read(inbox, next(now))
+    assert inbox.counts["frames"] == before + 2
     source.close()
     source.close()
-    assert calls == ["init", "close"]
+    assert sdk.calls == ["init", "close"]
     monkeypatch.setitem(sys.modules, "xrobotoolkit_sdk", None)
     with pytest.raises(UserError, match=r"pip install 'mrhubo\[pico\]'"):
         PicoSource()

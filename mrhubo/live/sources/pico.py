@@ -1,8 +1,8 @@
 """Body tracking of a PICO headset by XRoboToolkit: 24 joints, of which the places are read.
 
-SDK: https://github.com/XR-Robotics, on PyPI `xrobotoolkit-sdk`; its joints are SMPL's and two hands, its axes are taken
-to be right-handed with y up, as GMR takes them (https://github.com/YanjieZe/GMR, `XRobotStreamer`). Not tried with a
-headset: what is tested is the conversion, and that the SDK is asked as its documentation says.
+SDK: https://github.com/XR-Robotics, on PyPI `xrobotoolkit-sdk`; its joints are SMPL's and two hands, its axes are
+right-handed with y up, as its app in the headset writes them (XRoboToolkit-Unity-Client, `TrackingData.cs`) and GMR
+reads them (https://github.com/YanjieZe/GMR, `XRobotStreamer`). Not tried with a headset.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ class PicoSource(NamedSource):
         self._sdk = import_optional(
             "xrobotoolkit_sdk", "--source pico: needs XRoboToolkit's SDK: pip install 'mrhubo[pico]'"
         )
-        self._session, self._number, self._stamp = str(time.time_ns()), 0, None
+        self._session, self._number = str(time.time_ns()), 0
+        self._last: Any = None
         self._is_open = False
 
     def open(self) -> None:
@@ -71,20 +72,24 @@ class PicoSource(NamedSource):
         self._is_open = True
 
     def read(self, inbox: Inbox, now: float) -> bool:
-        """Gives the pose, if it is a new one; nobody, where the headset tracks no body.
+        """Gives the pose, if it is a new one; nobody, where the headset has tracked no body yet.
+
+        The SDK goes on telling the last body when the headset has lost it or has gone, and knows the time of a body
+        only where the app in the headset gives one, which that of 2025 does not. So a body is new if anything of it is:
+        no two measurements of a person are equal.
 
         Raises:
             UserError: the SDK has failed.
         """
         try:
             tracked = bool(self._sdk.is_body_data_available())
-            stamp = self._sdk.get_body_timestamp_ns() if tracked else None
-            if tracked and stamp == self._stamp:
-                return True
             poses = self._sdk.get_body_joints_pose() if tracked else None
+            times = (self._sdk.get_body_timestamp_ns(), self._sdk.get_body_joints_timestamp()) if tracked else None
         except Exception as error:
             raise UserError(f"--source pico: XRoboToolkit's SDK has failed: {first_line(error)}") from error
-        self._stamp = stamp
+        if tracked and (poses, times) == self._last:
+            return True
+        self._last = (poses, times)
         self._number += 1
         try:
             content = to_landmarks(poses) if tracked else Nobody()
