@@ -43,6 +43,7 @@ from tests.motion.readers import (
     test_pose_folders,
     test_sam3d_folders,
     test_soma_and_points,
+    test_trc_file,
 )
 from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
@@ -173,6 +174,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "parameters, a line each": ("damaged.csv", _parameter_table),
     "clips.json": ("damaged.json", lambda path: path.write_text(json.dumps(test_frame_lists.clips(24)))),
     "points, a line each": ("damaged.csv", _point_table),
+    "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
@@ -204,7 +206,7 @@ def fuzz(name: str, first: int, accidents: int, folder: Path) -> tuple[float, li
         write(path)
     good, text = (
         path.read_bytes(),
-        not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv", ".skeleton"},
+        not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv", ".skeleton", ".trc"},
     )
     slowest, wrong = 0.0, []
     for seed in range(first, first + accidents):

@@ -12,10 +12,9 @@ import re
 from mrhubo.motion.readers.content import Content
 
 _BLENDER = "convert it to BVH, for instance in Blender: import it, then File > Export > Motion Capture (.bvh)"
-_MARKERS = (
-    "it has markers, and not joints; solve it for a skeleton first, and export that as BVH, or convert it to SMPL with "
-    "MoSh++ or SOMA"
-)
+SOLVE = "solve it for a skeleton first, and export that as BVH, or convert it to SMPL with MoSh++ or SOMA"
+"""What to do with a recording of markers."""
+_MARKERS = f"it has markers, and not joints; {SOLVE}"
 _VICON = "solve it for a skeleton, and export that as BVH, for instance from Vicon Shogun or Blade"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"glTF", "a GLB file", _BLENDER),
@@ -26,7 +25,6 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"BLENDER", "a Blender file", "export the skeleton by File > Export > Motion Capture (.bvh)"),
     (r"[\x02-\x05]P", "a C3D file", _MARKERS),
     (r"\xff\xfe|\xfe\xff", "text in UTF-16", "save it in UTF-8"),
-    (r"PathFileType", "a TRC file", _MARKERS),
     (
         r'\s*\{.{0,300}"(?:people|bodies)"\s*:\s*\[',
         "a single frame of OpenPose or CMU Panoptic",

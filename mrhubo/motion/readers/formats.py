@@ -59,6 +59,7 @@ FORMATS: tuple[Format, ...] = (
     Format("SMPL parameters in tables (.csv)", "parameter_table", "is_parameter_table", "read_parameter_table", ()),
     Format("keypoints in tables (.csv)", "keypoint_table", "is_table", "read_table", ()),
     Format("keypoints in tables with a line a point", "point_table", "is_point_table", "read_point_table", ()),
+    Format("joints in TRC", "trc_file", "is_trc", "read_trc", (".trc",)),
     Format("keypoints (.npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     Format("videos (MP4, MOV, MKV, WebM, AVI)", "video", "is_video", "read_video", ()),
     # the last row: whatever else holds arrays in dictionaries

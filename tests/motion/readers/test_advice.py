@@ -30,7 +30,6 @@ _FILES = {
         "Blender",
     ),
     "C3D": (b"\x02P\0\0\0", "markers"),
-    "TRC": (b"PathFileType\t4\t(X/Y/Z)\n", "markers"),
     "a robot's joints": (
         b"Frame,root_translateX,root_translateY,left_hip_pitch_joint_dof\n0,0,1,0.5\n",
         "human motion",
