@@ -62,8 +62,8 @@ class _Limb:
     lower: Vector = _HANGING
     bent: tuple[Vector, Vector] | None = None
     """The upper bone when the hinge was bent last, and the axis about which it was."""
-    tip: Rotation = IDENTITY
-    """The hand or foot, as seen from the lower bone."""
+    tip: Rotation | None = None
+    """The hand or foot, as seen from the lower bone, on which it rests until it is seen."""
 
 
 class Root(NamedTuple):
@@ -192,10 +192,11 @@ def _see_limb(
     tip, tip_sure = seen.turn(end)
     if tip is not None:
         limb.tip = relative(world[hinge], tip)
-    world[end] = chained(world[hinge], limb.tip)
+    world[end] = world[hinge] if limb.tip is None else chained(world[hinge], limb.tip)
     found[start] = min(seen.surety(start, hinge) if upper else 0.0, carrier_sure)
     found[hinge] = min(seen.surety(hinge, end) if lower else 0.0, carrier_sure)
-    found[end] = min(tip_sure, carrier_sure)
+    # many senders have no points of hands at all, and arms are to follow them; who stands on feet has to know them
+    found[end] = found[hinge] if limb.tip is None and not one_way else min(tip_sure, carrier_sure)
 
 
 def _hinge_axis(limb: _Limb, hinge: str, known: bool, one_way: bool) -> Vector:

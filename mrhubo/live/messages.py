@@ -46,6 +46,8 @@ class Landmarks:
     """How sure the sender is of each, 0..1."""
     in_world: bool = False
     """Whether the points tell where the person is in the world, and not from the hips alone."""
+    axes_known: bool = True
+    """Whether the sender's axes surely are right-handed."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def _landmarks(told: dict[str, Any]) -> Landmarks:
     in_world = told.get("world", known.in_world)
     if not isinstance(in_world, bool):
         raise Refused("malformed")
-    return Landmarks(points, sure, in_world)
+    return Landmarks(points, sure, in_world, known.axes_known)
 
 
 def _names(known: PointSet, told: dict[str, Any], count: int) -> list[str | None]:

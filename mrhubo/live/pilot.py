@@ -15,6 +15,7 @@ from mrhubo.errors import UserError
 from mrhubo.live.body import Body, SeenPose
 from mrhubo.live.doubt import Doubt
 from mrhubo.live.governor import Governor
+from mrhubo.live.handedness import Handedness
 from mrhubo.live.inbox import Frame, Inbox
 from mrhubo.live.messages import Landmarks, Nobody
 from mrhubo.live.output import Output
@@ -50,6 +51,7 @@ class Pilot:
         self.pauses = 0
         """How often a period took longer than `stop_time`, so that the robot had stopped by itself."""
         self._body = Body(has_legs=robot.standing is not None)
+        self._handedness = Handedness()
         self._answer_N, self._confidence_X = robot.home_N, np.zeros(len(robot.branch_names))
         self._met = False
         """Whether somebody has been seen."""
@@ -140,7 +142,8 @@ class Pilot:
     def _pose(self, frame: Frame) -> SeenPose | None:
         """The pose of a frame; None: nobody is seen."""
         if isinstance(frame, Landmarks):
-            return self._body.see(frame.points, frame.sure, frame.in_world) if frame.points else None
+            points = frame.points if frame.axes_known else self._handedness.right(frame.points)
+            return self._body.see(points, frame.sure, frame.in_world) if points else None
         return None if isinstance(frame, Nobody) else frame
 
     def _may_go(self, now: float) -> bool:

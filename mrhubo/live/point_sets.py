@@ -38,6 +38,8 @@ class PointSet:
     """What turns its axes into right-handed ones with y up."""
     in_world: bool = False
     """Whether points are told in a world that stays, unless a message says otherwise."""
+    axes_known: bool = True
+    """Whether all senders have the axes that `signs` tells; else they may be left-handed."""
 
 
 def _webxr() -> dict[str, str]:
@@ -48,6 +50,6 @@ POINT_SETS = {
     "mediapipe": PointSet(SETS["MediaPipe"], signs=(1.0, -1.0, -1.0)),
     "pico": PointSet((*JOINT_NAMES, *(f"{side}_middle" for side in SIDES)), in_world=True),
     "webxr": PointSet(None, _webxr(), in_world=True),
-    "named": PointSet(None),
+    "named": PointSet(None, axes_known=False),
 }
 """By the name that a message gives."""

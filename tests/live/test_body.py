@@ -75,6 +75,22 @@ def test_what_is_missing_stays_where_it_was_seen_from_the_trunk(points: dict[str
         assert np.abs(hidden.local_J33[joint(name)] - after.local_J33[joint(name)]).max() < 1e-3, name
 
 
+@pytest.mark.parametrize("tells_middle", [False, True])
+def test_arms_of_senders_without_points_of_hands_are_sure(points: dict[str, np.ndarray], tells_middle: bool) -> None:
+    """As COCO's, Human3.6M's, SMPL's, PICO's: such hands rest on their forearms. Hands that were seen and are lost are
+    not sure.
+    """
+    body = Body()
+    told = {n: at for n, at in points.items() if n.split("_")[-1] not in ("index", "middle", "pinky")}
+    middle = {f"{side}_middle": told[f"{side}_wrist"] + 0.1 for side in ("left", "right")}  # too little for a turn
+    without = see(body, told | middle if tells_middle else told, 3)
+    wrists = [joint(f"{side}_wrist") for side in ("left", "right")]
+    assert (without.sure_J[wrists] == 1).all() and np.abs(without.local_J33[wrists] - np.eye(3)).max() < 1e-6
+    see(body, points, 4)
+    lost = see(body, told, 5)
+    assert (lost.sure_J[wrists] == 0).all() and np.abs(lost.local_J33[wrists] - np.eye(3)).max() > 0.1
+
+
 def test_sure_is_as_the_least_sure_point_is(points: dict[str, np.ndarray]) -> None:
     told = {name: tuple(point_T3[0].tolist()) for name, point_T3 in points.items()}
     found = Body().see(told, {"left_wrist": 0.4, "left_index": 0.7})

@@ -5,6 +5,8 @@ and its rotation, both relative to the bone above it; `/VMC/Ext/Root/Pos` with t
 version 2.1 on its scale and offset for mixed reality, which are not read). Unity's axes are left-handed: x to the
 right, y up, z forward, which is where an avatar looks. Mirrored in x they are ours. A bone's rotation refers to the
 avatar's T-pose, in which VRM has all rotations 0, as our rest pose has.
+`/VMC/Ext/OK` tells whether a model is loaded, whether it is calibrated, and whether the sender sees its person; what is
+not told is so. An avatar that waits for that stands in its T-pose, which nobody shows.
 """
 
 from __future__ import annotations
@@ -21,12 +23,13 @@ from mrhubo.lazy import import_optional
 from mrhubo.live.body import LEG_LENGTH, Root, SeenPose
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.inbox import LEASE, Inbox
-from mrhubo.live.messages import MAX_BYTES, Message, Refused, of_quaternions
+from mrhubo.live.messages import MAX_BYTES, Message, Nobody, Refused, of_quaternions
 from mrhubo.live.sources.udp import DatagramSource
 
 PORT = 39_539
 """On which programs that receive VMC listen by default."""
-ADDRESS, ROOT = "/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"
+ADDRESS, ROOT, STATUS = "/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos", "/VMC/Ext/OK"
+_CALIBRATED = 3
 _ARGUMENTS = 8
 """Name, position and rotation. What newer versions of the protocol tell after them is not read."""
 _MOST_MESSAGES = 512
@@ -43,12 +46,13 @@ BONES = {
     **{f"{side.capitalize()}{bone}": f"{side}_{joint}" for side in SIDES for bone, joint in _SIDED.items()},
 }
 """Our joints, by Unity's names of bones."""
-_HIPS, _LEG = "Hips", ("LeftLowerLeg", "LeftFoot")
+_HIPS, _LEG = "hips", ("leftlowerleg", "leftfoot")
 """The bone of the pelvis, and the bones whose positions tell how long a leg is."""
 _SHORTEST_LEG = 0.05
 _FARTHEST = 1e3
-_PLACE = {bone: POSED_JOINT_NAMES.index(joint) for bone, joint in BONES.items()}
-_ARMS = [POSED_JOINT_NAMES.index(f"{side}_{name}") for side in SIDES for name in ("shoulder", "elbow")]
+_PLACE = {bone.lower(): POSED_JOINT_NAMES.index(joint) for bone, joint in BONES.items()}
+"""Whatever their letters' case: VRM writes the same names with a small first letter."""
+_LIMBS = [POSED_JOINT_NAMES.index(f"{side}_{name}") for side in SIDES for name in ("shoulder", "elbow", "hip", "knee")]
 
 
 class Bones:
@@ -61,6 +65,8 @@ class Bones:
         """Hips, and the avatar's own place in the world, mirrored in x."""
         self._lengths: dict[str, float] = {}
         """Of the bones above `_LEG` [m]."""
+        self.shows_somebody = True
+        """Whether its sender says that the avatar moves as a person does."""
         self.dropped = 0
         """Messages that told no bone as the protocol does."""
 
@@ -82,12 +88,15 @@ class Bones:
         return is_any
 
     def _take(self, address: str, arguments: list[Any]) -> bool:
+        if address == STATUS:
+            self.shows_somebody = _shows_somebody(arguments)
+            return False
         if address not in (ADDRESS, ROOT):
             return False
         if len(arguments) < _ARGUMENTS or not isinstance(arguments[0], str):
             raise Refused("malformed")
         position, rotation = arguments[1:4], arguments[4:_ARGUMENTS]
-        name = ROOT if address == ROOT else arguments[0]
+        name = ROOT if address == ROOT else arguments[0].lower()
         place = None if address == ROOT else _PLACE.get(name)
         # all of it is read before any of it is kept
         pose = _pose(position, rotation) if name in (ROOT, _HIPS) else None
@@ -104,9 +113,9 @@ class Bones:
 
     @property
     def pose(self) -> SeenPose:
-        """As they are now; a bone that has never come rests, and an arm that has never come is not sure."""
+        """As they are now; a bone that has never come rests, and limbs that have never come are not sure."""
         sure_J = np.ones(len(self._seen_J))
-        for place in _ARMS:
+        for place in _LIMBS:
             sure_J[place] = self._seen_J[place]
         return SeenPose(of_quaternions(self._xyzw_J4).astype(np.float32), sure_J, self._root())
 
@@ -121,6 +130,16 @@ class Bones:
             turn_33, place_3 = avatar.turn_33 @ turn_33, avatar.place_3 + avatar.turn_33 @ place_3
         length = sum(self._lengths.values()) if len(self._lengths) == len(_LEG) else 0.0
         return Root(turn_33, place_3 * (LEG_LENGTH / length if length > _SHORTEST_LEG else 1.0))
+
+
+def _shows_somebody(told: list[Any]) -> bool:
+    """What a sender says of its avatar: loaded, and since version 2.5 the state and the kind of its calibration, since
+    2.7 whether somebody is tracked.
+    """
+    if not told or any(not isinstance(value, int | float) for value in told[:4]):
+        raise Refused("malformed")
+    loaded, calibration, _, tracked = (list(told[:4]) + [None] * 3)[:4]
+    return bool(loaded) and calibration in (None, _CALIBRATED) and tracked != 0
 
 
 def _position(values: list[Any]) -> np.ndarray:
@@ -235,5 +254,6 @@ class VmcSource(DatagramSource):
         self._datagrams.read(take)
         if moved and self._owner is not None:
             self._number += 1
-            inbox.offer(Message(self._session, self._number, now, self._bones.pose), self._owner, now)
+            content = self._bones.pose if self._bones.shows_somebody else Nobody()
+            inbox.offer(Message(self._session, self._number, now, content), self._owner, now)
         return True
