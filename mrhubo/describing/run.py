@@ -11,13 +11,15 @@ from pathlib import Path
 
 from mrhubo.config import is_config, load_config
 from mrhubo.describing.model_file import find_model, model_named
+from mrhubo.describing.roots import better_root
 from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, unsure
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.files.atomic import atomic_path
 from mrhubo.robot import BodyMap, Robot, build_body_map
 from mrhubo.robot.discovery import Discovery, discover
 from mrhubo.robot.mjcf import is_mjcf, urdf_of_mjcf
-from mrhubo.robot.urdf import Description
+from mrhubo.robot.rooted import rooted
+from mrhubo.robot.urdf import Description, describe_text
 from mrhubo.robot.urdf import describe as read_urdf
 from mrhubo.runtime.names import check_name
 
@@ -83,15 +85,23 @@ def describe_model(word: str, out: Path | None = None, force: bool = False, whol
     file = out or default_config(path, whole_body)
     with _as_urdf(path, file, force) as (urdf, notes):
         with model_named(path, urdf):
-            found = _discover(read_urdf(urdf), whole_body)
+            description = read_urdf(urdf)
+            found = _discover(description, whole_body)
         check_name("the config's file name", file.stem)
-        picture = file.with_suffix(".png")
+        picture, written = file.with_suffix(".png"), {}
+        if (root := better_root(description, found)) is not None:
+            urdf, told = _rooted_file(file), _root_told(description, root)
+            written[urdf] = rooted(description, root, file.parent)
+            found = _discover(describe_text(urdf, written[urdf]), whole_body)
+            notes = (*notes, f"{told}: the config names a file that says so, {urdf}")
         if not force:
-            refuse_existing(file)
+            for new in (file, *written):
+                refuse_existing(new)
             refuse_foreign(picture)
-        text = described_yaml(found, urdf, file, picture, path.name)
-        with atomic_path(file) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        written[file] = described_yaml(found, urdf, file, picture, path.name).encode()
+        for new, content in written.items():
+            with atomic_path(new) as temporary:
+                temporary.write_bytes(content)
     return Described(found, file, picture, urdf, notes)
 
 
@@ -107,9 +117,8 @@ def config_of(word: str) -> tuple[Path, Described | None]:
         described = describe_model(word)
         return described.file, described
     urdf = load_config(file).robot.urdf
-    if not any(
-        there.exists() and urdf.exists() and there.samefile(urdf) for there in (path, file.with_suffix(".urdf"))
-    ):
+    written = (path, file.with_suffix(".urdf"), _rooted_file(file))
+    if not any(there.exists() and urdf.exists() and there.samefile(urdf) for there in written):
         raise UserError(
             f"{file} is there already, of another model ({urdf}): name it, or describe yours by another --out"
         )
@@ -136,6 +145,10 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
     model, description = find_model(word), read_model(word)
     with model_named(model, description.path):
         found = _discover(description, whole_body)
+        if (root := better_root(description, found)) is not None:
+            warnings.warn(f"{word}: {_root_told(description, root)}", InputWarning, stacklevel=2)
+            description = describe_text(description.path, rooted(description, root))
+            found = _discover(description, whole_body)
         robot = _robot(description, found, _file_name(model))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
@@ -148,6 +161,18 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
             stacklevel=2,
         )
     return robot
+
+
+def _rooted_file(file: Path) -> Path:
+    """Where a robot's URDF is written with another root, of its config."""
+    return file.with_name(f"{file.stem}-rooted.urdf")
+
+
+def _root_told(description: Description, root: str) -> str:
+    return (
+        f"its root, '{description.root}', is carried by a limb that moves, so '{root}' was made the root, and is the "
+        "base whose place is told"
+    )
 
 
 def default_config(path: Path, whole_body: bool = False) -> Path:
