@@ -5,6 +5,7 @@ Legend: B frames, J = 21 posed joints, D directions, M measured ones, N joints, 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -73,6 +74,11 @@ class Engine(Protocol):
     """
 
     description: Description
+
+    @property
+    def kept_in(self) -> Collection[str]:
+        """The folders in which what is compiled is kept; none, where nothing is."""
+        ...
 
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Directions (B, D, 3) of poses, float64, and the networks' joint angles (B, N) [rad], float32.

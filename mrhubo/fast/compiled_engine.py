@@ -268,9 +268,12 @@ class CompiledEngine:
             self.avoid(nobody_0N, nothing_0D3)
             nowhere_0 = np.zeros(0, np.bool_)
             self._kernels.polish(self._tables, 0, False, nothing_0D3, nobody_0N.astype(np.float32), nowhere_0)
-            kernels = [*self._kernels, *self._motion_kernels]
-            kernels += [] if self._unroll is None else [self._universal_kernel]
-            note_kept((kernel.stats.cache_path for kernel in kernels), self._unroll is not None)
+            note_kept(self.kept_in, self._unroll is not None)
+
+    @property
+    def kept_in(self) -> set[str]:
+        """As `Engine.kept_in`."""
+        return {kernel.stats.cache_path for kernel in self._kernels}
 
     def _retarget(
         self, polish: int, avoid: bool, judge: bool, q_BN: np.ndarray, target_BD3: np.ndarray, shake_BX: np.ndarray,

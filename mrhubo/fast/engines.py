@@ -39,6 +39,9 @@ class NumpyEngine:
         """A copy in another process is made of the same arrays."""
         return type(self), (self.description,)
 
+    kept_in: frozenset[str] = frozenset()
+    """As `Engine.kept_in`."""
+
     def look(self, local_BJ33: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         """As `Engine.look`."""
         refuse(self.wrong(local_BJ33), shape)

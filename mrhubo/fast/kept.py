@@ -30,6 +30,8 @@ from mrhubo.files.cache import user_cache
 _SOURCES = ("compiled", "plain")
 _FOLDER = "NUMBA_CACHE_DIR"
 """The environment's variable for the folder in which numba keeps what it compiles."""
+MOTIONS, FRAMES, STANDING = "motions", "frames", "frames of who stands"
+"""Kinds of work, of which each compiles its own: whole motions, frames as they come, those of a robot with legs too."""
 _MARK = "mrhubo-compiled.txt"
 """Beside numba's files: which version of the sources they are of."""
 
@@ -50,20 +52,22 @@ def numba_is_there() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
-def is_kept(universal: bool = False) -> bool:
-    """Whether the compiled form starts without compiling, that of the universal network or that of others."""
+def is_kept(universal: bool = False, work: str = MOTIONS) -> bool:
+    """Whether the compiled form starts some work without compiling, that of the universal network or that of others."""
     try:
-        files = json.loads(_note(universal).read_text())
+        files = json.loads(_note(universal, work).read_text())
         return bool(files) and all(os.path.isfile(file) for file in files)
     except (OSError, ValueError, TypeError, UserError, importlib.metadata.PackageNotFoundError):
         return False
 
 
-def note_kept(folders: Iterable[str], universal: bool = False) -> None:
-    """Notes that all has been compiled, and kept in numba's folders; where nothing can be written, nothing is noted."""
+def note_kept(folders: Iterable[str], universal: bool = False, work: str = MOTIONS) -> None:
+    """Notes that all that some work needs has been compiled, and kept in numba's folders; where nothing can be written,
+    nothing is noted.
+    """
     files = [str(file) for folder in sorted(set(folders)) for file in sorted(Path(folder).glob("*kernels.*.nbi"))]
     with contextlib.suppress(UserError, importlib.metadata.PackageNotFoundError):
-        with atomic_path(_note(universal)) as half:
+        with atomic_path(_note(universal, work)) as half:
             half.write_text(json.dumps(files))
 
 
@@ -109,6 +113,6 @@ def drop_others(folder: str | None) -> None:
                 half.write_text(told)
 
 
-def _note(universal: bool) -> Path:
-    told = (universal, checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
+def _note(universal: bool, work: str) -> Path:
+    told = (universal, work, checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
     return user_cache() / f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"

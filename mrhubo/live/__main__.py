@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mrhubo.config import CommandParser, parse_arguments, run_command
 from mrhubo.config.answering import add_who_flags, add_whole_body_flag, check_whole_body
@@ -12,6 +12,9 @@ from mrhubo.config.arguments import number
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.video import fetching
+
+if TYPE_CHECKING:
+    from mrhubo.fast import FastRetargeter
 
 SETUP = "--setup"
 _SETTING_UP = f"mrhubo live {SETUP}"
@@ -79,7 +82,7 @@ def main(argv: list[str]) -> int:
         return 0
     config, options = parse_arguments(build_parser(), argv)
     from mrhubo.config.interrupts import Terminated
-    from mrhubo.fast.kept import is_kept, numba_is_there
+    from mrhubo.fast.kept import FRAMES, STANDING, is_kept, note_kept, numba_is_there
     from mrhubo.live import LiveRobot
     from mrhubo.live.governor import brake_steps
     from mrhubo.live.loop import Session, run_session
@@ -104,15 +107,21 @@ def main(argv: list[str]) -> int:
         raise UserError("--https: there is no page to serve; add --source ws or --sink ws")
     plan.check()
 
-    def known(joint_names: Sequence[str], urdf: Path | None) -> None:
-        plan.check_robot(joint_names, urdf)
-        if options.form != "numpy" and numba_is_there() and not is_kept(options.retargeter is None):
+    compiled: list[Callable[[], None]] = []
+
+    def known(fast: FastRetargeter, urdf: Path | None) -> None:
+        plan.check_robot(fast.joint_names, urdf)
+        what = fast.description.universal is not None, FRAMES if fast.description.legs is None else STANDING
+        if options.form != "numpy" and numba_is_there() and not is_kept(*what):
             print("the first session on a machine compiles, which takes a minute", flush=True)
+            compiled.append(lambda: note_kept(fast.engine.kept_in, *what))
 
     if options.retargeter is None:
         robot = LiveRobot.of_robot(options.robot, config, options.form, options.whole_body, known)
     else:
         robot = LiveRobot.of_package(options.retargeter, config, options.form, known)
+    for note in compiled:
+        note()
     print(f"robot '{robot.facts.name}', {len(robot.joint_names)} joints; {config.rate:g} joint angles a second")
 
     def started() -> None:

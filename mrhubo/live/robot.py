@@ -5,7 +5,7 @@ Legend: N joints, X branches (an arm, the head), J = 21 human joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,9 @@ from mrhubo.robot_motion import RobotFacts
 _CHEST = POSED_JOINT_NAMES.index("spine3")
 
 
-Known = Callable[[Sequence[str], Path | None], object]
-"""Is told the joints of what will be sent, and the robot's model where it is known, before anything is compiled; what
-it raises ends the rest."""
+Known = Callable[[FastRetargeter, Path | None], object]
+"""Is told of what answers, and of the robot's model where it is known, before anything is compiled; what it raises ends
+the rest."""
 StreamRoot = tuple[np.ndarray, np.ndarray]
 """A pelvis' rotation (3, 3) and place (3,) [m] in a world whose y is up."""
 
@@ -90,7 +90,7 @@ class LiveRobot:
             raise UserError(
                 f"--retargeter {source}: was made before packages told how a robot stands; `mrhubo fit` makes it anew"
             )
-        known(fast.joint_names, None)
+        known(fast, None)
         found = cls.of_retargeter(fast, config)
 
         def figure() -> dict[str, Any]:
@@ -122,7 +122,7 @@ class LiveRobot:
         retargeter = untrained(robot)
         urdf = retargeter.body_map.robot.urdf
         fast = FastRetargeter(retargeter.describe(), form)
-        known(fast.joint_names, urdf)
+        known(fast, urdf)
         found = cls.of_retargeter(fast, config, urdf)
 
         def figure() -> dict[str, Any]:

@@ -213,8 +213,8 @@ def test_a_robot_is_known_before_it_is_compiled(tmp_path: Path, monkeypatch: pyt
     class Enough(Exception):
         """Ends what would compile."""
 
-    def known(joint_names: Sequence[str], urdf: Path | None) -> None:
-        raise Enough(*joint_names, urdf)
+    def known(fast: FastRetargeter, urdf: Path | None) -> None:
+        raise Enough(*fast.joint_names, urdf)
 
     monkeypatch.setattr(LiveRobot, "of_retargeter", no_robot)
     with pytest.raises(Enough) as of_robot:

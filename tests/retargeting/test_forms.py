@@ -73,3 +73,4 @@ def test_the_universal_network_is_compiled_apart(tmp_path: Path, monkeypatch: py
     assert kept.is_kept() and not kept.is_kept(universal=True)
     kept.note_kept([str(tmp_path)], universal=True)
     assert kept.is_kept(universal=True)
+    assert not any(kept.is_kept(True, work) for work in (kept.FRAMES, kept.STANDING))
