@@ -5,6 +5,7 @@ Loopback needs no token: whoever can send there is on this machine. Anything els
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import os
 import secrets
@@ -16,6 +17,18 @@ from mrhubo.errors import UserError, shortened
 LOOPBACK = "127.0.0.1"
 TOKEN_VARIABLE = "MRHUBO_LIVE_TOKEN"
 _SHORTEST_TOKEN = 16
+
+
+def own_addresses() -> list[str]:
+    """The IPv4 addresses by which other machines may reach this one."""
+    import psutil
+
+    told = [entry.address for entries in psutil.net_if_addrs().values() for entry in entries]
+    found = set()
+    for address in told:
+        with contextlib.suppress(ValueError):
+            found.add(ipaddress.IPv4Address(address))
+    return [str(one) for one in sorted(found) if not (one.is_loopback or one.is_link_local or one.is_unspecified)]
 
 
 @dataclass(frozen=True)

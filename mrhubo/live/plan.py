@@ -39,7 +39,7 @@ class Plan:
 
     def told(self) -> list[str]:
         """Where it listens once all is open, a sentence each."""
-        said = [f"page: {server.url}" for server in self._servers.values()]
+        said = [f"page: {', or '.join(server.urls)}" for server in self._servers.values()]
         if self._servers and self._certificate is not None:
             made = "made for this machine, so that browsers warn of it" if self._certificate.ours else "your own"
             said.append(f"certificate: {made}; SHA-256 {self._certificate.fingerprint}")

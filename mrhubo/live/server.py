@@ -21,7 +21,7 @@ from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
 from mrhubo.live.certificate import ServerCertificate
-from mrhubo.live.endpoints import Endpoint, find_token
+from mrhubo.live.endpoints import Endpoint, find_token, own_addresses
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import MAX_BYTES
 from mrhubo.live.named import NamedSink, NamedSource
@@ -84,11 +84,18 @@ class Server:
     @property
     def url(self) -> str:
         """Of the page; beyond loopback it holds the token, behind a mark that browsers do not send."""
-        scheme = "http" if self.certificate is None else "https"
-        endpoint = self.endpoint
-        if endpoint.host in ("0.0.0.0", "::"):  # everywhere: no address that a browser could open
-            endpoint = Endpoint(socket.gethostname(), endpoint.port)
-        return f"{scheme}://{endpoint.shown}/" + ("" if self.token is None else f"#token={self.token}")
+        return self.urls[0]
+
+    @property
+    def urls(self) -> list[str]:
+        """All by which the page may be opened, the best first: one, or of a server that listens everywhere by this
+        machine's name, which phones seldom know, and by its addresses.
+        """
+        scheme, hosts = "http" if self.certificate is None else "https", [self.endpoint.host]
+        if self.endpoint.host in ("0.0.0.0", "::"):
+            hosts = [socket.gethostname(), *own_addresses()]
+        token = "" if self.token is None else f"#token={self.token}"
+        return [f"{scheme}://{Endpoint(host, self.endpoint.port).shown}/{token}" for host in hosts]
 
     def open(self) -> None:
         """Listens; does nothing if it does already.

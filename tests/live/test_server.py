@@ -180,6 +180,9 @@ def test_whoever_is_slow_gets_the_newest_and_a_flood_is_bounded(server: Server) 
         assert len(server._waiting) == 64
 
 
+TOLD = "#token=a-secret-of-some-length"
+
+
 def test_beyond_loopback_a_token_is_needed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(TOKEN_VARIABLE, "a-secret-of-some-length")
     server = Server(Endpoint("0.0.0.0", 0), folder)
@@ -192,7 +195,12 @@ def test_beyond_loopback_a_token_is_needed(folder: Path, monkeypatch: pytest.Mon
             assert client.response is not None and client.response.status_code == 101
         with connect(live(server), additional_headers={"Authorization": "Bearer a-secret-of-some-length"}):
             pass
-        assert server.url.endswith("/#token=a-secret-of-some-length")
+        assert all(url.endswith("/#token=a-secret-of-some-length") for url in server.urls)
+        assert server.urls[0] == server.url == f"http://{socket.gethostname()}:{server.endpoint.port}/" + TOLD
+        for url in server.urls[1:]:  # whoever opens them is let in
+            page = f"ws://{url.removeprefix('http://').removesuffix('/' + TOLD)}/live?token=a-secret-of-some-length"
+            with connect(page):
+                pass
         assert get(server, "/")[0] == 200, "the page holds no secret"
         inbox = Inbox(0.25)
         server.take(inbox, 0.0)
