@@ -29,7 +29,7 @@ from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
 from mrhubo.motion.readers.options import RATES, ReadOptions
 from mrhubo.motion.readers.point_names import by_names
-from mrhubo.motion.readers.sightings import check_size
+from mrhubo.motion.readers.sightings import check_size, placed
 from mrhubo.robot_motion.clock import find_rate
 
 _KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3}
@@ -97,9 +97,7 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     if time is not None and numbers == list(range(len(numbers))):
         unit = 1e-3 if _MILLISECONDS.search(header.columns[time][len("time") :]) else 1.0
         rate = _rate(unit * value_TX[:, time])
-    check_size(path, "the table", max(numbers) + 1, len(header.points))
-    placed_TK4 = np.full((max(numbers) + 1, *point_TK4.shape[1:]), np.nan)
-    placed_TK4[numbers] = point_TK4
+    placed_TK4 = placed(path, "the table", numbers, point_TK4)
     sure_TK = placed_TK4[..., 3] if None not in wanted else None
     names = list(header.points) if by_names(list(header.points)).keys() >= set(NEEDED) else None
     found = Keypoints(placed_TK4[..., :3], names, sure_TK, rate, "the table", options.of_one())

@@ -87,6 +87,19 @@ def check_size(path: Path, where: str, frames: int, points: int) -> None:
         )
 
 
+def placed(path: Path, where: str, numbers: Sequence[int], row_TKX: np.ndarray) -> np.ndarray:
+    """Rows of points by the numbers of their frames; NaN in frames that are missing.
+
+    Raises:
+        UserError: as for `check_size`.
+    """
+    frames = max(numbers) + 1
+    check_size(path, where, frames, row_TKX.shape[1])
+    found = np.full((frames, *row_TKX.shape[1:]), np.nan)
+    found[list(numbers)] = row_TKX
+    return found
+
+
 def frames_of_one(
     path: Path, sightings: Sequence[Sighting], options: ReadOptions, notes: list[str]
 ) -> tuple[str, list[int | None]]:

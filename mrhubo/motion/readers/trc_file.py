@@ -27,7 +27,7 @@ from mrhubo.motion.readers.keypoint_table import numbers_of
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
 from mrhubo.motion.readers.options import RATES, ReadOptions
 from mrhubo.motion.readers.point_names import by_names
-from mrhubo.motion.readers.sightings import check_size
+from mrhubo.motion.readers.sightings import check_size, placed
 
 _BEGINS = "PathFileType"
 _BEFORE = 2
@@ -76,8 +76,7 @@ def read_trc(path: Path, options: ReadOptions) -> Motion:
         numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, 0]])
     if max(numbers) + 1 > _GAPS * len(numbers):
         raise UserError(f"{path}: has {len(numbers)} frames, numbered from 0 to {max(numbers):,}; is one wrong?")
-    placed_TK3 = np.full((max(numbers) + 1, *point_TK3.shape[1:]), np.nan)
-    placed_TK3[numbers] = point_TK3
+    placed_TK3 = placed(path, "the file", numbers, point_TK3)
     called = ["head_top" if name == "Head" and set(names) >= _OF_HALPE else name for name in names]
     found = Keypoints(placed_TK3, called, None, _rate(told.get("DataRate", "")), "the TRC file", options.of_one())
     return motion_of_points(path, checked(path, found), options)
