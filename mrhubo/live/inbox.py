@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
+from collections.abc import Callable
 
 from mrhubo.live.body import SeenPose
 from mrhubo.live.messages import Heartbeat, Landmarks, Message, Nobody, Refused, read_message
@@ -62,6 +63,11 @@ class Inbox:
     def __init__(self, late: float) -> None:
         """`late`: as `LiveConfig.late` [s]."""
         self.counts: Counter[str] = Counter(dict.fromkeys(("frames", "heartbeats", *FAULTS), 0))
+        self.clock: Callable[[], float] | None = None
+        """Our clock [s], which is read anew for each message, where one runs: a process that is held up between its
+        period's beginning and its messages would take those for ones that came before they were sent, and all later
+        ones for late. None: each message comes at the time that it is offered with.
+        """
         self.held = False
         """Whether the last heartbeat told that the button is held."""
         self.heartbeat_at = self.frame_at = _LONG_AGO
@@ -79,6 +85,7 @@ class Inbox:
             sender: which connection or address it came from.
             now: our clock [s].
         """
+        now = now if self.clock is None else self.clock()
         try:
             self._take(data if isinstance(data, Message) else read_message(data), sender, now)
         except Refused as fault:

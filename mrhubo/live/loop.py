@@ -173,15 +173,16 @@ class Periods:
     def __init__(
         self, rate: float, clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], object] = time.sleep
     ) -> None:
-        self._period, self._clock, self._sleep = 1.0 / rate, clock, sleep
+        self.clock = clock
+        self._period, self._sleep = 1.0 / rate, sleep
         self._next: float | None = None
 
     def __call__(self) -> float:
         """Waits for the next one, and gives its time [s]."""
-        now = self._clock()
+        now = self.clock()
         if self._next is not None and now < self._next:
             self._sleep(self._next - now)
-            now = self._clock()
+            now = self.clock()
         self._next = now + self._period
         return now
 
@@ -217,6 +218,7 @@ def run(
 def run_session(session: Session, seconds: float | None = None, started: Callable[[], object] = lambda: None) -> None:
     """As `run`; `started` is called once all is open."""
     periods = Periods(session.pilot.config.rate)
+    session.pilot.inbox.clock = periods.clock
     with _Signals() as stop:
         session.open()
         try:

@@ -19,6 +19,7 @@ from mrhubo.live import loop
 from mrhubo.live.endpoints import TOKEN_VARIABLE, Endpoint
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.loop import Periods, Session
+from mrhubo.live.named import NamedSource
 from mrhubo.live.output import STATES, Output
 from mrhubo.live.sinks.file import FileSink
 from mrhubo.live.sinks.udp import UdpSink
@@ -90,6 +91,29 @@ def test_a_replay_is_followed_to_its_end_and_stopped(clock: Clock, replay: Repla
     assert [output.number for output in sink.outputs] == list(range(1, len(sink.outputs) + 1))
     assert set(session.states) <= set(STATES) and session.states["following"] > 300
     assert "frames" in session.summary()
+
+
+def test_a_session_that_was_held_up_follows_again(clock: Clock) -> None:
+    class Held(NamedSource):
+        """Says that the button is held, and shows somebody."""
+
+        has_heartbeat, step = True, 0
+
+        def open(self) -> None:
+            pass
+
+        def close(self) -> None:
+            pass
+
+        def read(self, inbox: Inbox, now: float) -> bool:
+            self.step += 1
+            clock.now += 0.4 * (self.step == 30)  # between the beginning of a period and its messages
+            for number, make in enumerate((beat, message)):
+                inbox.offer(make(2 * self.step + number, time=clock.now), "a", now)
+            return self.step < 120
+
+    session = loop.run(make_robot(lambda pose, time: UPPER), [Held()], [Kept()], LiveConfig(ramp_time=0.0))
+    assert session.states["following"] >= 118 and session.counts["late"] == 0
 
 
 def test_no_two_outputs_are_closer_than_a_period() -> None:

@@ -169,6 +169,19 @@ def test_late_frames_are_counted_and_clocks_may_drift() -> None:
         assert drifting.offer(Message("s", second, second * 0.9995, Nobody()), "a", float(second))
 
 
+def test_who_was_held_up_takes_nothing_afterwards_for_late() -> None:
+    inbox, clock = Inbox(0.25), [0.0]
+    inbox.clock = lambda: clock[0]
+    for number in range(200):
+        sent = number / 40
+        now = 1.0 if 1.0 < sent <= 1.4 else sent  # the period began, and then others had the processor
+        clock[0] = max(sent, 1.4) if sent >= 1.0 else sent
+        assert inbox.offer(beat(number, sent), "a", now) or 1.0 <= sent < 1.2
+        if sent > 1.4:
+            assert inbox.heartbeat_at == pytest.approx(clock[0])
+    assert inbox.counts["late"] < 10
+
+
 def test_one_sender_steers_until_it_is_silent_or_gone() -> None:
     inbox = Inbox(0.25)
     assert inbox.offer(message(0), "a", 0.0)
