@@ -89,10 +89,10 @@ def describe_model(word: str, out: Path | None = None, force: bool = False, whol
             found = _discover(description, whole_body)
         check_name("the config's file name", file.stem)
         picture, written = file.with_suffix(".png"), {}
-        if (root := better_root(description, found)) is not None:
-            urdf, told = _rooted_file(file), _root_told(description, root)
-            written[urdf] = rooted(description, root, file.parent)
-            found = _discover(describe_text(urdf, written[urdf]), whole_body)
+        if (turned := _by_its_trunk(description, found, whole_body, _rooted_file(file), file.parent)) is not None:
+            description, found, told = turned
+            urdf = description.path
+            written[urdf] = description.text
             notes = (*notes, f"{told}: the config names a file that says so, {urdf}")
         if not force:
             for new in (file, *written):
@@ -145,10 +145,9 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
     model, description = find_model(word), read_model(word)
     with model_named(model, description.path):
         found = _discover(description, whole_body)
-        if (root := better_root(description, found)) is not None:
-            warnings.warn(f"{word}: {_root_told(description, root)}", InputWarning, stacklevel=2)
-            description = describe_text(description.path, rooted(description, root))
-            found = _discover(description, whole_body)
+        if (turned := _by_its_trunk(description, found, whole_body, description.path)) is not None:
+            description, found, told = turned
+            warnings.warn(f"{word}: {told}", InputWarning, stacklevel=2)
         robot = _robot(description, found, _file_name(model))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
@@ -168,11 +167,21 @@ def _rooted_file(file: Path) -> Path:
     return file.with_name(f"{file.stem}-rooted.urdf")
 
 
-def _root_told(description: Description, root: str) -> str:
-    return (
+def _by_its_trunk(
+    description: Description, found: Discovery, whole_body: bool, path: Path, folder: Path | None = None
+) -> tuple[Description, Discovery, str] | None:
+    """A robot whose root is on a limb with its trunk as the root, at a path, what is found of it, and a sentence about
+    it; `folder` as for `rooted`. None where it stays as it is.
+    """
+    root = better_root(description, found)
+    if root is None:
+        return None
+    turned = describe_text(path, rooted(description, root, folder))
+    told = (
         f"its root, '{description.root}', is carried by a limb that moves, so '{root}' was made the root, and is the "
         "base whose place is told"
     )
+    return turned, _discover(turned, whole_body), told
 
 
 def default_config(path: Path, whole_body: bool = False) -> Path:

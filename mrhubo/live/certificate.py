@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import ipaddress
 import os
 import socket
 import ssl
@@ -16,13 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import psutil
-
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.cache import user_cache
 from mrhubo.files.regular import read_regular
 from mrhubo.lazy import import_optional
+from mrhubo.live.endpoints import is_lasting, own_addresses, read_address
 
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate, GeneralName
@@ -102,19 +100,12 @@ def _our_names(host: str) -> list[GeneralName]:
     from cryptography import x509
 
     own = socket.gethostname().lower()
-    names = ["localhost", own, f"{own}.local", *([] if _address(host) or not host else [host.lower()])]
-    told = [entry.address for entries in psutil.net_if_addrs().values() for entry in entries]
-    found = {address for text in ("127.0.0.1", "::1", host, *told) if (address := _address(text)) is not None}
+    names = ["localhost", own, f"{own}.local", *([] if read_address(host) or not host else [host.lower()])]
+    more = {address for text in ("127.0.0.1", "::1", host) if (address := read_address(text)) is not None}
     # Names that a certificate cannot hold, and what changes with every start of a network, are left out.
     usable = [name for name in dict.fromkeys(names) if name.isascii() and " " not in name]
-    addresses = sorted((one for one in found if not one.is_link_local and not one.is_unspecified), key=str)
+    addresses = sorted(own_addresses() | set(filter(is_lasting, more)), key=str)
     return [*map(x509.DNSName, usable), *map(x509.IPAddress, addresses)]
-
-
-def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(text)
-    return None
 
 
 def _now() -> datetime.datetime:

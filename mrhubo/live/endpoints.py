@@ -19,16 +19,27 @@ TOKEN_VARIABLE = "MRHUBO_LIVE_TOKEN"
 _SHORTEST_TOKEN = 16
 
 
-def own_addresses() -> list[str]:
-    """The IPv4 addresses by which other machines may reach this one."""
+Address = ipaddress.IPv4Address | ipaddress.IPv6Address
+
+
+def read_address(text: str) -> Address | None:
+    """An IP address; None where it is a name, or nothing."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(text)
+    return None
+
+
+def own_addresses() -> set[Address]:
+    """This machine's, but for those that change with every start of a network."""
     import psutil
 
     told = [entry.address for entries in psutil.net_if_addrs().values() for entry in entries]
-    found = set()
-    for address in told:
-        with contextlib.suppress(ValueError):
-            found.add(ipaddress.IPv4Address(address))
-    return [str(one) for one in sorted(found) if not (one.is_loopback or one.is_link_local or one.is_unspecified)]
+    return {found for text in told if (found := read_address(text)) is not None and is_lasting(found)}
+
+
+def is_lasting(address: Address) -> bool:
+    """Whether somebody may be found by an address more than once."""
+    return not (address.is_link_local or address.is_unspecified)
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,8 @@ class Server:
         """
         scheme, hosts = "http" if self.certificate is None else "https", [self.endpoint.host]
         if self.endpoint.host in ("0.0.0.0", "::"):
-            hosts = [socket.gethostname(), *own_addresses()]
+            reached = sorted(one for one in own_addresses() if one.version == 4 and not one.is_loopback)
+            hosts = [socket.gethostname(), *map(str, reached)]
         token = "" if self.token is None else f"#token={self.token}"
         return [f"{scheme}://{Endpoint(host, self.endpoint.port).shown}/{token}" for host in hosts]
 

@@ -10,6 +10,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import naming
 
@@ -48,6 +50,13 @@ def frame_numbers_in(path: Path, names: Sequence[str]) -> list[int]:
     """The same; what is wrong is said of a file or folder."""
     with naming(path):
         return frame_numbers(names)
+
+
+def numbers_in_column(path: Path, number_T: np.ndarray) -> list[int] | None:
+    """The same of a table's column; None where it does not tell the number of every frame."""
+    if not np.isfinite(number_T).all():
+        return None
+    return frame_numbers_in(path, [f"{number:.0f}" for number in number_T])
 
 
 def in_order(path: Path, named: Sequence[tuple[str, Frame]]) -> list[tuple[int, Frame]]:

@@ -23,7 +23,7 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
@@ -90,10 +90,11 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     empty_T1 = np.full((len(value_TX), 1), np.nan)
     value_TX = np.hstack([value_TX, empty_T1])  # the last column is that of what is not there
     point_TK4 = value_TX[:, [-1 if column is None else column for column in wanted]].reshape(len(value_TX), -1, 4)
-    numbers, rate = list(range(len(point_TK4))), None
+    numbers, rate = None, None
     frame, time = find_column(header.columns, FRAMES), find_column(header.columns, TIMES)
-    if frame is not None and np.isfinite(value_TX[:, frame]).all():
-        numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, frame]])
+    if frame is not None:
+        numbers = numbers_in_column(path, value_TX[:, frame])
+    numbers = numbers or list(range(len(point_TK4)))
     if time is not None and numbers == list(range(len(numbers))):
         unit = 1e-3 if _MILLISECONDS.search(header.columns[time][len("time") :]) else 1.0
         rate = _rate(unit * value_TX[:, time])

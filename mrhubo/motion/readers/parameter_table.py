@@ -22,7 +22,7 @@ from mrhubo.files.tree import tree_of
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.estimators import smpl_motion
-from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.key_words import usual_name
 from mrhubo.motion.readers.keypoint_files import POSE_KEYS
 from mrhubo.motion.readers.keypoint_table import FRAMES, TIMES, find_column, numbers_of, split_header
@@ -88,8 +88,8 @@ def _arrays(path: Path, header: _Header, value_TX: np.ndarray) -> dict[str, np.n
     """What a table tells of somebody, by the names of its columns."""
     found = {name: value_TX[:, places] for name, places in header.places.items()}
     frame, time = find_column(header.columns, FRAMES), find_column(header.columns, TIMES)
-    if frame is not None and np.isfinite(value_TX[:, frame]).all():
-        found["frame_ids"] = np.array(frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, frame]]))
+    if frame is not None and (numbers := numbers_in_column(path, value_TX[:, frame])) is not None:
+        found["frame_ids"] = np.array(numbers)
     if time is not None:
         found["timestamps"] = value_TX[:, time]
     return found

@@ -13,14 +13,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
-
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.regular import read_regular
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.advice import SOLVE
 from mrhubo.motion.readers.content import Content
-from mrhubo.motion.readers.frame_numbers import frame_numbers_in
+from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoint_table import numbers_of
@@ -71,9 +69,7 @@ def read_trc(path: Path, options: ReadOptions) -> Motion:
     columns = ["Frame#", "Time", *(f"{name}'s {axis}" for name in names for axis in "XYZ")]
     value_TX = numbers_of(path, [_filled(row, len(columns)) for row in rows], "\t", columns, {*range(len(columns))})
     point_TK3 = value_TX[:, _BEFORE:].reshape(len(value_TX), len(names), 3)
-    numbers = list(range(len(value_TX)))
-    if np.isfinite(value_TX[:, 0]).all():
-        numbers = frame_numbers_in(path, [f"{number:.0f}" for number in value_TX[:, 0]])
+    numbers = numbers_in_column(path, value_TX[:, 0]) or list(range(len(value_TX)))
     if max(numbers) + 1 > _GAPS * len(numbers):
         raise UserError(f"{path}: has {len(numbers)} frames, numbered from 0 to {max(numbers):,}; is one wrong?")
     placed_TK3 = placed(path, "the file", numbers, point_TK3)
