@@ -59,9 +59,12 @@ def render(
     if surface is not None and len(surface):
         draw_surface(canvas, surface.transformed(pose_44), len(local))
         local = Solids.concatenate([local, _stand_in(surface)])
-    linear_HW4 = _shade(canvas, local, basis_33[:, 2], np.asarray(light, float))
-    linear_HW4 = _shrink(linear_HW4, supersample)
-    linear_HW4[..., :3] *= 1.0 - _crevices(canvas, supersample, tall_m)[..., None]
+    window = canvas.covered(supersample)
+    seen, linear_HW4 = canvas.cut(window), np.zeros((height, width, 4), np.float32)
+    if seen.owner_HW.size:
+        part_HW4 = _shrink(_shade(seen, local, basis_33[:, 2], np.asarray(light, float)), supersample)
+        part_HW4[..., :3] *= 1.0 - _crevices(seen, supersample, tall_m)[..., None]
+        linear_HW4[tuple(slice(axis.start // supersample, axis.stop // supersample) for axis in window)] = part_HW4
     if ground == "auto":
         ground = solids.extent(np.array([0.0, 0.0, 1.0]))[0] if len(solids) else None
     shadow_HW = np.zeros((height, width), np.float32)
@@ -80,8 +83,6 @@ def _shade(canvas: Canvas, local: Solids, up_3: np.ndarray, light_3: np.ndarray)
     height, width = canvas.owner_HW.shape
     picture_HW4 = np.zeros((height, width, 4), np.float32)
     pixels_N = np.flatnonzero(canvas.owner_HW.ravel() >= 0)
-    if len(pixels_N) == 0:
-        return picture_HW4
     owner_N = canvas.owner_HW.ravel()[pixels_N]
     normal_3N = _normals(canvas, local, pixels_N, owner_N)
     if canvas.normal_HW3 is not None:  # of a surface, the last of the solids
@@ -139,21 +140,13 @@ def _normals(canvas: Canvas, local: Solids, pixels_N: np.ndarray, owner_N: np.nd
 
 def _crevices(canvas: Canvas, supersample: int, tall_m: float) -> np.ndarray:
     """How much darker (0..1) each pixel (H, W) is because its surroundings are nearer to the viewer."""
-    height, width = canvas.owner_HW.shape
-    darker_HW = np.zeros((height // supersample, width // supersample), np.float32)
     covered_HW = canvas.owner_HW >= 0
-    rows, columns = (np.flatnonzero(covered_HW.any(axis=axis)) // supersample for axis in (1, 0))
-    if len(rows) == 0:
-        return darker_HW
-    inside = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    samples = tuple(slice(part.start * supersample, part.stop * supersample) for part in inside)
-    depth_HW = _shrink(np.where(covered_HW[samples], canvas.depth_HW[samples], np.float32(0.0)), supersample)
-    share_HW = _shrink(covered_HW[samples].astype(np.float32), supersample)
+    depth_HW = _shrink(np.where(covered_HW, canvas.depth_HW, np.float32(0.0)), supersample)
+    share_HW = _shrink(covered_HW.astype(np.float32), supersample)
     radius = max(1, round(0.022 * tall_m / (canvas.pixel_m * supersample)))
     around_HW = _blur(depth_HW, radius) / np.maximum(_blur(share_HW, radius), 1e-6)
     nearer_HW = around_HW - depth_HW / np.maximum(share_HW, 1e-6)
-    darker_HW[inside] = np.where(share_HW > 0.0, np.clip(nearer_HW / (0.05 * tall_m) - 0.05, 0.0, 1.0) * 0.5, 0.0)
-    return darker_HW
+    return np.where(share_HW > 0.0, np.clip(nearer_HW / (0.05 * tall_m) - 0.05, 0.0, 1.0) * 0.5, 0.0)
 
 
 def _blur(picture_HW: np.ndarray, radius: int) -> np.ndarray:

@@ -16,6 +16,7 @@ solids.
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -49,42 +50,61 @@ class Canvas:
             slice(min(max(first[0], 0), width), min(max(last[0], 0), width)),
         )
 
+    def covered(self, step: int) -> tuple[slice, slice]:
+        """Rows and columns, multiples of ``step``, outside which no solid is seen."""
+        seen_HW = self.owner_HW >= 0
+        found = [np.flatnonzero(seen_HW.any(axis=axis)) // step for axis in (1, 0)]
+        rows, columns = (slice(step * at[0], step * (at[-1] + 1)) if len(at) else slice(0, 0) for at in found)
+        return rows, columns
+
+    def cut(self, window: tuple[slice, slice]) -> Canvas:
+        """Rows and columns of the canvas: views of its arrays."""
+        part = copy.copy(self)
+        part.v_H, part.u_W = self.v_H[window[0]], self.u_W[window[1]]
+        part.depth_HW, part.owner_HW, part.t_HW = self.depth_HW[window], self.owner_HW[window], self.t_HW[window]
+        part.normal_HW3 = None if self.normal_HW3 is None else self.normal_HW3[window]
+        return part
+
     def put(
         self, window: tuple[slice, slice], number: int, hit: np.ndarray, depth: np.ndarray, t: np.ndarray | float
     ) -> None:
         """Keep what is hit and nearer than what is there."""
-        hit = hit & (depth > self.depth_HW[window])
-        np.copyto(self.depth_HW[window], depth, where=hit)
+        before = self.depth_HW[window]
+        hit = hit & (depth > before)
+        np.copyto(before, depth, where=hit)
         np.copyto(self.owner_HW[window], number, where=hit)
         np.copyto(self.t_HW[window], t, where=hit, casting="same_kind")
 
 
 def draw(canvas: Canvas, local: Solids) -> None:
     """Put all solids, given in the picture frame, on the canvas."""
+    axis_S3 = local.ends_S3 - local.starts_S3
     box_S = np.any(local.sides_S3 != 0.0, axis=1)
-    for number in range(len(local)):
-        start, axis = local.starts_S3[number], local.ends_S3[number] - local.starts_S3[number]
-        radius, end_radius = float(local.radii_S[number]), float(local.end_radii_S[number])
+    tube_S = local.flat_S & np.any(axis_S3 != 0.0, axis=1)
+    radii = zip(local.radii_S.tolist(), local.end_radii_S.tolist(), strict=True)
+    for number, (radius, end_radius) in enumerate(radii):
+        start, axis = local.starts_S3[number], axis_S3[number]
         if box_S[number]:
             _draw_box(canvas, number, start, axis, local.sides_S3[number], radius)
-        elif local.flat_S[number] and np.any(axis != 0.0):
+        elif tube_S[number]:
             _draw_cylinder(canvas, number, start, axis, radius)
         else:
             _draw_capsule(canvas, number, start, axis, radius, end_radius)
 
 
 def _draw_capsule(canvas: Canvas, number: int, a: np.ndarray, b: np.ndarray, radius: float, end_radius: float) -> None:
-    end = a + b
+    # Python's numbers throughout: NumPy's own are of double precision, and so would be what they are multiplied with
+    (a_u, a_v, a_w), (b_u, b_v, b_w) = a.tolist(), b.tolist()
+    end_u, end_v = a_u + b_u, a_v + b_v
     window = canvas.window(
-        min(a[0] - radius, end[0] - end_radius),
-        max(a[0] + radius, end[0] + end_radius),
-        min(a[1] - radius, end[1] - end_radius),
-        max(a[1] + radius, end[1] + end_radius),
+        min(a_u - radius, end_u - end_radius),
+        max(a_u + radius, end_u + end_radius),
+        min(a_v - radius, end_v - end_radius),
+        max(a_v + radius, end_v + end_radius),
     )
-    du_W, dv_H1 = canvas.u_W[window[1]] - np.float32(a[0]), canvas.v_H[window[0], None] - np.float32(a[1])
+    du_W, dv_H1 = canvas.u_W[window[1]] - a_u, canvas.v_H[window[0], None] - a_v
     if du_W.size == 0 or dv_H1.size == 0:
         return
-    b_u, b_v, b_w = b.tolist()
     growth = end_radius - radius
     k = b_u * b_u + b_v * b_v - growth * growth
     flat_enough = k > 1e-6 * (b_u * b_u + b_v * b_v + b_w * b_w + 1e-12)
@@ -99,7 +119,7 @@ def _draw_capsule(canvas: Canvas, number: int, a: np.ndarray, b: np.ndarray, rad
         np.maximum(q_HW, 0.0, out=q_HW)
         np.sqrt(q_HW, out=q_HW)
         q_HW += b_w * t_HW
-        q_HW += a[2]
+        q_HW += a_w
         canvas.put(window, number, hit_HW, q_HW, t_HW)
 
     t0_k_HW = (du_W * b_u + radius * growth) + dv_H1 * b_v  # k t0
@@ -109,18 +129,19 @@ def _draw_capsule(canvas: Canvas, number: int, a: np.ndarray, b: np.ndarray, rad
         m_HW += q0_HW
         np.maximum(m_HW, 0.0, out=m_HW)
         np.sqrt(m_HW, out=m_HW)
-        m_HW *= b_w / np.sqrt(k * (k + b_w * b_w))
+        m_HW *= b_w / math.sqrt(k * (k + b_w * b_w))
         m_HW += t0_k_HW * (1.0 / k)
-        np.clip(m_HW, 0.0, 1.0, out=m_HW)
+        np.maximum(m_HW, 0.0, out=m_HW)
+        np.minimum(m_HW, 1.0, out=m_HW)
         put(m_HW)
         return
     # seen (nearly) end-on: the nearest point is on one of the end spheres, or, for k < 0, on the cone between them
     put(np.zeros_like(q0_HW))
-    if np.any(b != 0.0):
+    if b_u or b_v or b_w:
         put(np.ones_like(q0_HW))
     if k < 0.0 and k + b_w * b_w > 0.0:
         m_HW = q0_HW + t0_k_HW * t0_k_HW / k
-        shift_HW = np.sqrt(np.maximum(-m_HW, 0.0)) * (b_w / np.sqrt(-k * (k + b_w * b_w)))
+        shift_HW = np.sqrt(np.maximum(-m_HW, 0.0)) * (b_w / math.sqrt(-k * (k + b_w * b_w)))
         put(np.clip(t0_k_HW / k - shift_HW, 0.0, 1.0))
 
 

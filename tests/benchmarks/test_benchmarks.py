@@ -466,7 +466,7 @@ def test_files(run: Run, package: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_show(run: Run) -> None:
     found = rows(run("show", "--robots", "nao", "--frames", 3), "file")
-    assert [row[:2] for row in found] == [[".html", "3"], [".mp4", "3"], [".gif", "2"], [".png", "3"]]
+    assert [row[:2] for row in found] == [[".html", "3"], [".mp4", "3"], [".gif", "3"], [".png", "3"]]
     assert all(float(value) > 0 for row in found for value in row[2:4])
 
 

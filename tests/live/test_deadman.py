@@ -11,7 +11,7 @@ pytest.importorskip("websockets")
 
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.server import Server
-from tests.live.browser import Browser, find_browser
+from tests.browser import Browser, find_browser
 
 HINT = "document.querySelector('#hold small').textContent"
 USUAL = "space bar, or press and hold"

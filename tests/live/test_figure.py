@@ -22,7 +22,7 @@ from mrhubo.live.figure import figure_of
 from mrhubo.live.server import PageSink, Server
 from mrhubo.robot import Robot, link_poses, read_geometry
 from mrhubo.view import robot_solids
-from tests.live.browser import Browser, find_browser
+from tests.browser import Browser, find_browser
 from tests.live.robots import make_robot
 
 

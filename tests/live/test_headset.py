@@ -22,7 +22,7 @@ from mrhubo.live.messages import Landmarks, Nobody
 from mrhubo.live.point_sets import POINT_SETS
 from mrhubo.live.server import Server
 from mrhubo.motion.orientations import HEAD_POINTS
-from tests.live.browser import Browser, find_browser
+from tests.browser import Browser, find_browser
 
 # What the page uses of WebXR; `fake` says what the device sees, and is given the session.
 DEVICE = """

@@ -19,11 +19,12 @@ from mrhubo.live.body import Body
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.loop import Session
 from mrhubo.live.point_sets import POINT_SETS
+from mrhubo.live.robot import LiveRobot
 from mrhubo.live.server import PageSink, PageSource, Server
 from mrhubo.video import PoseEstimator
 from mrhubo.video.models import FOLDER_VARIABLE
 from mrhubo.view import Camera, human_figure, render
-from tests.live.browser import Browser, find_browser, write_y4m
+from tests.browser import Browser, find_browser, write_y4m
 from tests.live.robots import NAMES, make_robot
 from tests.video.films import needs_models
 
@@ -71,6 +72,22 @@ def arms(local_J33: np.ndarray) -> np.ndarray:
     return np.stack(rows)
 
 
+def held_session(robot: LiveRobot, server: Server, browser: Browser) -> tuple[Session, Callable[..., None]]:
+    """A session with the page, and what goes on with it until something is true."""
+    config = LiveConfig(late=10.0)  # drawing by the CPU, a browser takes seconds for a picture
+    session = Session.of(robot, [PageSource(server)], [PageSink(server)], config)
+    session.open()
+
+    def until(true: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
+        end = time.monotonic() + seconds
+        while not true():
+            assert time.monotonic() < end, f"{what}: {session.summary()}; {browser.complaints()}"
+            session.step(time.monotonic())
+            time.sleep(0.01)
+
+    return session, until
+
+
 def test_a_camera_moves_a_robot_while_the_key_is_held(
     browser: Browser, server: Server, image: np.ndarray, tmp_path: Path
 ) -> None:
@@ -81,17 +98,7 @@ def test_a_camera_moves_a_robot_while_the_key_is_held(
             poses.append(local_J33.copy())
         return np.full(len(NAMES), 0.2)
 
-    config = LiveConfig(late=10.0)  # drawing by the CPU, a browser takes seconds for a picture
-    session = Session.of(make_robot(answer), [PageSource(server)], [PageSink(server)], config)
-    session.open()
-
-    def until(true: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
-        end = time.monotonic() + seconds
-        while not true():
-            assert time.monotonic() < end, f"{what}: {session.summary()}; {browser.complaints()}"
-            session.step(time.monotonic())
-            time.sleep(0.01)
-
+    session, until = held_session(make_robot(answer), server, browser)
     until(lambda: browser.ask("document.getElementById('state').textContent") == "stopped", "the page does not connect")
     browser.ask("document.getElementById('model').value = '0'; document.getElementById('camera').click()")
     until(lambda: len(poses) >= 3, "nobody is seen")
@@ -121,6 +128,34 @@ def test_a_camera_moves_a_robot_while_the_key_is_held(
     off = np.degrees(np.arccos(np.clip((arms(poses[-1]) * arms(ours.local_J33)).sum(1), -1, 1)))
     assert np.median(off) < 8 and off.max() < 25, "MediaPipe's own program in the browser finds what ours does"
     session.close()
+
+
+def test_a_camera_that_is_unplugged_stops_the_robot_softly(browser: Browser, server: Server) -> None:
+    robot = make_robot(lambda local_J33, moment: np.full(len(NAMES), 0.2))
+    session, until = held_session(robot, server, browser)
+    until(lambda: browser.ask("document.getElementById('state').textContent") == "stopped", "the page does not connect")
+    browser.ask("document.getElementById('model').value = '0'; document.getElementById('camera').click()")
+    browser.key("keyDown")
+    until(lambda: session.states["following"] > 0, "nobody is seen")
+    browser.unplug()  # the key is still held
+    notice = "document.getElementById('notice').textContent"
+    until(lambda: not session.pilot.inbox.held, "the robot goes on without a camera")
+    assert browser.ask(notice) == "the camera is gone"
+    assert browser.ask("document.getElementById('camera').textContent") == "Start the camera"
+    last = session.last
+    assert last is not None
+    until(lambda: session.last is not None and not session.last.velocity_N.any(), "it does not stop")
+    assert session.last is not None and session.last.state == "stopped"
+    assert np.abs(session.last.q_N - last.stop_N).max() < 1e-6, "it brakes to where it said that it would stand"
+
+    browser.key("keyUp")
+    browser.ask("document.getElementById('camera').click()")  # plugged in again
+    until(lambda: browser.ask("document.getElementById('camera').textContent") == "Stop the camera", "it stays away")
+    before = session.states["following"]
+    browser.key("keyDown")
+    until(lambda: session.states["following"] > before, "the camera is back and nothing moves")
+    session.close()
+    assert browser.complaints() == []
 
 
 def test_without_models_the_page_says_what_to_do(

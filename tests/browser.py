@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import itertools
 import json
+import os
 import shutil
+import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -47,6 +50,13 @@ def write_y4m(path: Path, images: list[np.ndarray], rate: int = 15) -> Path:
     return path
 
 
+def _commands() -> Iterator[tuple[int, str]]:
+    """Processes of this machine (Linux) and their command lines."""
+    for place in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            yield int(place.parent.name), place.read_bytes().decode(errors="replace")
+
+
 class Browser:
     """One page in a browser whose camera is a file."""
 
@@ -62,10 +72,10 @@ class Browser:
             ],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
-        self._numbers = itertools.count(1)
+        self._folder, self._numbers = folder, itertools.count(1)
         self.events: list[dict[str, Any]] = []
         port_file = folder / "DevToolsActivePort"
-        self._wait(lambda: port_file.exists() and port_file.read_text().count("\n") >= 1, "the browser does not start")
+        self.wait(lambda: port_file.exists() and port_file.read_text().count("\n") >= 1, "the browser does not start")
         port = port_file.read_text().split("\n")[0]
         from websockets.sync.client import connect
 
@@ -89,7 +99,8 @@ class Browser:
             self._process.kill()
             self._process.wait()
 
-    def _wait(self, done: Callable[[], Any], what: str, seconds: float = _PATIENCE) -> Any:
+    def wait(self, done: Callable[[], Any], what: str, seconds: float = _PATIENCE) -> Any:
+        """What `done` returns, once that is true; fails by `what` if it never is."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if found := done():
@@ -131,11 +142,24 @@ class Browser:
 
     def until(self, script: str, seconds: float = _PATIENCE) -> Any:
         """Waits until an expression is true."""
-        return self._wait(lambda: self.ask(script), f"never true: {script}", seconds)
+        return self.wait(lambda: self.ask(script), f"never true: {script}", seconds)
 
     def key(self, kind: str, code: str = "Space", repeat: bool = False) -> None:
         """Presses (`keyDown`) or lets go of (`keyUp`) the space bar; `repeat`: it is held, and the system presses again."""
         self.call("Input.dispatchKeyEvent", type=kind, code=code, key=" ", windowsVirtualKeyCode=32, autoRepeat=repeat)
+
+    def unplug(self) -> None:
+        """Kills the browser's process that reads cameras, as nothing else takes a camera of Chromium's own away."""
+        found = [pid for pid, command in _commands() if str(self._folder) in command and "VideoCapture" in command]
+        assert found, "no process of the browser reads cameras"
+        for pid in found:
+            os.kill(pid, signal.SIGKILL)
+
+    def click(self, x: float, y: float) -> None:
+        """Moves the mouse to a place of the page [pixels], and presses and lets go of its left button."""
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def picture(self, path: Path) -> None:
         """A screenshot."""
