@@ -22,8 +22,8 @@ class LiveConfig:
     """Seconds over which speed rises to its limit after a start, and after every stop."""
     deadman: str = choice("auto", "auto", "held", "frames")
     """What says that the robot may move: `held`, a client's heartbeat that tells that its key or button is held;
-    `frames`, the stream itself; `auto`, `frames` where every source is a replay, VMC or PICO, which have no heartbeat,
-    else `held`."""
+    `frames`, the stream itself; `auto`, `held` where a source has a heartbeat, as WebSocket and UDP have, else
+    `frames`."""
     heartbeat_timeout: float = bounded(0.1, 0.02, 0.19)
     """Seconds without a heartbeat, or without a frame where frames are the dead-man, after which the robot brakes."""
     stop_time: float = bounded(0.2, 0.05, 2.0)

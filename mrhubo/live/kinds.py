@@ -7,6 +7,8 @@ SOURCES = {
     "udp": "udp[:PORT]: JSON messages in UDP datagrams (port 8766)",
     "vmc": "vmc[:PORT]: an avatar's bones by the VMC protocol, from this machine (port 39539)",
     "pico": "pico: body tracking of a PICO headset by XRoboToolkit",
+    "camera": "camera[:DEVICE][@MODEL]: a person before a camera of this machine (0; model lite, full or heavy)",
+    "video": "video:FILE[@MODEL]: a person in a film, as if a camera saw it now",
     "replay": "replay:FILE[@RATE]: a motion file at its rate, or at RATE where it tells none;"
     " replay-loop:FILE[@RATE]: again and again",
 }

@@ -15,6 +15,7 @@ from mrhubo.live.endpoints import LOOPBACK, Endpoint
 from mrhubo.live.named import NamedSink, NamedSource
 from mrhubo.live.server import PORT, PageSink, PageSource, Server
 from mrhubo.live.sinks.own_file import tried
+from mrhubo.video import MODELS
 
 UDP_PORT = 8766
 Part = TypeVar("Part")
@@ -57,6 +58,8 @@ class Plan:
             "udp": self._udp_source,
             "vmc": self._vmc_source,
             "pico": _pico,
+            "camera": _camera,
+            "video": self._video,
             "replay": lambda where: self._replay(where, False),
             "replay-loop": lambda where: self._replay(where, True),
         }
@@ -149,6 +152,15 @@ class Plan:
         self.read.append(Path(path))
         return ReplaySource.of_file(Path(path), loop, rate)
 
+    def _video(self, where: str) -> NamedSource:
+        from mrhubo.live.sources.camera import CameraSource
+
+        path, model = _with_model(where)
+        if not path:
+            raise UserError("--source video: names no film; write video:dance.mp4")
+        self.read.append(Path(path))
+        return CameraSource(film=Path(path), model=model)
+
     def _mujoco_sink(self, where: str, free: bool) -> NamedSink:
         from mrhubo.live.sinks.mujoco import MujocoSink
 
@@ -176,6 +188,19 @@ def _pico(where: str) -> NamedSource:
     from mrhubo.live.sources.pico import PicoSource
 
     return PicoSource()
+
+
+def _camera(where: str) -> NamedSource:
+    from mrhubo.live.sources.camera import CameraSource
+
+    device, model = _with_model(where)
+    return CameraSource(device or "0", model=model)
+
+
+def _with_model(where: str) -> tuple[str, str]:
+    """A camera or a film, and the estimator's model after an `@`."""
+    rest, at, model = where.rpartition("@")
+    return (rest, model) if at and model in MODELS else (where, "full")
 
 
 def _at_rate(where: str) -> tuple[str, float | None]:

@@ -8,7 +8,8 @@ Legend: H, W pixels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,7 +48,7 @@ def video_kind(start: bytes) -> str | None:
     return "yuv4mpegpipe" if start.startswith(b"YUV4MPEG2 ") else None
 
 
-def frames(path: Path) -> Iterator[Frame]:
+def frames(path: Path) -> Generator[Frame, None, None]:
     """The frames of a video, in the order in which they are shown. One that is shown no later than the one before is
     left out.
 
@@ -69,6 +70,28 @@ def frames(path: Path) -> Iterator[Frame]:
         except (av.FFmpegError, ValueError, OverflowError, MemoryError) as error:
             reason = getattr(error, "strerror", None) or error
             raise UserError(f"{path}: is a damaged video, or one that cannot be read: {reason}") from error
+
+
+def as_shown(
+    film: Iterator[Frame], clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], object] = time.sleep
+) -> Iterator[Frame]:
+    """The frames of a film, each when a player would show it; those that are over when they are asked for are left out.
+    Their times are those of the clock [s].
+    """
+    begun, waiting = None, None
+    for frame in film:
+        begun = clock() if begun is None else begun
+        if waiting is not None and clock() < begun + frame.time:
+            yield _when_due(waiting, begun, clock, sleep)
+        waiting = frame
+    if waiting is not None and begun is not None:
+        yield _when_due(waiting, begun, clock, sleep)
+
+
+def _when_due(frame: Frame, begun: float, clock: Callable[[], float], sleep: Callable[[float], object]) -> Frame:
+    due = begun + frame.time
+    sleep(max(0.0, due - clock()))
+    return Frame(due, frame.image_HW3)
 
 
 def _decoded(path: Path, container) -> Iterator[Frame]:  # noqa: ANN001 (importing its type takes PyAV)

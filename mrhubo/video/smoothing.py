@@ -21,26 +21,43 @@ _SPEED = 1.0
 """Cut-off of the speed [Hz]."""
 
 
+class OneEuro:
+    """The filter of points that come one after the other. A point that is NaN stays so, and begins anew after it."""
+
+    def __init__(self) -> None:
+        self._last_K3: np.ndarray | None = None
+        self._speed_K3: np.ndarray | float = 0.0
+
+    def step(self, raw_K3: np.ndarray, rate: float) -> np.ndarray:
+        """The points (K, 3) [m] that come next, filtered.
+
+        Args:
+            raw_K3: as an estimator gives them.
+            rate: one over the time since the last ones [1/s].
+        """
+        raw_K3 = np.array(raw_K3, dtype=np.float64)
+        last_K3, self._last_K3 = self._last_K3, raw_K3
+        if last_K3 is None:
+            return raw_K3
+        known_K3 = np.isfinite(raw_K3) & np.isfinite(last_K3)
+        # MediaPipe takes the speed from the filtered point, the paper from the raw one
+        seen_K3 = np.where(known_K3, (raw_K3 - last_K3) * rate, 0.0)
+        faster_K3 = self._speed_K3 + _share(rate, _SPEED) * (seen_K3 - self._speed_K3)
+        self._speed_K3 = np.where(known_K3, faster_K3, 0.0)
+        share_K3 = _share(rate, _LOWEST + _RISE * np.abs(self._speed_K3))
+        self._last_K3 = np.where(known_K3, last_K3 + share_K3 * (raw_K3 - last_K3), raw_K3)
+        return self._last_K3
+
+
 def smoothed(point_TK3: np.ndarray, rate: float) -> np.ndarray:
-    """Points (T, K, 3) [m] through the filter, frame by frame, each from what came before it. A point that is NaN stays
-    so, and the filter begins anew after it.
+    """Points (T, K, 3) [m] through the filter, frame by frame, each from what came before it.
 
     Args:
         point_TK3: as an estimator gives them.
         rate: frames per second.
     """
-    filtered_TK3 = np.array(point_TK3, dtype=np.float64)
-    speed_K3 = np.zeros(filtered_TK3.shape[1:])
-    speed_share = _share(rate, _SPEED)
-    for now in range(1, len(filtered_TK3)):
-        raw_K3, last_K3 = filtered_TK3[now].copy(), filtered_TK3[now - 1]
-        known_K3 = np.isfinite(raw_K3) & np.isfinite(last_K3)
-        # MediaPipe takes the speed from the filtered point, the paper from the raw one
-        seen_K3 = np.where(known_K3, (raw_K3 - last_K3) * rate, 0.0)
-        speed_K3 = np.where(known_K3, speed_K3 + speed_share * (seen_K3 - speed_K3), 0.0)
-        share_K3 = _share(rate, _LOWEST + _RISE * np.abs(speed_K3))
-        filtered_TK3[now] = np.where(known_K3, last_K3 + share_K3 * (raw_K3 - last_K3), raw_K3)
-    return filtered_TK3
+    one_euro = OneEuro()
+    return np.array([one_euro.step(raw_K3, rate) for raw_K3 in point_TK3]).reshape(np.shape(point_TK3))
 
 
 def _share(rate: float, cutoff: np.ndarray | float) -> np.ndarray:

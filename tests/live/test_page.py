@@ -23,21 +23,15 @@ from mrhubo.live.robot import LiveRobot
 from mrhubo.live.server import PageSink, PageSource, Server
 from mrhubo.video import PoseEstimator
 from mrhubo.video.models import FOLDER_VARIABLE
-from mrhubo.view import Camera, human_figure, render
 from tests.browser import Browser, find_browser, write_y4m
+from tests.live.figures import lifted_hand
 from tests.live.robots import NAMES, make_robot
 from tests.video.films import needs_models
 
 
 @pytest.fixture(scope="module")
 def image() -> np.ndarray:
-    """A figure that lifts a hand."""
-    local_J33 = torch.eye(3).repeat(21, 1, 1)
-    for joint, angle in ((15, -1.1), (16, 1.25), (17, -0.6)):
-        local_J33[joint] = torch.matrix_exp(torch.tensor([[0.0, -angle, 0.0], [angle, 0.0, 0.0], [0.0, 0.0, 0.0]]))
-    figure = human_figure(local_J33)
-    camera = Camera.framing(figure, (320, 240), azimuth_deg=0, elevation_deg=0, margin=0.08)
-    return np.asarray(render(figure, (320, 240), camera, (0.5, 0.55, 0.5), supersample=1))
+    return lifted_hand((320, 240))
 
 
 @pytest.fixture

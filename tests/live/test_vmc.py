@@ -121,6 +121,23 @@ def test_limbs_that_are_never_sent_are_not_sure(missing: set[str], small: bool) 
         assert pose.sure_J[place] == (joint not in LIMBS or joint not in {BONES[bone] for bone in missing})
 
 
+def test_limbs_that_come_no_more_are_not_sure_until_they_come_again() -> None:
+    bones, avatar = Bones(), make_avatar()
+    left = {bone: at for bone, at in avatar.items() if not bone.startswith("Right")}
+    expected = pose_of([bundled(*told(avatar))]).local_J33
+    for now, sent, gone in (
+        (0.0, avatar, False),
+        (0.4, left, False),
+        (0.6, left, True),
+        (60.0, left, True),
+        (60.1, avatar, False),
+    ):
+        bones.take(bundled(*told(sent)), now)
+        unsure = {joint for joint, sure in zip(POSED_JOINT_NAMES, bones.pose.sure_J, strict=True) if not sure}
+        assert unsure == ({joint for joint in LIMBS if joint.startswith("right")} if gone else set())
+        assert np.array_equal(bones.pose.local_J33, expected), "it stays where it was"
+
+
 WAITING = [(0,), (0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 2, 2), (1, 3, 0, 0)]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from mrhubo.errors import UserError
 from mrhubo.video import frames as module
-from mrhubo.video.frames import frames, video_kind
+from mrhubo.video.frames import Frame, as_shown, frames, video_kind
 from tests.video.films import numbered, write_video
 
 pytest.importorskip("av", reason="PyAV is not installed")
@@ -118,3 +118,23 @@ def test_without_pyav_it_says_what_to_install(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setitem(__import__("sys").modules, "av", None)
     with pytest.raises(UserError, match=r"film.mp4: .*pip install 'mrhubo\[video\]'"):
         list(frames(tmp_path / "film.mp4"))
+
+
+@pytest.mark.parametrize("work", [0.0, 0.01, 0.05, 0.31])
+def test_a_film_is_shown_at_its_own_pace_and_slow_eyes_miss_frames(work: float) -> None:
+    images = numbered(10)
+    clock = 100.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal clock
+        clock += seconds
+
+    found = []
+    for frame in as_shown((Frame(number / 10, image) for number, image in enumerate(images)), lambda: clock, sleep):
+        found.append((round(10 * (frame.time - 100.0)), clock - frame.time))
+        assert frame.image_HW3 is images[found[-1][0]]
+        sleep(work)
+    numbers, late = zip(*found, strict=True)
+    assert list(numbers) == sorted(set(numbers)) and numbers[0] == 0 and numbers[-1] == 9
+    assert 0.0 <= min(late) + 1e-9 and max(late) <= 0.1 + 1e-9, "no frame is shown when the next one is due"
+    assert len(numbers) == (10 if work < 0.1 else 4)

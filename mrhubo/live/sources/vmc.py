@@ -50,6 +50,8 @@ _HIPS, _LEG = "hips", ("leftlowerleg", "leftfoot")
 """The bone of the pelvis, and the bones whose positions tell how long a leg is."""
 _SHORTEST_LEG = 0.05
 _FARTHEST = 1e3
+_SILENT = 0.5
+"""Seconds without a bone, while others come, after which it is not seen: as of a tracker that has lost its limb."""
 _PLACE = {bone.lower(): POSED_JOINT_NAMES.index(joint) for bone, joint in BONES.items()}
 """Whatever their letters' case: VRM writes the same names with a small first letter."""
 _LIMBS = [POSED_JOINT_NAMES.index(f"{side}_{name}") for side in SIDES for name in ("shoulder", "elbow", "hip", "knee")]
@@ -60,7 +62,9 @@ class Bones:
 
     def __init__(self) -> None:
         self._xyzw_J4 = np.tile([0.0, 0.0, 0.0, 1.0], (len(POSED_JOINT_NAMES), 1))
-        self._seen_J = np.zeros(len(POSED_JOINT_NAMES), bool)
+        self._at_J = np.full(len(POSED_JOINT_NAMES), -math.inf)
+        """When each came last [s]."""
+        self._now = 0.0
         self._poses: dict[str, Root] = {}
         """Hips, and the avatar's own place in the world, mirrored in x."""
         self._lengths: dict[str, float] = {}
@@ -70,16 +74,20 @@ class Bones:
         self.dropped = 0
         """Messages that told no bone as the protocol does."""
 
-    def take(self, datagram: bytes) -> bool:
+    def take(self, datagram: bytes, now: float = 0.0) -> bool:
         """Takes the bones of one datagram; whether there were any. A message in it that tells no bone as the protocol
         does is dropped alone.
+
+        Args:
+            datagram: as it came.
+            now: when it came [s].
 
         Raises:
             Refused: the datagram is too long, or cut off.
         """
         if len(datagram) > MAX_BYTES:
             raise Refused("too_long")
-        is_any = False
+        is_any, self._now = False, now
         for message in _messages(datagram):
             try:
                 is_any |= self._take(*_osc(message))
@@ -104,7 +112,7 @@ class Bones:
         if place is not None:
             x, y, z, w = _quaternion(rotation)
             self._xyzw_J4[place] = x, -y, -z, w  # mirrored in x
-            self._seen_J[place] = True
+            self._at_J[place] = self._now
         if pose is not None:
             self._poses[name] = pose
         if length is not None:
@@ -112,11 +120,17 @@ class Bones:
         return place is not None or pose is not None
 
     @property
+    def seen_J(self) -> np.ndarray:
+        """Which bones have come yet (21,)."""
+        return np.isfinite(self._at_J)
+
+    @property
     def pose(self) -> SeenPose:
-        """As they are now; a bone that has never come rests, and limbs that have never come are not sure."""
-        sure_J = np.ones(len(self._seen_J))
-        for place in _LIMBS:
-            sure_J[place] = self._seen_J[place]
+        """As they are now; a bone that has never come rests. Limbs are sure as long as they come: each frame tells all
+        bones that its sender has.
+        """
+        sure_J = np.ones(len(self._at_J))
+        sure_J[_LIMBS] = self._at_J[_LIMBS] >= self._now - _SILENT
         return SeenPose(of_quaternions(self._xyzw_J4).astype(np.float32), sure_J, self._root())
 
     def _root(self) -> Root | None:
@@ -244,7 +258,7 @@ class VmcSource(DatagramSource):
                 return
             bones = self._bones if is_owner else Bones()
             try:
-                if bones.take(data):
+                if bones.take(data, now):
                     self._bones, self._owner, self._at, moved = bones, sender, now, True
             except Refused as fault:
                 inbox.counts[str(fault)] += 1
