@@ -120,11 +120,6 @@ class Bones:
         return place is not None or pose is not None
 
     @property
-    def seen_J(self) -> np.ndarray:
-        """Which bones have come yet (21,)."""
-        return np.isfinite(self._at_J)
-
-    @property
     def pose(self) -> SeenPose:
         """As they are now; a bone that has never come rests. Limbs are sure as long as they come: each frame tells all
         bones that its sender has.
