@@ -18,7 +18,7 @@ from mrhubo.files.npz import open_npz
 from mrhubo.robot_motion.base import base_of
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.npz import write_arrays
-from mrhubo.robot_motion.order import JointOrder
+from mrhubo.robot_motion.order import JointOrder, left_out
 from mrhubo.robot_motion.plain import build
 
 QPOS = "qpos"
@@ -42,7 +42,7 @@ def write_mujoco(motion: RobotMotion, path: Path, order: JointOrder | None) -> t
     if motion.frame_rate is not None:
         arrays["frame_rate"] = np.array(motion.frame_rate)
     write_arrays(path, {**arrays, "unit": np.array("rad")})
-    return notes
+    return notes + left_out(motion, order)
 
 
 def read_mujoco(path: Path) -> RobotMotion:

@@ -130,6 +130,20 @@ def in_order(motion: RobotMotion, order: JointOrder) -> tuple[RobotMotion, tuple
     return dataclasses.replace(motion, q=q, joint_names=order.names, robot=robot), tuple(notes)
 
 
+def left_out(motion: RobotMotion, order: JointOrder | None) -> tuple[str, ...]:
+    """What is to be said of a file that has a motion's joints alone, and no word of the robot's others: those that are
+    not at 0 are elsewhere in whatever plays it. Nothing, where the joints of an order are written: it knows which
+    there are.
+    """
+    if order is not None:
+        return ()
+    turned = [other.name for other in motion.robot.others if other.joint or other.offset]
+    if not turned:
+        return ()
+    return (f"joints that mimic others, or are held at another angle than 0, are not in it: {listed(turned)}; a"
+            " --joint-order that names them has them written",)  # fmt: skip
+
+
 def _lines(text: str) -> Iterator[str]:
     """Names that stand one a line, or with commas between; after # is a comment, and a list's dashes are no names."""
     for line in text.splitlines():

@@ -16,7 +16,7 @@ from mrhubo.errors import UserError
 from mrhubo.robot_motion.base import base_of
 from mrhubo.robot_motion.clock import in_full
 from mrhubo.robot_motion.motion import RobotMotion
-from mrhubo.robot_motion.order import JointOrder
+from mrhubo.robot_motion.order import JointOrder, left_out
 from mrhubo.robot_motion.plain import build
 from mrhubo.robot_motion.tables import read_rows, read_text, write_rows
 
@@ -32,7 +32,11 @@ def write_unitree(motion: RobotMotion, path: Path, order: JointOrder | None) -> 
     rows = np.concatenate([place, turn[:, _XYZW], motion.q], axis=1)
     write_rows(path, list(rows.T))
     rate = "unknown" if motion.frame_rate is None else in_full(motion.frame_rate)
-    return *notes, f"such a file names neither joints nor its frame rate, which is {rate}: tell who reads it"
+    return (
+        *notes,
+        *left_out(motion, order),
+        f"such a file names neither joints nor its frame rate, which is {rate}: tell who reads it",
+    )
 
 
 def read_unitree(path: Path, joint_names: Sequence[str], frame_rate: float | None = None) -> RobotMotion:

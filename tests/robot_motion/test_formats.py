@@ -166,7 +166,7 @@ def test_unitree_has_the_base_first_and_w_last(tmp_path: Path) -> None:
     numbers = [float(number) for number in (tmp_path / "a.csv").read_text().strip().split(",")]
     assert numbers[:7] == pytest.approx([1, 2, 3, 0, 0, -half, half])
     assert np.float32(numbers[7:]).tolist() == motion.q[0].tolist()
-    assert notes == ("such a file names neither joints nor its frame rate, which is 30: tell who reads it",)
+    assert notes[-1] == "such a file names neither joints nor its frame rate, which is 30: tell who reads it"
     with pytest.raises(UserError, match="no header, so its joints have to be named"):
         read_robot_motion(tmp_path / "a.csv")
     with pytest.raises(UserError, match="has 10 columns; expected 7 of the base and 1 joints"):
@@ -225,6 +225,18 @@ def test_an_order_turns_what_follows_and_holds_what_is_held(tmp_path: Path) -> N
     with pytest.raises(UserError, match=r"order.txt: joint 'waits' does not exist in the robot robo; nearest: 'waist'"):
         write_robot_motion(motion, tmp_path / "b.npz", joint_order=JointOrder(("waits",), "order.txt"))
     assert not (tmp_path / "b.npz").exists()
+
+
+@pytest.mark.parametrize("name", ["mujoco", "unitree"])
+def test_joints_that_a_simulator_would_leave_at_0_are_told(tmp_path: Path, name: str) -> None:
+    """`knee` is held at 0, where whatever plays the file has it anyway."""
+    motion, path = plain(), tmp_path / f"a{FORMATS[name].ending}"
+    told = "are not in it: finger, waist; a --joint-order that names them has them written"
+    assert any(told in note for note in write_robot_motion(motion, path, name))
+    order = JointOrder((*motion.joint_names, "knee"), "order.txt")
+    assert not any("not in it" in note for note in write_robot_motion(motion, path, name, order))
+    bare = RobotMotion(motion.q, motion.joint_names, motion.frame_rate)
+    assert not any("not in it" in note for note in write_robot_motion(bare, path, name))
 
 
 def test_limits_are_those_of_the_order(tmp_path: Path) -> None:
