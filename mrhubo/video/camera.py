@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mrhubo.errors import UserError, shortened
+from mrhubo.errors import UserError, listed, shortened
 from mrhubo.lazy import import_optional
 from mrhubo.video.frames import Frame
 
@@ -50,7 +50,9 @@ class Camera:
             )
         self._capture: Any = cv2.VideoCapture(int(device) if is_number else device)
         if not self._capture.isOpened():
-            raise UserError(f"camera {device}: is not there, or another program has it")
+            found = listed(str(path) for path in Path("/dev").glob("video*"))
+            hint = "" if found == "none" else f"; this machine has {found}"
+            raise UserError(f"camera {device}: is not there, or another program has it{hint}")
         for setting, value in (
             (cv2.CAP_PROP_FRAME_WIDTH, _SIZE[0]), (cv2.CAP_PROP_FRAME_HEIGHT, _SIZE[1]),
             (cv2.CAP_PROP_BUFFERSIZE, _HIDDEN_BUFFER),

@@ -80,9 +80,9 @@ class CameraSource(NamedSource):
 
     def notes(self) -> list[str]:
         """What is looked at."""
-        what = f"film: {self._film}"
+        what = f"camera {self._device}" if self._film is None else f"film: {self._film}"
         if self._camera is not None:
-            what = f"camera {self._device}: {self._camera.size[0]} x {self._camera.size[1]} pixels"
+            what += f": {self._camera.size[0]} x {self._camera.size[1]} pixels"
         return [f"{what}, model {self._model}"]
 
     def open(self) -> None:
