@@ -60,17 +60,17 @@ def render(
         draw_surface(canvas, surface.transformed(pose_44), len(local))
         local = Solids.concatenate([local, _stand_in(surface)])
     window = canvas.covered(supersample)
-    seen, linear_HW4 = canvas.cut(window), np.zeros((height, width, 4), np.float32)
+    seen, linear_HW4 = canvas.cut(window), np.zeros((0, 0, 4), np.float32)
     if seen.owner_HW.size:
-        part_HW4 = _shrink(_shade(seen, local, basis_33[:, 2], np.asarray(light, float)), supersample)
-        part_HW4[..., :3] *= 1.0 - _crevices(seen, supersample, tall_m)[..., None]
-        linear_HW4[tuple(slice(axis.start // supersample, axis.stop // supersample) for axis in window)] = part_HW4
+        linear_HW4 = _shrink(_shade(seen, local, basis_33[:, 2], np.asarray(light, float)), supersample)
+        linear_HW4[..., :3] *= 1.0 - _crevices(seen, supersample, tall_m)[..., None]
     if ground == "auto":
         ground = solids.extent(np.array([0.0, 0.0, 1.0]))[0] if len(solids) else None
     shadow_HW = np.zeros((height, width), np.float32)
     if ground is not None:
         shadow_HW = _ground_shadow(solids, camera, float(ground), size)
-    return _compose(linear_HW4, shadow_HW, background)
+    rows, columns = (slice(axis.start // supersample, axis.stop // supersample) for axis in window)
+    return _compose(linear_HW4, (rows, columns), shadow_HW, background)
 
 
 def _stand_in(surface: Surface) -> Solids:
@@ -179,7 +179,7 @@ def _ground_shadow(solids: Solids, camera: Camera, ground: float, size: tuple[in
     below_P3 = np.column_stack([points_P3[:, :2], np.full(len(points_P3), ground)]) - np.asarray(camera.target, float)
     u_P, v_P, _ = camera.basis() @ below_P3.T
     spread_P = 0.9 * radii_P + 0.3 * above_P
-    tall_m = float(np.ptp(solids.bounds()[:, 2]))
+    tall_m = float(np.ptp(solids.extent(np.array([0.0, 0.0, 1.0]))))
     weight_P = 0.22 * np.square(radii_P / spread_P) * np.exp(-above_P / (0.25 * max(tall_m, 1e-6)))
     across_PW = _bell(canvas.u_W, u_P, spread_P)
     along_PH = _bell(canvas.v_H, v_P, spread_P * max(rise, 0.05)) * weight_P[:, None].astype(np.float32)
@@ -207,16 +207,24 @@ def _shrink(picture_HW: np.ndarray, factor: int) -> np.ndarray:
     return total * np.float32(1.0 / factor**2)
 
 
-def _compose(linear_HW4: np.ndarray, shadow_HW: np.ndarray, background: Color | None) -> Image.Image:
-    """Gamma, then the figure over its shadow over the background: edges look smoother when mixed after the gamma."""
+def _compose(
+    linear_HW4: np.ndarray, window: tuple[slice, slice], shadow_HW: np.ndarray, background: Color | None
+) -> Image.Image:
+    """Gamma, then the figure, which is in the window, over its shadow over the background: edges look smoother when
+    mixed after the gamma.
+    """
     alpha_HW1 = linear_HW4[..., 3:]
     color_HW3 = np.sqrt(linear_HW4[..., :3] * alpha_HW1)  # = alpha * sqrt(color), as the colour is already times alpha
-    behind_HW1 = (1.0 - alpha_HW1) * (1.0 - shadow_HW[..., None])
+    behind_HW1 = 1.0 - shadow_HW[..., None]
+    behind_HW1[window] *= 1.0 - alpha_HW1
     if background is not None:
-        return Image.fromarray(_bytes(color_HW3 + behind_HW1 * np.asarray(background, np.float32)))
-    straight_HW3 = color_HW3 / np.maximum(1.0 - behind_HW1, 1e-6)
-    return Image.fromarray(_bytes(np.concatenate([straight_HW3, 1.0 - behind_HW1], axis=-1)))
+        mixed_HW3 = behind_HW1 * np.asarray(background, np.float32)
+        mixed_HW3[window] += color_HW3
+        return Image.fromarray(_bytes(mixed_HW3))
+    straight_HW4 = np.concatenate([np.zeros((*shadow_HW.shape, 3), np.float32), 1.0 - behind_HW1], axis=-1)
+    straight_HW4[window][..., :3] = color_HW3 / np.maximum(straight_HW4[window][..., 3:], 1e-6)
+    return Image.fromarray(_bytes(straight_HW4))
 
 
 def _bytes(values: np.ndarray) -> np.ndarray:
-    return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    return (np.minimum(values, 1.0) * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
