@@ -82,14 +82,10 @@ class Server:
         self._fault: Exception | None = None
 
     @property
-    def url(self) -> str:
-        """Of the page; beyond loopback it holds the token, behind a mark that browsers do not send."""
-        return self.urls[0]
-
-    @property
     def urls(self) -> list[str]:
         """All by which the page may be opened, the best first: one, or of a server that listens everywhere by this
-        machine's name, which phones seldom know, and by its addresses.
+        machine's name, which phones seldom know, and by its addresses. Beyond loopback each holds the token, behind a
+        mark that browsers do not send.
         """
         scheme, hosts = "http" if self.certificate is None else "https", [self.endpoint.host]
         if self.endpoint.host in ("0.0.0.0", "::"):

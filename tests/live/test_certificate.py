@@ -73,7 +73,7 @@ def test_a_client_that_was_told_of_it_checks_it_and_comes_in(server: Server, our
             return await asyncio.wait_for(client.recv(), 30)
 
     assert asyncio.run(watch()) in ("one", "two")
-    assert server.url == f"https://127.0.0.1:{port}/"
+    assert server.urls[0] == f"https://127.0.0.1:{port}/"
 
 
 def test_who_was_not_told_refuses_it(server: Server) -> None:
@@ -112,7 +112,7 @@ def test_pages_and_tokens_as_without_it(ours: ServerCertificate, monkeypatch: py
         for query, origin in (("", f"https://{here}"), (known, f"http://{here}"), (known, "https://evil.example")):
             assert status(f"wss://{here}/live{query}", trust, origin) == 403
         assert status(f"wss://{here}/live{known}", trust, f"https://{here}") == 101
-        assert server.url.startswith("https://") and server.url.endswith("/#token=a-secret-of-some-length")
+        assert server.urls[0].startswith("https://") and server.urls[0].endswith("/#token=a-secret-of-some-length")
     finally:
         server.close()
 

@@ -21,7 +21,7 @@ USUAL = "space bar, or press and hold"
 def browser(open_server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     find_browser()
     with Browser(tmp_path_factory.mktemp("browser") / "profile") as found:
-        found.go(open_server.url)
+        found.go(open_server.urls[0])
         yield found
 
 

@@ -64,7 +64,7 @@ def test_the_page_draws_what_forward_kinematics_say(
     angles_N = np.random.default_rng(0).uniform(nao.lower_N.numpy(), nao.upper_N.numpy())
     figure = json.loads(ask(server, "/robot.json")[1])
     with Browser(tmp_path_factory.mktemp("browser") / "profile") as browser:
-        browser.go(server.url)
+        browser.go(server.urls[0])
         pixels = "(() => { const c = document.getElementById('figure'); return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.filter((_, i) => i % 4 === 3 && i).reduce((sum, a, i) => (sum * 31 + a * (i % 997)) % 1e9, 0); })()"  # fmt: skip
         browser.until(f"!document.getElementById('robot').hidden && {pixels} > 0")
         before = browser.ask(pixels)

@@ -60,7 +60,7 @@ def browser(open_server: Server, tmp_path_factory: pytest.TempPathFactory) -> It
     find_browser()
     with Browser(tmp_path_factory.mktemp("browser") / "profile") as found:
         found.call("Page.addScriptToEvaluateOnNewDocument", source=DEVICE)
-        found.go(open_server.url)
+        found.go(open_server.urls[0])
         found.until("document.getElementById('state').textContent === 'connected'")
         yield found
 

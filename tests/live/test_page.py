@@ -49,7 +49,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory, image: np.ndarray, server:
     folder = tmp_path_factory.mktemp("browser")
     with Browser(folder / "profile", write_y4m(folder / "camera.y4m", [image, image])) as found:
         server.open()
-        found.go(server.url)
+        found.go(server.urls[0])
         yield found
 
 
