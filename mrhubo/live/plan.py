@@ -155,7 +155,7 @@ class Plan:
     def _video(self, where: str) -> NamedSource:
         from mrhubo.live.sources.camera import CameraSource
 
-        path, model = _with_model(where)
+        path, model = (where, "full") if where and Path(where).exists() else _with_model(where)
         if not path:
             raise UserError("--source video: names no film; write video:dance.mp4")
         self.read.append(Path(path))
@@ -200,6 +200,8 @@ def _camera(where: str) -> NamedSource:
 def _with_model(where: str) -> tuple[str, str]:
     """A camera or a film, and the estimator's model after an `@`."""
     rest, at, model = where.rpartition("@")
+    if at and model not in MODELS and (not rest or rest.isdecimal() or Path(rest).exists()):
+        raise UserError(f"--source {shortened(where)}: {unknown_name('model of poses', shortened(model), MODELS)}")
     return (rest, model) if at and model in MODELS else (where, "full")
 
 
