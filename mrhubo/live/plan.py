@@ -47,12 +47,14 @@ class Plan:
         return said + [sentence for source in self.sources for sentence in source.notes()]
 
     def add_source(self, text: str) -> None:
-        """`NAME` or `NAME:WHERE`.
+        """`NAME` or `NAME:WHERE`; of a camera `camera@MODEL` too.
 
         Raises:
             UserError: there is no such source, or it needs what is missing.
         """
         name, _, where = text.partition(":")
+        if name.startswith("camera@"):
+            name, where = "camera", text.removeprefix("camera")
         makers: dict[str, Callable[[str], NamedSource]] = {
             "ws": lambda where: PageSource(self._server(where, text)),
             "udp": self._udp_source,

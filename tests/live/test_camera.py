@@ -153,8 +153,9 @@ def test_what_is_not_there_is_told_before_anything_is_begun(tmp_path: Path, film
             plan.add_source(text)
     assert plan.sources == []
     plan.add_source("camera:0@lite")
+    plan.add_source("camera@lite")
     plan.add_source(f"video:{film}@heavy")
-    assert [source.notes()[0].split(", ")[-1] for source in plan.sources] == ["model lite", "model heavy"]
+    assert [source.notes()[0].split(", ")[-1] for source in plan.sources] == ["model lite", "model lite", "model heavy"]
     with pytest.raises(UserError, match="film"):
         plan.add_sink(f"file:{film}")
         plan.refuse_inputs([])
