@@ -1,7 +1,8 @@
-"""Signals that ask a command to end, and are not lost in the import of a library.
+"""Signals that ask a command to end, and are not lost in a library.
 
 Libraries import others that may be missing, and many catch whatever goes wrong then, interrupts too: trimesh in a
-hundred places, torch and networkx in dozens. A signal that comes in such a moment comes again, until the command ends.
+hundred places, torch and networkx in dozens. And what LLVM calls while numba compiles has no caller in Python that an
+interrupt could reach. A signal that comes in such a moment comes again, until the command ends.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ _OUTSIDE = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # a scheduler, a shutdown, a terminal that was closed
 _IMPORTING = "<frozen importlib._bootstrap>"
+_CALLED_BY_LLVM = "_raw_object_cache_notify", "_raw_object_cache_getbuffer"
+"""llvmlite's functions: ctypes prints what they raise, and goes on."""
 _AGAIN_S = 0.05
-"""After so long [s] a signal that came in the midst of an import comes again."""
+"""After so long [s] a signal that came where it may be lost comes again."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -71,7 +74,7 @@ _repeated: set[int] = set()
 
 def _is_answered(number: int, frame: FrameType | None) -> bool:
     """Whether a signal is one that came before, and whose interrupt is still on its way out. One that interrupts an
-    import comes again after a moment, as it may be lost there.
+    import, or what LLVM has called, comes again after a moment, as it may be lost there.
     """
     is_repeated = number in _repeated
     _repeated.discard(number)
@@ -80,7 +83,7 @@ def _is_answered(number: int, frame: FrameType | None) -> bool:
             _come_again(number)
         return True
     _again.discard(number)
-    if _is_importing(frame):
+    if _may_be_lost(frame):
         _again.add(number)
         _come_again(number)
     return False
@@ -102,10 +105,10 @@ def _come_again(number: int) -> None:
         threading.Thread(target=wait, daemon=True).start()
 
 
-def _is_importing(frame: FrameType | None) -> bool:
-    """Whether a command is in the midst of an import, at this frame or above it."""
+def _may_be_lost(frame: FrameType | None) -> bool:
+    """Whether a command is in the midst of an import, or of what LLVM has called, at this frame or above it."""
     while frame is not None and frame.f_code.co_name != "run_command":
-        if frame.f_code.co_filename == _IMPORTING:
+        if frame.f_code.co_filename == _IMPORTING or frame.f_code.co_name in _CALLED_BY_LLVM:
             return True
         frame = frame.f_back
     return False

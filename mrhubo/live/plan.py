@@ -47,12 +47,14 @@ class Plan:
         return said + [sentence for source in self.sources for sentence in source.notes()]
 
     def add_source(self, text: str) -> None:
-        """`NAME` or `NAME:WHERE`.
+        """`NAME` or `NAME:WHERE`; of a camera `camera@MODEL` too.
 
         Raises:
             UserError: there is no such source, or it needs what is missing.
         """
         name, _, where = text.partition(":")
+        if name.startswith("camera@"):
+            name, where = "camera", text.removeprefix("camera")
         makers: dict[str, Callable[[str], NamedSource]] = {
             "ws": lambda where: PageSource(self._server(where, text)),
             "udp": self._udp_source,
@@ -155,7 +157,7 @@ class Plan:
     def _video(self, where: str) -> NamedSource:
         from mrhubo.live.sources.camera import CameraSource
 
-        path, model = _with_model(where)
+        path, model = (where, "full") if where and Path(where).exists() else _with_model(where)
         if not path:
             raise UserError("--source video: names no film; write video:dance.mp4")
         self.read.append(Path(path))
@@ -200,6 +202,8 @@ def _camera(where: str) -> NamedSource:
 def _with_model(where: str) -> tuple[str, str]:
     """A camera or a film, and the estimator's model after an `@`."""
     rest, at, model = where.rpartition("@")
+    if at and model not in MODELS and (not rest or rest.isdecimal() or Path(rest).exists()):
+        raise UserError(f"--source {shortened(where)}: {unknown_name('model of poses', shortened(model), MODELS)}")
     return (rest, model) if at and model in MODELS else (where, "full")
 
 

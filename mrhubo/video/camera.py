@@ -58,7 +58,11 @@ class Camera:
             (cv2.CAP_PROP_BUFFERSIZE, _HIDDEN_BUFFER),
         ):  # fmt: skip
             self._capture.set(setting, value)
-        image_HW3 = self._read()
+        try:
+            image_HW3 = self._read()
+        except UserError:
+            self.close()
+            raise
         if image_HW3 is None:
             self.close()
             raise UserError(f"camera {device}: gives no picture; another program may have it, or may not be allowed to")
@@ -69,7 +73,7 @@ class Camera:
         """Its pictures as they come, each with the moment on a clock [s], until it is closed.
 
         Raises:
-            UserError: it is gone.
+            UserError: it is gone, or gives what is no picture.
         """
         while (image_HW3 := self._read()) is not None:
             yield Frame(clock(), image_HW3)
@@ -78,9 +82,13 @@ class Camera:
     def _read(self) -> np.ndarray | None:
         try:
             came, image_HW3 = self._capture.read()
-        except self._cv2.error:
+        except (self._cv2.error, OSError):
             return None
-        return self._cv2.cvtColor(image_HW3, self._cv2.COLOR_BGR2RGB) if came else None
+        if not came or image_HW3 is None or not image_HW3.size:
+            return None
+        if image_HW3.dtype != np.uint8:
+            raise UserError(f"camera {self.device}: gives pictures of {image_HW3.dtype}; only those of uint8 are read")
+        return self._cv2.cvtColor(image_HW3, self._cv2.COLOR_BGR2RGB)
 
     def close(self) -> None:
         """Gives it back; may be called twice."""

@@ -26,6 +26,8 @@ MAX_FRAMES = 200_000
 _LAST = 1.0
 """For so long may the last frame be shown [s], in a file that tells how long it is, but not of how many frames."""
 _MAX_BYTES = 64 * 2**30
+_BEHIND = 0.04
+"""A film whose next frame takes longer to read than this [s], and is over by then, goes on from there."""
 
 
 class Frame(NamedTuple):
@@ -76,13 +78,20 @@ def as_shown(
     film: Iterator[Frame], clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], object] = time.sleep
 ) -> Iterator[Frame]:
     """The frames of a film, each when a player would show it; those that are over when they are asked for are left out.
-    Their times are those of the clock [s].
+    Their times are those of the clock [s]. A film that is read more slowly than it plays is shown more slowly.
     """
-    begun, waiting = None, None
+    begun = waiting = None
+    asked = 0.0
     for frame in film:
-        begun = clock() if begun is None else begun
-        if waiting is not None and clock() < begun + frame.time:
-            yield _when_due(waiting, begun, clock, sleep)
+        now = clock()
+        if waiting is None or begun is None:
+            begun = asked = now
+        else:
+            if now >= begun + frame.time and now - asked > _BEHIND:
+                begun = now - waiting.time
+            if now < begun + frame.time:
+                yield _when_due(waiting, begun, clock, sleep)
+                asked = clock()
         waiting = frame
     if waiting is not None and begun is not None:
         yield _when_due(waiting, begun, clock, sleep)

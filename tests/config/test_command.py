@@ -190,6 +190,32 @@ def test_waiting_threads_spin_briefly_unless_the_user_wants_something_else():
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_llvm_tells_what_it_has_compiled_is_not_lost(number: signal.Signals) -> None:
+    """ctypes prints what a function raises that C has called, and goes on."""
+    pytest.importorskip("llvmlite", reason="numba is not installed")
+    body = (
+        "import ctypes\nfrom types import SimpleNamespace\nfrom llvmlite.binding import ExecutionEngine\n"
+        "def slow(*given):\n    print('go', flush=True); time.sleep(0.3)\n"
+        "engine = SimpleNamespace(_object_cache_getbuffer=slow, _find_module_ptr=slow)\n"
+        "data = SimpleNamespace(contents=SimpleNamespace(module_ptr=0))\n"
+        "called = ctypes.CFUNCTYPE(None)(lambda: ExecutionEngine._raw_object_cache_getbuffer(engine, data))\n"
+        "called()\nprint('compiled', flush=True)\ntime.sleep(60)"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", script(body)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert process.stdout is not None and process.stdout.readline() == "go\n"
+    process.send_signal(number)
+    try:
+        _, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    word = "interrupted" if number == signal.SIGINT else "terminated"
+    assert process.returncode == 128 + number and err.endswith(f"{word}; the same command resumes\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_library_that_catches_everything_while_it_is_imported_loses_no_signal(
     tmp_path: Path, number: signal.Signals
 ) -> None:

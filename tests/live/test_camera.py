@@ -153,11 +153,43 @@ def test_what_is_not_there_is_told_before_anything_is_begun(tmp_path: Path, film
             plan.add_source(text)
     assert plan.sources == []
     plan.add_source("camera:0@lite")
+    plan.add_source("camera@lite")
     plan.add_source(f"video:{film}@heavy")
-    assert [source.notes()[0].split(", ")[-1] for source in plan.sources] == ["model lite", "model heavy"]
+    assert [source.notes()[0].split(", ")[-1] for source in plan.sources] == ["model lite", "model lite", "model heavy"]
     with pytest.raises(UserError, match="film"):
         plan.add_sink(f"file:{film}")
         plan.refuse_inputs([])
+
+
+def test_a_film_whose_name_ends_as_a_model_does_is_played_and_a_wrong_model_is_told(
+    film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    needs_models()
+    monkeypatch.chdir(tmp_path)
+    plan = Plan()
+    for name in ("dance@lite", "@heavy", "dance.mp4"):
+        (tmp_path / name).write_bytes(film.read_bytes())
+    for text, told in (
+        ("dance@lite", "dance@lite, model full"),
+        ("dance@lite@heavy", "dance@lite, model heavy"),
+        ("@heavy", "@heavy, model full"),
+    ):
+        plan.add_source(f"video:{text}")
+        assert plan.sources[-1].notes() == [f"film: {told}"]
+    for text, what in (("video:dance.mp4@ful", "nearest: 'full'"), ("camera:0@huge", "available: "),
+                       ("camera:@huge", "'huge'"), ("video:dance@me.mp4", "there is no such file")):  # fmt: skip
+        with pytest.raises(UserError, match=what):
+            plan.add_source(text)
+
+
+def test_a_film_that_shows_one_picture_for_long_ends_at_once(tmp_path: Path, figure: np.ndarray) -> None:
+    needs_models()
+    path = write_video(tmp_path / "film.mkv", [figure, figure, figure], [0, 40, 60_000])
+    session, _ = followed(CameraSource(film=path, model="lite"))
+    begun = time.monotonic()
+    run_session(session, 0.5)
+    assert time.monotonic() - begun < 1.4
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("camera")]
 
 
 def test_a_damaged_film_ends_the_session_with_a_sentence(film: Path, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -45,6 +46,34 @@ def test_pictures_come_with_their_moments_until_the_camera_is_gone(asked: list[A
         next(pictures)
     camera.close()
     camera.close()
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ((True, None), "camera 0: gives no picture"),
+        ((True, np.zeros((0, 0, 3), np.uint8)), "camera 0: gives no picture"),
+        (OSError(19, "No such device"), "camera 0: gives no picture"),
+        ((True, np.zeros((4, 4, 3), np.float32)), "camera 0: gives pictures of float32; only those of uint8 are read"),
+    ],
+)
+def test_what_is_no_picture_is_told(given: Any, sentence: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed")
+    device = Mock()
+    device.read.side_effect = [given]
+    monkeypatch.setattr(cv2, "VideoCapture", lambda number: device)
+    with pytest.raises(UserError, match=sentence):
+        Camera("0")
+    assert device.release.called
+
+
+def test_grey_pictures_are_read_as_grey_ones_in_colour(monkeypatch: pytest.MonkeyPatch) -> None:
+    cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed")
+    device = Mock()
+    device.read.return_value = True, np.full((4, 6), 90, np.uint8)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda number: device)
+    image_HW3 = next(Camera("0").frames()).image_HW3
+    assert image_HW3.shape == (4, 6, 3) and (image_HW3 == 90).all()
 
 
 @pytest.mark.parametrize("device", ["", "film.mp4", "http://127.0.0.1/", "/dev/video999", "-1", "1234", "0 1", "²"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -138,3 +139,24 @@ def test_a_film_is_shown_at_its_own_pace_and_slow_eyes_miss_frames(work: float) 
     assert list(numbers) == sorted(set(numbers)) and numbers[0] == 0 and numbers[-1] == 9
     assert 0.0 <= min(late) + 1e-9 and max(late) <= 0.1 + 1e-9, "no frame is shown when the next one is due"
     assert len(numbers) == (10 if work < 0.1 else 4)
+
+
+def test_a_film_that_is_read_slowly_is_shown_slowly() -> None:
+    """A large one on a slow machine: no frame would ever come in time."""
+    clock = 100.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal clock
+        clock += seconds
+
+    def film() -> Iterator[Frame]:
+        for number in range(60):
+            sleep(0.05 if number < 40 else 0.001)
+            yield Frame(number / 30, np.full((2, 2, 3), number, np.uint8))
+
+    found = [(clock, frame.time, int(frame.image_HW3[0, 0, 0])) for frame in as_shown(film(), lambda: clock, sleep)]
+    shown, due, numbers = zip(*found, strict=True)
+    assert list(numbers) == sorted(set(numbers)) and numbers[-1] == 59
+    assert np.diff(shown).max() < 0.08, "there is never a gap in which a robot would stop"
+    assert max(np.subtract(shown, due)) < 0.05
+    assert np.diff(shown)[-15:] == pytest.approx(1 / 30), "once it is read fast enough it has its own pace"

@@ -91,45 +91,46 @@ class CameraSource(NamedSource):
         Raises:
             UserError: the camera is not there any more.
         """
-        self._stop.clear()
+        self._stop = threading.Event()  # of this session: a thread that an earlier one left in a driver stays stopped
         self._picture = self._seen = self._fault = None
         self._session, self._number = str(time.time_ns()), 0
         self._estimator.reset()
         if self._film is not None:
-            pictures = as_shown(frames(self._film))
+            pictures = as_shown(frames(self._film), sleep=self._stop.wait)
         else:
             self._camera = Camera(self._device)
             pictures = self._camera.frames()
         self._threads = [
-            threading.Thread(target=self._guarded, args=work, name=f"camera {name}", daemon=True)
+            threading.Thread(target=self._guarded, args=(self._stop, *work), name=f"camera {name}", daemon=True)
             for name, *work in (("pictures", self._take, pictures), ("points", self._look))
         ]
         for thread in self._threads:
             thread.start()
 
-    def _guarded(self, work: Callable[..., None], *arguments: Any) -> None:
+    def _guarded(self, stop: threading.Event, work: Callable[..., None], *arguments: Any) -> None:
         """Does it; an error is the session's, which learns of it when it reads."""
         try:
-            work(*arguments)
+            work(stop, *arguments)
         except Exception as error:
-            self._fault = self._fault or error
+            if not stop.is_set():
+                self._fault = self._fault or error
         finally:
             with self._lock:
                 self._lock.notify_all()
 
-    def _take(self, pictures: Iterator[Frame]) -> None:
+    def _take(self, stop: threading.Event, pictures: Iterator[Frame]) -> None:
         for picture in pictures:
+            if stop.is_set():
+                return
             with self._lock:
                 self._picture = picture
                 self._lock.notify_all()
-            if self._stop.is_set():
-                return
 
-    def _look(self) -> None:
+    def _look(self, stop: threading.Event) -> None:
         taker, one_euro, last = self._threads[0], OneEuro(), None
-        while not self._stop.is_set():
+        while not stop.is_set():
             with self._lock:
-                self._lock.wait_for(lambda: self._picture or self._stop.is_set() or not taker.is_alive(), 0.1)
+                self._lock.wait_for(lambda: self._picture or stop.is_set() or not taker.is_alive(), 0.1)
                 picture, self._picture = self._picture, None
                 if picture is None and not taker.is_alive():
                     return
