@@ -21,6 +21,8 @@ from mrhubo.video.frames import Frame
 _SIZE = 640, 480
 """Pixels that are asked for, and more than the models look at; a camera has what is nearest."""
 _DIGITS = 3
+_GONE_S, _AGAIN_S = 0.5, 0.01
+"""A camera that gives no picture for so long is gone; until then it is asked again after so long [s]."""
 _HIDDEN_BUFFER = 1
 """Pictures that a driver keeps for us: with more of them the oldest comes first."""
 
@@ -70,14 +72,22 @@ class Camera:
         """Width and height of its pictures [pixels]."""
 
     def frames(self, clock: Callable[[], float] = time.monotonic) -> Iterator[Frame]:
-        """Its pictures as they come, each with the moment on a clock [s], until it is closed.
+        """Its pictures as they come, each with the moment on a clock [s], until it is closed. One that does not come,
+        as where a cable has a loose contact, is left out.
 
         Raises:
             UserError: it is gone, or gives what is no picture.
         """
-        while (image_HW3 := self._read()) is not None:
-            yield Frame(clock(), image_HW3)
-        raise UserError(f"camera {self.device}: is gone; was it unplugged?")
+        last = clock()
+        while True:
+            image_HW3 = self._read()
+            if image_HW3 is not None:
+                last = clock()
+                yield Frame(last, image_HW3)
+            elif clock() - last < _GONE_S:
+                time.sleep(_AGAIN_S)
+            else:
+                raise UserError(f"camera {self.device}: is gone; was it unplugged?")
 
     def _read(self) -> np.ndarray | None:
         try:

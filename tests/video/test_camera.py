@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -37,7 +38,7 @@ def test_pictures_come_with_their_moments_until_the_camera_is_gone(asked: list[A
     moments = iter(range(100))
     pictures = camera.frames(lambda: float(next(moments)))
     found = [next(pictures) for _ in range(3)]  # opening it took one
-    assert [picture.time for picture in found] == [0.0, 1.0, 2.0]
+    assert [picture.time for picture in found] == [1.0, 2.0, 3.0]
     for number, (_, image_HW3) in enumerate(found, 1):
         assert image_HW3.shape == (64, 96, 3) and image_HW3.dtype == np.uint8
         assert np.abs(image_HW3[8:24, 8:40].mean((0, 1)) - [230, 20, 20]).max() < 12, "red comes first"
@@ -74,6 +75,18 @@ def test_grey_pictures_are_read_as_grey_ones_in_colour(monkeypatch: pytest.Monke
     monkeypatch.setattr(cv2, "VideoCapture", lambda number: device)
     image_HW3 = next(Camera("0").frames()).image_HW3
     assert image_HW3.shape == (4, 6, 3) and (image_HW3 == 90).all()
+
+
+def test_a_picture_that_does_not_come_is_left_out(asked: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    camera = Camera("0")
+    answers = iter([None, np.zeros((2, 2, 3), np.uint8), None, None, np.ones((2, 2, 3), np.uint8), *[None] * 1000])
+    monkeypatch.setattr(camera, "_read", lambda: next(answers))
+    pictures = camera.frames()
+    assert [float(next(pictures).image_HW3.mean()) for _ in range(2)] == [0.0, 1.0]
+    begun = time.monotonic()
+    with pytest.raises(UserError, match="camera 0: is gone"):
+        next(pictures)
+    assert 0.4 < time.monotonic() - begun < 5.0
 
 
 @pytest.mark.parametrize("device", ["", "film.mp4", "http://127.0.0.1/", "/dev/video999", "-1", "1234", "0 1", "²"])
