@@ -157,7 +157,7 @@ class Plan:
     def _video(self, where: str) -> NamedSource:
         from mrhubo.live.sources.camera import CameraSource
 
-        path, model = (where, "full") if where and Path(where).exists() else _with_model(where)
+        path, model = _with_model(*_parted(where))
         if not path:
             raise UserError("--source video: names no film; write video:dance.mp4")
         self.read.append(Path(path))
@@ -195,23 +195,26 @@ def _pico(where: str) -> NamedSource:
 def _camera(where: str) -> NamedSource:
     from mrhubo.live.sources.camera import CameraSource
 
-    device, model = _with_model(where)
+    device, model = _with_model(*where.rpartition("@"))
     return CameraSource(device or "0", model=model)
 
 
-def _with_model(where: str) -> tuple[str, str]:
-    """A camera or a film, and the estimator's model after an `@`."""
-    rest, at, model = where.rpartition("@")
+def _parted(where: str) -> tuple[str, str, str]:
+    """A file, an `@` and what stands after it, both empty where there is none, or a file has the whole name."""
+    return (where, "", "") if Path(where).exists() else where.rpartition("@")
+
+
+def _with_model(rest: str, at: str, model: str) -> tuple[str, str]:
+    """A camera or a film, and the estimator's model, of what was parted at the `@`."""
+    where = rest + at + model
     if at and model not in MODELS and (not rest or rest.isdecimal() or Path(rest).exists()):
         raise UserError(f"--source {shortened(where)}: {unknown_name('model of poses', shortened(model), MODELS)}")
     return (rest, model) if at and model in MODELS else (where, "full")
 
 
 def _at_rate(where: str) -> tuple[str, float | None]:
-    """A file, and the frame rate after an `@`; there is none where a file has such a name."""
-    path, _, rate = where.rpartition("@")
-    if Path(where).exists():
-        return where, None
+    """A file, and the frame rate after an `@`."""
+    path, _, rate = _parted(where)
     try:
         return path, float(rate)
     except ValueError:

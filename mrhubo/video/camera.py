@@ -62,12 +62,13 @@ class Camera:
             self._capture.set(setting, value)
         try:
             image_HW3 = self._read()
+            if image_HW3 is None:
+                raise UserError(
+                    f"camera {device}: gives no picture; another program may have it, or may not be allowed to"
+                )
         except UserError:
             self.close()
             raise
-        if image_HW3 is None:
-            self.close()
-            raise UserError(f"camera {device}: gives no picture; another program may have it, or may not be allowed to")
         self.size = image_HW3.shape[1], image_HW3.shape[0]
         """Width and height of its pictures [pixels]."""
 

@@ -80,21 +80,19 @@ def as_shown(
     """The frames of a film, each when a player would show it; those that are over when they are asked for are left out.
     Their times are those of the clock [s]. A film that is read more slowly than it plays is shown more slowly.
     """
-    begun = waiting = None
-    asked = 0.0
+    waiting = next(film, None)
+    if waiting is None:
+        return
+    begun = asked = clock()
     for frame in film:
         now = clock()
-        if waiting is None or begun is None:
-            begun = asked = now
-        else:
-            if now >= begun + frame.time and now - asked > _BEHIND:
-                begun = now - waiting.time
-            if now < begun + frame.time:
-                yield _when_due(waiting, begun, clock, sleep)
-                asked = clock()
+        if now >= begun + frame.time and now - asked > _BEHIND:
+            begun = now - waiting.time
+        if now < begun + frame.time:
+            yield _when_due(waiting, begun, clock, sleep)
+            asked = clock()
         waiting = frame
-    if waiting is not None and begun is not None:
-        yield _when_due(waiting, begun, clock, sleep)
+    yield _when_due(waiting, begun, clock, sleep)
 
 
 def _when_due(frame: Frame, begun: float, clock: Callable[[], float], sleep: Callable[[float], object]) -> Frame:

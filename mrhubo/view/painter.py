@@ -60,7 +60,7 @@ def render(
         draw_surface(canvas, surface.transformed(pose_44), len(local))
         local = Solids.concatenate([local, _stand_in(surface)])
     window = canvas.covered(supersample)
-    seen, linear_HW4 = canvas.cut(window), np.zeros((0, 0, 4), np.float32)
+    seen, linear_HW4 = canvas.cut(window, supersample), np.zeros((0, 0, 4), np.float32)
     if seen.owner_HW.size:
         linear_HW4 = _shrink(_shade(seen, local, basis_33[:, 2], np.asarray(light, float)), supersample)
         linear_HW4[..., :3] *= 1.0 - _crevices(seen, supersample, tall_m)[..., None]
@@ -69,8 +69,7 @@ def render(
     shadow_HW = np.zeros((height, width), np.float32)
     if ground is not None:
         shadow_HW = _ground_shadow(solids, camera, float(ground), size)
-    rows, columns = (slice(axis.start // supersample, axis.stop // supersample) for axis in window)
-    return _compose(linear_HW4, (rows, columns), shadow_HW, background)
+    return _compose(linear_HW4, window, shadow_HW, background)
 
 
 def _stand_in(surface: Surface) -> Solids:
@@ -227,4 +226,4 @@ def _compose(
 
 
 def _bytes(values: np.ndarray) -> np.ndarray:
-    return (np.minimum(values, 1.0) * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+    return (np.clip(values, 0.0, 1.0) * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)

@@ -51,14 +51,15 @@ class Canvas:
         )
 
     def covered(self, step: int) -> tuple[slice, slice]:
-        """Rows and columns, multiples of ``step``, outside which no solid is seen."""
+        """Rows and columns of blocks of ``step`` by ``step`` outside which no solid is seen."""
         seen_HW = self.owner_HW >= 0
         found = [np.flatnonzero(seen_HW.any(axis=axis)) // step for axis in (1, 0)]
-        rows, columns = (slice(step * at[0], step * (at[-1] + 1)) if len(at) else slice(0, 0) for at in found)
+        rows, columns = (slice(at[0], at[-1] + 1) if len(at) else slice(0, 0) for at in found)
         return rows, columns
 
-    def cut(self, window: tuple[slice, slice]) -> Canvas:
-        """Rows and columns of the canvas: views of its arrays."""
+    def cut(self, blocks: tuple[slice, slice], step: int) -> Canvas:
+        """Rows and columns of such blocks: views of the canvas' arrays."""
+        window = tuple(slice(step * axis.start, step * axis.stop) for axis in blocks)
         part = copy.copy(self)
         part.v_H, part.u_W = self.v_H[window[0]], self.u_W[window[1]]
         part.depth_HW, part.owner_HW, part.t_HW = self.depth_HW[window], self.owner_HW[window], self.t_HW[window]

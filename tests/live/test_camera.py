@@ -12,7 +12,6 @@ import pytest
 
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
-from mrhubo.live.body import Body
 from mrhubo.live.inbox import Inbox
 from mrhubo.live.loop import Session, run_session
 from mrhubo.live.messages import Landmarks, Nobody
@@ -20,7 +19,7 @@ from mrhubo.live.plan import Plan
 from mrhubo.live.sources.camera import CameraSource, to_content
 from mrhubo.video import PoseEstimator
 from mrhubo.video.estimator import Estimate
-from tests.live.figures import lifted_hand
+from tests.live.figures import lifted_hand, pose_of
 from tests.live.robots import NAMES, make_robot
 from tests.video.films import needs_models, numbered, write_video
 
@@ -74,17 +73,6 @@ def followed(source: CameraSource) -> tuple[Session, list[np.ndarray]]:
         return np.full(len(NAMES), 0.2)
 
     return Session.of(make_robot(answer), [source], [], CONFIG), poses
-
-
-def pose_of(image: np.ndarray) -> np.ndarray:
-    estimator = PoseEstimator("lite")
-    for _ in range(5):
-        found = estimator.landmarks(image)
-    content = to_content(found, found.point_K3)
-    assert isinstance(content, Landmarks)
-    seen = Body().see(content.points, content.sure)
-    assert seen is not None
-    return seen.local_J33
 
 
 def test_a_film_is_followed_as_if_a_camera_saw_it(film: Path, figure: np.ndarray) -> None:

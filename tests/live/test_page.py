@@ -15,16 +15,13 @@ pytest.importorskip("websockets")
 
 from mrhubo.body import KEYPOINT_NAMES, Skeleton
 from mrhubo.config.live import LiveConfig
-from mrhubo.live.body import Body
 from mrhubo.live.endpoints import Endpoint
 from mrhubo.live.loop import Session
-from mrhubo.live.point_sets import POINT_SETS
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.server import PageSink, PageSource, Server
-from mrhubo.video import PoseEstimator
 from mrhubo.video.models import FOLDER_VARIABLE
 from tests.browser import Browser, find_browser, write_y4m
-from tests.live.figures import lifted_hand
+from tests.live.figures import lifted_hand, pose_of
 from tests.live.robots import NAMES, make_robot
 from tests.video.films import needs_models
 
@@ -111,15 +108,7 @@ def test_a_camera_moves_a_robot_while_the_key_is_held(
     assert browser.ask(picture) == "hidden", "who is not seen any more is not shown either"
     assert browser.complaints() == []
 
-    estimator = PoseEstimator("lite")
-    for _ in range(3):
-        found = estimator.landmarks(image)
-    names = POINT_SETS["mediapipe"].names
-    assert names is not None
-    told = {name: tuple(found.point_K3[place].tolist()) for place, name in enumerate(names) if name != "-"}
-    ours = Body().see(told, dict.fromkeys(told, 1.0))
-    assert ours is not None
-    off = np.degrees(np.arccos(np.clip((arms(poses[-1]) * arms(ours.local_J33)).sum(1), -1, 1)))
+    off = np.degrees(np.arccos(np.clip((arms(poses[-1]) * arms(pose_of(image))).sum(1), -1, 1)))
     assert np.median(off) < 8 and off.max() < 25, "MediaPipe's own program in the browser finds what ours does"
     session.close()
 
