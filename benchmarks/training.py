@@ -31,7 +31,6 @@ from mrhubo.robot import build_body_map
 from mrhubo.runtime.run_logger import RunLogger
 from mrhubo.runtime.runs import start_run
 from mrhubo.runtime.tracking import open_client
-from mrhubo.runtime.trainer import cosine_schedule
 
 
 class Stopwatch(lightning.Callback):
@@ -72,8 +71,8 @@ def main(argv: list[str]) -> None:
 
     def bare() -> float:
         net, loader = module(), data()
-        optimizer = torch.optim.AdamW(net.network.parameters(), config.trainer.lr)
-        schedule = cosine_schedule(optimizer, steps)
+        configured = net.configure_optimizers()
+        optimizer, schedule = configured["optimizer"], configured["lr_scheduler"]["scheduler"]
         start = time.perf_counter()
         for batch in loader:
             loss = net.losses(*batch)["loss"]

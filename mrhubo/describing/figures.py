@@ -18,11 +18,10 @@ from mrhubo.body import KEYPOINT_NAMES
 from mrhubo.body.skeleton import POSED_JOINT_NAMES, SIDE_OF
 from mrhubo.describing.markers import SIDE_COLORS, arrow, axis_rods, bone
 from mrhubo.frames import human_to_world
-from mrhubo.robot import Axis, BodyMap, Limb, bare_sticks, link_poses, read_geometry
-from mrhubo.robot.meshes import read_meshes
-from mrhubo.view import Solids, human_figure, robot_solids
+from mrhubo.robot import Axis, BodyMap, Limb, link_poses
+from mrhubo.view import Solids, human_figure
+from mrhubo.view.robot import RobotShape
 from mrhubo.view.solids import Color
-from mrhubo.view.surfaces import Surface, sample_surfaces
 
 _PALE: Color = (0.84, 0.86, 0.89)
 """Of both bodies, under their marks."""
@@ -40,8 +39,6 @@ class Figure:
 
     body: Solids
     marks: Solids
-    skin: Surface | None
-    """What is drawn of the body besides, from meshes; it lies within what `body` takes up."""
     middle_3: np.ndarray
     """The middle (3,) of where the arms start, or of the body, where nothing starts at the chest."""
 
@@ -51,13 +48,7 @@ class FigureMaker:
 
     def __init__(self, body_map: BodyMap) -> None:
         self.body_map, self.robot = body_map, body_map.robot
-        parsed = self.robot.description.parsed
-        self._geometry = read_geometry(parsed)
-        shaped = {shape.link for shape in self._geometry}
-        meshes = read_meshes(parsed, self.robot.description.path, shaped)
-        surfaces = sample_surfaces(((mesh.vertices_V3, mesh.faces_F3) for mesh in meshes), _PALE)
-        self._skins = [(mesh.link, skin) for mesh, skin in zip(meshes, surfaces, strict=True) if len(skin)]
-        self._sticks = bare_sticks(self.robot.description, {link for link, _ in self._skins} | shaped)
+        self._shape = RobotShape(self.robot.description)
         self._limbs = [d for d in body_map.directions if isinstance(d, Limb)]
         self._axes = [d for d in body_map.directions if isinstance(d, Axis)]
         self._inner = [limb.part.hangs_on == limb.part.seen_from for limb in self._limbs]
@@ -71,7 +62,7 @@ class FigureMaker:
         body = human_figure(local_J33, self.body_map.skeleton, _PALE, None)
         middle_3 = self._middle(start_E3, body)
         marks = self._marks(start_E3, end_E3, self.body_map.human_directions(local_J33[None])[0], points)
-        return Figure(body, Solids.concatenate([marks, _front(middle_3)]), None, middle_3)
+        return Figure(body, Solids.concatenate([marks, _front(middle_3)]), middle_3)
 
     def robot_figure(self, q_N: Tensor, size: float = 1.0, rod: float = _ROD, front: bool = True) -> Figure:
         """The robot at joint angles (N,) [rad]; `size` of its marks, half the length [m] of a joint axis's `rod`, and
@@ -88,9 +79,9 @@ class FigureMaker:
         marks = self._marks(start_E3, end_E3, view.direction_BD3[0], origins, size)
         shown = link_poses(self.robot.description.parsed, self.robot.configuration(q_N.numpy()))
         rods = axis_rods(self._joint_axes(shown, place_44), rod, size)
-        body, skin = self._body(shown, place_44)
+        body = self._shape.solids(shown).recolored(_PALE).scaled(self.scale).transformed(place_44)
         middle_3 = self._middle(start_E3, body)
-        return Figure(body, Solids.concatenate([marks, rods, *([_front(middle_3)] if front else [])]), skin, middle_3)
+        return Figure(body, Solids.concatenate([marks, rods, *([_front(middle_3)] if front else [])]), middle_3)
 
     def places(self, q_N: Tensor) -> dict[str, np.ndarray]:
         """Where the config's points (3,) are in `robot_figure`, by their names."""
@@ -148,16 +139,6 @@ class FigureMaker:
 
     def _middle(self, start_E3: np.ndarray, body: Solids) -> np.ndarray:
         return start_E3[self._inner].mean(axis=0) if any(self._inner) else body.bounds().mean(axis=0)
-
-    def _body(self, poses: Mapping[str, np.ndarray], place_44: np.ndarray) -> tuple[Solids, Surface | None]:
-        """Primitive shapes, and the surface of meshes; sticks, where neither makes a body."""
-        solids = robot_solids(self._geometry, poses, self._sticks).recolored(_PALE)
-        body = solids.scaled(self.scale).transformed(place_44)
-        if not self._skins:
-            return body, None
-        skins = [skin.transformed(poses[link]).transformed(place_44, self.scale) for link, skin in self._skins]
-        ends = [(end_3, end_3, 1e-4, 1e-4) for skin in skins for end_3 in skin.extremes()]
-        return Solids.concatenate([body, Solids.capsules(ends, _PALE)]), Surface.concatenate(skins)
 
     def _joint_axes(
         self, poses: Mapping[str, np.ndarray], place_44: np.ndarray

@@ -94,7 +94,7 @@ def _errors(body_map: BodyMap, q_PN: torch.Tensor, poses_PJ33: torch.Tensor) -> 
 
 
 def _render(figure: Figure, size: tuple[int, int], camera: Camera, ground: str | None = "auto") -> Image.Image:
-    picture = render(figure.body, size, camera, ground=ground, surface=figure.skin)
+    picture = render(figure.body, size, camera, ground=ground)
     marks = render(figure.marks, size, camera, background=None, ground=None)
     picture.paste(marks, (0, 0), marks)
     return picture
@@ -117,7 +117,7 @@ def _details(body_map: BodyMap, maker: FigureMaker, q_N: torch.Tensor) -> Image.
     """The whole robot, and every point of the config from near, with the axes around it."""
     figure, away = maker.robot_figure(q_N, 0.45, 0.6 * _NEAR_M, front=False), _distances(body_map)
     views = [Camera.framing(figure.body, _DETAIL, azimuth, 8.0) for azimuth in (0.0, 90.0)]
-    whole = [render(figure.body, _DETAIL, camera, surface=figure.skin) for camera in views]
+    whole = [render(figure.body, _DETAIL, camera) for camera in views]
     pictures, titles = whole, ["from the front", "from its left"]
     for name, place_3 in maker.places(q_N).items():
         camera = Camera(35.0, 25.0, (float(place_3[0]), float(place_3[1]), float(place_3[2])), _NEAR_M)

@@ -1,7 +1,7 @@
 """The robot as the page draws it: rigid bodies that hang on each other, each of capsules, as JSON.
 
-The page places the bodies by the joint angles of every message (`page/robot.js`). Boxes become the capsules along them;
-nothing that is drawn here is used for motion.
+The page places the bodies by the joint angles of every message (`page/robot.js`). Boxes become the capsules along them,
+and so do meshes that stand for no collision; nothing that is drawn here is used for motion.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from mrhubo.robot import Robot
+    from mrhubo.view import Solids
+    from mrhubo.viewer.bodies import Body
 
 _MOST = 400
 """Capsules of a robot; of more the largest are kept."""
@@ -29,18 +31,28 @@ def figure_of(robot: Robot, joint_names: Sequence[str]) -> dict[str, Any]:
         robot: whose URDF tells.
         joint_names: those of the messages, in their order.
     """
-    from mrhubo.robot import bare_sticks, drawn_shapes
+    from mrhubo.robot.looks import read_looks
     from mrhubo.view import Solids, robot_solids
+    from mrhubo.view.surfaces import Placed, Surface, rods
     from mrhubo.viewer.bodies import body_sticks, read_bodies
 
-    description = robot.description
-    geometry = drawn_shapes(description)
+    looks, of_meshes = read_looks(robot.description), robot.description.solids.of_meshes
+    seen, hugged = {shape.link for shape in looks.shapes}, {shape.link for shape in of_meshes}
+    geometry = [*looks.shapes, *(shape for shape in of_meshes if shape.link not in seen)]
+    meshes = [mesh for mesh in looks.meshes if mesh.link not in hugged]
     bodies = read_bodies(robot, joint_names)
-    sticks = body_sticks(bodies, bare_sticks(description, {shape.link for shape in geometry}))
-    solids = [
-        Solids.concatenate([robot_solids([s for s in geometry if s.link in body.links], body.links), own])
-        for body, own in zip(bodies, sticks, strict=True)
-    ]
+
+    def of(body: Body, own: Solids) -> Solids:
+        placed = [
+            Placed.of(Surface.of(mesh.vertices_V3, mesh.faces_F3, mesh.color), body.links[mesh.link])
+            for mesh in meshes
+            if mesh.link in body.links
+        ]
+        rows = [(start_3, end_3, radius, radius) for start_3, end_3, radius in zip(*rods(placed), strict=True)]
+        about = Solids.capsules(rows, [mesh.color for mesh in placed])
+        return Solids.concatenate([robot_solids([s for s in geometry if s.link in body.links], body.links), about, own])
+
+    solids = [of(body, own) for body, own in zip(bodies, body_sticks(bodies, looks.sticks), strict=True)]
     rows = [
         np.column_stack([s.starts_S3, s.ends_S3, s.radii_S, s.end_radii_S, (255 * s.colors_S3).round()]) for s in solids
     ]

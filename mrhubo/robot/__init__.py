@@ -1,7 +1,7 @@
 """The robot: its URDF, batched kinematics, and which link stands for which part of the human body."""
 
 from mrhubo.robot.alignment import align_pose
-from mrhubo.robot.bare import bare_sticks, drawn_shapes
+from mrhubo.robot.bare import bare_sticks
 from mrhubo.robot.body_map import BodyMap, build_body_map
 from mrhubo.robot.collision import SelfCollision
 from mrhubo.robot.facts import robot_facts
@@ -25,7 +25,6 @@ __all__ = [
     "align_pose",
     "bare_sticks",
     "build_body_map",
-    "drawn_shapes",
     "link_poses",
     "read_collision_geometry",
     "read_geometry",

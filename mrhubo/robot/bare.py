@@ -1,4 +1,4 @@
-"""What is drawn of a robot without its meshes, and sticks where links have no shapes, so that it is seen whole."""
+"""Sticks where links have no shapes, so that a robot is seen whole."""
 
 from __future__ import annotations
 
@@ -6,20 +6,12 @@ from collections.abc import Collection
 
 import numpy as np
 
-from mrhubo.robot.shapes import LinkGeometry, read_geometry
 from mrhubo.robot.urdf import Description
 
 _FEWEST = 1 / 3
 """Share of links with shapes below which every link gets a stick: the rest are meshes that are not there."""
 _SHORTEST = 0.06
 """Shorter sticks, as a share of the robot's reach, are not missed: the links of a shoulder, whose joints cross."""
-
-
-def drawn_shapes(description: Description) -> list[LinkGeometry]:
-    """The shapes of links; of those that have meshes alone the capsules that stand for them in collisions."""
-    geometry = read_geometry(description.parsed)
-    shaped = {shape.link for shape in geometry}
-    return [*geometry, *(shape for shape in description.solids.of_meshes if shape.link not in shaped)]
 
 
 def bare_sticks(description: Description, shaped: Collection[str]) -> dict[str, str]:

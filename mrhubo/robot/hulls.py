@@ -21,7 +21,7 @@ _DIRECTIONS = 1_000
 radius, however many vertices there are."""
 _POINTS = 3_000
 """Points that tell how much room is shared: to one or two percent."""
-_MANY, _CELLS = 50_000, 100
+_MANY, _CELLS = 300_000, 100
 """Vertices from which on only the outermost are looked at, and cells of the grid along an axis."""
 _AT_ONCE = 2**24
 _SIZES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
@@ -49,7 +49,7 @@ def capsules_of(vertices_V3: np.ndarray) -> list[Capsule]:
 
 def extremes(vertices_V3: np.ndarray) -> np.ndarray:
     """The vertices (H, 3) that lie farthest in directions all around."""
-    vertices_V3 = _outermost(vertices_V3) if len(vertices_V3) > _MANY else vertices_V3
+    vertices_V3 = _corners(_outermost(vertices_V3) if len(vertices_V3) > _MANY else vertices_V3)
     number = np.arange(_DIRECTIONS) + 0.5
     height, turn = 1 - 2 * number / _DIRECTIONS, np.pi * (1 + 5**0.5) * number  # R. Swinbank and R. J. Purser, 2006
     across = np.sqrt(1 - height**2)
@@ -62,6 +62,15 @@ def extremes(vertices_V3: np.ndarray) -> np.ndarray:
         found = along[farthest, np.arange(_DIRECTIONS)]
         chosen, best = np.where(found > best, farthest + first, chosen), np.maximum(found, best)
     return vertices_V3[np.unique(chosen)]
+
+
+def _corners(vertices_V3: np.ndarray) -> np.ndarray:
+    """The vertices at the corners of their convex hull, which are few; all that differ, where they have no room."""
+    vertices_V3 = np.unique(vertices_V3, axis=0)
+    try:
+        return vertices_V3[ConvexHull(vertices_V3).vertices]
+    except (QhullError, ValueError):
+        return vertices_V3
 
 
 def _outermost(vertices_V3: np.ndarray) -> np.ndarray:

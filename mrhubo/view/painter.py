@@ -17,7 +17,8 @@ from PIL import Image
 from mrhubo.view.camera import Camera
 from mrhubo.view.raster import FACE, Canvas, draw, half_axes
 from mrhubo.view.solids import Color, Solids
-from mrhubo.view.surfaces import Surface, draw_surface
+from mrhubo.view.surfaces import rods
+from mrhubo.view.triangles import draw_triangles
 
 WHITE: Color = (1.0, 1.0, 1.0)
 LIGHT = (-0.45, 0.62, 0.75)
@@ -32,22 +33,20 @@ def render(
     supersample: int = 2,
     ground: float | str | None = "auto",
     light: tuple[float, float, float] = LIGHT,
-    surface: Surface | None = None,
 ) -> Image.Image:
     """Picture of one or several figures.
 
     ``size``: width, height in pixels. ``camera``: default :meth:`Camera.framing` the figures. ``background``: RGB
     0..1, or None for a transparent RGBA picture. ``supersample``: samples per pixel in either direction. ``ground``:
     height z of the floor that takes a soft shadow, m; "auto" is the lowest point of the figures, None draws no shadow.
-    ``light``: direction towards the lamp, picture frame. ``surface``: drawn among the figures; it throws no shadow, and
-    does not count where figures are framed.
+    ``light``: direction towards the lamp, picture frame.
     """
     solids = solids if isinstance(solids, Solids) else Solids.concatenate(solids)
     width, height = size
     if min(width, height, supersample) < 1:
         raise ValueError(f"render: size {size} and supersample {supersample} must be at least 1")
     if camera is None:
-        camera = Camera.framing(solids, size) if len(solids) else Camera()
+        camera = Camera() if solids.nothing else Camera.framing(solids, size)
     basis_33 = camera.basis()
     pose_44 = np.eye(4)
     pose_44[:3, :3], pose_44[:3, 3] = basis_33, -basis_33 @ np.asarray(camera.target, float)
@@ -55,38 +54,46 @@ def render(
 
     canvas = Canvas(width * supersample, height * supersample, camera.width_m / (width * supersample))
     draw(canvas, local)
-    tall_m = float(np.ptp(local.extent(np.array([0.0, 1.0, 0.0])))) if len(local) else 1.0
-    if surface is not None and len(surface):
-        draw_surface(canvas, surface.transformed(pose_44), len(local))
-        local = Solids.concatenate([local, _stand_in(surface)])
+    tall_m = float(np.ptp(local.extent(np.array([0.0, 1.0, 0.0])))) if not local.nothing else 1.0
+    first_mesh = len(local)
+    if local.meshes:
+        local = _draw_meshes(canvas, local)
     window = canvas.covered(supersample)
     seen, linear_HW4 = canvas.cut(window, supersample), np.zeros((0, 0, 4), np.float32)
     if seen.owner_HW.size:
-        linear_HW4 = _shrink(_shade(seen, local, basis_33[:, 2], np.asarray(light, float)), supersample)
+        linear_HW4 = _shrink(_shade(seen, local, first_mesh, basis_33[:, 2], np.asarray(light, float)), supersample)
         linear_HW4[..., :3] *= 1.0 - _crevices(seen, supersample, tall_m)[..., None]
     if ground == "auto":
-        ground = solids.extent(np.array([0.0, 0.0, 1.0]))[0] if len(solids) else None
+        ground = None if solids.nothing else solids.extent(np.array([0.0, 0.0, 1.0]))[0]
     shadow_HW = np.zeros((height, width), np.float32)
     if ground is not None:
         shadow_HW = _ground_shadow(solids, camera, float(ground), size)
     return _compose(linear_HW4, window, shadow_HW, background)
 
 
-def _stand_in(surface: Surface) -> Solids:
-    """A solid with a surface's colour, in which its pixels have their row."""
-    return Solids.capsules([(np.zeros(3), np.zeros(3), 1.0, 1.0)], surface.color)
+def _draw_meshes(canvas: Canvas, local: Solids) -> Solids:
+    """Puts the meshes on the canvas; the solids, and behind them one for each mesh, which has its colour."""
+    corners = [mesh.corners() for mesh in local.meshes]
+    owner_F = np.repeat(len(local) + np.arange(len(corners)), [len(corners_F33) for corners_F33 in corners])
+    draw_triangles(canvas, np.concatenate(corners), owner_F)
+    rows = [(np.zeros(3), np.zeros(3), 1.0, 1.0)] * len(corners)
+    return Solids.concatenate([local, Solids.capsules(rows, [mesh.color for mesh in local.meshes])])
 
 
-def _shade(canvas: Canvas, local: Solids, up_3: np.ndarray, light_3: np.ndarray) -> np.ndarray:
-    """Linear RGB times coverage, and coverage (0 or 1), of the samples (H, W, 4); ``up_3``: up, picture frame."""
+def _shade(canvas: Canvas, local: Solids, first_mesh: int, up_3: np.ndarray, light_3: np.ndarray) -> np.ndarray:
+    """Linear RGB times coverage, and coverage (0 or 1), of the samples (H, W, 4).
+
+    ``first_mesh``: from this solid on they stand for meshes, whose normals are on the canvas. ``up_3``: up, picture
+    frame.
+    """
     height, width = canvas.owner_HW.shape
     picture_HW4 = np.zeros((height, width, 4), np.float32)
     pixels_N = np.flatnonzero(canvas.owner_HW.ravel() >= 0)
     owner_N = canvas.owner_HW.ravel()[pixels_N]
     normal_3N = _normals(canvas, local, pixels_N, owner_N)
-    if canvas.normal_HW3 is not None:  # of a surface, the last of the solids
-        disc_N = owner_N == len(local) - 1
-        normal_3N[:, disc_N] = canvas.normal_HW3.reshape(-1, 3)[pixels_N[disc_N]].T
+    if canvas.normal_HW3 is not None:
+        meshed_N = owner_N >= first_mesh
+        normal_3N[:, meshed_N] = canvas.normal_HW3.reshape(-1, 3)[pixels_N[meshed_N]].T
     n_w = normal_3N[2]
 
     light_3 = light_3 / np.linalg.norm(light_3)
@@ -166,13 +173,17 @@ def _ground_shadow(solids: Solids, camera: Camera, ground: float, size: tuple[in
     """
     width, height = size
     rise = np.sin(np.radians(camera.elevation_deg))
-    if len(solids) == 0 or rise <= 0.0:
+    if solids.nothing or rise <= 0.0:
         return np.zeros((height, width), np.float32)
     canvas = Canvas(width, height, camera.width_m / width)
     steps = np.array([0.0, 0.5, 1.0])
-    points_SX3 = solids.starts_S3[:, None] + steps[:, None] * (solids.ends_S3 - solids.starts_S3)[:, None]
-    points_P3 = points_SX3.reshape(-1, 3)
+    starts_S3, ends_S3 = solids.starts_S3, solids.ends_S3
     radii_S = np.maximum(np.maximum(solids.radii_S, solids.end_radii_S), np.linalg.norm(solids.sides_S3, axis=1))
+    if solids.meshes:
+        begin_M3, end_M3, radius_M = rods(solids.meshes)
+        starts_S3, ends_S3 = np.concatenate([starts_S3, begin_M3]), np.concatenate([ends_S3, end_M3])
+        radii_S = np.concatenate([radii_S, radius_M])
+    points_P3 = (starts_S3[:, None] + steps[:, None] * (ends_S3 - starts_S3)[:, None]).reshape(-1, 3)
     radii_P = np.repeat(np.maximum(radii_S, 1e-6), len(steps))
     above_P = np.maximum(points_P3[:, 2] - radii_P - ground, 0.0)
     below_P3 = np.column_stack([points_P3[:, :2], np.full(len(points_P3), ground)]) - np.asarray(camera.target, float)

@@ -15,7 +15,7 @@ from torch import Tensor
 from mrhubo.body import BodyPrior, Skeleton
 from mrhubo.evaluation.clips import Clip
 from mrhubo.pairing import PairFilter
-from mrhubo.robot import Robot, bare_sticks, link_poses, read_geometry
+from mrhubo.robot import Robot, link_poses
 from mrhubo.rotation import stack_columns
 from mrhubo.view import (
     Solids,
@@ -24,8 +24,8 @@ from mrhubo.view import (
     figure_animation,
     figure_sheet,
     human_figure,
-    robot_solids,
 )
+from mrhubo.view.robot import FINEST, RobotShape
 
 PAIR_TITLES = {"phi": "phi", "residual_m": "keypoint distance [mm]", "z_norm": "|z|"}
 """Measures of pairs that pictures show, and their titles."""
@@ -42,10 +42,10 @@ class Artist:
 
     def __init__(self, robot: Robot, skeleton: Skeleton | None = None) -> None:
         self.robot, self.skeleton = robot, skeleton or Skeleton()
-        self.geometry = read_geometry(robot.description.parsed)
-        self.sticks = bare_sticks(robot.description, {shape.link for shape in self.geometry})
-        height = float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2]))
-        self.scale = _FIGURE_HEIGHT_M / max(height, 1e-3)
+        self.shape = RobotShape(robot.description)
+        height = max(float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2])), 1e-3)
+        self.scale = _FIGURE_HEIGHT_M / height
+        self.shape.simplify(FINEST * height)
 
     def human(self, local_J33: Tensor) -> Solids:
         """A human in a pose, local rotations (21, 3, 3)."""
@@ -54,7 +54,7 @@ class Artist:
     def robot_figure(self, q_N: Tensor, scaled: bool = True) -> Solids:
         """The robot at joint angles (N,) [rad], scaled to the human's height."""
         poses = link_poses(self.robot.description.parsed, self.robot.configuration(q_N.numpy()))
-        solids = robot_solids(self.geometry, poses, self.sticks)
+        solids = self.shape.solids(poses)
         return solids.scaled(self.scale) if scaled else solids
 
     def pairs(self, pairs: dict[str, Tensor], pair_filter: PairFilter, prior: BodyPrior, count: int = 3) -> Image:

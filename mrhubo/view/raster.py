@@ -38,7 +38,7 @@ class Canvas:
         self.t_HW = np.zeros((height, width), np.float32)
         self.pixel_m = pixel_m
         self.normal_HW3: np.ndarray | None = None
-        """Of what is drawn as discs (`mrhubo.view.surfaces`), picture frame."""
+        """Of triangles (`mrhubo.view.triangles`), picture frame."""
 
     def window(self, u_low: float, u_high: float, v_low: float, v_high: float) -> tuple[slice, slice]:
         """Rows and columns whose pixel centres may lie in the rectangle."""

@@ -1,14 +1,39 @@
-"""Robots as solids: the primitive shapes of a URDF, placed by the poses of its links."""
+"""Robots as solids: the shapes and meshes of a URDF, placed by the poses of its links."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mrhubo.errors import unknown_name
 from mrhubo.robot import ROBOT_COLOR, LinkGeometry
+from mrhubo.robot.looks import read_looks
+from mrhubo.robot.urdf import Description
 from mrhubo.view.solids import Color, Solids
+from mrhubo.view.surfaces import Placed, Surface
+
+FINEST = 1 / 450
+"""What is smaller, as a share of a robot's height, is not seen where it is drawn among others."""
+
+
+class RobotShape:
+    """What is drawn of a robot, to be placed by the poses of its links."""
+
+    def __init__(self, description: Description) -> None:
+        looks = read_looks(description)
+        self._shapes, self._sticks = looks.shapes, looks.sticks
+        self._surfaces = [(m.link, Surface.of(m.vertices_V3, m.faces_F3, m.color)) for m in looks.meshes]
+
+    def solids(self, link_poses: Mapping[str, np.ndarray]) -> Solids:
+        """The robot with its links at ``link_poses``, as for :func:`robot_solids`."""
+        meshes = tuple(Placed.of(surface, _pose(link_poses, link)) for link, surface in self._surfaces)
+        return replace(robot_solids(self._shapes, link_poses, self._sticks), meshes=meshes)
+
+    def simplify(self, metres: float) -> None:
+        """Leaves out of the meshes what is smaller, so that pictures in which it is not seen take less time."""
+        self._surfaces = [(link, surface.coarser(metres)) for link, surface in self._surfaces]
 
 
 def robot_solids(

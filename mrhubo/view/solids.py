@@ -1,4 +1,4 @@
-"""Solids: what a picture is made of. Capsules (also tapered ones and spheres), flat-ended cylinders and boxes.
+"""Solids: what a picture is made of. Capsules (also tapered ones and spheres), flat-ended cylinders, boxes, and meshes.
 
 World frame: x forward, y left, z up, metres (REP 103). Human points come in the human frame (x to the body's left, y
 up, z forward) and are turned by `mrhubo.frames.human_to_world`.
@@ -9,11 +9,12 @@ Axes: S solids, P points.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-Color = tuple[float, float, float]
+from mrhubo.view.surfaces import Color, Placed, outlines
+
 _EMPTY = np.zeros(0)
 
 
@@ -41,6 +42,8 @@ class Solids:
     """True: a flat-ended cylinder; default: false."""
     sides_S3: np.ndarray = field(default_factory=_EMPTY.copy)
     """Not zero: a box; half of its width as a vector, m; default: zero."""
+    meshes: tuple[Placed, ...] = ()
+    """Surfaces beside the rows."""
 
     def __post_init__(self) -> None:
         self.starts_S3 = np.asarray(self.starts_S3, float).reshape(-1, 3)
@@ -54,18 +57,24 @@ class Solids:
         self.flat_S = np.zeros(count, bool) if len(flat) == 0 else flat
         sides = np.asarray(self.sides_S3, float).reshape(-1, 3)
         self.sides_S3 = np.zeros((count, 3)) if len(sides) == 0 else sides
-        for item in fields(self):
-            value = getattr(self, item.name)
+        for name in _rows():
+            value = getattr(self, name)
             if len(value) != count:
-                raise ValueError(f"Solids: {item.name} has {len(value)} rows, starts_S3 has {count}")
+                raise ValueError(f"Solids: {name} has {len(value)} rows, starts_S3 has {count}")
             if not np.isfinite(value).all():
                 row = int(np.argwhere(~np.isfinite(value))[0, 0])
-                raise ValueError(f"Solids: {item.name}[{row}] is not finite: {value[row]}")
+                raise ValueError(f"Solids: {name}[{row}] is not finite: {value[row]}")
         if count and min(self.radii_S.min(), self.end_radii_S.min()) < 0.0:
             raise ValueError("Solids: a radius is negative")
 
     def __len__(self) -> int:
+        """How many rows there are; meshes do not count."""
         return len(self.starts_S3)
+
+    @property
+    def nothing(self) -> bool:
+        """Whether there is nothing to be seen."""
+        return len(self) == 0 and not self.meshes
 
     @classmethod
     def empty(cls) -> Solids:
@@ -87,7 +96,8 @@ class Solids:
     def concatenate(cls, parts: Iterable[Solids]) -> Solids:
         """All solids of the parts, in their order."""
         parts = [cls.empty(), *parts]
-        return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
+        rows = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _rows()}
+        return cls(**rows, meshes=tuple(mesh for part in parts for mesh in part.meshes))
 
     def transformed(self, pose_44: np.ndarray) -> Solids:
         """A copy moved by a rigid motion (4, 4), m: what was given in the frame of the pose, in the world frame."""
@@ -101,6 +111,7 @@ class Solids:
             self.end_radii_S.copy(),
             self.flat_S.copy(),
             self.sides_S3 @ rotation_33.T,
+            tuple(mesh.moved(rotation_33, offset_3) for mesh in self.meshes),
         )
 
     def translated(self, offset_3: np.ndarray) -> Solids:
@@ -119,19 +130,24 @@ class Solids:
             self.end_radii_S * factor,
             self.flat_S.copy(),
             self.sides_S3 * factor,
+            tuple(mesh.moved(factor * np.eye(3), np.zeros(3)) for mesh in self.meshes),
         )
 
     def recolored(self, color: Color) -> Solids:
         """A copy in one RGB colour, 0..1."""
         copy = self.translated(np.zeros(3))
         copy.colors_S3[:] = color
+        copy.meshes = tuple(replace(mesh, color=color) for mesh in copy.meshes)
         return copy
 
     def extent(self, direction_3: np.ndarray) -> tuple[float, float]:
-        """Least and greatest coordinate of the figure's surface along a unit direction (3,), m."""
-        if len(self) == 0:
+        """Least and greatest coordinate of the figure's surface along a unit direction (3,), m; of meshes by their
+        outlines.
+        """
+        if self.nothing:
             raise ValueError("Solids: an empty figure has no extent")
         direction = np.asarray(direction_3, float)
+        meshed_P = (outlines(self.meshes) @ direction).ravel()
         box_S = np.any(self.sides_S3 != 0.0, axis=1)
         axis_S3 = _unit(self.ends_S3 - self.starts_S3)
         reach_S = np.ones(len(self))  # of a sphere, in radii
@@ -141,12 +157,19 @@ class Solids:
         side_S = np.abs(self.sides_S3 @ direction)
         start_S, end_S = self.starts_S3 @ direction, self.ends_S3 @ direction
         start_reach_S, end_reach_S = self.radii_S * reach_S + side_S, self.end_radii_S * reach_S + side_S
-        low = min((start_S - start_reach_S).min(), (end_S - end_reach_S).min())
-        return float(low), float(max((start_S + start_reach_S).max(), (end_S + end_reach_S).max()))
+        lowest = np.concatenate([start_S - start_reach_S, end_S - end_reach_S, meshed_P])
+        return float(lowest.min()), float(
+            np.concatenate([start_S + start_reach_S, end_S + end_reach_S, meshed_P]).max()
+        )
 
     def bounds(self) -> np.ndarray:
         """Corners (2, 3) of the axis-aligned box around the figure, m, world frame: least, then greatest x, y, z."""
         return np.array([self.extent(axis) for axis in np.eye(3)]).T
+
+
+def _rows() -> list[str]:
+    """The names of the arrays."""
+    return [item.name for item in fields(Solids) if item.name != "meshes"]
 
 
 def _unit(vectors_S3: np.ndarray) -> np.ndarray:

@@ -1,114 +1,105 @@
-"""Surfaces: meshes as many small discs, which are drawn all at once, however many triangles a mesh has.
+"""Surfaces: meshes of triangles, and where they stand in a figure.
 
-World frame: x forward, y left, z up, metres. Axes: P discs, H, W pixels.
+World frame: x forward, y left, z up, metres. Axes: V vertices, F triangles, M surfaces, O points of
+an outline.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrhubo.view.raster import Canvas
-from mrhubo.view.solids import Color
-
-_OVERLAP = 1.1
-"""Radius of a disc by the distance of its neighbours: no gaps, and few steps at edges."""
-_WIDEST = 20
-"""Most pixels that a disc reaches to either side."""
+Color = tuple[float, float, float]
+_AROUND_D3 = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+"""Directions all around, towards which an outline's points are the farthest."""
+_KEY_BITS = 21
+"""Of a cell's number along each axis, so that three make one number of 64 bits."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
-    """Discs all over a surface."""
+    """A mesh of at least one triangle, in a frame of its own."""
 
-    points_P3: np.ndarray
-    """Their centres, m."""
-    normals_P3: np.ndarray
-    """Unit, to either side."""
-    radius_m: float
+    corners_F33: np.ndarray
+    """Corners of the triangles, m, float32."""
+    outline_O3: np.ndarray
+    """Some of the vertices, which stand for all where the surface's size counts, m."""
     color: Color
     """RGB, 0..1."""
 
-    def __len__(self) -> int:
-        return len(self.points_P3)
+    @classmethod
+    def of(cls, vertices_V3: np.ndarray, faces_F3: np.ndarray, color: Color) -> Surface:
+        """A mesh of vertices (V, 3) [m] and triangles (F, 3)."""
+        corners_F33 = np.asarray(vertices_V3, float)[np.asarray(faces_F3, int)]
+        points_P3 = corners_F33.reshape(-1, 3)
+        return cls(corners_F33.astype(np.float32), points_P3[(points_P3 @ _AROUND_D3.T).argmax(axis=0)], color)
 
-    def transformed(self, pose_44: np.ndarray, factor: float = 1.0) -> Surface:
-        """A copy ``factor`` times as large about the origin, then moved by a rigid motion (4, 4), m."""
-        turn_33 = pose_44[:3, :3].T
-        points_P3 = factor * self.points_P3 @ turn_33 + pose_44[:3, 3]
-        return Surface(points_P3, self.normals_P3 @ turn_33, factor * self.radius_m, self.color)
+    def coarser(self, metres: float) -> Surface:
+        """The same without what is smaller: vertices in one cube of so many metres become one, in their middle, and
+        triangles of less than three such are gone.
 
-    def extremes(self) -> np.ndarray:
-        """The points (6, 3) farthest along every axis, which stand for it where its size counts."""
-        return self.points_P3[[*self.points_P3.argmin(axis=0), *self.points_P3.argmax(axis=0)]]
+        J. Rossignac, P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes" (1993).
+        """
+        points_P3 = self.corners_F33.reshape(-1, 3)
+        cells_P3 = np.floor((points_P3 - points_P3.min(axis=0)) / metres).astype(np.int64)
+        if cells_P3.max() >= 1 << _KEY_BITS:  # far finer than the mesh is large
+            return self
+        key_P = (cells_P3[:, 0] << 2 * _KEY_BITS) | (cells_P3[:, 1] << _KEY_BITS) | cells_P3[:, 2]
+        _, own_P, count_C = np.unique(key_P, return_inverse=True, return_counts=True)
+        middle_C3 = np.stack([np.bincount(own_P, points_P3[:, axis]) / count_C for axis in range(3)], axis=1)
+        faces_F3 = own_P.reshape(-1, 3)
+        a_F, b_F, c_F = faces_F3.T
+        kept_F3 = faces_F3[(a_F != b_F) & (b_F != c_F) & (c_F != a_F)]
+        return replace(self, corners_F33=middle_C3[kept_F3].astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A surface somewhere in a figure: its points are turn x + place."""
+
+    surface: Surface
+    turn_33: np.ndarray
+    """A rotation times a size."""
+    place_3: np.ndarray
+    """Metres."""
+    color: Color
+    """RGB, 0..1; the surface's own has no say."""
 
     @classmethod
-    def concatenate(cls, parts: Sequence[Surface]) -> Surface:
-        """All discs of surfaces of one colour and disc."""
-        points_P3, normals_P3 = (
-            np.concatenate([getattr(p, name) for p in parts]) for name in ("points_P3", "normals_P3")
-        )
-        return cls(points_P3, normals_P3, parts[0].radius_m, parts[0].color)
+    def of(cls, surface: Surface, pose_44: np.ndarray) -> Placed:
+        """A surface with its frame at a pose (4, 4), m, in its own colour."""
+        pose = np.asarray(pose_44, float)
+        return cls(surface, pose[:3, :3], pose[:3, 3], surface.color)
+
+    def moved(self, turn_33: np.ndarray, place_3: np.ndarray) -> Placed:
+        """The same, turned (or made larger) about the origin, then shifted, m."""
+        return replace(self, turn_33=turn_33 @ self.turn_33, place_3=turn_33 @ self.place_3 + place_3)
+
+    def corners(self) -> np.ndarray:
+        """Corners (F, 3, 3) of its triangles, m, float32."""
+        return self.surface.corners_F33 @ self.turn_33.T.astype(np.float32) + self.place_3.astype(np.float32)
 
 
-def sample_surfaces(
-    meshes: Iterable[tuple[np.ndarray, np.ndarray]], color: Color, count: int = 200_000, seed: int = 0
-) -> list[Surface]:
-    """Discs on meshes, ``count`` in all, spread by area; one surface a mesh, all with discs of one size.
-
-    Args:
-        meshes: vertices (V, 3) [m] and triangles (F, 3) of each.
-        color: of all.
-        count: how many discs.
-        seed: of where they are.
-    """
-    corners = [vertices_V3[faces_F3] for vertices_V3, faces_F3 in meshes]
-    crosses = [np.cross(c_F33[:, 1] - c_F33[:, 0], c_F33[:, 2] - c_F33[:, 0]) for c_F33 in corners]
-    areas = [0.5 * np.linalg.norm(cross_F3, axis=1) for cross_F3 in crosses]
-    total, generator = sum(float(area_F.sum()) for area_F in areas), np.random.default_rng(seed)
-    if total <= 0.0:
-        return [Surface(np.zeros((0, 3)), np.zeros((0, 3)), 0.0, color) for _ in corners]
-    radius_m = _OVERLAP * float(np.sqrt(total / count))
-    surfaces = []
-    for corner_F33, cross_F3, area_F in zip(corners, crosses, areas, strict=True):
-        number = int(np.ceil(count * area_F.sum() / total))
-        # evenly spaced along the triangles' summed areas: large ones get many, small ones some
-        places_P = (np.arange(number) + generator.random(number)) * (area_F.sum() / max(number, 1))
-        chosen_P = np.searchsorted(np.cumsum(area_F), places_P).clip(0, len(area_F) - 1)
-        u_P1, v_P1 = generator.random((2, number, 1))
-        u_P1, v_P1 = np.where(u_P1 + v_P1 > 1, 1 - u_P1, u_P1), np.where(u_P1 + v_P1 > 1, 1 - v_P1, v_P1)
-        a_P3, b_P3, c_P3 = (corner_F33[chosen_P, corner] for corner in range(3))
-        normal_P3 = cross_F3[chosen_P] / np.maximum(2 * area_F[chosen_P], 1e-18)[:, None]
-        surfaces.append(Surface(a_P3 + u_P1 * (b_P3 - a_P3) + v_P1 * (c_P3 - a_P3), normal_P3, radius_m, color))
-    return surfaces
+def outlines(meshes: Sequence[Placed]) -> np.ndarray:
+    """Points (M, O, 3) that stand for surfaces where their size counts, m."""
+    if not meshes:
+        return np.zeros((0, len(_AROUND_D3), 3))
+    turn_M33, place_M3 = np.array([m.turn_33 for m in meshes]), np.array([m.place_3 for m in meshes])
+    outline_MO3 = np.array([m.surface.outline_O3 for m in meshes])
+    return outline_MO3 @ turn_M33.swapaxes(1, 2) + place_M3[:, None]
 
 
-def draw_surface(canvas: Canvas, local: Surface, number: int) -> None:
-    """Puts a surface, given in the picture frame, on a canvas as solid ``number``, and its normals beside it."""
-    height, width = canvas.depth_HW.shape
-    reach = min(int(np.ceil(local.radius_m / canvas.pixel_m)), _WIDEST)
-    column_P = np.floor(width / 2 + local.points_P3[:, 0] / canvas.pixel_m).astype(int)
-    row_P = np.floor(height / 2 - local.points_P3[:, 1] / canvas.pixel_m).astype(int)
-    seen_P = (column_P >= -reach) & (column_P < width + reach) & (row_P >= -reach) & (row_P < height + reach)
-    order_P = np.flatnonzero(seen_P)
-    order_P = order_P[local.points_P3[order_P, 2].argsort()]  # the nearest last: it stays where several fall on a pixel
-    points_P3, normals_P3 = local.points_P3[order_P].astype(np.float32), local.normals_P3[order_P].astype(np.float32)
-    normals_P3 = normals_P3 * np.where(normals_P3[:, 2:] < 0, np.float32(-1), np.float32(1))
-    slope_P2 = normals_P3[:, :2] / np.maximum(normals_P3[:, 2:], 1e-3)
-    column_P, row_P = column_P[order_P], row_P[order_P]
-    if canvas.normal_HW3 is None:
-        canvas.normal_HW3 = np.zeros((height, width, 3), np.float32)
-    for down in range(-reach, reach + 1):
-        for right in range(-reach, reach + 1):
-            rows_P, columns_P = row_P + down, column_P + right
-            inside_P = (rows_P >= 0) & (rows_P < height) & (columns_P >= 0) & (columns_P < width)
-            tilt_P = (slope_P2[:, 0] * right - slope_P2[:, 1] * down) * np.float32(canvas.pixel_m)
-            if down or right:  # seen from the side, a disc is an ellipse; its centre is always drawn
-                inside_P &= (down * down + right * right) * canvas.pixel_m**2 + tilt_P**2 < local.radius_m**2
-            depth_P = points_P3[:, 2] - tilt_P
-            inside_P[inside_P] = depth_P[inside_P] > canvas.depth_HW[rows_P[inside_P], columns_P[inside_P]]
-            place = rows_P[inside_P], columns_P[inside_P]
-            canvas.depth_HW[place], canvas.owner_HW[place] = depth_P[inside_P], number
-            canvas.normal_HW3[place] = normals_P3[inside_P]
+def rods(meshes: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """About what surfaces are from far: the ends (M, 3), (M, 3) and the radii (M,) [m] of rods through them."""
+    points_MO3 = outlines(meshes)
+    rough_M13 = points_MO3.mean(axis=1, keepdims=True)
+    axes_M33 = np.linalg.svd(points_MO3 - rough_M13, full_matrices=False)[2]
+    along_MO3 = (points_MO3 - rough_M13) @ axes_M33.swapaxes(1, 2)
+    low_M3, high_M3 = along_MO3.min(axis=1), along_MO3.max(axis=1)
+    middle_M3 = rough_M13[:, 0] + np.einsum("mk,mki->mi", (low_M3 + high_M3) / 2, axes_M33)
+    half_M3 = (high_M3 - low_M3) / 2
+    reach_M3 = axes_M33[:, 0] * (half_M3[:, :1] - half_M3[:, 1:2]).clip(0.0)
+    return middle_M3 - reach_M3, middle_M3 + reach_M3, half_M3[:, 1]

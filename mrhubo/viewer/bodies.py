@@ -12,9 +12,9 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.rotations import axis_angle_to_matrix
-from mrhubo.robot import Robot, bare_sticks, read_geometry
+from mrhubo.robot import Robot
 from mrhubo.robot.joint import Mimic, drive
-from mrhubo.robot.meshes import read_meshes
+from mrhubo.robot.looks import read_looks
 from mrhubo.robot.urdf import Description, moved
 from mrhubo.view import Solids, stick_radius, stick_solids
 from mrhubo.viewer.meshing import Mesh, capsule_meshes, joined, shape_mesh
@@ -110,36 +110,16 @@ def _driver(description: Description, joint: str) -> Mimic:
 
 
 def dress(bodies: Sequence[Body], robot: Robot) -> None:
-    """Gives bodies their looks: the meshes and shapes of the URDF's visual elements; for a link without any that can be
-    read, its collision shapes, or the capsules that stand for collision meshes; and sticks where links have none of
-    these (:func:`mrhubo.robot.bare_sticks`).
-    """
-    parsed, path = robot.description.parsed, robot.description.path
+    """Gives bodies their looks (:func:`mrhubo.robot.looks.read_looks`)."""
+    looks = read_looks(robot.description)
     found: dict[str, list[Mesh]] = {}
-    shaped = read_geometry(parsed)
-    for mesh in read_meshes(parsed, path):
+    for mesh in looks.meshes:
         found.setdefault(mesh.link, []).append(Mesh(mesh.vertices_V3, mesh.faces_F3, mesh.color))
-    seen = _links_with_visible_shapes(robot)
-    for shape in shaped:
-        if shape.link not in found or shape.link in seen:
-            found.setdefault(shape.link, []).append(shape_mesh(shape))
-    meshed = [shape for shape in robot.description.solids.of_meshes if shape.link not in found]
-    for shape in meshed:
+    for shape in looks.shapes:
         found.setdefault(shape.link, []).append(shape_mesh(shape))
-    sticks = body_sticks(bodies, bare_sticks(robot.description, found))
-    for body, solids in zip(bodies, sticks, strict=True):
+    for body, solids in zip(bodies, body_sticks(bodies, looks.sticks), strict=True):
         parts = [mesh.placed(pose_44) for link, pose_44 in body.links.items() for mesh in found.get(link, [])]
         body.meshes = joined(parts) + capsule_meshes(solids)
-
-
-def _links_with_visible_shapes(robot: Robot) -> set[str]:
-    """Links whose visual elements hold a primitive shape, so that their shapes belong beside their meshes."""
-    return {
-        link.name
-        for link in robot.description.parsed.robot.links
-        for visual in link.visuals
-        if visual.geometry is not None and visual.geometry.mesh is None
-    }
 
 
 def body_sticks(bodies: Sequence[Body], sticks: Mapping[str, str]) -> list[Solids]:

@@ -14,8 +14,8 @@ from PIL.Image import Image
 from mrhubo.body import KEYPOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.frames import base_to_human
-from mrhubo.robot import bare_sticks, drawn_shapes
-from mrhubo.view import Solids, animated_frames, figure_sheet, human_solids, robot_solids, save_gif, save_png
+from mrhubo.view import Solids, animated_frames, figure_sheet, human_solids, save_gif, save_png
+from mrhubo.view.robot import FINEST, RobotShape
 from mrhubo.viewer.film import save_mp4
 from mrhubo.viewer.performance import Performance
 from mrhubo.viewer.person import Person
@@ -74,18 +74,16 @@ def _person_solids(person: Person, standing: Standing, frames: Sequence[int]) ->
 
 
 def _robot_solids(robot: Performance, standing: Standing, frames: Sequence[int]) -> list[Solids]:
-    """From shapes alone: of meshes the painter draws the capsules that stand for them in collisions."""
-    description = robot.robot.description
-    geometry = drawn_shapes(description)
-    sticks = bare_sticks(description, {shape.link for shape in geometry})
+    shape = RobotShape(robot.robot.description)
     names, poses_TL44 = robot.links()
     poses_TL44 = poses_TL44[list(frames)]
     base_T44 = _in_place(standing, frames)
+    if len(frames):
+        tall_m = float(np.ptp(shape.solids(dict(zip(names, poses_TL44[0], strict=True))).bounds()[:, 2]))
+        shape.simplify(FINEST * max(tall_m, 1e-3))
     poses_TL44[..., :3, 3] /= robot.scale  # shapes are drawn at their own size, and then made larger
     return [
-        robot_solids(geometry, dict(zip(names, poses_L44, strict=True)), sticks)
-        .scaled(robot.scale)
-        .transformed(base_44)
+        shape.solids(dict(zip(names, poses_L44, strict=True))).scaled(robot.scale).transformed(base_44)
         for poses_L44, base_44 in zip(poses_TL44, base_T44, strict=True)
     ]
 

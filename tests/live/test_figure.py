@@ -131,10 +131,40 @@ def test_robots_without_shapes_and_with_many(root: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(room, "_MOST", 10)
     assert sum(len(body["capsules"]) for body in figure_of(nao, nao.joint_names)["bodies"]) <= 10
     monkeypatch.undo()
-    monkeypatch.setattr("mrhubo.robot.bare.read_geometry", lambda parsed: [])
+    monkeypatch.setattr("mrhubo.robot.looks.read_geometry", lambda parsed: [])
     bodies = figure_of(nao, nao.joint_names)["bodies"]
     for number, body in enumerate(bodies):
         hanging = [other["origin"] for other in bodies if other["parent"] == number]
         ends = [row[3:6] for row in body["capsules"]]
         for origin_44 in hanging:
             assert any(np.allclose(np.array(origin_44)[:3, 3], end_3, atol=1e-5) for end_3 in ends), body
+
+
+def test_a_mesh_that_collides_with_nothing_is_a_rod(root: Path, tmp_path: Path) -> None:
+    """As a foot is, which stands on four points: the page has no meshes."""
+    import trimesh
+
+    path = tmp_path / "nao.urdf"
+    told = (root / "data" / "robots" / "nao" / "nao.urdf").read_text()
+    trimesh.creation.box((0.5, 0.1, 0.1)).export(tmp_path / "hat.stl")
+    visual = '<visual><geometry><mesh filename="hat.stl"/></geometry></visual>'
+    path.write_text(
+        told.replace(
+            "</robot>",
+            f"""<link name="hat">{visual}</link>
+<joint name="hat" type="fixed"><parent link="torso"/><child link="hat"/><origin xyz="0 0 1"/></joint></robot>""",
+        )
+    )
+    config = tmp_path / "nao.yaml"
+    shipped = (root / "conf" / "nao.yaml").read_text()
+    config.write_text(shipped.replace("../data/robots/nao/nao.urdf", str(path)))
+    robot = Robot.from_config(config)
+    before = figure_of(Robot.from_config(root / "conf" / "nao.yaml"), robot.joint_names)["bodies"]
+    after = figure_of(robot, robot.joint_names)["bodies"]
+    (new,) = [
+        row for one, two in zip(before, after, strict=True) for row in two["capsules"] if row not in one["capsules"]
+    ]
+    ends_23 = np.reshape(new[:6], (2, 3))
+    assert np.ptp(ends_23[:, 2]) < 0.03 and ends_23[0, 2] > 1.0
+    length = float(np.linalg.norm(ends_23[1] - ends_23[0]))
+    assert length == pytest.approx(0.4, abs=0.05) and new[6] == pytest.approx(0.05, abs=0.01)
