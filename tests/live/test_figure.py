@@ -167,4 +167,6 @@ def test_a_mesh_that_collides_with_nothing_is_a_rod(root: Path, tmp_path: Path) 
     ends_23 = np.reshape(new[:6], (2, 3))
     assert np.ptp(ends_23[:, 2]) < 0.03 and ends_23[0, 2] > 1.0
     length = float(np.linalg.norm(ends_23[1] - ends_23[0]))
-    assert length == pytest.approx(0.4, abs=0.05) and new[6] == pytest.approx(0.05, abs=0.01)
+    assert 0.5 <= length + 2 * new[6] < 0.52 and 0.049 < new[6] < 0.08, (
+        "as long as the box, between its side and its diagonal"
+    )
