@@ -35,7 +35,7 @@ class SolidShapes:
 
 
 def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
-    """The shapes of every link's collision elements.
+    """The shapes of every link's collision elements, and the meshes of hands that have none.
 
     Args:
         urdf: what yourdfpy has made of the robot.
@@ -45,8 +45,9 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
     found: list[LinkGeometry] = []
     gaps: set[str] = set()
     triangles = 0
+    seen_alone = _ends_seen_alone(urdf)
     for link in urdf.robot.links:
-        for element in link.collisions:
+        for element in link.visuals if link.name in seen_alone else link.collisions:
             mesh = None if element.geometry is None else element.geometry.mesh
             if mesh is None:
                 continue
@@ -64,6 +65,20 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
             place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
             found += [_geometry(link.name, capsule, place_44) for capsule in known[key]]
     return SolidShapes((*read_collision_geometry(urdf), *found), tuple(found), frozenset(gaps))
+
+
+def _ends_seen_alone(urdf: yourdfpy.URDF) -> set[str]:
+    """Links that end a limb, are seen, and collide with nothing by the file, while what they are fixed to does: hands,
+    most of the time, which go through the thighs if nobody looks at them.
+    """
+    links = {link.name: link for link in urdf.robot.links}
+    onward = {joint.parent for joint in urdf.robot.joints}
+    held = {joint.child: joint.parent for joint in urdf.robot.joints if joint.type == "fixed"}
+    return {
+        name
+        for name, link in links.items()
+        if link.visuals and not link.collisions and name not in onward and name in held and links[held[name]].collisions
+    }
 
 
 def _geometry(link: str, capsule: Capsule, place_44: np.ndarray) -> LinkGeometry:
