@@ -30,8 +30,10 @@ _THIN = 1e-4
 """What is thinner [m] is given this thickness: a sheet has no room to be shared."""
 
 
-def capsules_of(vertices_V3: np.ndarray) -> list[Capsule]:
-    """Capsules (start (3,), end (3,), radius [m]), three at most, that hug the convex hull of vertices (V, 3) [m]."""
+def capsules_of(vertices_V3: np.ndarray, alone: bool = False) -> list[Capsule]:
+    """Capsules (start (3,), end (3,), radius [m]), three at most, that hug the convex hull of vertices (V, 3) [m];
+    `alone`: one.
+    """
     turn_33, low_3, high_3 = smallest_box(corners_H3 := extremes(vertices_V3))
     pose_44 = np.eye(4)
     pose_44[:3, :3], pose_44[:3, 3] = turn_33, turn_33 @ (low_3 + high_3) / 2
@@ -41,7 +43,7 @@ def capsules_of(vertices_V3: np.ndarray) -> list[Capsule]:
     points_X3 = unit_X3 * half_3
     inside_X3 = points_X3[_inside_hull(points_X3, local_H3, half_3)]
     room = 8 * float(half_3.prod()) * len(inside_X3) / _POINTS
-    shapes = list(_candidates(local_H3, half_3))
+    shapes = [shape for shape in _candidates(local_H3, half_3) if not alone or shape.kind in ("sphere", "capsule")]
     shared = [_shared(capsules(shape, shape.origin_44), inside_X3, room, unit_X3) for shape in shapes]
     best = shapes[int(np.argmax(shared))]
     return capsules(best, pose_44 @ best.origin_44)

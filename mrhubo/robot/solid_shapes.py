@@ -1,5 +1,8 @@
 """What of a robot can bump into what: the primitive shapes of its collision elements, and capsules in place of meshes.
 
+Hands often have no collision element, though what they are fixed to has: of these, what is seen counts, a mesh as one
+capsule. Where three hug a flat hand, it stays between two shapes of a thigh more often when it is to give way.
+
 A mesh is looked for where the URDF names it, beside it and in the folders above (`mrhubo.robot.meshes`). Where it is
 not there, or cannot be read, the link has a gap, and nobody knows whether it touches anything.
 """
@@ -16,7 +19,7 @@ from mrhubo.fast.rotations import shortest_turn
 from mrhubo.robot.capsules import Capsule
 from mrhubo.robot.hulls import capsules_of
 from mrhubo.robot.meshes import MOST_TRIANGLES, read_mesh, scale_of
-from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry
+from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
 
 _MOST_MESHES = 300
 """Different meshes of one robot: a few hundredths of a second each."""
@@ -35,7 +38,7 @@ class SolidShapes:
 
 
 def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
-    """The shapes of every link's collision elements, and the meshes of hands that have none.
+    """The shapes of every link's collision elements, and what is seen of hands that have none.
 
     Args:
         urdf: what yourdfpy has made of the robot.
@@ -59,12 +62,13 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
                 read = None if enough else read_mesh(key[0], path, scale_3)
                 if read is not None:
                     triangles += len(read[1])
-                    known[key] = capsules_of(read[0][np.unique(read[1])])
-            if not known[key]:
+                    known[key] = capsules_of(read[0][np.unique(read[1])], link.name in seen_alone)
+            if not known[key] and link.name not in seen_alone:
                 gaps.add(link.name)
             place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
             found += [_geometry(link.name, capsule, place_44) for capsule in known[key]]
-    return SolidShapes((*read_collision_geometry(urdf), *found), tuple(found), frozenset(gaps))
+    simple = [shape for shape in read_geometry(urdf) if shape.link in seen_alone]
+    return SolidShapes((*read_collision_geometry(urdf), *simple, *found), tuple(found), frozenset(gaps))
 
 
 def _ends_seen_alone(urdf: yourdfpy.URDF) -> set[str]:
