@@ -44,7 +44,7 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
         urdf: what yourdfpy has made of the robot.
         path: its file.
     """
-    known: dict[tuple[str, tuple[float, ...]], list[Capsule]] = {}
+    known: dict[tuple[str, tuple[float, ...], bool], list[Capsule]] = {}
     found: list[LinkGeometry] = []
     gaps: set[str] = set()
     triangles = 0
@@ -55,15 +55,15 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
             if mesh is None:
                 continue
             scale_3 = scale_of(mesh)
-            key = str(mesh.filename), tuple(scale_3.tolist())
+            key = str(mesh.filename), tuple(scale_3.tolist()), link.name in seen_alone
             if key not in known:
                 known[key] = []
                 enough = len(known) > _MOST_MESHES or triangles > MOST_TRIANGLES
                 read = None if enough else read_mesh(key[0], path, scale_3)
                 if read is not None:
                     triangles += len(read[1])
-                    known[key] = capsules_of(read[0][np.unique(read[1])], link.name in seen_alone)
-            if not known[key] and link.name not in seen_alone:
+                    known[key] = capsules_of(read[0][np.unique(read[1])], alone=key[2])
+            if not known[key] and not key[2]:
                 gaps.add(link.name)
             place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
             found += [_geometry(link.name, capsule, place_44) for capsule in known[key]]

@@ -57,3 +57,11 @@ def test_extremes_are_those_of_the_whole() -> None:
     assert len(kept) <= 1000 and {tuple(point) for point in kept} <= {tuple(point) for point in points}
     for direction in rotation(3):
         assert (kept @ direction).max() > 0.97 * (points @ direction).max()
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_one_capsule_alone(name: str) -> None:
+    mesh = MESHES[name][0]
+    ((start_3, end_3, radius),) = capsules_of(np.asarray(mesh.vertices), alone=True)
+    half_3 = mesh.extents / 2
+    assert np.all(np.abs((start_3 + end_3) / 2) < 0.02) and half_3.min() / 2 < radius < half_3.max() * 1.5

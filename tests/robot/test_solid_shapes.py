@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 import trimesh
@@ -87,3 +88,49 @@ def test_what_overlaps_at_home_is_meant_to(folder: Path) -> None:
     around = "<collision><origin xyz='-0.2 0 0'/><geometry><sphere radius='0.1'/></geometry></collision>"
     shapes = SelfCollision(folded(folder, more=around))
     assert not bool(shapes.collides(shapes.robot.home()[None]))
+
+
+HAND = """<link name="hand"><visual><origin xyz="0.1 0 0"/><geometry>{looks}</geometry></visual>{more}</link>
+<joint name="wrist" type="{kind}"><parent link="fore"/><child link="hand"/><origin xyz="0.2 0 0"/>{limit}</joint></robot>"""
+
+
+def with_hand(folder: Path, looks: str, kind: str = "fixed", more: str = "", fore: str | None = None) -> Robot:
+    path = folded(folder).urdf
+    told = path.read_text() if fore is None else path.read_text().replace(MESH.format(x=0.2, name="rod"), fore)
+    limit = "" if kind == "fixed" else LIMIT
+    path.write_text(told.replace("</robot>", HAND.format(looks=looks, kind=kind, limit=limit, more=more)))
+    return Robot(path, ["shoulder", "elbow"])
+
+
+@pytest.mark.parametrize(
+    ("looks", "kinds"),
+    [
+        ("<mesh filename='box.stl' scale='0.001 0.001 0.001'/>", {"capsule", "sphere"}),
+        ("<box size='0.1 0.15 0.2'/>", {"box"}),
+    ],
+)
+def test_hands_that_are_seen_and_collide_with_nothing_count(folder: Path, looks: str, kinds: set[str]) -> None:
+    robot = with_hand(folder, looks)
+    shapes = [shape for shape in robot.description.solids.shapes if shape.link == "hand"]
+    assert len(shapes) == 1 and shapes[0].kind in kinds
+    assert np.allclose(shapes[0].origin_44[:3, 3], [0.1, 0.0, 0.0], atol=0.01)
+    assert "hand" in {name for pair in SelfCollision(robot).pairs for name in pair}
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"kind": "revolute"},  # what moves by itself may be left out on purpose
+        {"more": "<collision><geometry><sphere radius='0.01'/></geometry></collision>"},
+        {"fore": ""},  # nor is it known of the forearm
+    ],
+)
+def test_what_else_is_seen_does_not_count(folder: Path, told: dict[str, str]) -> None:
+    robot = with_hand(folder, "<mesh filename='box.stl' scale='0.001 0.001 0.001'/>", **told)
+    found = [shape for shape in robot.description.solids.shapes if shape.link == "hand"]
+    assert len(found) == ("more" in told) and all(shape.kind == "sphere" for shape in found)
+
+
+def test_a_hand_whose_mesh_is_not_there_leaves_no_gap(folder: Path) -> None:
+    shapes = SelfCollision(with_hand(folder, "<mesh filename='none.stl'/>"))
+    assert shapes.known and not shapes.uncovered
