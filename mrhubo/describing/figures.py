@@ -20,7 +20,7 @@ from mrhubo.describing.markers import SIDE_COLORS, arrow, axis_rods, bone
 from mrhubo.frames import human_to_world
 from mrhubo.robot import Axis, BodyMap, Limb, link_poses
 from mrhubo.view import Solids, human_figure
-from mrhubo.view.robot import RobotShape
+from mrhubo.view.robot import FINEST, RobotShape
 from mrhubo.view.solids import Color
 
 _PALE: Color = (0.84, 0.86, 0.89)
@@ -29,6 +29,8 @@ _ARROW, _SHORT_ARROW, _FRONT_ARROW = 0.17, 0.11, 0.34
 """Lengths [m] of the arrows: a part's first direction, its second one, and where the chest looks."""
 _ROD = 0.09
 """Half of a joint axis's rod [m]."""
+_TALL = 1.8
+"""About the human's height [m], which is the robot's where it is drawn."""
 _MOST_STRETCH = 2.5
 """How far the scale that makes limbs alike may be from the one that makes heights alike."""
 
@@ -48,12 +50,13 @@ class FigureMaker:
 
     def __init__(self, body_map: BodyMap) -> None:
         self.body_map, self.robot = body_map, body_map.robot
-        self._shape = RobotShape(self.robot.description)
+        self._fine = self._shape = RobotShape(self.robot.description)
         self._limbs = [d for d in body_map.directions if isinstance(d, Limb)]
         self._axes = [d for d in body_map.directions if isinstance(d, Axis)]
         self._inner = [limb.part.hangs_on == limb.part.seen_from for limb in self._limbs]
         self.scale = 1.0
         self.scale = self._scale(self.robot.home())
+        self._shape = self._fine.coarser(FINEST * _TALL / self.scale)
 
     def human(self, local_J33: Tensor) -> Figure:
         """The human in a pose, local rotations (21, 3, 3)."""
@@ -64,9 +67,9 @@ class FigureMaker:
         marks = self._marks(start_E3, end_E3, self.body_map.human_directions(local_J33[None])[0], points)
         return Figure(body, Solids.concatenate([marks, _front(middle_3)]), middle_3)
 
-    def robot_figure(self, q_N: Tensor, size: float = 1.0, rod: float = _ROD, front: bool = True) -> Figure:
-        """The robot at joint angles (N,) [rad]; `size` of its marks, half the length [m] of a joint axis's `rod`, and
-        whether an arrow shows where its chest looks.
+    def robot_figure(self, q_N: Tensor, size: float = 1.0, rod: float = _ROD, near: bool = False) -> Figure:
+        """The robot at joint angles (N,) [rad]; `size` of its marks, and half the length [m] of a joint axis's `rod`.
+        From `near` its meshes are as fine as they are, and no arrow shows where its chest looks.
         """
         poses = self.robot.forward(q_N[None])
         view = self.body_map.shared.view_robot(poses)
@@ -79,9 +82,10 @@ class FigureMaker:
         marks = self._marks(start_E3, end_E3, view.direction_BD3[0], origins, size)
         shown = link_poses(self.robot.description.parsed, self.robot.configuration(q_N.numpy()))
         rods = axis_rods(self._joint_axes(shown, place_44), rod, size)
-        body = self._shape.solids(shown).recolored(_PALE).scaled(self.scale).transformed(place_44)
+        shape = self._fine if near else self._shape
+        body = shape.solids(shown).recolored(_PALE).scaled(self.scale).transformed(place_44)
         middle_3 = self._middle(start_E3, body)
-        return Figure(body, Solids.concatenate([marks, rods, *([_front(middle_3)] if front else [])]), middle_3)
+        return Figure(body, Solids.concatenate([marks, rods, *([] if near else [_front(middle_3)])]), middle_3)
 
     def places(self, q_N: Tensor) -> dict[str, np.ndarray]:
         """Where the config's points (3,) are in `robot_figure`, by their names."""

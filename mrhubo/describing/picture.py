@@ -115,7 +115,7 @@ def _upper_body(figure: Figure, wide: float) -> Camera:
 
 def _details(body_map: BodyMap, maker: FigureMaker, q_N: torch.Tensor) -> Image.Image:
     """The whole robot, and every point of the config from near, with the axes around it."""
-    figure, away = maker.robot_figure(q_N, 0.45, 0.6 * _NEAR_M, front=False), _distances(body_map)
+    figure, away = maker.robot_figure(q_N, 0.45, 0.6 * _NEAR_M, near=True), _distances(body_map)
     views = [Camera.framing(figure.body, _DETAIL, azimuth, 8.0) for azimuth in (0.0, 90.0)]
     whole = [render(figure.body, _DETAIL, camera) for camera in views]
     pictures, titles = whole, ["from the front", "from its left"]

@@ -45,7 +45,7 @@ class Artist:
         self.shape = RobotShape(robot.description)
         height = max(float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2])), 1e-3)
         self.scale = _FIGURE_HEIGHT_M / height
-        self.shape.simplify(FINEST * height)
+        self.shape = self.shape.coarser(FINEST * height)
 
     def human(self, local_J33: Tensor) -> Solids:
         """A human in a pose, local rotations (21, 3, 3)."""

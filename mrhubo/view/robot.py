@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -31,9 +32,11 @@ class RobotShape:
         meshes = tuple(Placed.of(surface, _pose(link_poses, link)) for link, surface in self._surfaces)
         return replace(robot_solids(self._shapes, link_poses, self._sticks), meshes=meshes)
 
-    def simplify(self, metres: float) -> None:
-        """Leaves out of the meshes what is smaller, so that pictures in which it is not seen take less time."""
-        self._surfaces = [(link, surface.coarser(metres)) for link, surface in self._surfaces]
+    def coarser(self, metres: float) -> RobotShape:
+        """The same without what is smaller in its meshes, so that pictures in which it is not seen take less time."""
+        found = copy.copy(self)
+        found._surfaces = [(link, surface.coarser(metres)) for link, surface in self._surfaces]
+        return found
 
 
 def robot_solids(

@@ -80,7 +80,7 @@ def _robot_solids(robot: Performance, standing: Standing, frames: Sequence[int])
     base_T44 = _in_place(standing, frames)
     if len(frames):
         tall_m = float(np.ptp(shape.solids(dict(zip(names, poses_TL44[0], strict=True))).bounds()[:, 2]))
-        shape.simplify(FINEST * max(tall_m, 1e-3))
+        shape = shape.coarser(FINEST * max(tall_m, 1e-3))
     poses_TL44[..., :3, 3] /= robot.scale  # shapes are drawn at their own size, and then made larger
     return [
         shape.solids(dict(zip(names, poses_L44, strict=True))).scaled(robot.scale).transformed(base_44)
