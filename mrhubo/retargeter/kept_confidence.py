@@ -17,9 +17,7 @@ from torch import Tensor
 
 import mrhubo
 from mrhubo.errors import UserError
-from mrhubo.files.atomic import atomic_path
-from mrhubo.files.cache import user_cache
-from mrhubo.files.regular import open_regular
+from mrhubo.files.cache import keep_text, kept_text
 from mrhubo.retargeter.calibration import calibrate
 from mrhubo.retargeter.confidence import ConfidenceModel
 from mrhubo.retargeter.package import Retargeter
@@ -30,16 +28,12 @@ _LONGEST = 10_000
 
 def calibrated(retargeter: Retargeter) -> ConfidenceModel:
     """As `calibrate`; of a robot that it was asked for before, what it found then."""
-    try:
-        folder = user_cache()
-    except UserError:  # a user without a home
-        return calibrate(retargeter)
-    path = folder / f"confidence-{_checksum(retargeter)}.json"
-    with contextlib.suppress(OSError, UserError, UnicodeDecodeError), open_regular(path) as file:
-        return ConfidenceModel.from_json(file.read(_LONGEST).decode())
+    name = f"confidence-{_checksum(retargeter)}.json"
+    if (told := kept_text(name, _LONGEST)) is not None:
+        with contextlib.suppress(UserError):
+            return ConfidenceModel.from_json(told)
     found = calibrate(retargeter)
-    with contextlib.suppress(OSError, UserError), atomic_path(path) as half:
-        half.write_text(found.to_json(), encoding="utf-8")
+    keep_text(name, found.to_json())
     return found
 
 

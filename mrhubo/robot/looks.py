@@ -35,8 +35,6 @@ def read_looks(description: Description) -> Looks:
     }
     shapes = [shape for shape in read_geometry(parsed) if shape.link not in meshed or shape.link in visible]
     dressed = meshed | {shape.link for shape in shapes}
-    if any(
-        link.collisions and link.name not in dressed for link in parsed.robot.links
-    ):  # finding them takes seconds
+    if any(link.collisions and link.name not in dressed for link in parsed.robot.links):  # finding them takes seconds
         shapes += [shape for shape in description.solids.of_meshes if shape.link not in dressed]
     return Looks(meshes, shapes, bare_sticks(description, dressed | {shape.link for shape in shapes}))

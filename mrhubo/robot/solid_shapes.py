@@ -17,12 +17,15 @@ import yourdfpy
 
 from mrhubo.fast.rotations import shortest_turn
 from mrhubo.robot.capsules import Capsule
-from mrhubo.robot.hulls import capsules_of
+from mrhubo.robot.kept_capsules import kept_capsules
 from mrhubo.robot.meshes import MOST_TRIANGLES, read_mesh, scale_of
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
 
 _MOST_MESHES = 300
 """Different meshes of one robot: a few hundredths of a second each."""
+
+_Key = tuple[str, tuple[float, ...], bool]
+"""A mesh's file and scale, and whether one capsule is to stand for it."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,10 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
         urdf: what yourdfpy has made of the robot.
         path: its file.
     """
-    known: dict[tuple[str, tuple[float, ...], bool], list[Capsule]] = {}
-    found: list[LinkGeometry] = []
-    gaps: set[str] = set()
-    triangles = 0
     seen_alone = _ends_seen_alone(urdf)
+    meshes: dict[_Key, np.ndarray | None] = {}
+    places: list[tuple[str, _Key, np.ndarray]] = []
+    triangles = 0
     for link in urdf.robot.links:
         for element in link.visuals if link.name in seen_alone else link.collisions:
             mesh = None if element.geometry is None else element.geometry.mesh
@@ -56,17 +58,17 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
                 continue
             scale_3 = scale_of(mesh)
             key = str(mesh.filename), tuple(scale_3.tolist()), link.name in seen_alone
-            if key not in known:
-                known[key] = []
-                enough = len(known) > _MOST_MESHES or triangles > MOST_TRIANGLES
+            if key not in meshes:
+                enough = len(meshes) >= _MOST_MESHES or triangles > MOST_TRIANGLES
                 read = None if enough else read_mesh(key[0], path, scale_3)
-                if read is not None:
-                    triangles += len(read[1])
-                    known[key] = capsules_of(read[0][np.unique(read[1])], alone=key[2])
-            if not known[key] and not key[2]:
-                gaps.add(link.name)
-            place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
-            found += [_geometry(link.name, capsule, place_44) for capsule in known[key]]
+                meshes[key] = None if read is None else read[0][np.unique(read[1])]
+                triangles += 0 if read is None else len(read[1])
+            places.append((link.name, key, np.eye(4) if element.origin is None else np.asarray(element.origin, float)))
+    there = {key: vertices_V3 for key, vertices_V3 in meshes.items() if vertices_V3 is not None}
+    hugging = kept_capsules([(vertices_V3, key[2]) for key, vertices_V3 in there.items()])
+    known = dict(zip(there, hugging, strict=True))
+    found = [_geometry(link, c, place_44) for link, key, place_44 in places for c in known.get(key, [])]
+    gaps = {link for link, key, _ in places if key not in known and not key[2]}
     simple = [shape for shape in read_geometry(urdf) if shape.link in seen_alone]
     return SolidShapes((*read_collision_geometry(urdf), *simple, *found), tuple(found), frozenset(gaps))
 

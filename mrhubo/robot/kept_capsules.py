@@ -1,0 +1,59 @@
+"""Capsules of a robot's meshes: found once, which takes a tenth of a second each, and kept in the user's cache."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import xxhash
+
+from mrhubo.files.cache import keep_text, kept_text
+from mrhubo.robot import capsules, hulls
+from mrhubo.robot.capsules import Capsule
+
+_LONGEST = 1_000_000
+"""Bytes of a file that is one of ours."""
+
+Mesh = tuple[np.ndarray, bool]
+"""Vertices (V, 3) [m], and whether one capsule is to stand for it."""
+
+
+def kept_capsules(meshes: Sequence[Mesh]) -> list[list[Capsule]]:
+    """`capsules_of` each mesh; of meshes that it was asked for before, together, what it found then."""
+    if not meshes:
+        return []
+    digest = xxhash.xxh3_128(_method())
+    for vertices_V3, alone in meshes:
+        digest.update(f"{vertices_V3.shape} {alone} ".encode() + np.ascontiguousarray(vertices_V3).tobytes())
+    name = f"capsules-{digest.hexdigest()}.json"
+    told = kept_text(name, _LONGEST)
+    if told is not None and (known := _read(told, len(meshes))) is not None:
+        return known
+    found = [hulls.capsules_of(vertices_V3, alone) for vertices_V3, alone in meshes]
+    rows = [[[*start_3.tolist(), *end_3.tolist(), radius] for start_3, end_3, radius in each] for each in found]
+    keep_text(name, json.dumps(rows))
+    return found
+
+
+def _read(told: str, count: int) -> list[list[Capsule]] | None:
+    """The capsules of a file; None where it is not one of ours, whole."""
+    with contextlib.suppress(ValueError, TypeError, RecursionError):
+        found = [np.array(rows, float).reshape(-1, 7) for rows in json.loads(told)]
+        if len(found) == count and all(
+            len(r_C7) and np.isfinite(r_C7).all() and (r_C7[:, 6] > 0).all() for r_C7 in found
+        ):
+            return [[(row_7[:3], row_7[3:6], float(row_7[6])) for row_7 in row_C7] for row_C7 in found]
+    return None
+
+
+@cache
+def _method() -> bytes:
+    """A checksum of how they are found."""
+    digest = xxhash.xxh3_128()
+    for module in (capsules, hulls):
+        digest.update(Path(module.__file__ or "").read_bytes())
+    return digest.digest()
