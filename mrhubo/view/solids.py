@@ -157,10 +157,9 @@ class Solids:
         side_S = np.abs(self.sides_S3 @ direction)
         start_S, end_S = self.starts_S3 @ direction, self.ends_S3 @ direction
         start_reach_S, end_reach_S = self.radii_S * reach_S + side_S, self.end_radii_S * reach_S + side_S
-        lowest = np.concatenate([start_S - start_reach_S, end_S - end_reach_S, meshed_P])
-        return float(lowest.min()), float(
-            np.concatenate([start_S + start_reach_S, end_S + end_reach_S, meshed_P]).max()
-        )
+        low_P = np.concatenate([start_S - start_reach_S, end_S - end_reach_S, meshed_P])
+        high_P = np.concatenate([start_S + start_reach_S, end_S + end_reach_S, meshed_P])
+        return float(low_P.min()), float(high_P.max())
 
     def bounds(self) -> np.ndarray:
         """Corners (2, 3) of the axis-aligned box around the figure, m, world frame: least, then greatest x, y, z."""

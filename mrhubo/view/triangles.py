@@ -25,21 +25,23 @@ def draw_triangles(canvas: Canvas, corners_F33: np.ndarray, owner_F: np.ndarray)
     height, width = canvas.depth_HW.shape
     pixel_F3 = corners_F33[..., 0] / np.float32(canvas.pixel_m) + np.float32(width / 2 - 0.5)
     line_F3 = np.float32(height / 2 - 0.5) - corners_F33[..., 1] / np.float32(canvas.pixel_m)
-    first_F2 = np.stack([np.ceil(pixel_F3.min(axis=1)), np.ceil(line_F3.min(axis=1))], axis=1)
+    first_F2 = np.stack([np.ceil(pixel_F3.min(axis=1)), np.ceil(line_F3.min(axis=1))], axis=1).clip(0)
     last_F2 = np.stack([np.floor(pixel_F3.max(axis=1)), np.floor(line_F3.max(axis=1))], axis=1)
-    first_F2 = np.maximum(first_F2, 0).astype(np.int64)
-    last_F2 = np.minimum(last_F2, [width - 1, height - 1]).astype(np.int64)
-    seen_F = np.flatnonzero((last_F2 >= first_F2).all(axis=1))
+    last_F2 = np.minimum(last_F2, [width - 1, height - 1])
+    seen_F = np.flatnonzero((last_F2 >= first_F2).all(axis=1) & np.isfinite(corners_F33).all(axis=(1, 2)))
     if not len(seen_F):
         return
     face_N = np.full(height * width, -1, np.int64)
-    span_F2 = (last_F2 - first_F2 + 1)[seen_F]
+    corners_F33, owner_F = corners_F33[seen_F], owner_F[seen_F]
+    pixel_F3, line_F3 = pixel_F3[seen_F], line_F3[seen_F]
+    first_F2, last_F2 = first_F2[seen_F].astype(np.int64), last_F2[seen_F].astype(np.int64)
+    span_F2 = last_F2 - first_F2 + 1
     size_F2 = 1 << np.ceil(np.log2(span_F2)).astype(np.int64)  # the same for many, so that they are done at once
     code_F = size_F2[:, 0] * (2 * height + 2) + size_F2[:, 1]
     for code in np.unique(code_F):
         chosen = np.flatnonzero(code_F == code)
         wide, high = size_F2[chosen[0]].tolist()
-        for part in _parts(seen_F[chosen], max(1, _AT_ONCE // (wide * high))):
+        for part in _parts(chosen, max(1, _AT_ONCE // (wide * high))):
             _put(canvas, corners_F33[part, :, 2], pixel_F3[part], line_F3[part], first_F2[part], last_F2[part], part,
                  (wide, high), face_N)  # fmt: skip
     drawn_N = np.flatnonzero(face_N >= 0)

@@ -78,10 +78,10 @@ def _robot_solids(robot: Performance, standing: Standing, frames: Sequence[int])
     names, poses_TL44 = robot.links()
     poses_TL44 = poses_TL44[list(frames)]
     base_T44 = _in_place(standing, frames)
+    poses_TL44[..., :3, 3] /= robot.scale  # shapes are drawn at their own size, and then made larger
     if len(frames):
         tall_m = float(np.ptp(shape.solids(dict(zip(names, poses_TL44[0], strict=True))).bounds()[:, 2]))
         shape = shape.coarser(FINEST * max(tall_m, 1e-3))
-    poses_TL44[..., :3, 3] /= robot.scale  # shapes are drawn at their own size, and then made larger
     return [
         shape.solids(dict(zip(names, poses_L44, strict=True))).scaled(robot.scale).transformed(base_44)
         for poses_L44, base_44 in zip(poses_TL44, base_T44, strict=True)

@@ -98,3 +98,11 @@ def test_every_pixel_sees_the_nearest_triangle_around_its_centre(seed: int, coun
 def test_a_mesh_without_area_is_nothing() -> None:
     flat = figure_of(trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False))
     assert np.array_equal(picture(flat), picture(Solids.empty()))
+
+
+def test_what_is_nowhere_is_not_drawn() -> None:
+    canvas, corners_F33 = Canvas(24, 20, 0.05), soup(0, 30, 0.3)
+    corners_F33[::3, 1], corners_F33[1::3, 2, 0] = np.nan, np.inf
+    draw_triangles(canvas, corners_F33, np.arange(30))
+    assert set(canvas.owner_HW.ravel().tolist()) <= {-1, *range(2, 30, 3)} and canvas.owner_HW.max() >= 0
+    draw_triangles(canvas, np.zeros((0, 3, 3), np.float32), np.zeros(0, int))
