@@ -20,7 +20,7 @@ from mrhubo.describing.markers import SIDE_COLORS, arrow, axis_rods, bone
 from mrhubo.frames import human_to_world
 from mrhubo.robot import Axis, BodyMap, Limb, link_poses
 from mrhubo.view import Solids, human_figure
-from mrhubo.view.robot import FINEST, RobotShape
+from mrhubo.view.robot import RobotShape
 from mrhubo.view.solids import Color
 
 _PALE: Color = (0.84, 0.86, 0.89)
@@ -56,7 +56,7 @@ class FigureMaker:
         self._inner = [limb.part.hangs_on == limb.part.seen_from for limb in self._limbs]
         self.scale = 1.0
         self.scale = self._scale(self.robot.home())
-        self._shape = self._fine.coarser(FINEST * _TALL / self.scale)
+        self._shape = self._fine.coarser(_TALL / self.scale)
 
     def human(self, local_J33: Tensor) -> Figure:
         """The human in a pose, local rotations (21, 3, 3)."""

@@ -25,13 +25,15 @@ import xxhash
 
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
-from mrhubo.files.cache import user_cache
+from mrhubo.files.cache import keep_text, kept_text, user_cache
 
 _SOURCES = ("compiled", "plain")
 _FOLDER = "NUMBA_CACHE_DIR"
 """The environment's variable for the folder in which numba keeps what it compiles."""
 MOTIONS, FRAMES, STANDING = "motions", "frames", "frames of who stands"
 """Kinds of work, of which each compiles its own: whole motions, frames as they come, those of a robot with legs too."""
+_LONGEST = 10_000_000
+"""Bytes of a note that is one of ours."""
 _MARK = "mrhubo-compiled.txt"
 """Beside numba's files: which version of the sources they are of."""
 
@@ -55,9 +57,9 @@ def numba_is_there() -> bool:
 def is_kept(universal: bool = False, work: str = MOTIONS) -> bool:
     """Whether the compiled form starts some work without compiling, that of the universal network or that of others."""
     try:
-        files = json.loads(_note(universal, work).read_text())
+        files = json.loads(kept_text(_note(universal, work), _LONGEST) or "[]")
         return bool(files) and all(os.path.isfile(file) for file in files)
-    except (OSError, ValueError, TypeError, UserError, importlib.metadata.PackageNotFoundError):
+    except (OSError, ValueError, TypeError, importlib.metadata.PackageNotFoundError):
         return False
 
 
@@ -66,9 +68,8 @@ def note_kept(folders: Iterable[str], universal: bool = False, work: str = MOTIO
     nothing is noted.
     """
     files = [str(file) for folder in sorted(set(folders)) for file in sorted(Path(folder).glob("*kernels.*.nbi"))]
-    with contextlib.suppress(UserError, importlib.metadata.PackageNotFoundError):
-        with atomic_path(_note(universal, work)) as half:
-            half.write_text(json.dumps(files))
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        keep_text(_note(universal, work), json.dumps(files))
 
 
 def make_room() -> None:
@@ -113,6 +114,7 @@ def drop_others(folder: str | None) -> None:
                 half.write_text(told)
 
 
-def _note(universal: bool, work: str) -> Path:
+def _note(universal: bool, work: str) -> str:
+    """The name of the note in the user's cache."""
     told = (universal, work, checksum(), importlib.metadata.version("numba"), sys.version, sys.prefix, platform.node())
-    return user_cache() / f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"
+    return f"compiled-{xxhash.xxh3_64(repr(told).encode()).hexdigest()}.json"

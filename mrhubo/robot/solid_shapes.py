@@ -52,12 +52,13 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
     places: list[tuple[str, _Key, np.ndarray]] = []
     triangles = 0
     for link in urdf.robot.links:
-        for element in link.visuals if link.name in seen_alone else link.collisions:
+        alone = link.name in seen_alone
+        for element in link.visuals if alone else link.collisions:
             mesh = None if element.geometry is None else element.geometry.mesh
             if mesh is None:
                 continue
             scale_3 = scale_of(mesh)
-            key = str(mesh.filename), tuple(scale_3.tolist()), link.name in seen_alone
+            key = str(mesh.filename), tuple(scale_3.tolist()), alone
             if key not in meshes:
                 enough = len(meshes) >= _MOST_MESHES or triangles > MOST_TRIANGLES
                 read = None if enough else read_mesh(key[0], path, scale_3)

@@ -55,13 +55,12 @@ def render(
     canvas = Canvas(width * supersample, height * supersample, camera.width_m / (width * supersample))
     draw(canvas, local)
     tall_m = float(np.ptp(local.extent(np.array([0.0, 1.0, 0.0])))) if not local.nothing else 1.0
-    first_mesh = len(local)
     if local.meshes:
         local = _draw_meshes(canvas, local)
     window = canvas.covered(supersample)
     seen, linear_HW4 = canvas.cut(window, supersample), np.zeros((0, 0, 4), np.float32)
     if seen.owner_HW.size:
-        linear_HW4 = _shrink(_shade(seen, local, first_mesh, basis_33[:, 2], np.asarray(light, float)), supersample)
+        linear_HW4 = _shrink(_shade(seen, local, basis_33[:, 2], np.asarray(light, float)), supersample)
         linear_HW4[..., :3] *= 1.0 - _crevices(seen, supersample, tall_m)[..., None]
     if ground == "auto":
         ground = None if solids.nothing else solids.extent(np.array([0.0, 0.0, 1.0]))[0]
@@ -80,19 +79,15 @@ def _draw_meshes(canvas: Canvas, local: Solids) -> Solids:
     return Solids.concatenate([local, Solids.capsules(rows, [mesh.color for mesh in local.meshes])])
 
 
-def _shade(canvas: Canvas, local: Solids, first_mesh: int, up_3: np.ndarray, light_3: np.ndarray) -> np.ndarray:
-    """Linear RGB times coverage, and coverage (0 or 1), of the samples (H, W, 4).
-
-    ``first_mesh``: from this solid on they stand for meshes, whose normals are on the canvas. ``up_3``: up, picture
-    frame.
-    """
+def _shade(canvas: Canvas, local: Solids, up_3: np.ndarray, light_3: np.ndarray) -> np.ndarray:
+    """Linear RGB times coverage, and coverage (0 or 1), of the samples (H, W, 4); ``up_3``: up, picture frame."""
     height, width = canvas.owner_HW.shape
     picture_HW4 = np.zeros((height, width, 4), np.float32)
     pixels_N = np.flatnonzero(canvas.owner_HW.ravel() >= 0)
     owner_N = canvas.owner_HW.ravel()[pixels_N]
     normal_3N = _normals(canvas, local, pixels_N, owner_N)
-    if canvas.normal_HW3 is not None:
-        meshed_N = owner_N >= first_mesh
+    if canvas.normal_HW3 is not None:  # of the meshes, for which the last solids stand
+        meshed_N = owner_N >= len(local) - len(local.meshes)
         normal_3N[:, meshed_N] = canvas.normal_HW3.reshape(-1, 3)[pixels_N[meshed_N]].T
     n_w = normal_3N[2]
 

@@ -25,7 +25,7 @@ from mrhubo.view import (
     figure_sheet,
     human_figure,
 )
-from mrhubo.view.robot import FINEST, RobotShape
+from mrhubo.view.robot import RobotShape
 
 PAIR_TITLES = {"phi": "phi", "residual_m": "keypoint distance [mm]", "z_norm": "|z|"}
 """Measures of pairs that pictures show, and their titles."""
@@ -43,9 +43,9 @@ class Artist:
     def __init__(self, robot: Robot, skeleton: Skeleton | None = None) -> None:
         self.robot, self.skeleton = robot, skeleton or Skeleton()
         self.shape = RobotShape(robot.description)
-        height = max(float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2])), 1e-3)
-        self.scale = _FIGURE_HEIGHT_M / height
-        self.shape = self.shape.coarser(FINEST * height)
+        height = float(np.ptp(self.robot_figure(robot.home(), scaled=False).bounds()[:, 2]))
+        self.scale = _FIGURE_HEIGHT_M / max(height, 1e-3)
+        self.shape = self.shape.coarser(height)
 
     def human(self, local_J33: Tensor) -> Solids:
         """A human in a pose, local rotations (21, 3, 3)."""

@@ -15,7 +15,7 @@ from mrhubo.robot.urdf import Description
 from mrhubo.view.solids import Color, Solids
 from mrhubo.view.surfaces import Placed, Surface
 
-FINEST = 1 / 450
+_FINEST = 1 / 450
 """What is smaller, as a share of a robot's height, is not seen where it is drawn among others."""
 
 
@@ -32,10 +32,13 @@ class RobotShape:
         meshes = tuple(Placed.of(surface, _pose(link_poses, link)) for link, surface in self._surfaces)
         return replace(robot_solids(self._shapes, link_poses, self._sticks), meshes=meshes)
 
-    def coarser(self, metres: float) -> RobotShape:
-        """The same without what is smaller in its meshes, so that pictures in which it is not seen take less time."""
+    def coarser(self, tall_m: float) -> RobotShape:
+        """The same without what is not seen of the meshes of a robot that is so tall [m], so that pictures take less
+        time.
+        """
         found = copy.copy(self)
-        found._surfaces = [(link, surface.coarser(metres)) for link, surface in self._surfaces]
+        finest = _FINEST * max(tall_m, 1e-3)
+        found._surfaces = [(link, surface.coarser(finest)) for link, surface in self._surfaces]
         return found
 
 

@@ -9,7 +9,7 @@ Axes: S solids, P points.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -137,7 +137,7 @@ class Solids:
         """A copy in one RGB colour, 0..1."""
         copy = self.translated(np.zeros(3))
         copy.colors_S3[:] = color
-        copy.meshes = tuple(replace(mesh, color=color) for mesh in copy.meshes)
+        copy.meshes = tuple(mesh.recolored(color) for mesh in copy.meshes)
         return copy
 
     def extent(self, direction_3: np.ndarray) -> tuple[float, float]:

@@ -65,14 +65,21 @@ class Placed:
     """A rotation times a size."""
     place_3: np.ndarray
     """Metres."""
-    color: Color
-    """RGB, 0..1; the surface's own has no say."""
 
     @classmethod
     def of(cls, surface: Surface, pose_44: np.ndarray) -> Placed:
-        """A surface with its frame at a pose (4, 4), m, in its own colour."""
+        """A surface with its frame at a pose (4, 4), m."""
         pose = np.asarray(pose_44, float)
-        return cls(surface, pose[:3, :3], pose[:3, 3], surface.color)
+        return cls(surface, pose[:3, :3], pose[:3, 3])
+
+    @property
+    def color(self) -> Color:
+        """RGB, 0..1."""
+        return self.surface.color
+
+    def recolored(self, color: Color) -> Placed:
+        """The same in another colour, RGB, 0..1."""
+        return replace(self, surface=replace(self.surface, color=color))
 
     def moved(self, turn_33: np.ndarray, place_3: np.ndarray) -> Placed:
         """The same, turned (or made larger) about the origin, then shifted, m."""

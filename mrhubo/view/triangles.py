@@ -8,8 +8,6 @@ the viewer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from mrhubo.view.raster import Canvas
@@ -23,27 +21,25 @@ _EDGE = np.float32(1e-4)
 def draw_triangles(canvas: Canvas, corners_F33: np.ndarray, owner_F: np.ndarray) -> None:
     """Puts triangles, given in the picture frame [m], on a canvas as solids ``owner_F``, and their normals beside."""
     height, width = canvas.depth_HW.shape
-    pixel_F3 = corners_F33[..., 0] / np.float32(canvas.pixel_m) + np.float32(width / 2 - 0.5)
-    line_F3 = np.float32(height / 2 - 0.5) - corners_F33[..., 1] / np.float32(canvas.pixel_m)
-    first_F2 = np.stack([np.ceil(pixel_F3.min(axis=1)), np.ceil(line_F3.min(axis=1))], axis=1).clip(0)
-    last_F2 = np.stack([np.floor(pixel_F3.max(axis=1)), np.floor(line_F3.max(axis=1))], axis=1)
-    last_F2 = np.minimum(last_F2, [width - 1, height - 1])
+    place_F33 = corners_F33 * np.array([1 / canvas.pixel_m, -1 / canvas.pixel_m, 1.0], np.float32)
+    place_F33[..., :2] += np.array([width / 2 - 0.5, height / 2 - 0.5], np.float32)
+    first_F2 = np.ceil(place_F33[..., :2].min(axis=1)).clip(0)
+    last_F2 = np.minimum(np.floor(place_F33[..., :2].max(axis=1)), [width - 1, height - 1])
     seen_F = np.flatnonzero((last_F2 >= first_F2).all(axis=1) & np.isfinite(corners_F33).all(axis=(1, 2)))
     if not len(seen_F):
         return
     face_N = np.full(height * width, -1, np.int64)
-    corners_F33, owner_F = corners_F33[seen_F], owner_F[seen_F]
-    pixel_F3, line_F3 = pixel_F3[seen_F], line_F3[seen_F]
+    corners_F33, owner_F, place_F33 = corners_F33[seen_F], owner_F[seen_F], place_F33[seen_F]
     first_F2, last_F2 = first_F2[seen_F].astype(np.int64), last_F2[seen_F].astype(np.int64)
-    span_F2 = last_F2 - first_F2 + 1
-    size_F2 = 1 << np.ceil(np.log2(span_F2)).astype(np.int64)  # the same for many, so that they are done at once
+    size_F2 = 1 << np.ceil(np.log2(last_F2 - first_F2 + 1)).astype(np.int64)
     code_F = size_F2[:, 0] * (2 * height + 2) + size_F2[:, 1]
-    for code in np.unique(code_F):
-        chosen = np.flatnonzero(code_F == code)
-        wide, high = size_F2[chosen[0]].tolist()
-        for part in _parts(chosen, max(1, _AT_ONCE // (wide * high))):
-            _put(canvas, corners_F33[part, :, 2], pixel_F3[part], line_F3[part], first_F2[part], last_F2[part], part,
-                 (wide, high), face_N)  # fmt: skip
+    for code in np.unique(code_F):  # sizes are powers of two, so that many triangles have the same and are done at once
+        chosen_F = np.flatnonzero(code_F == code)
+        wide, high = size_F2[chosen_F[0]].tolist()
+        count = max(1, _AT_ONCE // (wide * high))
+        for at in range(0, len(chosen_F), count):
+            number_F = chosen_F[at : at + count]
+            _put(canvas, face_N, number_F, place_F33[number_F], first_F2[number_F], last_F2[number_F], (wide, high))
     drawn_N = np.flatnonzero(face_N >= 0)
     winner_N = face_N[drawn_N]
     canvas.owner_HW.ravel()[drawn_N] = owner_F[winner_N]
@@ -52,25 +48,20 @@ def draw_triangles(canvas: Canvas, corners_F33: np.ndarray, owner_F: np.ndarray)
     canvas.normal_HW3.reshape(-1, 3)[drawn_N] = _normals(corners_F33[winner_N])
 
 
-def _parts(rows_F: np.ndarray, count: int) -> Iterator[np.ndarray]:
-    return (rows_F[at : at + count] for at in range(0, len(rows_F), count))
-
-
 def _put(
     canvas: Canvas,
-    depth_F3: np.ndarray,
-    pixel_F3: np.ndarray,
-    line_F3: np.ndarray,
+    face_N: np.ndarray,
+    number_F: np.ndarray,
+    place_F33: np.ndarray,
     first_F2: np.ndarray,
     last_F2: np.ndarray,
-    number_F: np.ndarray,
     size: tuple[int, int],
-    face_N: np.ndarray,
 ) -> None:
-    """Samples of triangles, none of which is larger than ``size`` pixels: depth, and number, where they are nearest."""
+    """Samples of triangles, none of which is larger than ``size`` pixels: depth, and number, where they are nearest.
+    ``place_F33``: column and row of the corners, and their depth [m].
+    """
     width = canvas.depth_HW.shape[1]
-    x0_F, x1_F, x2_F = pixel_F3.T
-    y0_F, y1_F, y2_F = line_F3.T
+    (x0_F, x1_F, x2_F), (y0_F, y1_F, y2_F), depth_3F = place_F33.transpose(2, 1, 0)
     area_F = (x1_F - x0_F) * (y2_F - y0_F) - (x2_F - x0_F) * (y1_F - y0_F)
     flat_F = np.abs(area_F) < 1e-12  # seen from its edge
     inverse_F = np.where(flat_F, np.float32(0.0), 1.0 / np.where(flat_F, np.float32(1.0), area_F))
@@ -90,9 +81,9 @@ def _put(
     inside_FYX &= (rows_FY <= last_F2[:, 1:])[:, :, None]
     triangle_N, row_N, column_N = np.nonzero(inside_FYX)
     place_N = rows_FY[triangle_N, row_N] * width + columns_FX[triangle_N, column_N]
-    near_F3 = depth_F3[triangle_N]
-    found_N = near_F3[:, 0] + second_FYX[inside_FYX] * (near_F3[:, 1] - near_F3[:, 0])
-    found_N += third_FYX[inside_FYX] * (near_F3[:, 2] - near_F3[:, 0])
+    near_3N = depth_3F[:, triangle_N]
+    found_N = near_3N[0] + second_FYX[inside_FYX] * (near_3N[1] - near_3N[0])
+    found_N += third_FYX[inside_FYX] * (near_3N[2] - near_3N[0])
     depth_N = canvas.depth_HW.reshape(-1)
     kept_N = np.flatnonzero(found_N > depth_N[place_N])
     kept_N = kept_N[found_N[kept_N].argsort(kind="stable")]  # the nearest last: it stays where several fall on a pixel

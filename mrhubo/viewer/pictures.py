@@ -15,7 +15,7 @@ from mrhubo.body import KEYPOINT_NAMES
 from mrhubo.errors import UserError
 from mrhubo.frames import base_to_human
 from mrhubo.view import Solids, animated_frames, figure_sheet, human_solids, save_gif, save_png
-from mrhubo.view.robot import FINEST, RobotShape
+from mrhubo.view.robot import RobotShape
 from mrhubo.viewer.film import save_mp4
 from mrhubo.viewer.performance import Performance
 from mrhubo.viewer.person import Person
@@ -80,8 +80,8 @@ def _robot_solids(robot: Performance, standing: Standing, frames: Sequence[int])
     base_T44 = _in_place(standing, frames)
     poses_TL44[..., :3, 3] /= robot.scale  # shapes are drawn at their own size, and then made larger
     if len(frames):
-        tall_m = float(np.ptp(shape.solids(dict(zip(names, poses_TL44[0], strict=True))).bounds()[:, 2]))
-        shape = shape.coarser(FINEST * max(tall_m, 1e-3))
+        first = shape.solids(dict(zip(names, poses_TL44[0], strict=True)))
+        shape = shape.coarser(float(np.ptp(first.bounds()[:, 2])))
     return [
         shape.solids(dict(zip(names, poses_L44, strict=True))).scaled(robot.scale).transformed(base_44)
         for poses_L44, base_44 in zip(poses_TL44, base_T44, strict=True)

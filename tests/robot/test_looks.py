@@ -56,7 +56,7 @@ def test_the_figure_is_as_large_as_its_meshes(tmp_path: Path) -> None:
     looks(tmp_path, ROD.format("visual"))
     shape, ankle_44 = RobotShape(describe(tmp_path / "my.urdf")), np.eye(4)
     ankle_44[:3, 3] = [0.0, 0.0, -0.4]
-    bounds = shape.coarser(0.001).solids({"shin": np.eye(4), "foot": ankle_44}).bounds()
+    bounds = shape.coarser(0.45).solids({"shin": np.eye(4), "foot": ankle_44}).bounds()
     assert np.allclose(bounds, [[-0.125, -0.05, -0.425], [0.125, 0.05, 0.2]], atol=2e-3)
     with pytest.raises(ValueError, match="foot"):
         shape.solids({"shin": np.eye(4)})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -18,7 +20,7 @@ def surface_of(mesh: trimesh.Trimesh) -> Surface:
 
 
 def figure_of(*meshes: Placed) -> Solids:
-    return Solids(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), meshes=meshes)
+    return replace(Solids.empty(), meshes=meshes)
 
 
 def placed(mesh: trimesh.Trimesh) -> Placed:

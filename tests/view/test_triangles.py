@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -24,7 +26,7 @@ def ball(centre_3: np.ndarray, radius: float) -> Solids:
 def figure_of(mesh: trimesh.Trimesh, color: tuple[float, float, float] = GREY) -> Solids:
     surface = Surface.of(np.asarray(mesh.vertices), np.asarray(mesh.faces), color)
     placed = Placed.of(surface, np.eye(4))
-    return Solids(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), meshes=(placed,))
+    return replace(Solids.empty(), meshes=(placed,))
 
 
 def picture(*figures: Solids) -> np.ndarray:
