@@ -15,6 +15,12 @@ from mrhubo.errors import UserError, first_line, nearest, shortened
 
 _DESCRIPTIONS = "robot_descriptions"
 _PATHS = ("URDF_PATH", "MJCF_PATH")
+_LONGEST_NAME = 40
+_SAYS_NOTHING = {"description", "main", "model", "mujoco_model", "robot", "scene", "urdf"}
+"""Names that files of many robots have, such as `model.urdf` (Gazebo, icub-models) and `robot.xml` (robosuite)."""
+_DECLARED = re.compile(rb"""<(?:robot|mujoco)\b[^<>]*?\s(?:name|model)\s*=\s*["']([^"'<>]+)""")
+_BEGINNING = 100_000
+"""Bytes in which the first element of a robot's file stands."""
 
 
 def find_model(word: str) -> Path:
@@ -59,6 +65,32 @@ def _described(word: str) -> Path:
 def _no_file(word: str) -> str:
     near = nearest(word, shipped_configs())
     return f"'{word}' is no file" + (f" (a config that ships with mrhubo: '{near}')" if near is not None else "")
+
+
+def model_name(path: Path) -> str:
+    """What a robot is called where nobody says it: as its file, or as the file says where the file's own name, such as
+    `model.urdf`, says nothing. Letters, digits, `-` and `_`.
+    """
+    name = _plain(path.name.partition(".")[0])
+    if name.lower() in _SAYS_NOTHING:
+        declared = _declared_name(path)
+        name = name if declared.lower() in _SAYS_NOTHING else declared or name
+    return name or "robot"
+
+
+def _declared_name(path: Path) -> str:
+    """What the first element of a file calls it; nothing where it does not, or where the file cannot be read, of which
+    its reader tells.
+    """
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        if (found := _DECLARED.search(file.read(_BEGINNING))) is not None:
+            return _plain(found[1].decode(errors="replace"))
+    return ""
+
+
+def _plain(name: str) -> str:
+    letters = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
+    return letters.strip("_-")[:_LONGEST_NAME]
 
 
 @contextlib.contextmanager

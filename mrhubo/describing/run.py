@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mrhubo.config import is_config, load_config
-from mrhubo.describing.model_file import find_model, model_named
+from mrhubo.describing.model_file import find_model, model_name, model_named
 from mrhubo.describing.roots import better_root
 from mrhubo.describing.yaml_file import described_yaml, keypoint_entries, unsure
 from mrhubo.errors import InputWarning, UserError
@@ -24,7 +24,6 @@ from mrhubo.robot.urdf import describe as read_urdf
 from mrhubo.runtime.names import check_name
 
 DEFAULT_FOLDER = Path("conf")
-_LONGEST_NAME = 40
 _MOST_JOINTS = 1_000
 """Joints that move: known humanoids with all their fingers have 150, and looking takes the square of their number."""
 
@@ -148,7 +147,7 @@ def open_robot(word: str, whole_body: bool = False) -> Robot:
         if (turned := _by_its_trunk(description, found, whole_body, description.path)) is not None:
             description, found, told = turned
             warnings.warn(f"{word}: {told}", InputWarning, stacklevel=2)
-        robot = _robot(description, found, _file_name(model))
+        robot = _robot(description, found, model_name(model))
     for about, text in unsure(found).items():
         warnings.warn(f"{word}: {about}: {text}", InputWarning, stacklevel=2)
     if guessed := found.guessed:
@@ -186,7 +185,7 @@ def _by_its_trunk(
 
 def default_config(path: Path, whole_body: bool = False) -> Path:
     """Where the config of a model goes if nobody says it."""
-    return DEFAULT_FOLDER / f"{_file_name(path)}{'-whole-body' if whole_body else ''}.yaml"
+    return DEFAULT_FOLDER / f"{model_name(path)}{'-whole-body' if whole_body else ''}.yaml"
 
 
 def draw_config(file: Path, picture: Path) -> str | None:
@@ -280,9 +279,3 @@ def _as_urdf(path: Path, file: Path, force: bool) -> Iterator[tuple[Path, tuple[
             with atomic_path(urdf) as temporary:
                 temporary.write_bytes(former)
         raise
-
-
-def _file_name(path: Path) -> str:
-    """What a robot's config is called where nobody says it: as its model."""
-    plain = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in path.name.partition(".")[0])
-    return plain.strip("_-")[:_LONGEST_NAME] or "robot"

@@ -35,6 +35,26 @@ def test_a_description_is_a_config_that_a_fit_takes(urdf: Path, tmp_path: Path) 
     assert robot.urdf.samefile(urdf) and robot.name == "my"
 
 
+@pytest.mark.parametrize(
+    ("file", "declared", "name"),
+    [
+        ("model.urdf", '<robot name="iCub">', "iCub"),
+        ("Robot.URDF", "<robot version='1' name = 'my bot/2'>", "my_bot_2"),
+        ("model.urdf", '<robot name="model">', "model"),
+        ("model.urdf", "<robot>", "model"),
+        ("g1.urdf", '<robot name="other">', "g1"),
+    ],
+)
+def test_a_file_whose_name_says_nothing_has_that_which_it_gives_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, declared: str, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = re.sub("<robot[^>]*>", declared, PAIR, count=1)
+    Path(file).write_text(f'<?xml version="1.0"?>\n<!-- a link is named below: name="no" -->\n{text}')
+    assert describe_model(file).file == Path(f"conf/{name}.yaml")
+    assert open_robot(file).name == name
+
+
 def test_nothing_is_replaced_without_force(urdf: Path) -> None:
     describe_model("my.urdf")
     Path("conf/my.yaml").write_text("mine")
