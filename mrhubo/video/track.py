@@ -11,12 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.robot_motion.clock import rate_of_step, rate_of_times, seconds
+from mrhubo.robot_motion.clock import STEADY, at_rate, rate_of_step, rate_of_times, seconds, uneven_steps
 from mrhubo.video.estimator import PoseEstimator
 from mrhubo.video.frames import MAX_FRAMES, frames
-
-_STEADY = 0.2
-"""Of a frame: so far may a steady video's frames be from where a fixed rate has them; files round times to 1 ms."""
 
 
 @dataclass(frozen=True)
@@ -59,27 +56,13 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
     notes = [] if seen == len(times) else [f"nobody is found in {len(times) - seen:,} of {len(times):,} frames"]
     time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
     rate = rate_of_times(time_T, seconds)
-    if np.abs(time_T * rate - np.arange(len(time_T))).max() > _STEADY:
-        step_T = np.diff(time_T)
-        rate = rate_of_step(f"{np.median(step_T):.3g}") or rate  # files round times to 1 ms
+    if np.abs(time_T * rate - np.arange(len(time_T))).max() > STEADY:
+        rate = rate_of_step(f"{np.median(np.diff(time_T)):.3g}") or rate  # files round times to 1 ms
         notes.append(
-            f"its {len(time_T):,} frames follow each other after {1000 * step_T.min():.0f} to"
-            f" {1000 * step_T.max():.0f} ms: points are interpolated to {rate:.4g} frames per second"
+            f"its {len(time_T):,} frames follow each other after {uneven_steps(time_T)} ms: points are interpolated to"
+            f" {rate:.4g} frames per second"
         )
         if time_T[-1] * rate > MAX_FRAMES:
             raise UserError(f"{path}: its {len(times):,} frames are spread over {time_T[-1]:.3g} s; that is no film")
         point_TK3, visibility_TK = (at_rate(time_T, value, rate) for value in (point_TK3, visibility_TK))
     return Track(rate, point_TK3, visibility_TK, tuple(notes))
-
-
-def at_rate(time_T: np.ndarray, value_TX: np.ndarray, rate: float) -> np.ndarray:
-    """Values (S, ...) at a fixed rate, on the straight lines between those (T, ...) at given times, the first of which
-    is 0 [s]; NaN between two of which one is.
-    """
-    time_S = np.arange(int(time_T[-1] * rate * (1 + 1e-9)) + 1) / rate
-    before_S = np.clip(np.searchsorted(time_T, time_S, side="right") - 1, 0, len(time_T) - 2)
-    share_S = (time_S - time_T[before_S]) / (time_T[before_S + 1] - time_T[before_S])
-    share_SX = np.clip(share_S, 0, 1).reshape(-1, *[1] * (value_TX.ndim - 1))
-    first, second = value_TX[before_S], value_TX[before_S + 1]
-    between = first + share_SX * (second - first)
-    return np.where(share_SX == 0, first, np.where(share_SX == 1, second, between))

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from mrhubo.errors import UserError
+from mrhubo.robot_motion.clock import at_rate
 from mrhubo.video import track as module
 from mrhubo.video.estimator import Estimate
 from mrhubo.video.frames import Frame
-from mrhubo.video.track import at_rate, track_body
+from mrhubo.video.track import track_body
 
 
 class Known:
