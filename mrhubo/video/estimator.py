@@ -2,7 +2,7 @@
 
 The detector looks for somebody until there is somebody; from then on each picture's landmarks tell where to look in the
 next (`mediapipe/modules/pose_landmark/pose_landmark_cpu.pbtxt`). Somebody who is lost is looked for again in the same
-picture.
+picture; of several, who is nearest to where they were is taken.
 
 Legend: K = 33 points, H, W pixels.
 """
@@ -22,6 +22,9 @@ from mrhubo.video.region import Region
 
 PRESENT = 0.5
 """From this presence on there is somebody."""
+_ELSEWHERE = 0.35
+"""How far from a body, in sides of the smaller square around one, another is: of one body, detector and landmarks are
+0.15 apart at most."""
 
 
 class Estimate(NamedTuple):
@@ -58,10 +61,11 @@ class PoseEstimator:
         self._detector = Detector(folder / DETECTOR, threads)
         self._network = LandmarkNetwork(folder / f"pose_landmark_{model}.tflite", threads)
         self._region: Region | None = None
+        self._last: Region | None = None
 
     def reset(self) -> None:
         """Forgets where somebody was: what comes next has nothing to do with what came before."""
-        self._region = None
+        self._region = self._last = None
 
     def landmarks(self, image_HW3: np.ndarray) -> Estimate:
         """The points of the body in the next picture.
@@ -76,14 +80,22 @@ class PoseEstimator:
             raise ValueError(f"a picture is (height, width, 3) of uint8, not {image_HW3.shape} of {image_HW3.dtype}")
         known, self._region = self._region, None
         found = None if known is None else self._network.find(image_HW3, known)
-        if (found is None or not _is_body(found)) and (region := self._detector.find(image_HW3)) is not None:
+        if (found is None or not _is_body(found)) and (regions := self._detector.find(image_HW3)):
+            last = self._last
+            region = regions[0] if last is None else min(regions, key=last.apart)
             found = self._network.find(image_HW3, region)
         if found is not None and _is_body(found):
             self._region = found.region
+            self._last = found.region or self._last
             return Estimate(found.point_K3, found.visibility_K, found.presence, found.pixel_K2)
         nowhere = np.full((POINTS, 3), np.nan)
         presence = 0.0 if found is None else found.presence
         return Estimate(nowhere, np.zeros(POINTS), presence, nowhere[:, :2].copy())
+
+    def sees_others(self, image_HW3: np.ndarray) -> bool:
+        """Whether somebody is in a picture, RGB, uint8, where the one that was found in the last picture is not."""
+        here = self._region
+        return here is not None and any(here.apart(region) > _ELSEWHERE for region in self._detector.find(image_HW3))
 
 
 def _is_body(found: Landmarks) -> bool:

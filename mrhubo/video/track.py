@@ -14,6 +14,14 @@ from mrhubo.errors import UserError
 from mrhubo.robot_motion.clock import STEADY, at_rate, rate_of_step, rate_of_times, seconds, uneven_steps
 from mrhubo.video.estimator import PoseEstimator
 from mrhubo.video.frames import MAX_FRAMES, frames
+from mrhubo.video.people import tell_apart
+
+_LOOK_S = 0.5
+"""How often it is looked who else is there [s]."""
+_SMALL = 0.2
+"""Of the longer side of a picture: smaller people are often missed, or taken for turned or mirrored ones."""
+_TRUNK = [11, 12, 23, 24]
+"""Shoulders and hips among the points."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +35,17 @@ class Track:
     visibility_TK: np.ndarray
     notes: tuple[str, ...] = ()
     """What is to be known about it, a sentence each."""
+    who_T: np.ndarray | None = None
+    """Who it is, people counted as they come, -1 where nobody is there; None: it is one throughout."""
+
+    def only(self, who: int) -> Track:
+        """One of the people, from the first frame in which they are seen to the last."""
+        seen_T = np.ones(len(self.point_TK3), bool) if self.who_T is None else self.who_T == who
+        first, last = np.flatnonzero(seen_T)[[0, -1]].tolist()
+        part, hidden = slice(first, last + 1), ~seen_T[first : last + 1]
+        point_TK3, visibility_TK = self.point_TK3[part].copy(), self.visibility_TK[part].copy()
+        point_TK3[hidden], visibility_TK[hidden] = np.nan, 0.0
+        return Track(self.rate, point_TK3, visibility_TK, self.notes)
 
     @property
     def seen_T(self) -> np.ndarray:
@@ -42,9 +61,14 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
         UserError: the file is no video, or damaged (`mrhubo.video.frames`); it has one frame, or nobody is in it.
     """
     estimator.reset()
-    times, points, visible = [], [], []
+    times, points, pixels, visible = [], [], [], []
+    looks, longer = list[bool](), 1
     for time, image_HW3 in frames(path):
         found = estimator.landmarks(image_HW3)
+        if time >= _LOOK_S * len(looks):
+            looks.append(estimator.sees_others(image_HW3))
+        pixels.append(found.pixel_K2)
+        longer = max(image_HW3.shape[:2])
         times.append(time)
         points.append(found.point_K3)
         visible.append(found.visibility_K)
@@ -52,9 +76,23 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
         raise UserError(f"{path}: has one frame; a motion needs two at least")
     seen = sum(bool(np.isfinite(point_K3).all()) for point_K3 in points)
     if not seen:
-        raise UserError(f"{path}: nobody is found in any of its {len(times):,} frames")
+        raise UserError(
+            f"{path}: nobody is found in any of its {len(times):,} frames; a person has to be as tall as a quarter of"
+            " the picture's longer side, and a film of smaller ones to be cut to them"
+        )
     notes = [] if seen == len(times) else [f"nobody is found in {len(times) - seen:,} of {len(times):,} frames"]
+    if any(looks):
+        notes.append(
+            f"several people are seen in {sum(looks):,} of {len(looks):,} pictures that were looked through: one is"
+            " followed, the surest one at first, and may be mistaken for another where one covers the other"
+        )
+    share = float(np.nanmedian(np.ptp(np.stack(pixels), axis=1).max(1))) / longer
+    if 0 < share < _SMALL:
+        notes.append(
+            f"the person is {share:.0%} of the picture's longer side tall: cut the film to them, limbs may be far off"
+        )
     time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
+    who_T = tell_apart(time_T, point_TK3, np.stack(pixels), _TRUNK)
     rate = rate_of_times(time_T, seconds)
     if np.abs(time_T * rate - np.arange(len(time_T))).max() > STEADY:
         rate = rate_of_step(f"{np.median(np.diff(time_T)):.3g}") or rate  # files round times to 1 ms
@@ -65,4 +103,8 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
         if time_T[-1] * rate > MAX_FRAMES:
             raise UserError(f"{path}: its {len(times):,} frames are spread over {time_T[-1]:.3g} s; that is no film")
         point_TK3, visibility_TK = (at_rate(time_T, value, rate) for value in (point_TK3, visibility_TK))
-    return Track(rate, point_TK3, visibility_TK, tuple(notes))
+        place_T = at_rate(time_T, np.arange(len(who_T)), rate)
+        before_T, after_T = (who_T[end(place_T).astype(int)] for end in (np.floor, np.ceil))
+        who_T = np.where(before_T == after_T, before_T, -1)
+        point_TK3[who_T < 0], visibility_TK[who_T < 0] = np.nan, 0.0
+    return Track(rate, point_TK3, visibility_TK, tuple(notes), who_T)
