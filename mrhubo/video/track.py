@@ -15,6 +15,7 @@ from mrhubo.robot_motion.clock import STEADY, at_rate, rate_of_step, rate_of_tim
 from mrhubo.video.estimator import PoseEstimator
 from mrhubo.video.frames import MAX_FRAMES, frames
 from mrhubo.video.people import tell_apart
+from mrhubo.video.sides import EXCHANGED, exchanged_points
 
 _LOOK_S = 0.5
 """How often it is looked who else is there [s]."""
@@ -93,6 +94,14 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
         )
     time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
     who_T = tell_apart(time_T, point_TK3, np.stack(pixels), _TRUNK)
+    exchanged_TK = exchanged_points(time_T, point_TK3, who_T)
+    if exchanged_TK.any():
+        point_TK3 = np.where(exchanged_TK[..., None], point_TK3[:, EXCHANGED], point_TK3)
+        visibility_TK = np.where(exchanged_TK, visibility_TK[:, EXCHANGED], visibility_TK)
+        notes.append(
+            f"left and right are exchanged for a moment, in {int(exchanged_TK.any(1).sum()):,} of {seen:,} frames: they"
+            " are put back"
+        )
     rate = rate_of_times(time_T, seconds)
     if np.abs(time_T * rate - np.arange(len(time_T))).max() > STEADY:
         rate = rate_of_step(f"{np.median(np.diff(time_T)):.3g}") or rate  # files round times to 1 ms

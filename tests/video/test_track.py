@@ -12,10 +12,12 @@ from mrhubo.robot_motion.clock import at_rate
 from mrhubo.video import track as module
 from mrhubo.video.estimator import Estimate
 from mrhubo.video.frames import Frame
+from mrhubo.video.sides import EXCHANGED
 from mrhubo.video.track import track_body
 
 FAR = 150
 SPREAD_K3 = np.random.default_rng(0).uniform(-1, 1, (33, 3))
+SPREAD_K3[[11, 12, 23, 24]] = [[1, 1, 0], [-1, 1, 0], [1, 0, 0], [-1, 0, 0]]
 """Points of those who are found in pictures brighter than `FAR`, by whom one can tell how large they are: a metre is a
 pixel, and places are brightnesses."""
 
@@ -97,6 +99,20 @@ def test_who_is_followed_after_another_is_somebody_else(film) -> None:
     track = track_body(Path("a.mkv"), Known())
     assert track.who_T is not None and track.who_T.tolist() == [0, 0, 0, 0, -1, 1, 1, 1]
     assert track.seen_T.tolist() == [True] * 4 + [False] + [True] * 3, "nothing is between two people"
+
+
+def test_sides_that_change_for_a_moment_are_put_back(film) -> None:
+    class Doubting(Known):
+        def landmarks(self, image_HW3: np.ndarray) -> Estimate:
+            found = super().landmarks(np.full_like(image_HW3, 200))
+            wrong = int(image_HW3[0, 0, 0]) == 201
+            order = EXCHANGED if wrong else np.arange(33)
+            return found._replace(point_K3=found.point_K3[order], visibility_K=np.arange(33)[order] / 33)
+
+    film([number / 30 for number in range(12)], [200] * 5 + [201] * 3 + [200] * 4)
+    track = track_body(Path("a.mkv"), Doubting())
+    assert np.ptp(track.point_TK3, axis=0).max() == 0 and np.ptp(track.visibility_TK, axis=0).max() == 0
+    assert track.notes == ("left and right are exchanged for a moment, in 3 of 12 frames: they are put back",)
 
 
 def test_it_is_told_if_others_are_there(film) -> None:
