@@ -60,7 +60,7 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "a robot's, as Unitree's tools write them, are no human's; of points, the first line must name the columns",
     ),
     (
-        r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b",
+        r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b(?!\s*[{,:.\[])",
         "a skeleton (.asf) without a motion",
         "name the .amc file, and leave this one beside it",
     ),

@@ -56,6 +56,15 @@ def test_what_to_do_is_said(what: str, tmp_path: Path) -> None:
         mrhubo.read_motion(path)
 
 
+@pytest.mark.parametrize(
+    "start", [":root {\n  --blue: #00f;\n}\n", ":root{color:red}", ":root,\n:host { }", ":root:not(.a) {}"]
+)
+def test_a_style_sheet_is_no_skeleton(start: str, tmp_path: Path) -> None:
+    (tmp_path / "style.css").write_text(start)
+    with pytest.raises(NoMotion, match="is text that begins with ':root"):
+        mrhubo.read_motion(tmp_path / "style.css")
+
+
 def test_a_skeleton_beside_its_motion_is_no_motion_of_a_folder(tmp_path: Path) -> None:
     (tmp_path / "07.asf").write_text(":version 1.10\n")
     (tmp_path / "scene.glb").write_bytes(b"glTF\x02\0\0\0")
