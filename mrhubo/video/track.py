@@ -19,8 +19,8 @@ from mrhubo.video.sides import EXCHANGED, exchanged_points
 
 _LOOK_S = 0.5
 """How often it is looked who else is there [s]."""
-_SMALL = 0.2
-"""Of the longer side of a picture: smaller people are often missed, or taken for turned or mirrored ones."""
+_SMALL = 120.0
+"""Pixels: smaller people are often missed, or taken for turned or mirrored ones."""
 _TRUNK = [11, 12, 23, 24]
 """Shoulders and hips among the points."""
 
@@ -63,13 +63,12 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
     """
     estimator.reset()
     times, points, pixels, visible = [], [], [], []
-    looks, longer = list[bool](), 1
+    looks = list[bool]()
     for time, image_HW3 in frames(path):
         found = estimator.landmarks(image_HW3)
         if time >= _LOOK_S * len(looks):
             looks.append(estimator.sees_others(image_HW3))
         pixels.append(found.pixel_K2)
-        longer = max(image_HW3.shape[:2])
         times.append(time)
         points.append(found.point_K3)
         visible.append(found.visibility_K)
@@ -78,8 +77,8 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
     seen = sum(bool(np.isfinite(point_K3).all()) for point_K3 in points)
     if not seen:
         raise UserError(
-            f"{path}: nobody is found in any of its {len(times):,} frames; a person has to be as tall as a quarter of"
-            " the picture's longer side, and a film of smaller ones to be cut to them"
+            f"{path}: nobody is found in any of its {len(times):,} frames; a person has to be as tall as a sixth of"
+            " the picture's shorter side, and a film of smaller ones to be cut to them"
         )
     notes = [] if seen == len(times) else [f"nobody is found in {len(times) - seen:,} of {len(times):,} frames"]
     if any(looks):
@@ -87,10 +86,10 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
             f"several people are seen in {sum(looks):,} of {len(looks):,} pictures that were looked through: one is"
             " followed, the surest one at first, and may be mistaken for another where one covers the other"
         )
-    share = float(np.nanmedian(np.ptp(np.stack(pixels), axis=1).max(1))) / longer
-    if 0 < share < _SMALL:
+    tall = float(np.nanmedian(np.ptp(np.stack(pixels), axis=1).max(1)))
+    if 0 < tall < _SMALL:
         notes.append(
-            f"the person is {share:.0%} of the picture's longer side tall: cut the film to them, limbs may be far off"
+            f"the person is {tall:.0f} pixels tall: limbs may be far off, a larger picture of them would be better"
         )
     time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
     who_T = tell_apart(time_T, point_TK3, np.stack(pixels), _TRUNK)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrhubo.video.detector import SIDE, anchors, bodies
+from mrhubo.video.detector import SIDE, anchors, bodies, parts_of
 
 
 def told(*boxes: tuple[float, float, float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -44,3 +44,10 @@ def test_nobody_where_none_is_sure() -> None:
     assert found_42 == pytest.approx(np.full((4, 2), 0.5), abs=1e-5)
     (found_42,) = bodies(*told((0.5, 0.5, 0.0, 3.0)))
     assert found_42 == pytest.approx(np.full((4, 2), 0.5), abs=1e-5), "a box without area"
+
+
+def test_parts_cover_a_picture_and_half_of_each_other() -> None:
+    parts = parts_of(200, 100, 50)
+    assert len(parts) == 7 * 3 and {part.size for part in parts} == {50} and (parts[0].x, parts[0].y) == (25, 25)
+    assert max(part.x for part in parts) == 175 and max(part.y for part in parts) == 75
+    assert len(parts_of(100, 100, 100)) == 1 and len(parts_of(130, 100, 100)) == 2
