@@ -27,6 +27,8 @@ _OVERLAP = 0.3
 _CLOSER, _FILLS, _WIDER, _WANDERS = 2, 0.6, 1.3, 0.5
 """How often a body is looked at again whose square is smaller than this share of a picture's longer side, how much
 wider, and how far off, in sides of the smaller square, the same one is then."""
+_LONGEST = 8
+"""Parts of a picture that is longer, in sides of a part, would be too many."""
 _HIPS, _CIRCLE = 0, 1
 """Of the four points that each anchor tells: the middle of the hips, and where the circle around them that holds the
 whole body is straight above."""
@@ -59,7 +61,7 @@ class Detector:
         only bodies that are less tall than a fifth of the longer side.
         """
         whole = Region.whole(image_HW3.shape[1], image_HW3.shape[0])
-        return [self._closer(image_HW3, region) for region in self._look(image_HW3, whole)]
+        return self._look(image_HW3, whole)
 
     def find_small(self, image_HW3: np.ndarray) -> list[Region]:
         """The same of bodies in parts of a picture, squares of its shorter side, or else of half of it: of the first
@@ -67,12 +69,14 @@ class Detector:
         """
         height, width = image_HW3.shape[:2]
         for side in (min(height, width), min(height, width) // 2):
-            for part in parts_of(width, height, side) if side else ():
+            if not 0 < max(height, width) <= _LONGEST * side:
+                break
+            for part in parts_of(width, height, side):
                 if found := self._look(image_HW3, part):
-                    return [self._closer(image_HW3, region) for region in found]
+                    return found
         return []
 
-    def _closer(self, image_HW3: np.ndarray, region: Region) -> Region:
+    def closer(self, image_HW3: np.ndarray, region: Region) -> Region:
         """The same body's, of a square that it fills better, if it is small in a picture: the network tells the hips of
         those in wrong places.
         """

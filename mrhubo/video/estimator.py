@@ -103,7 +103,8 @@ class PoseEstimator:
         """
         if not regions:
             return None
-        found = self._network.find(image_HW3, min(regions, key=self._last.apart) if self._last else regions[0])
+        region = min(regions, key=self._last.apart) if self._last else regions[0]
+        found = self._network.find(image_HW3, self._detector.closer(image_HW3, region))
         return found if found.presence >= presence else None
 
     def sees_others(self, image_HW3: np.ndarray) -> bool:

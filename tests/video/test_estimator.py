@@ -117,6 +117,17 @@ def test_nobody_is_looked_for_in_parts_now_and_then(estimator: PoseEstimator, mo
     assert len(looks) == 3
 
 
+def test_of_a_long_picture_no_parts_are_looked_through(
+    estimator: PoseEstimator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[int] = []
+    monkeypatch.setattr(estimator._detector, "_look", lambda image, square: looks.append(1) or [])
+    for width, height in ((8192, 1), (1, 8192), (4096, 300), (1, 1)):
+        assert estimator._detector.find_small(np.zeros((height, width, 3), np.uint8)) == []
+    assert len(looks) <= 1
+    assert estimator._detector.find_small(np.zeros((1080, 1920, 3), np.uint8)) == [] and 20 < len(looks) < 30
+
+
 def test_others_are_seen(estimator: PoseEstimator, scene) -> None:
     image_HW3, _ = scene
     estimator.reset()
