@@ -33,6 +33,7 @@ from tests.motion.damage import altered_words, damaged_by, read_or_refused
 from tests.motion.readers import (
     estimator_files,
     test_amc,
+    test_deepmimic,
     test_frame_lists,
     test_humanml,
     test_keypoints,
@@ -146,6 +147,10 @@ def _rows(width: int) -> Callable[[Path], None]:
     return lambda path: np.save(path, test_humanml.rows(width).astype(np.float32))
 
 
+def _deepmimic(path: Path) -> None:
+    test_deepmimic.write(path, test_deepmimic.rows(_FRAMES))
+
+
 def _parameter_table(path: Path) -> None:
     path.write_text(test_parameter_table.table(test_parameter_table.columns(0, "flat", 24), rows=[*range(_FRAMES)]))
 
@@ -173,6 +178,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     **{f"features, {width}": ("damaged.npy", _rows(width)) for width in test_humanml.ORDERS},
     "parameters, a line each": ("damaged.csv", _parameter_table),
     "clips.json": ("damaged.json", lambda path: path.write_text(json.dumps(test_frame_lists.clips(24)))),
+    "deepmimic": ("damaged.json", _deepmimic),
     "points, a line each": ("damaged.csv", _point_table),
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),

@@ -3,7 +3,7 @@
 What is written is rounded: 0.033333 s is the step of 30 frames per second and not of 30.0003. Of the rates whose times
 a file's digits are, the roundest is meant.
 
-Legend: T frames.
+Legend: T frames, S frames of another rate, X numbers of a frame.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ between all times of a file, and so most likely is exact, if it has so many.
 """
 _CLOCKS = (1_000_000, 1_000)
 """Units of clocks that whole nanoseconds may come from: ms, us."""
+STEADY = 0.2
+"""Of a frame: so far may frames be from where a fixed rate has them; files round times to 1 ms."""
 _UNEVEN = 0.1
 """How far a step may be from the mean one, as a share of it: whole milliseconds at 120 frames a second are off by 8%, a
 frame that was dropped by 100%."""
@@ -116,6 +118,25 @@ def usual_rates(text: str) -> tuple[float, ...]:
     if step >= _COARSE * unit * (1 - 1e-9):
         return ()
     return tuple(rate for rate in _MOST_USUAL if _has_step(rate, step, unit))
+
+
+def uneven_steps(time_T: np.ndarray) -> str:
+    """The shortest and the longest step between times (T,) [s], in milliseconds, for a sentence."""
+    step_T = 1000 * np.diff(time_T)
+    return f"{step_T.min():.0f} to {step_T.max():.0f}"
+
+
+def at_rate(time_T: np.ndarray, value_TX: np.ndarray, rate: float) -> np.ndarray:
+    """Values (S, ...) at a fixed rate, on the straight lines between those (T, ...) at given times, the first of which
+    is 0 [s]; NaN between two of which one is.
+    """
+    time_S = np.arange(int(time_T[-1] * rate * (1 + 1e-9)) + 1) / rate
+    before_S = np.clip(np.searchsorted(time_T, time_S, side="right") - 1, 0, len(time_T) - 2)
+    share_S = (time_S - time_T[before_S]) / (time_T[before_S + 1] - time_T[before_S])
+    share_SX = np.clip(share_S, 0, 1).reshape(-1, *[1] * (value_TX.ndim - 1))
+    first, second = value_TX[before_S], value_TX[before_S + 1]
+    between = first + share_SX * (second - first)
+    return np.where(share_SX == 0, first, np.where(share_SX == 1, second, between))
 
 
 def in_full(rate: float) -> str:

@@ -47,6 +47,10 @@ class Region:
             return None
         return cls(float(hips_2[0]), float(hips_2[1]), 2 * radius * _LARGER, math.atan2(right, -down))
 
+    def apart(self, other: Region) -> float:
+        """How far the middle of another is away, in sides of the smaller one."""
+        return math.hypot(self.x - other.x, self.y - other.y) / min(self.size, other.size)
+
     def crop(self, image_HW3: np.ndarray, side: int) -> np.ndarray:
         """What is in it (S, S, 3), 0 to 1, float32; black beyond the picture's edges.
 

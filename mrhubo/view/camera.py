@@ -65,18 +65,34 @@ def common_cameras(
     azimuth_deg: float = 30.0,
     elevation_deg: float = 12.0,
     margin: float = 0.07,
+    ground: float | None = None,
 ) -> list[Camera]:
-    """A camera for each figure, all at one scale: each figure in the middle of its picture, all on one ground line."""
+    """A camera for each figure, all at one scale: each figure in the middle of its picture, all on one ground line.
+
+    ``ground``: height z of the floor that is there, m, above which who jumps stays; None: the lowest point of each.
+    """
     cameras = [Camera.framing(figure, size, azimuth_deg, elevation_deg, margin) for figure in figures]
     extents = [camera._extents(figure) for camera, figure in zip(cameras, figures, strict=True)]
+    floors = [
+        low if ground is None else float(_below(figure, ground) @ camera.basis()[1])
+        for camera, figure, (_, (low, _), _) in zip(cameras, figures, extents, strict=True)
+    ]
     width = max((right - left for (left, right), _, _ in extents), default=1.0)
-    height = max((high - low for _, (low, high), _ in extents), default=1.0)
-    width_m = _width_m(width, height, size, margin)
+    above = max((high - floor for floor, (_, (_, high), _) in zip(floors, extents, strict=True)), default=1.0)
+    below = max((floor - low for floor, (_, (low, _), _) in zip(floors, extents, strict=True)), default=0.0)
+    above, below = max(above, 0.0), max(below, 0.0)
+    width_m = _width_m(width, above + below, size, margin)
     framed: list[Camera] = []
-    for camera, ((left, right), (low, _), (far, near)) in zip(cameras, extents, strict=True):
-        target = np.array([(left + right) / 2.0, low + height / 2.0, (far + near) / 2.0]) @ camera.basis()
+    for camera, floor, ((left, right), _, (far, near)) in zip(cameras, floors, extents, strict=True):
+        target = np.array([(left + right) / 2.0, floor + (above - below) / 2.0, (far + near) / 2.0]) @ camera.basis()
         framed.append(replace(camera, target=_triple(target), width_m=width_m))
     return framed
+
+
+def _below(figure: Solids, ground: float) -> np.ndarray:
+    """The point (3,) of a floor below the middle of a figure [m]."""
+    middle = [sum(figure.extent(axis)) / 2 for axis in np.eye(3)[:2]]
+    return np.array([*middle, ground])
 
 
 def _width_m(width: float, height: float, size: tuple[int, int], margin: float) -> float:

@@ -34,10 +34,14 @@ def figure_sheet(
     titles: Sequence[str] = (),
     caption: str = "",
     size: tuple[int, int] = (220, 260),
+    ground: float | None = None,
 ) -> Image:
-    """A table of figures, all at one scale, with titles above columns and beside rows; `size` of a cell in pixels."""
-    cameras = iter(common_cameras([figure for row in rows for figure in row], size))
-    pictures = [[render(figure, size, next(cameras)) for figure in row] for row in rows]
+    """A table of figures, all at one scale, with titles above columns and beside rows; `size` of a cell in pixels,
+    `ground` as for `common_cameras`.
+    """
+    cameras = iter(common_cameras([figure for row in rows for figure in row], size, ground=ground))
+    floor = "auto" if ground is None else ground
+    pictures = [[render(figure, size, next(cameras), ground=floor) for figure in row] for row in rows]
     return contact_sheet(pictures, columns, titles, caption)
 
 

@@ -139,4 +139,5 @@ def save_pictures(stage: Stage, path: Path, title: str) -> int:
 
 
 def _sheet(stage: Stage, times: Sequence[float], title: str) -> Image:
-    return figure_sheet(columns(stage, times), [f"{time:.1f} s" for time in times], _titles(stage), title)
+    moments = [f"{time:.1f} s" for time in times]
+    return figure_sheet(columns(stage, times), moments, _titles(stage), title, ground=0.0)

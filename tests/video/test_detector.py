@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrhubo.video.detector import SIDE, anchors, best_of
+from mrhubo.video.detector import SIDE, anchors, bodies, parts_of
 
 
 def told(*boxes: tuple[float, float, float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -27,15 +27,27 @@ def test_anchors_are_those_of_the_model() -> None:
     assert anchor_A2.mean(0) == pytest.approx([0.5, 0.5])
 
 
-def test_boxes_that_overlap_the_surest_are_averaged_and_others_left_out() -> None:
-    point_42 = best_of(*told((0.5, 0.5, 0.2, 2.0), (0.52, 0.5, 0.2, 1.0), (0.8, 0.8, 0.1, 1.5), (0.51, 0.5, 0.2, -3.0)))
-    first, second = 1 / (1 + np.exp(-2)), 1 / (1 + np.exp(-1))
-    assert point_42 == pytest.approx(np.tile([(0.5 * first + 0.52 * second) / (first + second), 0.5], (4, 1)), abs=1e-5)
+def test_boxes_that_overlap_a_surer_one_are_averaged_and_others_are_other_bodies() -> None:
+    boxes = (0.5, 0.5, 0.2, 1.5), (0.8, 0.8, 0.1, 1.2), (0.52, 0.5, 0.2, 1.0), (0.51, 0.5, 0.2, -3.0)
+    found = bodies(*told(*boxes))
+    first, second = 1 / (1 + np.exp(-1.5)), 1 / (1 + np.exp(-1))
+    middle = (0.5 * first + 0.52 * second) / (first + second)
+    assert len(found) == 2 and found[0] == pytest.approx(np.tile([middle, 0.5], (4, 1)), abs=1e-5)
+    assert found[1] == pytest.approx(np.full((4, 2), 0.8), abs=1e-5)
 
 
 def test_nobody_where_none_is_sure() -> None:
-    assert best_of(*told((0.5, 0.5, 0.2, -0.1))) is None
+    assert bodies(*told((0.5, 0.5, 0.2, -0.1))) == []
     told_A12, logit_A, anchor_A2 = told((0.5, 0.5, 0.2, 3.0), (0.2, 0.2, 0.1, 500.0))
     told_A12[1, 5] = np.nan
-    assert best_of(told_A12, logit_A, anchor_A2) == pytest.approx(np.full((4, 2), 0.5), abs=1e-5)
-    assert best_of(*told((0.5, 0.5, 0.0, 3.0))) == pytest.approx(np.full((4, 2), 0.5), abs=1e-5), "a box without area"
+    (found_42,) = bodies(told_A12, logit_A, anchor_A2)
+    assert found_42 == pytest.approx(np.full((4, 2), 0.5), abs=1e-5)
+    (found_42,) = bodies(*told((0.5, 0.5, 0.0, 3.0)))
+    assert found_42 == pytest.approx(np.full((4, 2), 0.5), abs=1e-5), "a box without area"
+
+
+def test_parts_cover_a_picture_and_half_of_each_other() -> None:
+    parts = parts_of(200, 100, 50)
+    assert len(parts) == 7 * 3 and {part.size for part in parts} == {50} and (parts[0].x, parts[0].y) == (25, 25)
+    assert max(part.x for part in parts) == 175 and max(part.y for part in parts) == 75
+    assert len(parts_of(100, 100, 100)) == 1 and len(parts_of(130, 100, 100)) == 2

@@ -94,6 +94,52 @@ def test_whoever_is_lost_is_found_again(estimator: PoseEstimator, scene) -> None
     assert np.median(degrees_off(found.point_K3, true)) < 15
 
 
+@pytest.mark.parametrize("place", [(40, 60), (100, 560)])
+def test_somebody_small_is_found(estimator: PoseEstimator, scene, place: tuple[int, int]) -> None:
+    image_HW3, true = scene
+    down, right = place
+    wide_HW3 = np.full((480, 854, 3), (128, 140, 128), np.uint8)
+    wide_HW3[down : down + 160, right : right + 160] = image_HW3.reshape(160, 2, 160, 2, 3).mean((1, 3))
+    estimator.reset()
+    found = estimator.landmarks(wide_HW3)
+    assert found.presence > 0.9, "a person of a sixth of the longer side"
+    assert np.median(degrees_off(found.point_K3, true)) < 15
+    hip_2 = (found.pixel_K2[23] + found.pixel_K2[24]) / 2
+    assert (np.abs(hip_2 - [right + 80, down + 80]) < 20).all()
+
+
+def test_nobody_is_looked_for_in_parts_now_and_then(estimator: PoseEstimator, monkeypatch: pytest.MonkeyPatch) -> None:
+    looks: list[int] = []
+    monkeypatch.setattr(estimator._detector, "find_small", lambda image: looks.append(1) or [])
+    estimator.reset()
+    for _ in range(21):
+        assert np.isnan(estimator.landmarks(np.full((64, 96, 3), 128, np.uint8)).point_K3).all()
+    assert len(looks) == 3
+
+
+def test_of_a_long_picture_no_parts_are_looked_through(
+    estimator: PoseEstimator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[int] = []
+    monkeypatch.setattr(estimator._detector, "_look", lambda image, square: looks.append(1) or [])
+    for width, height in ((8192, 1), (1, 8192), (4096, 300), (1, 1)):
+        assert estimator._detector.find_small(np.zeros((height, width, 3), np.uint8)) == []
+    assert len(looks) <= 1
+    assert estimator._detector.find_small(np.zeros((1080, 1920, 3), np.uint8)) == [] and 20 < len(looks) < 30
+
+
+def test_others_are_seen(estimator: PoseEstimator, scene) -> None:
+    image_HW3, _ = scene
+    estimator.reset()
+    assert not estimator.sees_others(image_HW3), "nobody is followed"
+    estimator.landmarks(image_HW3)
+    assert not estimator.sees_others(image_HW3)
+    both_HW3 = np.concatenate([image_HW3, image_HW3], axis=1)
+    estimator.reset()
+    estimator.landmarks(both_HW3)
+    assert estimator.sees_others(both_HW3)
+
+
 def test_pictures_and_models_are_checked(estimator: PoseEstimator, tmp_path: Path) -> None:
     for image in (np.zeros((4, 4), np.uint8), np.zeros((4, 4, 3)), np.zeros((0, 4, 3), np.uint8)):
         with pytest.raises(ValueError, match="a picture is"):

@@ -57,3 +57,7 @@ def test_no_region_around_nothing() -> None:
     assert Region.around(np.array([3.0, 4.0]), np.array([3.0, 4.2])) is None
     assert Region.around(np.array([np.nan, 4.0]), np.array([3.0, 40.0])) is None
     assert Region.around(np.array([3.0, 4.0]), np.array([np.inf, 40.0])) is None
+
+
+def test_how_far_squares_are_apart_is_told_by_the_smaller_one() -> None:
+    assert Region(10, 20, 50).apart(Region(40, 60, 100, 1.0)) == Region(40, 60, 100).apart(Region(10, 20, 50)) == 1.0

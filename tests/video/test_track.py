@@ -8,17 +8,25 @@ import numpy as np
 import pytest
 
 from mrhubo.errors import UserError
+from mrhubo.robot_motion.clock import at_rate
 from mrhubo.video import track as module
 from mrhubo.video.estimator import Estimate
 from mrhubo.video.frames import Frame
-from mrhubo.video.track import at_rate, track_body
+from mrhubo.video.sides import EXCHANGED
+from mrhubo.video.track import track_body
+
+FAR = 150
+SPREAD_K3 = np.random.default_rng(0).uniform(-1, 1, (33, 3))
+SPREAD_K3[[11, 12, 23, 24]] = [[1, 1, 0], [-1, 1, 0], [1, 0, 0], [-1, 0, 0]]
+"""Points of those who are found in pictures brighter than `FAR`, by whom one can tell how large they are: a metre is a
+pixel, and places are brightnesses."""
 
 
 class Known:
     """Finds points at the brightness of a picture's first pixel; nobody where it is black."""
 
-    def __init__(self) -> None:
-        self.resets = 0
+    def __init__(self, others: bool = False) -> None:
+        self.resets, self.others, self.looks = 0, others, 0
 
     def reset(self) -> None:
         self.resets += 1
@@ -26,7 +34,14 @@ class Known:
     def landmarks(self, image_HW3: np.ndarray) -> Estimate:
         value = float(image_HW3[0, 0, 0]) or np.nan
         point_K3 = np.full((33, 3), value)
-        return Estimate(point_K3, np.nan_to_num(point_K3[:, 0] / 255), 1.0, point_K3[:, :2])
+        pixel_K2 = point_K3[:, :2] + (SPREAD_K3[:, :2] if value > FAR else 0)
+        return Estimate(
+            point_K3 + (SPREAD_K3 if value > FAR else 0), np.nan_to_num(point_K3[:, 0] / 255), 1.0, pixel_K2
+        )
+
+    def sees_others(self, image_HW3: np.ndarray) -> bool:
+        self.looks += 1
+        return self.others
 
 
 @pytest.fixture
@@ -68,8 +83,49 @@ def test_nobody_stays_nobody(film) -> None:
     assert track.seen_T.tolist() == [True, False, True, True, True] and (track.visibility_TK[1] == 0).all()
     assert track.notes[0] == "nobody is found in 1 of 5 frames"
     film([0.0, 0.1, 0.2], [0, 0, 0])
-    with pytest.raises(UserError, match="a.mkv: nobody is found in any of its 3 frames"):
+    with pytest.raises(UserError, match="a.mkv: nobody is found in any of its 3 frames; a person has to be as tall"):
         track_body(Path("a.mkv"), Known())
+
+
+def test_who_is_followed_after_another_is_somebody_else(film) -> None:
+    values = [200, 200, 200, 0, 240, 240, 202, 202]
+    film([0.1 * number for number in range(8)], values)
+    track = track_body(Path("a.mkv"), Known())
+    assert track.who_T is not None and track.who_T.tolist() == [0, 0, 0, -1, 1, 1, 0, 0]
+    first, second = track.only(0), track.only(1)
+    assert first.seen_T.tolist() == [True, True, True, False, False, False, True, True] and first.who_T is None
+    assert (first.visibility_TK[3:6] == 0).all() and len(second.point_TK3) == 2 and second.seen_T.all()
+    film([0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7], [200, 200, 200, 200, 240, 240, 240])
+    track = track_body(Path("a.mkv"), Known())
+    assert track.who_T is not None and track.who_T.tolist() == [0, 0, 0, 0, -1, 1, 1, 1]
+    assert track.seen_T.tolist() == [True] * 4 + [False] + [True] * 3, "nothing is between two people"
+
+
+def test_sides_that_change_for_a_moment_are_put_back(film) -> None:
+    class Doubting(Known):
+        def landmarks(self, image_HW3: np.ndarray) -> Estimate:
+            found = super().landmarks(np.full_like(image_HW3, 200))
+            wrong = int(image_HW3[0, 0, 0]) == 201
+            order = EXCHANGED if wrong else np.arange(33)
+            return found._replace(point_K3=found.point_K3[order], visibility_K=np.arange(33)[order] / 33)
+
+    film([number / 30 for number in range(12)], [200] * 5 + [201] * 3 + [200] * 4)
+    track = track_body(Path("a.mkv"), Doubting())
+    assert np.ptp(track.point_TK3, axis=0).max() == 0 and np.ptp(track.visibility_TK, axis=0).max() == 0
+    assert track.notes[-1] == "left and right are exchanged for a moment, in 3 of 12 frames: they are put back"
+
+
+def test_it_is_told_if_others_are_there(film) -> None:
+    film([0.1 * number for number in range(12)], [100] * 12)
+    alone, among = Known(), Known(others=True)
+    assert track_body(Path("a.mkv"), alone).notes == () and alone.looks == 3
+    assert "several people are seen in 3 of 3 pictures" in track_body(Path("a.mkv"), among).notes[0]
+
+
+def test_who_is_small_is_told_to_be(film) -> None:
+    film([0.0, 0.1, 0.2], [200, 200, 200])
+    (note,) = track_body(Path("a.mkv"), Known()).notes
+    assert note.startswith("the person is 2 pixels tall: limbs may be far off")
 
 
 def test_no_film_of_one_picture_or_of_years(film) -> None:

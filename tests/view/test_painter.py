@@ -159,6 +159,20 @@ def test_common_cameras_keep_scale_and_ground_line(human):
     assert common_cameras([]) == []
 
 
+def test_common_cameras_leave_who_jumps_above_the_ground(human):
+    stands = human_solids(*human)
+    floor = stands.extent(np.array([0.0, 0.0, 1.0]))[0]
+    jumps = stands.translated(np.array([2.0, 0.0, 0.5]))
+    cameras = common_cameras([stands, jumps], (150, 200), ground=floor)
+    assert cameras[0].width_m == cameras[1].width_m
+    lowest = [
+        np.nonzero(alpha(figure, camera, (150, 200)))[0].max()
+        for figure, camera in zip([stands, jumps], cameras, strict=True)
+    ]
+    raised = 0.5 * np.cos(np.deg2rad(12)) * 150 / cameras[0].width_m
+    assert lowest[0] - lowest[1] == pytest.approx(raised, abs=1.5) and lowest[0] < 199
+
+
 def test_background_shadow_and_transparency():
     sphere = solid((0, 0, 0.2), radius=0.2)
     plain = pixels(render(sphere, (80, 80), ground=None, background=(0.2, 0.4, 0.6)))

@@ -16,12 +16,18 @@ SOLVE = "solve it for a skeleton first, and export that as BVH, or convert it to
 """What to do with a recording of markers."""
 _MARKERS = f"it has markers, and not joints; {SOLVE}"
 _VICON = "solve it for a skeleton, and export that as BVH, for instance from Vicon Shogun or Blade"
+_FILM = "convert it to MP4, by ffmpeg for instance: ffmpeg -i FILE film.mp4"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"glTF", "a GLB file", _BLENDER),
     (r"Kaydara FBX|; FBX", "an FBX file", _BLENDER),
     (r'\s*\{(?=.*"asset"\s*:)(?=.*"(?:nodes|scenes|meshes|animations|buffers)"\s*:)', "a glTF file", _BLENDER),
     (r"\s*<\?xml.{0,400}<COLLADA|\s*<COLLADA", "a COLLADA file", _BLENDER),
     (r"PXR-USDC|#usda", "a USD file", _BLENDER),
+    (r"FLV\x01", "a video (FLV)", _FILM),
+    (r"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "a video or a sound (WMV, WMA)", _FILM),
+    (r"\x00\x00\x01\xba", "a video (MPEG)", _FILM),
+    (r"G.{187}G.{187}G|.{4}G.{191}G.{191}G", "a video (MPEG-TS, AVCHD)", _FILM),
+    (r"GIF8", "a moving picture (GIF)", _FILM),
     (r"BLENDER", "a Blender file", "export the skeleton by File > Export > Motion Capture (.bvh)"),
     (r"[\x02-\x05]P", "a C3D file", _MARKERS),
     (r"\xff\xfe|\xfe\xff", "text in UTF-16", "save it in UTF-8"),
@@ -60,7 +66,7 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "a robot's, as Unitree's tools write them, are no human's; of points, the first line must name the columns",
     ),
     (
-        r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b",
+        r"\s*+(?:#[^\n]*+\n\s*+)*+:(?:version|name|units|documentation|root|bonedata)\b(?!\s*[{,:.\[])",
         "a skeleton (.asf) without a motion",
         "name the .amc file, and leave this one beside it",
     ),

@@ -55,7 +55,7 @@ FORMATS: tuple[Format, ...] = (
     Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
-    Format("keypoints and SMPL parameters in JSON", "json_file", "is_json", "read_json", ()),
+    Format("keypoints, SMPL parameters and DeepMimic's motions in JSON", "json_file", "is_json", "read_json", ()),
     Format("SMPL parameters in tables (.csv)", "parameter_table", "is_parameter_table", "read_parameter_table", ()),
     Format("keypoints in tables (.csv)", "keypoint_table", "is_table", "read_table", ()),
     Format("keypoints in tables with a line a point", "point_table", "is_point_table", "read_point_table", ()),

@@ -1,4 +1,4 @@
-"""Motions in JSON: SMPL parameters, or else keypoints; also with a line of JSON a frame.
+"""Motions in JSON: of DeepMimic's humanoid, SMPL parameters, or else keypoints; also with a line of JSON a frame.
 
 Fit3D and CHI3D have `transl` (T, 3), `global_orient` (T, 1, 3, 3), `body_pose` (T, 21, 3, 3) and `betas` in lists
 (https://github.com/sminchisescu-research/imar_vision_datasets_tools); others what they would save as .npz.
@@ -16,6 +16,7 @@ from mrhubo.files.regular import read_regular
 from mrhubo.files.tree import tree_of
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.deepmimic import read_deepmimic
 from mrhubo.motion.readers.estimators import smpl_motion
 from mrhubo.motion.readers.frame_bodies import refuse_frame
 from mrhubo.motion.readers.keypoint_files import POSE_KEYS, checked
@@ -48,8 +49,8 @@ def read_json(path: Path, options: ReadOptions) -> Motion:
         if lines is None:
             raise UserError(f"{path}: is no JSON: {shortened(str(error), 80)}") from error
         value = lines
-    found = None
-    if _POSES.search(text):
+    found = read_deepmimic(path, value, options)
+    if found is None and _POSES.search(text):
         tree = tree_of(value, path, "")
         found = smpl_motion(path, tree, options)
         if found is None:

@@ -15,6 +15,7 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import told_rate
 from mrhubo.motion.readers.sightings import UNSURE
+from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.video.frames import video_kind
 from mrhubo.video.track import Track, track_body
 
@@ -25,7 +26,7 @@ def is_video(content: Content) -> bool:
 
 
 def read_video(path: Path, options: ReadOptions) -> Motion:
-    """Follows the body that is surest found through a video.
+    """Follows the body that is surest found through a video. Who is followed after them is another person.
 
     Points are smoothed as MediaPipe does it (`mrhubo.video.smoothing`). How the body is turned is as the camera sees
     it, level where the camera is; where it goes is not told.
@@ -38,11 +39,27 @@ def read_video(path: Path, options: ReadOptions) -> Motion:
     from mrhubo.video.smoothing import smoothed
 
     track = track_body(path, PoseEstimator(options.pose_model))
-    notes = [*track.notes, "where the person goes is not known: a single camera sees how limbs point"]
+    notes = [*track.notes]
+    track = _one(path, track, options, notes)
+    notes.append("where the person goes is not known: a single camera sees how limbs point")
     rate = told_rate(path, "has", track.rate, options, notes)
     source = f"a video, in which BlazePose's {options.pose_model} model finds a body"
     track = replace(track, rate=rate, point_TK3=smoothed(track.point_TK3, rate))
     return motion_of_track(motion_name(path), track, source, tuple(notes), str(path))
+
+
+def _one(path: Path, track: Track, options: ReadOptions, notes: list[str]) -> Track:
+    """The person who is asked for, or seen longest, among those who were followed one after the other."""
+    count_P = np.zeros(1, int) if track.who_T is None else np.bincount(track.who_T[track.who_T >= 0])
+    if len(count_P) < 2:
+        notes += options.of_one()
+        return track
+    people = [Person(str(who), count) for who, count in enumerate(count_P.tolist()) if count]
+    chosen = choose(path, people, options, notes)
+    first, last = np.flatnonzero(track.who_T == int(chosen.person))[[0, -1]].tolist()
+    check_span(path, chosen.length, last + 1 - first)
+    notes.append(f"'{chosen.person}' is seen from {first / track.rate:.4g} to {last / track.rate:.4g} s of the film")
+    return track.only(int(chosen.person))
 
 
 def motion_of_track(name: str, track: Track, source: str, notes: tuple[str, ...], what: str = "") -> Motion:

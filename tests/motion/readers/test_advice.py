@@ -43,6 +43,12 @@ _FILES = {
     "a .csv file of Vicon": (b"Joints,,\r\n120,,\r\n,,Hips,,,\r\n", "BVH"),
     "Qualisys": (b"NO_OF_FRAMES\t100\nNO_OF_CAMERAS\t8\n", "markers"),
     "OpenSim": (b"Coordinates\nversion=1\nnRows=2\nendheader\ntime\tpelvis_tilt\n", "recording"),
+    "FLV": (b"FLV\x01\x01\0\0\0\x09", "MP4"),
+    "WMV": (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11\xa6\xd9", "MP4"),
+    r"\(MPEG\)": (b"\0\0\x01\xba\x44\0", "MP4"),
+    "MPEG-TS": ((b"G" + bytes(187)) * 4, "MP4"),
+    "AVCHD": ((bytes(4) + b"G" + bytes(187)) * 4, "MP4"),
+    "GIF": (b"GIF89a\x01\0", "MP4"),
     r"\.asf": (b"# a comment\n:version 1.10\n:name VICON\n", "amc"),
 }
 
@@ -54,6 +60,15 @@ def test_what_to_do_is_said(what: str, tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(NoMotion, match=f"{what}.*{words}"):
         mrhubo.read_motion(path)
+
+
+@pytest.mark.parametrize(
+    "start", [":root {\n  --blue: #00f;\n}\n", ":root{color:red}", ":root,\n:host { }", ":root:not(.a) {}"]
+)
+def test_a_style_sheet_is_no_skeleton(start: str, tmp_path: Path) -> None:
+    (tmp_path / "style.css").write_text(start)
+    with pytest.raises(NoMotion, match="is text that begins with ':root"):
+        mrhubo.read_motion(tmp_path / "style.css")
 
 
 def test_a_skeleton_beside_its_motion_is_no_motion_of_a_folder(tmp_path: Path) -> None:

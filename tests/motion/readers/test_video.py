@@ -55,7 +55,13 @@ def walk() -> Motion:
 
 
 @pytest.fixture
-def seen(walk: Motion, monkeypatch: pytest.MonkeyPatch) -> dict[str, np.ndarray]:
+def place_T2() -> np.ndarray:
+    """Where in the picture each frame's person is [pixels]."""
+    return np.zeros((12, 2))
+
+
+@pytest.fixture
+def seen(walk: Motion, place_T2: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> dict[str, np.ndarray]:
     """The points of the walk, which whoever reads a film is told; a hand is hidden for three frames, and for two more
     nobody is there.
     """
@@ -77,7 +83,11 @@ def seen(walk: Motion, monkeypatch: pytest.MonkeyPatch) -> dict[str, np.ndarray]
 
         def landmarks(self, image_HW3: np.ndarray) -> Estimate:
             self.frame += 1
-            return Estimate(point_TK3[self.frame], visibility_TK[self.frame], 1.0, point_TK3[self.frame, :, :2])
+            pixel_K2 = 100 * point_TK3[self.frame, :, :2] + place_T2[self.frame]
+            return Estimate(point_TK3[self.frame], visibility_TK[self.frame], 1.0, pixel_K2)
+
+        def sees_others(self, image_HW3: np.ndarray) -> bool:
+            return False
 
     monkeypatch.setattr(estimators, "PoseEstimator", Told)
     monkeypatch.setattr(track, "frames", lambda path: (Frame(t / 25, np.zeros((2, 2, 3), np.uint8)) for t in range(12)))
@@ -108,6 +118,24 @@ def test_what_is_not_seen_is_told(seen: dict[str, np.ndarray]) -> None:
     assert "full" in motion.source and "heavy" in read_video(FILM, ReadOptions(pose_model="heavy")).source
     sure_TJ = motion.arrays.confidence_TJ
     assert sure_TJ is not None and (sure_TJ[9:11] == 0).all() and sure_TJ[0] == pytest.approx(0.9)
+
+
+def test_of_people_who_are_followed_one_after_the_other_one_is_taken(
+    seen: dict[str, np.ndarray], place_T2: np.ndarray
+) -> None:
+    whole = read_video(FILM, ReadOptions(person="someone"))
+    assert "'someone' that was asked for is left out" in "\n".join(whole.notes)
+    place_T2[7:, 0] = 3000
+    motion = read_video(FILM, ReadOptions())
+    part, all_of_it = ({name: x_T3[:4] for name, x_T3 in points_of(each).items()} for each in (motion, whole))
+    assert len(motion) == 7 and degrees_off(part, all_of_it).max() < 0.1
+    said = "\n".join(motion.notes)
+    assert "'0' is seen longest and was taken; there are '0' (7 frames), '1' (3 frames)" in said
+    assert "'0' is seen from 0 to 0.24 s of the film" in said
+    other = read_video(FILM, ReadOptions(person="1"))
+    assert len(other) == 5 and "'1' is seen from 0.28 to 0.44 s of the film" in other.notes
+    with pytest.raises(UserError, match="there is no person '2'; there are '0'"):
+        read_video(FILM, ReadOptions(person="2"))
 
 
 def test_videos_are_read_by_name_and_not_among_a_folders_motions(
