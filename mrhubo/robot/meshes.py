@@ -10,6 +10,7 @@ import io
 import logging
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,8 @@ _MOST_BYTES = 50_000_000
 MOST_TRIANGLES = 2_000_000
 """Of one mesh, and of all that a robot has; the last one may go beyond."""
 _MOST_METRES = 1e3
+_MOST_FOLDERS = 12
+"""Of a mesh's name, from its end, that are looked for above a URDF."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ def read_meshes(urdf: yourdfpy.URDF, path: Path, without: Collection[str] = ()) 
 
     Args:
         urdf: what yourdfpy has made of the robot.
-        path: its file: meshes are looked for beside it, and `package://` in the folders above it.
+        path: its file: meshes are looked for beside it, and in the folders above it.
         without: links whose meshes are not wanted.
     """
     found: list[LinkMesh] = []
@@ -97,16 +100,16 @@ def find_mesh(name: str, path: Path) -> Path | None:
     """The file that a URDF names as a mesh; None where it is not to be found.
 
     Args:
-        name: `meshes/arm.stl`, relative to the URDF, `file://...`, or `package://PACKAGE/...`, which is looked for in
-            the folders above the URDF, with and without the package's name.
+        name: `meshes/arm.stl`, `package://PACKAGE/...`, or `file://...`. What is not where the name says, from the URDF
+            on, is looked for by as much of the name's end as any folder above the URDF has: a package, or a folder of
+            somebody else's machine, may have been copied anywhere.
         path: the URDF.
     """
-    kind, _, rest = name.rpartition("://")
-    places = [path.parent / rest]
-    if kind == "package":
-        inner = rest.partition("/")[2]
-        places = [folder / part for folder in path.absolute().parents for part in (rest, inner) if part]
-    return next((place for place in places if _is_file(place)), None)
+    rest = name.rpartition("://")[2].replace("\\", "/")
+    parts = [part for part in rest.split("/") if part not in ("", ".", "..")][-_MOST_FOLDERS:]
+    tails = ("/".join(parts[first:]) for first in range(len(parts)))
+    places = (folder / tail for tail in tails for folder in path.absolute().parents)
+    return next((place for place in chain([path.parent / rest], places) if _is_file(place)), None)
 
 
 def _is_file(place: Path) -> bool:

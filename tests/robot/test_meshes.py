@@ -39,6 +39,33 @@ def test_vertices_are_scaled_and_placed(folder: Path, kind: str) -> None:
     assert np.allclose(mesh.vertices_V3.max(axis=0), [0.2, 0.05, 1.15], atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "robots/robot/meshes/box.stl",  # from a folder above, as a program that is started there takes it
+        "file:///home/somebody/ws/src/robot/meshes/box.stl",
+        "/home/somebody/ws/src/other/meshes/box.stl",
+        "C:\\ws\\robot\\meshes\\box.stl",
+        "model://robot/meshes/box.stl",
+        "package:///meshes/box.stl",
+        "../../elsewhere/meshes/box.stl",
+    ],
+)
+def test_a_mesh_is_found_by_the_end_of_its_name(folder: Path, name: str) -> None:
+    deep = folder / "urdf" / "my.urdf"
+    deep.parent.mkdir()
+    found = find_mesh(name, deep)
+    assert found is not None and found.samefile(folder / "meshes" / "box.stl")
+
+
+def test_more_of_a_name_counts_more_than_a_nearer_folder(folder: Path) -> None:
+    near = folder / "urdf" / "box.stl"
+    near.parent.mkdir()
+    near.write_bytes(b"")
+    found = find_mesh("package://any/meshes/box.stl", near.with_name("my.urdf"))
+    assert found is not None and found.samefile(folder / "meshes" / "box.stl")
+
+
 def test_packages_are_looked_for_above_the_urdf(folder: Path) -> None:
     place = folder / "meshes" / "box.stl"
     deep = folder / "urdf" / "more" / "my.urdf"
