@@ -25,7 +25,7 @@ def read_looks(description: Description) -> Looks:
     elements, or the capsules that stand for collision meshes whose files are not there.
     """
     parsed = description.parsed
-    meshes = read_meshes(parsed, description.path)
+    meshes = read_meshes(description)
     meshed = {mesh.link for mesh in meshes}
     visible = {
         link.name
