@@ -12,7 +12,7 @@ import numpy as np
 import xxhash
 
 from mrhubo.files.cache import keep_text, kept_text
-from mrhubo.robot import capsules, hulls
+from mrhubo.robot import capsules, hugging, hulls
 from mrhubo.robot.capsules import Capsule
 
 _LONGEST = 1_000_000
@@ -54,6 +54,6 @@ def _read(told: str, count: int) -> list[list[Capsule]] | None:
 def _method() -> bytes:
     """A checksum of how they are found."""
     digest = xxhash.xxh3_128()
-    for module in (capsules, hulls):
+    for module in (capsules, hugging, hulls):
         digest.update(Path(module.__file__ or "").read_bytes())
     return digest.digest()
