@@ -1,7 +1,7 @@
 """Self-collision of a robot: signed distances between the capsules of its links, and how they change with the joints.
 
 The shapes are those of the URDF's collision elements: a sphere and a cylinder with round ends are capsules, and one to
-three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`), or the hull of a mesh
+three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`), up to four the hull of a mesh
 (`mrhubo.robot.hulls`). `uncovered` names the links of which a mesh is not there, and `unknown` those of them for which
 nobody knows whether the robot touches itself.
 

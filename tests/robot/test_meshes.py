@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from trimesh.exchange.dae import export_collada
 
 from mrhubo.robot import mesh_files, meshes
 from mrhubo.robot.mesh_files import find_mesh
@@ -109,7 +110,7 @@ def test_materials_are_not_opened(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 def collada(file: Path, mesh: trimesh.Trimesh, asset: str) -> None:
     """Writes a mesh with a unit and axes of our own."""
-    text = trimesh.exchange.dae.export_collada(mesh).decode()
+    text = export_collada(mesh).decode()
     start, end = text.index("<asset"), text.index("</asset>")
     file.write_text(f"{text[:start]}<asset>{asset}{text[end:]}")
 
