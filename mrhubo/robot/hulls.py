@@ -28,7 +28,7 @@ _MANY, _CELLS = 300_000, 100
 _AT_ONCE = 2**24
 _SIZES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
 """Of the shape that just holds the hull; at the least, a ball in a cube is much smaller than what holds the cube."""
-_MOST_CAPSULES = 4
+MOST_CAPSULES = 4
 _WORTH = 0.015
 """By how much more room one more capsule must share: pairs grow with the square of their number."""
 _PARTED = 1_000
@@ -37,10 +37,8 @@ _THIN = 1e-4
 """What is thinner [m] is given this thickness: a sheet has no room to be shared."""
 
 
-def capsules_of(vertices_V3: np.ndarray, alone: bool = False) -> list[Capsule]:
-    """Capsules (start (3,), end (3,), radius [m]), four at most, that hug the convex hull of vertices (V, 3) [m];
-    `alone`: one.
-    """
+def capsules_of(vertices_V3: np.ndarray, most: int = MOST_CAPSULES) -> list[Capsule]:
+    """Capsules (start (3,), end (3,), radius [m]), so many at most, that hug the convex hull of vertices (V, 3) [m]."""
     turn_33, low_3, high_3 = smallest_box(corners_H3 := extremes(vertices_V3))
     middle_3 = turn_33 @ (low_3 + high_3) / 2
     half_3 = np.maximum((high_3 - low_3) / 2, _THIN / 2)
@@ -49,24 +47,24 @@ def capsules_of(vertices_V3: np.ndarray, alone: bool = False) -> list[Capsule]:
     points_X3 = unit_X3 * half_3
     inside_X3 = points_X3[_inside_hull(points_X3, local_H3, half_3)]
     room = 8 * float(half_3.prod()) * len(inside_X3) / _POINTS
-    shapes = [shape for shape in _candidates(local_H3, half_3) if not alone or shape.kind in ("sphere", "capsule")]
-    found = [capsules(shape, shape.origin_44) for shape in shapes]
+    found = [capsules(shape, shape.origin_44) for shape in _candidates(local_H3, half_3)]
+    found = [some for some in found if len(some) <= most]
     shared = [_shared(some, inside_X3, room, unit_X3) for some in found]
     first = int(np.argmax(shared))
-    fitted = _fitted(found[first], local_H3, inside_X3, alone)
+    fitted = _fitted(found[first], local_H3, inside_X3, most)
     worth = [_shared(some, inside_X3, room, unit_X3) - _WORTH * len(some) for some in fitted]
     best = max(zip(worth, fitted, strict=True), key=lambda pair: pair[0], default=(-np.inf, []))
     chosen = best[1] if best[0] > shared[first] - _WORTH * len(found[first]) else found[first]
     return [(turn_33 @ start_3 + middle_3, turn_33 @ end_3 + middle_3, radius) for start_3, end_3, radius in chosen]
 
 
-def _fitted(found: list[Capsule], corners_H3: np.ndarray, inside_X3: np.ndarray, alone: bool) -> list[list[Capsule]]:
+def _fitted(found: list[Capsule], corners_H3: np.ndarray, inside_X3: np.ndarray, most: int) -> list[list[Capsule]]:
     """Capsules that are fitted to a hull: those that were found, and others; none where it has no room."""
     try:
         surface = Surface(corners_H3)
     except (QhullError, ValueError):
         return []
-    others = [] if alone else [parted(inside_X3[:_PARTED], count) for count in (2, 3, _MOST_CAPSULES)]
+    others = [parted(inside_X3[:_PARTED], count) for count in range(2, most + 1)]
     return [surface.fitted(some) for some in (found, *others) if some]
 
 

@@ -95,6 +95,6 @@ def test_extremes_are_those_of_the_whole() -> None:
 @pytest.mark.parametrize("name", MESHES)
 def test_one_capsule_alone(name: str) -> None:
     mesh = MESHES[name][0]
-    ((start_3, end_3, radius),) = capsules_of(np.asarray(mesh.vertices), alone=True)
+    ((start_3, end_3, radius),) = capsules_of(np.asarray(mesh.vertices), most=1)
     half_3 = mesh.extents / 2
     assert np.all(np.abs((start_3 + end_3) / 2) < 0.02) and half_3.min() / 2 < radius < half_3.max() * 1.5
