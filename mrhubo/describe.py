@@ -67,9 +67,8 @@ def main(argv: list[str]) -> int:
     answer = ", answer what is not decided" if open_ else ""
     print(f"next:     look at the picture{answer}, then  {next_command(described.found, described.file)}")
     if described.more:
-        print(
-            f"          {' and '.join(described.more)} move too with  mrhubo describe {shlex.quote(word)} --whole-body"
-        )
+        parts = "the waist moves" if described.more == ("waist",) else f"{' and '.join(described.more)} move"
+        print(f"          {parts} too with  mrhubo describe {shlex.quote(word)} --whole-body")
     return status
 
 

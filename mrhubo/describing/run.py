@@ -40,18 +40,13 @@ class Described:
     urdf: Path
     notes: tuple[str, ...]
     """What was left out of a model that was no URDF."""
+    more: tuple[str, ...]
+    """What of the body the robot can move, and this config leaves out."""
 
     @property
     def doubts(self) -> dict[str, str]:
         """The entries that are guesses, and what was asked about each."""
         return unsure(self.found)
-
-    @property
-    def more(self) -> list[str]:
-        """What of the body the robot has, and this config leaves out."""
-        chains = self.found.chains
-        parts = {"legs": chains.get("left_leg"), "waist": chains.get("waist")}
-        return [] if self.found.whole_body else [name for name, joints in parts.items() if joints]
 
 
 def read_model(word: str) -> Description:
@@ -101,7 +96,7 @@ def describe_model(word: str, out: Path | None = None, force: bool = False, whol
         for new, content in written.items():
             with atomic_path(new) as temporary:
                 temporary.write_bytes(content)
-    return Described(found, file, picture, urdf, notes)
+    return Described(found, file, picture, urdf, notes, _more(description, found))
 
 
 def config_of(word: str) -> tuple[Path, Described | None]:
@@ -246,6 +241,13 @@ def _discover(description: Description, whole_body: bool = False) -> Discovery:
         fault = next(iter(description.faults.values()))
         raise UserError(f"{description.path}, {fault}; without this joint no two whole arms are found") from error
     return found
+
+
+def _more(description: Description, found: Discovery) -> tuple[str, ...]:
+    """Which of legs and waist have joints that move if the whole body does, and not in what was found."""
+    moved = set(discover(description, whole_body=True).joints) - set(found.joints)
+    parts = {"legs": found.chains.get("left_leg", ()), "waist": found.chains.get("waist", ())}
+    return tuple(name for name, joints in parts.items() if moved & set(joints))
 
 
 def _robot(description: Description, found: Discovery, name: str) -> Robot:

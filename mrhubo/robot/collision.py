@@ -1,13 +1,14 @@
 """Self-collision of a robot: signed distances between the capsules of its links, and how they change with the joints.
 
 The shapes are those of the URDF's collision elements: a sphere and a cylinder with round ends are capsules, and one to
-three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`), or the hull of a mesh
+three capsules hug a flat-ended cylinder or a box (`mrhubo.robot.capsules`), up to four the hull of a mesh
 (`mrhubo.robot.hulls`). `uncovered` names the links of which a mesh is not there, and `unknown` those of them for which
 nobody knows whether the robot touches itself.
 
 Links that the sampled joints do not move against each other are one body. Two bodies that share a joint cannot be kept
 apart, so they are not compared; nor are two of which some capsules overlap in more than half of all random poses (an
-upper arm and a forearm with an axis of its own between the two, both of which reach around the elbow). Nor are two
+upper arm and a forearm with an axis of its own between the two, both of which reach around the elbow), or nearly do
+where they stand for a mesh, whose hull fills what is hollow: one that reaches into it is always near. Nor are two
 capsules that overlap in the robot's home pose: whoever made it means them to, as a shoulder in the hollow of a trunk
 whose hull is closed (MoveIt's setup assistant leaves out the same, as "collision by default").
 
@@ -33,6 +34,8 @@ from mrhubo.robot.model import LinkPoses, Robot
 _SAMPLES = 2_000
 _FEW_SAMPLES = 100
 _ALWAYS = 0.5
+_NEARLY = 0.004
+"""How near capsules of a mesh count as overlapping in random poses, as a share of the robot: 6 mm of a human's."""
 _SLACK = 1e-3
 _CHUNK = 1024
 """Most poses at a time."""
@@ -150,7 +153,7 @@ class SelfCollision(nn.Module):
         body_C = self._body_C.cpu()
         every_2P = torch.triu_indices(len(body_C), len(body_C), offset=1)
         self._keep_pairs(every_2P[:, apart_LL[body_C[every_2P[0]], body_C[every_2P[1]]]])
-        often_P = self._overlaps(self.robot.sample(self._samples(), torch.Generator().manual_seed(0)))
+        often_P = self._often_near(self.robot.sample(self._samples(), torch.Generator().manual_seed(0)))
         for i, j in body_C[self._pair_2P[:, often_P].cpu()].T.unique(dim=0).tolist():
             apart_LL[i, j] = apart_LL[j, i] = False
         pair_2P = self._pair_2P.cpu()
@@ -174,12 +177,18 @@ class SelfCollision(nn.Module):
         """Random poses that tell which bodies always overlap: fewer where there are very many pairs."""
         return max(_FEW_SAMPLES, min(_SAMPLES, _AT_ONCE // max(1, self._pair_2P.shape[1])))
 
-    def _overlaps(self, q_BN: Tensor) -> Tensor:
-        """Which pairs overlap in more than half of the poses."""
+    def _often_near(self, q_BN: Tensor) -> Tensor:
+        """Which pairs overlap in more than half of the poses, or nearly do where one of them stands for a mesh."""
+        hulls = {shape.link for shape in self.robot.description.solids.of_meshes}
+        of_mesh_C = torch.tensor([link in hulls for link in self._links], device=self._body_C.device, dtype=torch.bool)
+        centre_C3 = self._place(self.robot.forward(self.robot.home()[None])).ends_BC23[0].mean(dim=1)
+        size = float((centre_C3.amax(0) - centre_C3.amin(0)).norm()) if len(centre_C3) else 0.0
+        near_P = of_mesh_C[self._pair_2P].any(dim=0) * (_NEARLY * size)
         count_P = torch.zeros(self._pair_2P.shape[1], dtype=torch.long, device=self._body_C.device)
         for rows in self._chunks(len(q_BN)):
-            close = self._closer(self._place(self._poses(q_BN, None, rows)), 0.0)
-            count_P += torch.bincount(close.pair_X, minlength=len(count_P))
+            close = self._closer(self._place(self._poses(q_BN, None, rows)), _NEARLY * size)
+            pair_X = close.pair_X[close.distance_X < near_P[close.pair_X]]
+            count_P += torch.bincount(pair_X, minlength=len(count_P))
         return count_P > _ALWAYS * len(q_BN)
 
     @property

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,8 @@ _NO_XML = {
 }
 _LISTS = ("xyz", "rpy", "size", "scale")
 """Attributes of several numbers."""
+_STRANGE_VERSION = re.compile(rb"""\A(\s*<\?xml\s+version\s*=\s*["'])(?!1\.0)[^"']*""")
+"""Simulators write, and take, a version 0.0 of XML, and a zero at the end of a file."""
 _UNDEFINED_PREFIX = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
 
 
@@ -130,6 +133,8 @@ def _parse(path: Path, text: bytes) -> etree._Element:
             robot = etree.fromstring(text, etree.XMLParser(**options, recover=True))
             if robot is not None:
                 return robot
+        if (usual := _STRANGE_VERSION.sub(rb"\g<1>1.0", text.rstrip(b"\0"))) != text:
+            return _parse(path, usual)
         if (as_meant := _as_latin(text)) is not None:
             return _parse(path, as_meant)
         reason = "it is empty" if not text.strip() else error

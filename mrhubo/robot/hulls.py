@@ -1,7 +1,8 @@
 """Capsules that hug a mesh: what a collision mesh becomes.
 
 A mesh is taken as its convex hull, as most programs for physics take it. Of boxes, cylinders, capsules and balls along
-the sides of the smallest box around it, in some sizes, that one stands for it whose capsules share most room with it.
+the sides of the smallest box around it, in some sizes, the one whose capsules share most room with it is where a fit
+begins (`mrhubo.robot.hugging`); others begin with parts of the hull, which may be more.
 
 Legend: V vertices, H corners of the hull, X points in the room around it, F flat sides, C capsules.
 """
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from mrhubo.robot.capsules import Capsule, capsules
+from mrhubo.robot.hugging import Surface, parted
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry
 
 _DIRECTIONS = 1_000
@@ -26,27 +28,44 @@ _MANY, _CELLS = 300_000, 100
 _AT_ONCE = 2**24
 _SIZES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
 """Of the shape that just holds the hull; at the least, a ball in a cube is much smaller than what holds the cube."""
+MOST_CAPSULES = 4
+_WORTH = 0.015
+"""By how much more room one more capsule must share: pairs grow with the square of their number."""
+_PARTED = 1_000
+"""Points inside that are parted."""
 _THIN = 1e-4
 """What is thinner [m] is given this thickness: a sheet has no room to be shared."""
 
 
-def capsules_of(vertices_V3: np.ndarray, alone: bool = False) -> list[Capsule]:
-    """Capsules (start (3,), end (3,), radius [m]), three at most, that hug the convex hull of vertices (V, 3) [m];
-    `alone`: one.
-    """
+def capsules_of(vertices_V3: np.ndarray, most: int = MOST_CAPSULES) -> list[Capsule]:
+    """Capsules (start (3,), end (3,), radius [m]), so many at most, that hug the convex hull of vertices (V, 3) [m]."""
     turn_33, low_3, high_3 = smallest_box(corners_H3 := extremes(vertices_V3))
-    pose_44 = np.eye(4)
-    pose_44[:3, :3], pose_44[:3, 3] = turn_33, turn_33 @ (low_3 + high_3) / 2
+    middle_3 = turn_33 @ (low_3 + high_3) / 2
     half_3 = np.maximum((high_3 - low_3) / 2, _THIN / 2)
-    local_H3 = (corners_H3 - pose_44[:3, 3]) @ turn_33
+    local_H3 = (corners_H3 - middle_3) @ turn_33
     unit_X3 = np.random.default_rng(0).uniform(-1, 1, (_POINTS, 3))
     points_X3 = unit_X3 * half_3
     inside_X3 = points_X3[_inside_hull(points_X3, local_H3, half_3)]
     room = 8 * float(half_3.prod()) * len(inside_X3) / _POINTS
-    shapes = [shape for shape in _candidates(local_H3, half_3) if not alone or shape.kind in ("sphere", "capsule")]
-    shared = [_shared(capsules(shape, shape.origin_44), inside_X3, room, unit_X3) for shape in shapes]
-    best = shapes[int(np.argmax(shared))]
-    return capsules(best, pose_44 @ best.origin_44)
+    found = [capsules(shape, shape.origin_44) for shape in _candidates(local_H3, half_3)]
+    found = [some for some in found if len(some) <= most]
+    shared = [_shared(some, inside_X3, room, unit_X3) for some in found]
+    first = int(np.argmax(shared))
+    fitted = _fitted(found[first], local_H3, inside_X3, most)
+    worth = [_shared(some, inside_X3, room, unit_X3) - _WORTH * len(some) for some in fitted]
+    best = max(zip(worth, fitted, strict=True), key=lambda pair: pair[0], default=(-np.inf, []))
+    chosen = best[1] if best[0] > shared[first] - _WORTH * len(found[first]) else found[first]
+    return [(turn_33 @ start_3 + middle_3, turn_33 @ end_3 + middle_3, radius) for start_3, end_3, radius in chosen]
+
+
+def _fitted(found: list[Capsule], corners_H3: np.ndarray, inside_X3: np.ndarray, most: int) -> list[list[Capsule]]:
+    """Capsules that are fitted to a hull: those that were found, and others; none where it has no room."""
+    try:
+        surface = Surface(corners_H3)
+    except (QhullError, ValueError):
+        return []
+    others = [parted(inside_X3[:_PARTED], count) for count in range(2, most + 1)]
+    return [surface.fitted(some) for some in (found, *others) if some]
 
 
 def extremes(vertices_V3: np.ndarray) -> np.ndarray:

@@ -12,11 +12,14 @@ import numpy as np
 import xxhash
 
 from mrhubo.files.cache import keep_text, kept_text
-from mrhubo.robot import capsules, hulls
+from mrhubo.robot import capsules, hugging, hulls
 from mrhubo.robot.capsules import Capsule
 
 _LONGEST = 1_000_000
 """Bytes of a file that is one of ours."""
+_SMALL, _SMALLER = 0.5, 0.25
+"""Meshes smaller than these shares of the largest one get two capsules at most, and one: what those leave out is small
+beside what more do of the large ones, and pairs grow with the square of their number."""
 
 Mesh = tuple[np.ndarray, bool]
 """Vertices (V, 3) [m], and whether one capsule is to stand for it."""
@@ -33,10 +36,19 @@ def kept_capsules(meshes: Sequence[Mesh]) -> list[list[Capsule]]:
     told = kept_text(name, _LONGEST)
     if told is not None and (known := _read(told, len(meshes))) is not None:
         return known
-    found = [hulls.capsules_of(vertices_V3, alone) for vertices_V3, alone in meshes]
+    sizes = [float(np.linalg.norm(np.ptp(vertices_V3, axis=0))) for vertices_V3, _ in meshes]
+    found = [
+        hulls.capsules_of(vertices_V3, 1 if alone else _most(size / max(*sizes, 1e-9)))
+        for (vertices_V3, alone), size in zip(meshes, sizes, strict=True)
+    ]
     rows = [[[*start_3.tolist(), *end_3.tolist(), radius] for start_3, end_3, radius in each] for each in found]
     keep_text(name, json.dumps(rows))
     return found
+
+
+def _most(share: float) -> int:
+    """Most capsules of a mesh, by its size as a share of the largest one."""
+    return 1 if share < _SMALLER else 2 if share < _SMALL else hulls.MOST_CAPSULES
 
 
 def _read(told: str, count: int) -> list[list[Capsule]] | None:
@@ -54,6 +66,6 @@ def _read(told: str, count: int) -> list[list[Capsule]] | None:
 def _method() -> bytes:
     """A checksum of how they are found."""
     digest = xxhash.xxh3_128()
-    for module in (capsules, hulls):
-        digest.update(Path(module.__file__ or "").read_bytes())
+    for file in (capsules.__file__, hugging.__file__, hulls.__file__, __file__):
+        digest.update(Path(file or "").read_bytes())
     return digest.digest()

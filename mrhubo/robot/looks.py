@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import yourdfpy
+
 from mrhubo.robot.bare import bare_sticks
+from mrhubo.robot.joint import Joint
+from mrhubo.robot.mesh_files import find_mesh
 from mrhubo.robot.meshes import LinkMesh, read_meshes
 from mrhubo.robot.shapes import LinkGeometry, read_geometry
 from mrhubo.robot.urdf import Description
@@ -22,10 +26,12 @@ class Looks:
 
 def read_looks(description: Description) -> Looks:
     """The meshes and shapes of the URDF's visual elements; for a link without any that can be read its collision
-    elements, or the capsules that stand for collision meshes whose files are not there.
+    elements, or the capsules that stand for collision meshes whose files are not there. A link that only collides
+    is not drawn where it keeps its place to one that is seen: a box around a hand is there for safety.
     """
     parsed = description.parsed
-    meshes = read_meshes(parsed, description.path)
+    unseen = _seen_by_others(description)
+    meshes = read_meshes(description, unseen)
     meshed = {mesh.link for mesh in meshes}
     visible = {
         link.name
@@ -34,7 +40,33 @@ def read_looks(description: Description) -> Looks:
         if visual.geometry is not None and visual.geometry.mesh is None
     }
     shapes = [shape for shape in read_geometry(parsed) if shape.link not in meshed or shape.link in visible]
-    dressed = meshed | {shape.link for shape in shapes}
+    shapes = [shape for shape in shapes if shape.link not in unseen]
+    dressed = meshed | {shape.link for shape in shapes} | unseen
     if any(link.collisions and link.name not in dressed for link in parsed.robot.links):  # finding them takes seconds
         shapes += [shape for shape in description.solids.of_meshes if shape.link not in dressed]
-    return Looks(meshes, shapes, bare_sticks(description, dressed | {shape.link for shape in shapes}))
+    return Looks(meshes, shapes, bare_sticks(description, meshed | {shape.link for shape in shapes}))
+
+
+def _seen_by_others(description: Description) -> set[str]:
+    """Links without looks of their own, each fixed to links of which some have any that can be read."""
+    body_of = {description.root: description.root}
+    below: dict[str, list[Joint]] = {}
+    for joint in description.joints.values():
+        below.setdefault(joint.parent, []).append(joint)
+    order = [description.root]
+    for link in order:
+        for joint in below.get(link, []):
+            body_of[joint.child] = body_of[link] if joint.kind == "fixed" else joint.child
+            order.append(joint.child)
+    parsed = description.parsed
+    looking = {link.name for link in parsed.robot.links if any(_seen(visual, description) for visual in link.visuals)}
+    seen = {body_of[link] for link in looking if link in body_of}
+    return {link.name for link in parsed.robot.links if not link.visuals and body_of.get(link.name) in seen}
+
+
+def _seen(visual: yourdfpy.urdf.Visual, description: Description) -> bool:
+    """Whether there is something to be drawn of an element."""
+    geometry = visual.geometry
+    if geometry is None:
+        return False
+    return geometry.mesh is None or find_mesh(str(geometry.mesh.filename), description.path) is not None

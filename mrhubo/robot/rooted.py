@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from mrhubo.robot.document import read_document
 from mrhubo.robot.joint import ROTARY, Joint
-from mrhubo.robot.meshes import find_mesh
+from mrhubo.robot.mesh_files import find_mesh
 from mrhubo.robot.urdf import Description
 
 _MOVES = (*ROTARY, "prismatic")

@@ -96,7 +96,7 @@ def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
         if found:
             return np.concatenate(found), True
     others = {each.name for each in parsed.robot.links} - links
-    meshes = read_meshes(parsed, description.path, others)
+    meshes = read_meshes(description, others)
     found = [_placed(_points(extremes(mesh.vertices_V3)), from_44[mesh.link]) for mesh in meshes]
     if found:
         return np.concatenate(found), True

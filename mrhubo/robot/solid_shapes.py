@@ -3,7 +3,7 @@
 Hands often have no collision element, though what they are fixed to has: of these, what is seen counts, a mesh as one
 capsule. Where three hug a flat hand, it stays between two shapes of a thigh more often when it is to give way.
 
-A mesh is looked for where the URDF names it, beside it and in the folders above (`mrhubo.robot.meshes`). Where it is
+A mesh is looked for where the URDF names it, and in the folders above (`mrhubo.robot.mesh_files`). Where it is
 not there, or cannot be read, the link has a gap, and nobody knows whether it touches anything.
 """
 
@@ -18,7 +18,7 @@ import yourdfpy
 from mrhubo.fast.rotations import shortest_turn
 from mrhubo.robot.capsules import Capsule
 from mrhubo.robot.kept_capsules import kept_capsules
-from mrhubo.robot.meshes import MOST_TRIANGLES, read_mesh, scale_of
+from mrhubo.robot.mesh_files import MOST_TRIANGLES, read_mesh, scale_of
 from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
 
 _MOST_MESHES = 300
@@ -40,12 +40,13 @@ class SolidShapes:
     """Links with a mesh that is not there, cannot be read, or is too much."""
 
 
-def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
+def read_solids(urdf: yourdfpy.URDF, path: Path, upright: bool) -> SolidShapes:
     """The shapes of every link's collision elements, and what is seen of hands that have none.
 
     Args:
         urdf: what yourdfpy has made of the robot.
         path: its file.
+        upright: whether meshes whose y is up are turned (`mrhubo.robot.mesh_axes`).
     """
     seen_alone = _ends_seen_alone(urdf)
     meshes: dict[_Key, np.ndarray | None] = {}
@@ -61,7 +62,7 @@ def read_solids(urdf: yourdfpy.URDF, path: Path) -> SolidShapes:
             key = str(mesh.filename), tuple(scale_3.tolist()), alone
             if key not in meshes:
                 enough = len(meshes) >= _MOST_MESHES or triangles > MOST_TRIANGLES
-                read = None if enough else read_mesh(key[0], path, scale_3)
+                read = None if enough else read_mesh(key[0], path, scale_3, upright)
                 meshes[key] = None if read is None else read[0][np.unique(read[1])]
                 triangles += 0 if read is None else len(read[1])
             places.append((link.name, key, np.eye(4) if element.origin is None else np.asarray(element.origin, float)))

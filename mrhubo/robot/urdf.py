@@ -23,6 +23,7 @@ from mrhubo.errors import UserError, unknown_name
 from mrhubo.robot.document import read_text
 from mrhubo.robot.joint import ROTARY, Joint, Mimic
 from mrhubo.robot.limits import with_soft_limits, without_empty_limits
+from mrhubo.robot.mesh_axes import turns_upright
 from mrhubo.robot.solid_shapes import SolidShapes, read_solids
 from mrhubo.robot.tree import Tree, read_tree
 
@@ -58,7 +59,7 @@ class Description:
     """By link: mass [kg] and its centre [m] in the link's frame, of those that have a mass."""
     text: bytes = field(default=b"", repr=False, compare=False)
     """What was read, unpacked: the file may be another one by the time that a package takes it along."""
-    _read: dict[str, SolidShapes] = field(default_factory=dict, repr=False, compare=False)
+    _read: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
     """What has been read when it was first asked for; the same robot in another form knows it too."""
     _found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
     """What `once` has found."""
@@ -71,8 +72,15 @@ class Description:
     def solids(self) -> SolidShapes:
         """The shapes that can bump into each other; meshes are read when first asked for."""
         if "solids" not in self._read:
-            self._read["solids"] = read_solids(self.parsed, self.path)
+            self._read["solids"] = read_solids(self.parsed, self.path, self.upright)
         return self._read["solids"]
+
+    @property
+    def upright(self) -> bool:
+        """Whether meshes of files whose y is up are turned, so that their z is; told when first asked for."""
+        if "upright" not in self._read:
+            self._read["upright"] = turns_upright(self.parsed, self.path)
+        return self._read["upright"]
 
     @cached_property
     def kinematics(self) -> str:

@@ -219,3 +219,15 @@ def test_a_robot_of_ten_thousand_joints_is_refused_at_once(tmp_path: Path) -> No
     (tmp_path / "long.urdf").write_text(f'<robot name="long">{links}{joints}</robot>')
     with pytest.raises(UserError, match="9,999 joints move"):
         describe_model(str(tmp_path / "long.urdf"), tmp_path / "long.yaml")
+
+
+@pytest.mark.parametrize(("kind", "more"), [("revolute", ("waist",)), ("prismatic", ())])
+def test_a_lift_is_no_waist_that_moves_too(tmp_path: Path, kind: str, more: tuple[str, ...]) -> None:
+    """What is told to move with the whole body does: a column that slides turns no chest."""
+    text = humanoid(4).urdf  # on a pedestal, with a waist of one joint
+    (tmp_path / "my.urdf").write_text(text.replace('"waist_rol_j" type="revolute"', f'"waist_rol_j" type="{kind}"'))
+    described = describe_model(str(tmp_path / "my.urdf"), tmp_path / "my.yaml")
+    assert described.more == more
+    whole = describe_model(str(tmp_path / "my.urdf"), tmp_path / "whole.yaml", whole_body=True)
+    assert set(whole.found.joints) - set(described.found.joints) == {"waist_rol_j"} & set(whole.found.joints)
+    assert ("waist_rol_j" in whole.found.joints) == bool(more) and whole.more == ()

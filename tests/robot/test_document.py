@@ -44,9 +44,12 @@ def written(folder: Path, content: str | bytes) -> Path:
         PAIR.encode("utf-16"),
         "<?xml version='1.0' encoding='utf-8'?><!-- by Jos\xe9 -->".encode("latin-1") + PAIR.encode(),
         "<?xml version='1.0'?><!-- by hand --><?tool x?>" + PAIR,
+        PAIR + "\r\n\0",
+        '<?xml version="0.0" ?>\n' + PAIR,
+        "<?xml version = '' encoding='utf-8'?>" + PAIR + "\0\0",
     ],
     ids=["plain", "packed", "default namespace", "prefix", "no name", "expanded xacro", "unexplained prefix",
-         "foreign joint", "blank lines first", "byte order mark", "utf-16", "latin", "comment"],
+         "foreign joint", "blank lines first", "byte order mark", "utf-16", "latin", "comment", "a zero at its end", "version 0.0", "no version"],
 )  # fmt: skip
 def test_all_forms_of_one_robot_are_read_alike(tmp_path: Path, content: str | bytes) -> None:
     found = describe(written(tmp_path, content))

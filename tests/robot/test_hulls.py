@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import ConvexHull
 
 from mrhubo.robot.hulls import capsules_of, extremes
 
@@ -40,8 +41,40 @@ def test_capsules_hug_a_mesh_wherever_it_is(name: str) -> None:
     for seed in range(2):
         turn_33, move_3 = rotation(seed), np.array([0.3, -2.0, 1.0])
         found = capsules_of(np.asarray(mesh.vertices) @ turn_33.T + move_3)
-        assert 1 <= len(found) <= 3
+        assert 1 <= len(found) <= 4
         assert np.abs(outside(found, points_X3 @ turn_33.T + move_3)).mean() < near
+
+
+def hull(name: str) -> np.ndarray:
+    """Corners of a hull that no box, cylinder or ball is like, as covers of limbs are [m]."""
+    generator = np.random.default_rng(len(name))
+    if name == "wedge":  # a thigh, thick at the hip and thin at the knee
+        return np.array([[x * w, y * w, z] for z, w in ((0.0, 1.0), (-0.45, 0.35)) for x in (-0.07, 0.07) for y in (-0.13, 0.13)])  # fmt: skip
+    if name == "foot":  # a sole, and the ankle above its rear
+        sole = [[x, y, 0.0] for x in (-0.08, 0.16) for y in (-0.05, 0.05)]
+        return np.array(sole + [[x, y, 0.1] for x in (-0.05, 0.03) for y in (-0.03, 0.03)])
+    if name == "hook":  # a bracket of a shoulder
+        return np.concatenate([generator.normal(size=(60, 3)) * 0.01 + place for place in ([0, 0, 0], [0.15, 0, 0], [0.15, 0.05, 0.12])])  # fmt: skip
+    return generator.normal(size=(200, 3)) * [0.05, 0.09, 0.12]
+
+
+@pytest.mark.parametrize("name", ["wedge", "foot", "hook", "egg"])
+def test_capsules_stick_out_of_a_hull_no_farther_than_they_leave_out_of_it(name: str) -> None:
+    """Neither the surface of the capsules is far outside of the hull, nor the hull's outside of them, beside its size."""
+    corners_H3 = hull(name)
+    mesh = trimesh.convex.convex_hull(corners_H3)
+    found = capsules_of(corners_H3)
+    size = float(np.linalg.norm(mesh.extents))
+    points_X3 = np.asarray(trimesh.sample.sample_surface(mesh, 2000, seed=0)[0])
+    assert np.abs(outside(found, points_X3)).mean() < 0.035 * size
+    ball_X3 = np.asarray(trimesh.creation.icosphere(2, 1.0).vertices)
+    on_them_X3 = np.concatenate([
+        start_3 + share * (end_3 - start_3) + radius * ball_X3
+        for start_3, end_3, radius in found for share in np.linspace(0, 1, 9)
+    ])  # fmt: skip
+    shell_X3 = on_them_X3[outside(found, on_them_X3) > -1e-6]
+    sides_F4 = np.unique(np.round(ConvexHull(corners_H3).equations, 6), axis=0)
+    assert (shell_X3 @ sides_F4[:, :3].T + sides_F4[:, 3]).max() < 0.06 * size
 
 
 def test_what_has_no_room_gets_a_thin_capsule() -> None:
@@ -62,6 +95,6 @@ def test_extremes_are_those_of_the_whole() -> None:
 @pytest.mark.parametrize("name", MESHES)
 def test_one_capsule_alone(name: str) -> None:
     mesh = MESHES[name][0]
-    ((start_3, end_3, radius),) = capsules_of(np.asarray(mesh.vertices), alone=True)
+    ((start_3, end_3, radius),) = capsules_of(np.asarray(mesh.vertices), most=1)
     half_3 = mesh.extents / 2
     assert np.all(np.abs((start_3 + end_3) / 2) < 0.02) and half_3.min() / 2 < radius < half_3.max() * 1.5

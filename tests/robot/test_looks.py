@@ -52,6 +52,19 @@ def test_meshes_and_shapes_beside_each_other(tmp_path: Path) -> None:
     assert [mesh.link for mesh in found.meshes] == ["shin", "foot"] and found.shapes == []
 
 
+@pytest.mark.parametrize(("foot", "drawn"), [("foot.stl", []), ("none.stl", ["guard"])])
+def test_a_box_for_safety_hides_no_hand(tmp_path: Path, foot: str, drawn: list[str]) -> None:
+    """A link that only collides, fixed to one that is seen, is not drawn, as no other program draws it."""
+    looks(tmp_path, BONE.format("visual"), foot)
+    path = tmp_path / "my.urdf"
+    guard = """<link name="guard"><collision><geometry><box size="0.3 0.3 0.3"/></geometry></collision></link>
+        <joint name="fixed" type="fixed"><parent link="foot"/><child link="guard"/></joint></robot>"""
+    path.write_text(path.read_text().replace("</robot>", guard).replace('<sphere radius="0.005"/>', ""))
+    found = read_looks(describe(path))
+    assert [shape.link for shape in found.shapes if shape.link != "shin"] == drawn
+    assert any(shape.link == "guard" for shape in describe(path).solids.shapes)
+
+
 def test_the_figure_is_as_large_as_its_meshes(tmp_path: Path) -> None:
     looks(tmp_path, ROD.format("visual"))
     shape, ankle_44 = RobotShape(describe(tmp_path / "my.urdf")), np.eye(4)

@@ -134,3 +134,25 @@ def test_what_else_is_seen_does_not_count(folder: Path, told: dict[str, str]) ->
 def test_a_hand_whose_mesh_is_not_there_leaves_no_gap(folder: Path) -> None:
     shapes = SelfCollision(with_hand(folder, "<mesh filename='none.stl'/>"))
     assert shapes.known and not shapes.uncovered
+
+
+@pytest.mark.parametrize("meshes", [True, False])
+def test_what_is_nearly_always_beside_a_hull_is_not_compared_with_it(tmp_path: Path, meshes: bool) -> None:
+    """A wrist that reaches into a forearm, two joints on: hulls are closed, and known to some millimetres alone. Simple
+    shapes are what they are.
+    """
+
+    def ball(radius: float, x: float = 0.0) -> str:
+        trimesh.creation.icosphere(3, radius).export(tmp_path / f"{radius}.stl")
+        shape = f"<mesh filename='{radius}.stl'/>" if meshes else f"<sphere radius='{radius}'/>"
+        return f"<collision><origin xyz='{x} 0 0'/><geometry>{shape}</geometry></collision>"
+
+    path = tmp_path / "toy.urdf"
+    path.write_text(
+        f"""<robot name="toy"><link name="fore">{ball(0.05)}</link><link name="twist"/>
+        <link name="wrist">{ball(0.03)}{ball(0.06, 1.0)}</link>
+        <joint name="a" type="revolute"><parent link="fore"/><child link="twist"/><origin xyz="0.082 0 0"/>{LIMIT}</joint>
+        <joint name="b" type="revolute"><parent link="twist"/><child link="wrist"/>{LIMIT}</joint></robot>"""
+    )
+    shapes = SelfCollision(Robot(path, ["a", "b"]))
+    assert (shapes.pairs == ()) == meshes and len(shapes.pairs) == (0 if meshes else 2)

@@ -14,6 +14,7 @@ from mrhubo.robot.discovery.leg import Leg
 from mrhubo.robot.discovery.leg_axes import parallel
 from mrhubo.robot.discovery.lines import cross, unit
 from mrhubo.robot.discovery.motion import straight_angle
+from mrhubo.robot.soles import sole_balls
 
 _FLAT, _TILTED = 0.9, 0.9998
 """Cosines of how far the flat of a foot's box may be from the robot's up to be its sole (25 degrees), and within which
@@ -31,6 +32,10 @@ _HEIGHT, _HEEL = 0.165, 0.32
 """Where an ankle is that has no joint: how high above the sole, as a share of the knee's height, and how far before the
 heel, as a share of the foot's length. Both are medians of fifteen public humanoids whose ankles have joints, of which
 the height is 0.11 to 0.31 and the distance 0.22 to 0.5."""
+_THICK = 0.025
+"""How far above the lowest of a sole's shapes others touch a floor too, as a share of the shin."""
+_TILTS = np.radians(np.arange(0, 16) * np.array([[1], [-1]])).T.ravel().tolist()
+"""How far such a sole may be tilted forwards or backwards at zero [rad], the least first."""
 _FOOT, _FLOOR = 0.25, 0.1
 """How long a foot is at least, and how far above the lowest of its shapes the others may end, as shares of the knee's
 height."""
@@ -66,7 +71,10 @@ def read_foot(bodies: Bodies, leg: Leg, heading: Heading) -> Foot:
             why = "the leg is spread at zero" if aside > _SPREAD else "the leg does not stand at zero"
             why = "no joint turns it against the shin" if leg.ankle_at is None else why
             why = "it ends in a wheel, which is no foot" if leg.wheeled else why
-            doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: upright as the robot is at zero"
+            taken = "upright as the robot is at zero"
+            if leg.ankle_at is not None and aside > _SPREAD and stands and down >= _STANDING:
+                up_3, taken = _flatter(bodies, leg, heading, link)
+            doubt = f"{why}, so nothing tells how the foot lies on a floor; taken: {taken}"
     forward_3 = heading.forward_3
     if leg.straight and leg.ankle_at is not None:
         # By left and right, which no foot that hangs at zero changes.
@@ -130,6 +138,37 @@ def _up(bodies: Bodies, leg: Leg, up_3: np.ndarray) -> tuple[np.ndarray, str | N
         if len(standing) == 1:
             return unit(standing[0]), "flat as its box is, on the only side on which the ankle lets it stand", 0.7
     return up_3, None, 0.0
+
+
+def _flatter(bodies: Bodies, leg: Leg, heading: Heading, link: str) -> tuple[np.ndarray, str]:
+    """Where the sole of a foot without a box, at the end of a leg that is spread at zero, faces away from, and what was
+    taken: along the leg as seen from before, if its lowest shapes are far wider then, and tilted as they lie, if they
+    are far longer then; else the robot's up.
+    """
+    up_3, forward_3 = heading.up_3, heading.forward_3
+    leg_3 = leg.hip.point_3 - leg.ankle.point_3
+    along_3 = unit(leg_3 - forward_3 * (leg_3 @ forward_3))
+    balls_K4, known = sole_balls(link, bodies.description)
+    places_K3 = balls_K4[:, :3] @ bodies.pose_44[link][:3, :3].T
+    thick = _THICK * float(np.linalg.norm(leg.knee.point_3 - leg.ankle.point_3))
+
+    def size(sole_3: np.ndarray, across_3: np.ndarray) -> float:
+        height_K = places_K3 @ sole_3 - balls_K4[:, 3]
+        return float(np.ptp(places_K3[height_K < height_K.min() + thick] @ across_3))
+
+    def lying(sole_3: np.ndarray) -> tuple[np.ndarray, float]:
+        """It, tilted where its lowest shapes are far longer then, and how wide they are."""
+        left_3 = cross(sole_3, forward_3)
+        tilted = [math.cos(tilt) * sole_3 + math.sin(tilt) * forward_3 for tilt in _TILTS]
+        longest_3 = max(tilted, key=lambda tilted_3: size(tilted_3, cross(left_3, tilted_3)))
+        if size(longest_3, cross(left_3, longest_3)) > 2 * size(sole_3, forward_3) + thick:
+            sole_3 = longest_3
+        return sole_3, size(sole_3, left_3)
+
+    (sole_3, wide), (_, narrow) = lying(along_3), lying(up_3)
+    if known and wide > 2 * narrow + thick:
+        return sole_3, "flat on what is lowest of its shapes where the leg is upright"
+    return up_3, "upright as the robot is at zero"
 
 
 def _stands(leg: Leg, up_3: np.ndarray) -> bool:
