@@ -60,14 +60,16 @@ def find_mesh(name: str, path: Path) -> Path | None:
     Args:
         name: `meshes/arm.stl`, `package://PACKAGE/...`, or `file://...`. What is not where the name says, from the URDF
             on, is looked for by as much of the name's end as any folder above the URDF has: a package, or a folder of
-            somebody else's machine, may have been copied anywhere.
+            somebody else's machine, may have been copied anywhere. The file's own name alone counts beside the URDF:
+            farther away it may be another robot's.
         path: the URDF.
     """
     rest = name.rpartition("://")[2].replace("\\", "/")
     parts = [part for part in rest.split("/") if part not in ("", ".", "..")][-_MOST_FOLDERS:]
-    tails = ("/".join(parts[first:]) for first in range(len(parts)))
+    tails = ("/".join(parts[first:]) for first in range(len(parts) - 1))
     places = (folder / tail for tail in tails for folder in path.absolute().parents)
-    return next((place for place in chain([path.parent / rest], places) if _is_file(place)), None)
+    beside = (path.parent / name for name in parts[-1:])
+    return next((place for place in chain([path.parent / rest], places, beside) if _is_file(place)), None)
 
 
 def _is_file(place: Path) -> bool:

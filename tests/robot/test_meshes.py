@@ -68,6 +68,17 @@ def test_more_of_a_name_counts_more_than_a_nearer_folder(folder: Path) -> None:
     assert found is not None and found.samefile(folder / "meshes" / "box.stl")
 
 
+def test_a_files_own_name_counts_beside_the_urdf_alone(folder: Path) -> None:
+    (folder / "box.stl").write_bytes(b"")
+    deep = folder / "urdf" / "my.urdf"
+    deep.parent.mkdir()
+    assert find_mesh("package://any/visual/box.stl", deep) is None
+    beside = deep.with_name("box.stl")
+    beside.write_bytes(b"")
+    found = find_mesh("package://any/visual/box.stl", deep)
+    assert found is not None and found.samefile(beside)
+
+
 def test_packages_are_looked_for_above_the_urdf(folder: Path) -> None:
     place = folder / "meshes" / "box.stl"
     deep = folder / "urdf" / "more" / "my.urdf"

@@ -184,7 +184,7 @@ def notes(limbs: Limbs, ranges: Mapping[str, FoundRange]) -> Iterator[str]:
             "wrong in the file; if it is, correct it there, or give what is right in robot.ranges"
         )
     for what in limbs.heading.contradicted:
-        yield f"against where the robot was found to face speaks: {what}"
+        yield f"what speaks against where the robot was found to face, as if it faced the other way: {what}"
     if not limbs.whole_body:
         return
     for name, source in shared_hips(limbs).items():
