@@ -245,6 +245,8 @@ def _discover(description: Description, whole_body: bool = False) -> Discovery:
 
 def _more(description: Description, found: Discovery) -> tuple[str, ...]:
     """Which of legs and waist have joints that move if the whole body does, and not in what was found."""
+    if found.whole_body:
+        return ()
     moved = set(discover(description, whole_body=True).joints) - set(found.joints)
     parts = {"legs": found.chains.get("left_leg", ()), "waist": found.chains.get("waist", ())}
     return tuple(name for name, joints in parts.items() if moved & set(joints))

@@ -122,5 +122,5 @@ def test_elbows_without_limits_tell_by_how_they_are_bent_at_zero_where_the_robot
         link = made.join(f"{side}_elbow", link, (0, 0, -0.3), Y, None, "continuous", rpy=(0, -0.9, 0))
         made.join(f"{side}_hand", link, (0, 0, -0.25), Y, None, "fixed")
     found = made.found(tmp_path)
-    assert any("speaks: the elbows bend forward" in note for note in found.notes)
+    assert any("faced the other way: the elbows bend forward" in note for note in found.notes)
     assert "forward" in about(found)
