@@ -184,9 +184,10 @@ class SelfCollision(nn.Module):
         centre_C3 = self._place(self.robot.forward(self.robot.home()[None])).ends_BC23[0].mean(dim=1)
         size = float((centre_C3.amax(0) - centre_C3.amin(0)).norm()) if len(centre_C3) else 0.0
         near_P = of_mesh_C[self._pair_2P].any(dim=0) * (_NEARLY * size)
+        near = float(near_P.max()) if len(near_P) else 0.0
         count_P = torch.zeros(self._pair_2P.shape[1], dtype=torch.long, device=self._body_C.device)
         for rows in self._chunks(len(q_BN)):
-            close = self._closer(self._place(self._poses(q_BN, None, rows)), _NEARLY * size)
+            close = self._closer(self._place(self._poses(q_BN, None, rows)), near)
             pair_X = close.pair_X[close.distance_X < near_P[close.pair_X]]
             count_P += torch.bincount(pair_X, minlength=len(count_P))
         return count_P > _ALWAYS * len(q_BN)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import yourdfpy
 
 from mrhubo.robot.bare import bare_sticks
-from mrhubo.robot.joint import Joint
-from mrhubo.robot.mesh_files import find_mesh
+from mrhubo.robot.mesh_files import find_mesh, mesh_of
 from mrhubo.robot.meshes import LinkMesh, read_meshes
 from mrhubo.robot.shapes import LinkGeometry, read_geometry
 from mrhubo.robot.urdf import Description
@@ -49,24 +48,19 @@ def read_looks(description: Description) -> Looks:
 
 def _seen_by_others(description: Description) -> set[str]:
     """Links without looks of their own, each fixed to links of which some have any that can be read."""
-    body_of = {description.root: description.root}
-    below: dict[str, list[Joint]] = {}
-    for joint in description.joints.values():
-        below.setdefault(joint.parent, []).append(joint)
-    order = [description.root]
-    for link in order:
-        for joint in below.get(link, []):
-            body_of[joint.child] = body_of[link] if joint.kind == "fixed" else joint.child
-            order.append(joint.child)
     parsed = description.parsed
+    body_of = {
+        link.name: next((j.child for j in description.joints_above(link.name) if j.kind != "fixed"), description.root)
+        for link in parsed.robot.links
+    }
     looking = {link.name for link in parsed.robot.links if any(_seen(visual, description) for visual in link.visuals)}
-    seen = {body_of[link] for link in looking if link in body_of}
-    return {link.name for link in parsed.robot.links if not link.visuals and body_of.get(link.name) in seen}
+    seen = {body_of[link] for link in looking}
+    return {link.name for link in parsed.robot.links if not link.visuals and body_of[link.name] in seen}
 
 
 def _seen(visual: yourdfpy.urdf.Visual, description: Description) -> bool:
     """Whether there is something to be drawn of an element."""
-    geometry = visual.geometry
-    if geometry is None:
-        return False
-    return geometry.mesh is None or find_mesh(str(geometry.mesh.filename), description.path) is not None
+    mesh = mesh_of(visual)
+    if mesh is None:
+        return visual.geometry is not None
+    return find_mesh(str(mesh.filename), description.path) is not None

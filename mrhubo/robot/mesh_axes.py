@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import yourdfpy
 
-from mrhubo.robot.mesh_files import UPRIGHT_33, is_y_up, read_mesh, scale_of
+from mrhubo.robot.mesh_files import UPRIGHT_33, is_y_up, mesh_of, read_mesh, scale_of
+from mrhubo.robot.shapes import place_of
 
 _MOST = 12
 """Meshes that are looked at."""
@@ -31,15 +32,15 @@ def turns_upright(urdf: yourdfpy.URDF, path: Path) -> bool:
     """
     joints: dict[str, list[np.ndarray]] = {}
     for joint in urdf.robot.joints:
-        joints.setdefault(joint.parent, []).append(np.eye(4)[:3, 3] if joint.origin is None else joint.origin[:3, 3])
+        joints.setdefault(joint.parent, []).append(np.zeros(3) if joint.origin is None else joint.origin[:3, 3])
     off_K2, lengths = [], []
     for link in urdf.robot.links:
         for element in (link.visuals or link.collisions)[:1]:
-            mesh = None if element.geometry is None else element.geometry.mesh
+            mesh = mesh_of(element)
             if mesh is None or len(off_K2) >= _MOST or not is_y_up(str(mesh.filename), path):
                 continue
             points_J3 = np.array([np.zeros(3), *joints.get(link.name, [])])
-            place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
+            place_44 = place_of(element)
             if (read := read_mesh(str(mesh.filename), path, np.ones(3))) is None:
                 continue
             both = [scale_of(mesh) * vertices_V3 for vertices_V3 in (read[0], read[0] @ UPRIGHT_33.T)]

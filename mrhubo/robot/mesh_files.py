@@ -34,6 +34,11 @@ UPRIGHT_33 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns y up to z up."""
 
 
+def mesh_of(element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision) -> yourdfpy.urdf.Mesh | None:
+    """The mesh that an element of a link is; None where it is another shape, or none."""
+    return None if element.geometry is None else element.geometry.mesh
+
+
 def scale_of(mesh: yourdfpy.urdf.Mesh) -> np.ndarray:
     """How much larger (3,) a URDF wants a mesh than its file has it."""
     return np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, float), (3,))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import yourdfpy
 
-from mrhubo.robot.mesh_files import MOST_TRIANGLES, read_mesh, scale_of
-from mrhubo.robot.shapes import ROBOT_COLOR, Color, visual_colors
+from mrhubo.robot.mesh_files import MOST_TRIANGLES, mesh_of, read_mesh, scale_of
+from mrhubo.robot.shapes import ROBOT_COLOR, Color, place_of, visual_colors
 from mrhubo.robot.urdf import Description
 
 
@@ -58,12 +58,12 @@ def _meshes(
 ) -> Iterator[LinkMesh]:
     named = next((color for color in colors if color is not None), ROBOT_COLOR)
     for number, element in enumerate(elements):
-        mesh = None if element.geometry is None else element.geometry.mesh
+        mesh = mesh_of(element)
         if mesh is None:
             continue
         found = read_mesh(str(mesh.filename), description.path, scale_of(mesh), description.upright)
         if found is None:
             continue
-        place_44 = np.eye(4) if element.origin is None else np.asarray(element.origin, float)
+        place_44 = place_of(element)
         color = (colors[number] if isinstance(element, yourdfpy.urdf.Visual) else None) or named
         yield LinkMesh(link, found[0] @ place_44[:3, :3].T + place_44[:3, 3], found[1], color)

@@ -101,6 +101,11 @@ def without_markers(shapes: Iterable[LinkGeometry], size: float) -> list[LinkGeo
     return [shape for shape in shapes if _extent(shape) > _MARKER * size]
 
 
+def place_of(element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision) -> np.ndarray:
+    """Where an element is in its link: a new pose (4, 4) [m]."""
+    return np.eye(4) if element.origin is None else np.array(element.origin, float)
+
+
 def _extent(shape: LinkGeometry) -> float:
     """About the longest side of the box around a shape [m]."""
     if shape.kind == "box":
@@ -144,7 +149,7 @@ def _shape(
     link: str, element: yourdfpy.urdf.Visual | yourdfpy.urdf.Collision, color: Color, metres: float = 1.0
 ) -> LinkGeometry | None:
     geometry = element.geometry
-    origin_44 = np.eye(4) if element.origin is None else np.array(element.origin, float)
+    origin_44 = place_of(element)
     origin_44[:3, 3] *= metres
     if geometry is None:
         return None

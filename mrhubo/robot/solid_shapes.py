@@ -18,8 +18,8 @@ import yourdfpy
 from mrhubo.fast.rotations import shortest_turn
 from mrhubo.robot.capsules import Capsule
 from mrhubo.robot.kept_capsules import kept_capsules
-from mrhubo.robot.mesh_files import MOST_TRIANGLES, read_mesh, scale_of
-from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, read_collision_geometry, read_geometry
+from mrhubo.robot.mesh_files import MOST_TRIANGLES, mesh_of, read_mesh, scale_of
+from mrhubo.robot.shapes import ROBOT_COLOR, LinkGeometry, place_of, read_collision_geometry, read_geometry
 
 _MOST_MESHES = 300
 """Different meshes of one robot: a few hundredths of a second each."""
@@ -55,7 +55,7 @@ def read_solids(urdf: yourdfpy.URDF, path: Path, upright: bool) -> SolidShapes:
     for link in urdf.robot.links:
         alone = link.name in seen_alone
         for element in link.visuals if alone else link.collisions:
-            mesh = None if element.geometry is None else element.geometry.mesh
+            mesh = mesh_of(element)
             if mesh is None:
                 continue
             scale_3 = scale_of(mesh)
@@ -65,7 +65,7 @@ def read_solids(urdf: yourdfpy.URDF, path: Path, upright: bool) -> SolidShapes:
                 read = None if enough else read_mesh(key[0], path, scale_3, upright)
                 meshes[key] = None if read is None else read[0][np.unique(read[1])]
                 triangles += 0 if read is None else len(read[1])
-            places.append((link.name, key, np.eye(4) if element.origin is None else np.asarray(element.origin, float)))
+            places.append((link.name, key, place_of(element)))
     there = {key: vertices_V3 for key, vertices_V3 in meshes.items() if vertices_V3 is not None}
     hugging = kept_capsules([(vertices_V3, key[2]) for key, vertices_V3 in there.items()])
     known = dict(zip(there, hugging, strict=True))

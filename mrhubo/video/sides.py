@@ -13,7 +13,7 @@ import numpy as np
 
 EXCHANGED = np.array([0, 4, 5, 6, 1, 2, 3, 8, 7, 10, 9, *np.arange(11, 33).reshape(-1, 2)[:, ::-1].ravel()])
 """The point on the other side, of each: nose, eyes, ears, mouth, and pairs from the shoulders down."""
-_SHOULDERS, _HIPS = (11, 12), (23, 24)
+SHOULDERS, HIPS = (11, 12), (23, 24)
 """The left one, and the right one."""
 _UPPER, _LOWER = slice(0, 23), slice(23, 33)
 """The points that go with shoulders, and with hips."""
@@ -39,7 +39,7 @@ def exchanged_points(time_T: np.ndarray, point_TK3: np.ndarray, who_T: np.ndarra
     """
     exchanged_TK, seen_S = np.zeros(point_TK3.shape[:2], bool), np.flatnonzero(who_T >= 0)
     if len(seen_S):
-        shoulder_S3, hip_S3 = (_line(point_TK3[seen_S], *ends) for ends in (_SHOULDERS, _HIPS))
+        shoulder_S3, hip_S3 = (_line(point_TK3[seen_S], *ends) for ends in (SHOULDERS, HIPS))
         apart_S = np.append(True, (np.diff(time_T[seen_S]) > _NEXT_S) | (np.diff(who_T[seen_S]) != 0))
         turned_S = np.append(False, (shoulder_S3[1:] * shoulder_S3[:-1]).sum(-1) < _TURNED) & ~apart_S
         wrong_S = _minority(time_T[seen_S], turned_S, apart_S)

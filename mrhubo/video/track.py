@@ -15,14 +15,13 @@ from mrhubo.robot_motion.clock import STEADY, at_rate, rate_of_step, rate_of_tim
 from mrhubo.video.estimator import PoseEstimator
 from mrhubo.video.frames import MAX_FRAMES, frames
 from mrhubo.video.people import tell_apart
-from mrhubo.video.sides import EXCHANGED, exchanged_points
+from mrhubo.video.sides import EXCHANGED, HIPS, SHOULDERS, exchanged_points
 
 _LOOK_S = 0.5
 """How often it is looked who else is there [s]."""
 _SMALL = 120.0
 """Pixels: smaller people are often missed, or taken for turned or mirrored ones."""
-_TRUNK = [11, 12, 23, 24]
-"""Shoulders and hips among the points."""
+_TRUNK = [*SHOULDERS, *HIPS]
 
 
 @dataclass(frozen=True)
