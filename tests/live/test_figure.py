@@ -167,5 +167,4 @@ def test_a_mesh_that_collides_with_nothing_is_a_rod(root: Path, tmp_path: Path) 
     ends_23 = np.reshape(new[:6], (2, 3))
     assert np.ptp(ends_23[:, 2]) < 0.03 and ends_23[0, 2] > 1.0
     length = float(np.linalg.norm(ends_23[1] - ends_23[0]))
-    assert abs(length + 2 * new[6] - 0.5) < 0.025, "as long as the box, within a twentieth"
-    assert 0.049 < new[6] < 0.08
+    assert 0.5 <= length + 2 * new[6] < 0.523 and 0.049 < new[6] < 0.08, "as long as the box, and its diagonal, to 3 mm"
