@@ -61,7 +61,10 @@ def add_motion_flags(parser: CommandParser[None]) -> None:
     parser.add_argument("--mirror", action="store_true", help="exchange left and right of the human")
     person = "which of several people in a file, by the name or number that it has for them; default: seen longest"
     parser.add_argument("--person", metavar="PERSON", help=person)
-    parser.add_argument("--bvh-map", metavar="FILE", help="YAML file that says which joint of a BVH file is which")
+    animation = "which of several animations of an FBX or glTF file, by its name; default: the longest"
+    parser.add_argument("--animation", metavar="NAME", help=animation)
+    bvh_map = "YAML file that says which joint of a BVH, FBX or glTF file is which"
+    parser.add_argument("--bvh-map", metavar="FILE", help=bvh_map)
     model = "which model finds the body in a video: lite, full (default) or heavy"
     parser.add_argument("--pose-model", metavar="MODEL", default="full", help=model)
     add_whole_body_flag(parser)
@@ -118,7 +121,7 @@ def read_request(options: Namespace, joint_order: str | None = None) -> Request:
 
     bvh_map = None if options.bvh_map is None else Path(options.bvh_map)
     return Request(
-        options=ReadOptions(options.rate, options.person, bvh_map, options.pose_model),
+        options=ReadOptions(options.rate, options.person, bvh_map, options.pose_model, options.animation),
         start=getattr(options, "from") or 0.0,
         end=options.to,
         rate=options.out_rate,

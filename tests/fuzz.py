@@ -30,6 +30,7 @@ from mrhubo.robot_motion import FORMATS, write_robot_motion
 from tests.files.bounded import bounded
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.motion.damage import altered_words, damaged_by, read_or_refused
+from tests.motion.fbx_writer import Manner, write_fbx
 from tests.motion.readers import (
     estimator_files,
     test_amc,
@@ -59,6 +60,15 @@ def _bvh(style: Style) -> Callable[[Path], None]:
     def write(path: Path) -> None:
         whole = mrhubo.read_motion(_MOTION)
         path.write_text(write_bvh(trim(whole, end=(_FRAMES - 1) / whole.frame_rate), style))
+
+    return write
+
+
+def _fbx(manner: Manner) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        whole = mrhubo.read_motion(_MOTION)
+        short = trim(whole, end=(_FRAMES - 1) / whole.frame_rate)
+        write_fbx(short, Style(t_pose_first=True, fingers=False), manner, path)
 
     return write
 
@@ -169,6 +179,11 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "amass": ("damaged.npz", lambda path: path.write_bytes(_MOTION.read_bytes())),
     "bvh": ("damaged.bvh", _bvh(Style())),
     "bvh, positions": ("damaged.bvh", _bvh(Style(names="nameless", axes="random", positions=True, doubled=True))),
+    "fbx": ("damaged.fbx", _fbx(Manner(own_axes=True, version=7500))),
+    "fbx, not packed": ("damaged.fbx", _fbx(Manner(packed=False, bind_poses=True, skin=False))),
+    "fbx, text": ("damaged", _fbx(Manner(is_text=True, own_axes=True, weighted=True))),
+    "fbx of 2009": ("damaged.fbx", _fbx(Manner(version=6100))),
+    "fbx of 2009, text": ("damaged", _fbx(Manner(version=6100, is_text=True))),
     "amc": ("07_01.amc", _acclaim),
     "asf": ("07.asf", _acclaim),
     "points.json": ("damaged.json", _points_json),

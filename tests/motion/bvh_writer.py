@@ -70,6 +70,8 @@ class Style:
     """3ds Max's habit: collars hang on the neck, thighs on the spine, and move against them."""
     twists: bool = False
     """Ends of bones on upper arms, forearms and thighs, as skins need them."""
+    cloth: bool = False
+    """A long skirt and long hair, of chains of joints alike, as avatars have them."""
     seed: int = 0
     """Of the order of children and of random axes."""
 
@@ -134,6 +136,15 @@ def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
             if style.twists:
                 row = _INDEX[f"{side}_{joint}"]
                 nodes[f"{side}{joint}Twist*"] = (f"{side}_{joint}", row, 0.5 * offsets[_INDEX[f"{side}_{end}"]])
+    if style.cloth:
+        for kind, base, count, links in (("skirt", "pelvis", 12, 4), ("hair", "head", 8, 4)):
+            for chain, angle in enumerate(np.linspace(0, 2 * np.pi, count, endpoint=False)):
+                way = np.array([np.cos(angle), 0.0, np.sin(angle)])
+                for link in range(links):
+                    parent = f"{kind}{chain}_{link - 1}" if link else base
+                    offset = way * (0.15 if link else 0.1) * 0.3 + [0.0, -0.22, 0.0] if link else way * 0.1
+                    nodes[f"{kind}{chain}_{link}"] = (parent, _INDEX[base], np.array(offset))
+                nodes[f"{kind}{chain}*"] = (f"{kind}{chain}_{links - 1}", _INDEX[base], np.array([0.0, -0.22, 0.0]))
     if style.prop:
         nodes["stick*"] = ("right_wrist", _INDEX["right_wrist"], np.array([0.0, 0.0, 1.2]))
     nodes["head*"] = ("head", _INDEX["head"], np.array([0.0, 0.18, 0.0]))

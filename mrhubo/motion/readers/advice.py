@@ -1,9 +1,4 @@
-"""What to do with files that hold human motion in a form that is not read here.
-
-No library that is maintained, permissive and small reads the skins and animations of GLB and FBX files that animators'
-programs write: pygltflib leaves decoding and skeletons to its user, trimesh reads shapes alone, and FBX is closed. So
-they are to be converted, which Blender does.
-"""
+"""What to do with files that hold human motion in a form that is not read here."""
 
 from __future__ import annotations
 
@@ -12,14 +7,13 @@ import re
 from mrhubo.motion.readers.content import Content
 
 _BLENDER = "convert it to BVH, for instance in Blender: import it, then File > Export > Motion Capture (.bvh)"
-SOLVE = "solve it for a skeleton first, and export that as BVH, or convert it to SMPL with MoSh++ or SOMA"
+SOLVE = "solve it for a skeleton first, and export that as BVH or FBX, or convert it to SMPL with MoSh++ or SOMA"
 """What to do with a recording of markers."""
 _MARKERS = f"it has markers, and not joints; {SOLVE}"
-_VICON = "solve it for a skeleton, and export that as BVH, for instance from Vicon Shogun or Blade"
+_VICON = "solve it for a skeleton, and export that as BVH or FBX, for instance from Vicon Shogun or Blade"
 _FILM = "convert it to MP4, by ffmpeg for instance: ffmpeg -i FILE film.mp4"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"glTF", "a GLB file", _BLENDER),
-    (r"Kaydara FBX|; FBX", "an FBX file", _BLENDER),
     (r'\s*\{(?=.*"asset"\s*:)(?=.*"(?:nodes|scenes|meshes|animations|buffers)"\s*:)', "a glTF file", _BLENDER),
     (r"\s*<\?xml.{0,400}<COLLADA|\s*<COLLADA", "a COLLADA file", _BLENDER),
     (r"PXR-USDC|#usda", "a USD file", _BLENDER),
@@ -37,10 +31,10 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "name the folder that holds them all; points in a picture (pose_keypoints_2d) have to be lifted to three"
         " dimensions first, for instance with MMPose or MotionBERT",
     ),
-    (r"\s*<\?xml.{0,400}<mvnx|\s*<mvnx", "an MVNX file of Xsens", "export BVH from MVN: File > Export > BVH"),
+    (r"\s*<\?xml.{0,400}<mvnx|\s*<mvnx", "an MVNX file of Xsens", "export BVH or FBX from MVN: File > Export"),
     (r"Vocaloid Motion Data", "a VMD file of MikuMikuDance", f"play it on a model, and {_BLENDER}"),
     (r"%YAML.{0,400}AnimationClip:", "an animation clip of Unity", "export the character as BVH or FBX first"),
-    (r"//Maya ASCII", "a scene of Maya", "export the skeleton as BVH, over FBX and Blender for instance"),
+    (r"//Maya ASCII", "a scene of Maya", "export the skeleton as FBX"),
     (
         r"\s*(?:<!DOCTYPE html|<html)",
         "a web page",
@@ -54,7 +48,7 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"(?:Joints|Segments|Model Outputs|Trajectories)[,\s]*\n\s*[0-9.]+[,\s]*\n", "a .csv file of Vicon Nexus", _VICON),
     (r"NO_OF_FRAMES\b", "a .tsv file of Qualisys Track Manager", _MARKERS),
     (r"Coordinates\s.{0,2000}?endheader", "a .mot file of OpenSim", "name the recording from which it was made"),
-    (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH from Motive"),
+    (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH or FBX from Motive"),
     (
         r"[^\n]{0,4000}?(?:root_translate|_joint(?:_dof|_pos)?\b|_dof\b)[^\n]*+\n",
         "a table of a robot's joints",

@@ -13,12 +13,9 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import RATES, NoRate, ReadOptions
 from mrhubo.motion.readers.rate import asked_rate
-from mrhubo.motion.readers.tracks import Person, choose
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
-from mrhubo.motion.readers.tree.hierarchy import JointTree
-from mrhubo.motion.readers.tree.limbs import find_limbs
-from mrhubo.motion.readers.tree.shape import Shape
+from mrhubo.motion.readers.tree.people import of_person
 
 
 def is_bvh(content: Content) -> bool:
@@ -55,27 +52,6 @@ def read_bvh(path: Path, options: ReadOptions) -> Motion:
         rate = told
     if rate is None:
         rate = asked_rate(path, options)
-    tree = _of_person(path, tree, options, notes)
+    tree = of_person(path, tree, options, notes)
     given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
     return tree_motion(tree, motion_name(path), str(path), rate, "BVH file:", given, tuple(notes))
-
-
-def _of_person(path: Path, tree: JointTree, options: ReadOptions, notes: list[str]) -> JointTree:
-    """The tree of one of the people in a file, who have a root each; the whole tree where it has one root.
-
-    Raises:
-        UserError: there is nobody whose root has the name that is asked for.
-    """
-    roots = tree.roots
-    if len(roots) < 2:
-        notes += options.of_one()
-        return tree
-    people: dict[str, JointTree] = {}
-    for root in roots:
-        under, name = tree.under(root), tree.names[root]
-        if find_limbs(Shape(under)) is not None:
-            people[name if name not in people else f"{name} {len(people) + 1}"] = under
-    if not people:
-        return tree
-    chosen = choose(path, [Person(name, len(tree)) for name in people], options, notes)
-    return people[chosen.person]

@@ -53,6 +53,7 @@ _PYTHON = (".pkl", ".pickle", ".joblib", ".pt", ".pth", ".npy")
 FORMATS: tuple[Format, ...] = (
     Format("AMASS and SMPL-family .npz", "amass", "is_amass", "read_amass", (".npz",)),
     Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
+    Format("FBX", "scene.fbx", "is_fbx", "read_fbx", (".fbx",)),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints, SMPL parameters and DeepMimic's motions in JSON", "json_file", "is_json", "read_json", ()),

@@ -36,9 +36,11 @@ class ReadOptions:
     """Which of several people in a file: the name or number that the file has for them; default: whoever is seen
     longest."""
     bvh_map: Path | None = None
-    """A YAML file that says which joint of a BVH file is which."""
+    """A YAML file that says which joint of a BVH file, or node of a scene (FBX, glTF), is which."""
     pose_model: str = "full"
     """Which model finds the body in a video: `lite`, `full` or `heavy`, the faster or the more exact."""
+    animation: str | None = None
+    """Which of several animations of a scene (FBX, glTF), by its name; default: the longest."""
 
     def __post_init__(self) -> None:
         """Raises a UserError where the rate is none."""

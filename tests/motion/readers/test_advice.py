@@ -21,8 +21,6 @@ def _zipped(name: str) -> bytes:
 
 _FILES = {
     "GLB": (b"glTF\x02\0\0\0", "Blender"),
-    "FBX": (b"Kaydara FBX Binary  \x00\x1a\x00", "Blender"),
-    "an FBX": (b"; FBX 7.4.0 project file\n", "Blender"),
     "glTF": (b'{"asset": {"version": "2.0"}, "nodes": []}', "Blender"),
     "a glTF": (  # whose skin has joints
         b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"name": "Armature"}],'

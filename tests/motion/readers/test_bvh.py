@@ -106,6 +106,7 @@ styles = st.builds(
     fingers=st.booleans(),
     prop=st.booleans(),
     twists=st.booleans(),
+    cloth=st.booleans(),
     seed=st.integers(0, 1000),
 )
 

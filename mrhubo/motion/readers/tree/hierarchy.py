@@ -41,6 +41,8 @@ class JointTree:
     """Parents before children."""
     value_TC: np.ndarray
     """Angles [deg] and coordinates, a row a frame."""
+    rest_name: str = "its pose at all angles 0"
+    """What the pose is, in words, in which all angles are 0."""
 
     def __len__(self) -> int:
         return len(self.value_TC)
@@ -77,7 +79,7 @@ class JointTree:
         kept = [place for place in range(len(self.joints)) if root in self.above(place)]
         moved = {place: number for number, place in enumerate(kept)}
         joints = [replace(self.joints[place], parent=moved.get(self.joints[place].parent, -1)) for place in kept]
-        return JointTree(tuple(joints), self.value_TC)
+        return replace(self, joints=tuple(joints))
 
     def pose(self, frames: slice | np.ndarray, places: Sequence[int] | None = None) -> Pose:
         """Some joints, or all, in some frames."""
@@ -147,16 +149,16 @@ def _turned(joint: Joint, above_33F: np.ndarray, value_FC: np.ndarray) -> np.nda
     turn_33F = above_33F.copy()
     own = [(axis, np.radians(angle)) for axis, angle in joint.axes]
     for axis, angle in own:
-        _turn(turn_33F, axis, angle)
+        turn_about(turn_33F, axis, angle)
     for axis, column in joint.rotation:
-        _turn(turn_33F, axis, np.radians(value_FC[:, column]))
+        turn_about(turn_33F, axis, np.radians(value_FC[:, column]))
     for axis, angle in own[::-1]:
-        _turn(turn_33F, axis, -angle)
+        turn_about(turn_33F, axis, -angle)
     return turn_33F
 
 
-def _turn(matrix_33F: np.ndarray, axis: str, angle_F: np.ndarray | float) -> None:
-    """Turns by angles [rad] about an axis of what is turned already, in place."""
+def turn_about(matrix_33F: np.ndarray, axis: str, angle_F: np.ndarray | float) -> None:
+    """Turns rotations (3, 3, F) by angles [rad] about an axis of what is turned already, in place."""
     first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     sine_F, cosine_F = np.sin(angle_F), np.cos(angle_F)
     one_3F, other_3F = matrix_33F[:, first].copy(), matrix_33F[:, second]

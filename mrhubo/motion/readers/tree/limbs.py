@@ -8,7 +8,9 @@ children, cartoon figures and skeletons whose joints lie a few centimetres besid
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations, permutations
@@ -31,10 +33,12 @@ _CALLED = 6.0
 """What it is worth that all joints of a leg are called after a leg, and all of an arm after an arm."""
 _HEADED = 6.0
 """What it is worth that a head hangs where the arms do, or that the arms hang farther from the root than the legs."""
+_CROWDED = 20.0
+"""Cost of a pair beside which there is a third one of the same bones: chains of a skirt, of hair, of a cape."""
 _MOST_JOINTS = 24
 """Of a limb, that are looked at."""
 _BEST_PAIRS = 8
-"""Pairs that are looked at, the longest."""
+"""Pairs that are looked at, the longest of those without a third one beside them, of those called limbs, and of all."""
 
 Triple = tuple[int, int, int]
 
@@ -54,9 +58,22 @@ class Limbs:
 
 def find_limbs(shape: Shape) -> Limbs | None:
     """The arms and legs that fit a body best; None where no two pairs of limbs can be such."""
-    pairs = sorted(shape.pairs(), key=lambda pair: -pair.limbs[0].below[-1])[:_BEST_PAIRS]
-    found = [limbs for legs, arms in permutations(pairs, 2) if (limbs := _fit(shape, legs, arms)) is not None]
+    pairs = sorted(shape.pairs(), key=lambda pair: -pair.limbs[0].below[-1])
+    partners = Counter(chain.places[0] for pair in pairs if shape.same(*pair.limbs) for chain in pair.limbs)
+    crowded = {id(pair) for pair in pairs if any(partners[chain.places[0]] > 1 for chain in pair.limbs)}
+    alone = [pair for pair in pairs if id(pair) not in crowded]
+    called = [pair for pair in pairs if limb_votes(_names(shape, pair))]
+    looked_at = {id(pair): pair for kind in (alone, called, pairs) for pair in kind[:_BEST_PAIRS]}.values()
+    found = [
+        dataclasses.replace(limbs, cost=limbs.cost + _CROWDED * sum(id(pair) in crowded for pair in (legs, arms)))
+        for legs, arms in permutations(looked_at, 2)
+        if (limbs := _fit(shape, legs, arms)) is not None
+    ]
     return min(found, key=lambda limbs: limbs.cost, default=None)
+
+
+def _names(shape: Shape, pair: Pair) -> list[str]:
+    return [shape.tree.names[place] for chain in pair.limbs for place in chain.places]
 
 
 def _fit(shape: Shape, legs: Pair, arms: Pair) -> Limbs | None:
@@ -82,8 +99,7 @@ def _fit(shape: Shape, legs: Pair, arms: Pair) -> Limbs | None:
         return None
     cost = sum(cost for cost, _ in (*leg_fits, *arm_fits))
     for pair, sign in ((legs, 1.0), (arms, -1.0)):
-        names = [tree.names[place] for chain in pair.limbs for place in chain.places]
-        cost -= sign * _CALLED * limb_votes(names)
+        cost -= sign * _CALLED * limb_votes(_names(shape, pair))
     way = {*tree.above(legs.carrier)}
     others = [
         child

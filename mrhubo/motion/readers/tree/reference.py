@@ -68,7 +68,7 @@ def find_reference(tree: JointTree, place: Mapping[str, int]) -> Reference | Non
         place: which joint is which (`mrhubo.motion.readers.tree.anatomy`).
     """
     for pose, what, strict in (
-        (tree.rest(), "its pose at all angles 0", False),
+        (tree.rest(), tree.rest_name, False),
         (tree.pose(slice(0, 1), list(place.values())), "its first frame", True),
     ):
         found = _read(pose, place, what, strict)

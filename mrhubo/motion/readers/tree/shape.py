@@ -19,6 +19,8 @@ _LONG = 0.25
 """A limb is at least this share as long as the longest one that has a partner."""
 _UNLIKE = 0.25
 """How far the bones of a pair may differ, as a mean logarithm of their ratio; people's differ by some hundredths."""
+_SAME = 0.05
+"""The same of bones that were made as copies of each other."""
 _COMPARED = 2
 """Bones of a pair that are compared; what hangs on hands and feet may differ, as a hand with a stick does."""
 _MOST_CHILDREN = 40
@@ -95,6 +97,11 @@ class Shape:
         if len(bones) < _COMPARED or len(others) < _COMPARED:
             return False
         return float(np.mean(np.abs(np.log(np.array(bones) / np.array(others))))) < _UNLIKE
+
+    def same(self, one: Chain, other: Chain) -> bool:
+        """Whether two limbs have the same bones to their ends, as copies of one."""
+        bones, others = np.array(self._bones(one)), np.array(self._bones(other))
+        return len(bones) == len(others) and bool(np.abs(np.log(bones / others)).max(initial=0.0) < _SAME)
 
     def _bones(self, chain: Chain) -> list[float]:
         """Lengths of the bones below the first joint that are some."""

@@ -1,0 +1,118 @@
+"""The motion of a body in a scene: of which animation, by which pose at rest, at which rate.
+
+Legend: T frames.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.errors import UserError, nearest, shortened
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.assemble import MAX_FRAMES
+from mrhubo.motion.readers.content import NoMotion
+from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.scene.nodes import Animation, Rest, Scene, TooLarge, kept_nodes, scene_tree
+from mrhubo.motion.readers.tree.anatomy import find_anatomy
+from mrhubo.motion.readers.tree.convert import Given, tree_motion
+from mrhubo.motion.readers.tree.given import read_map
+from mrhubo.motion.readers.tree.hierarchy import JointTree
+from mrhubo.motion.readers.tree.people import of_person
+from mrhubo.motion.readers.tree.reference import find_reference
+
+_LISTED = 10
+_TESTED = 64
+"""Frames by which a pose at rest is looked at."""
+_SAME_DEG, _MOST = 0.5, 0.9
+"""Angles that are as in another pose; and the share of them, in a pose that is the same."""
+
+
+def scene_motion(path: Path, scene: Scene, kind: str, options: ReadOptions, notes: list[str]) -> Motion:
+    """The motion of one body in a scene.
+
+    Args:
+        path: the file, for sentences.
+        scene: what it holds.
+        kind: what the file is, for `Motion.source`.
+        options: may tell a rate, an animation, a person, and joints.
+        notes: is told what the file leaves open.
+
+    Raises:
+        NoMotion: nothing moves in it.
+        UserError: it is too large, no body is found in it, or it has no animation or person that is asked for.
+    """
+    animation = _chosen(path, scene, options, notes)
+    rate = float(options.rate or animation.rate)
+    if options.rate is not None and abs(options.rate / animation.rate - 1) > 1e-3:
+        notes.append(f"its animation has {animation.rate:.6g} keys a second: read at {rate:g}")
+    frames = int(np.floor((animation.end - animation.start) * rate + 1e-3)) + 1
+    if frames > MAX_FRAMES:
+        what = shortened(animation.name, 40)
+        raise UserError(f"{path}: '{what}' has {frames:,} frames; at most {MAX_FRAMES:,} are read")
+    time_T = np.minimum(animation.start + np.arange(frames) / rate, animation.end)
+    kept = kept_nodes(scene)
+    try:
+        rest = _standing(path, scene, animation, time_T, kept)
+        tree = scene_tree(scene, animation, time_T, rest, kept)
+    except TooLarge as error:
+        raise UserError(f"{path}: has {error}, more than are read; cut it, or give a lower --rate") from error
+    except ValueError as error:
+        raise UserError(f"{path}: {error}") from error
+    tree = of_person(path, tree, options, notes)
+    given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
+    named = f"{kind} '{shortened(animation.name, 40)}':" if animation.name else f"{kind}:"
+    return tree_motion(tree, motion_name(path), str(path), rate, named, given, tuple(notes))
+
+
+def _chosen(path: Path, scene: Scene, options: ReadOptions, notes: list[str]) -> Animation:
+    """The animation that is asked for, or the longest."""
+    if not scene.animations:
+        raise NoMotion(f"{path}: holds {len(scene.nodes):,} nodes, none of which moves; export the animation with them")
+    by_length = sorted(scene.animations, key=lambda animation: animation.start - animation.end)
+    names = [shortened(animation.name, 40) for animation in by_length]
+    present = ", ".join(
+        f"'{name}' ({animation.end - animation.start:.3g} s)"
+        for name, animation in zip(names[:_LISTED], by_length, strict=False)
+    )
+    present += f", and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    if options.animation is None:
+        if len(by_length) > 1:
+            notes.append(
+                f"'{names[0]}' is the longest animation and was taken; there are {present}; --animation or"
+                " ReadOptions(animation=...) takes another"
+            )
+        return by_length[0]
+    for animation in by_length:
+        if animation.name == options.animation:
+            return animation
+    near = nearest(options.animation, [animation.name for animation in by_length]) if len(names) > _LISTED else None
+    also = f"; nearest: '{near}'" if near is not None else ""
+    raise UserError(f"{path}: has no animation '{shortened(options.animation, 40)}'; there are {present}{also}")
+
+
+def _standing(path: Path, scene: Scene, animation: Animation, time_T: np.ndarray, kept: list[int]) -> Rest:
+    """The first of the poses at rest in which a body stands at rest; where it does in none, the first."""
+    some_T = time_T[np.unique(np.linspace(0, len(time_T) - 1, _TESTED).astype(int))]
+    for rest in scene.rests:
+        tree = scene_tree(scene, animation, some_T, rest, kept)
+        if _is_rest(path, tree) and not (rest.may_move and _begins_so(tree)):
+            return rest
+    return scene.rests[0]
+
+
+def _is_rest(path: Path, tree: JointTree) -> bool:
+    try:
+        anatomy = find_anatomy(tree, None, str(path))
+    except UserError:  # said by who reads the tree
+        return False
+    found = find_reference(tree, anatomy.place)
+    return found is not None and found.what == tree.rest_name
+
+
+def _begins_so(tree: JointTree) -> bool:
+    """Whether a motion begins in its pose at rest: nodes that nobody put to rest are as in the first frame."""
+    columns = [column for joint in tree.joints for _, column in joint.rotation]
+    return bool((np.abs(tree.value_TC[0, columns]) < _SAME_DEG).mean() > _MOST)

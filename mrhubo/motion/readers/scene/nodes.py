@@ -1,0 +1,219 @@
+"""A scene of nodes that move in each other, as FBX and glTF have them, to a tree of joints.
+
+Nodes are turned, moved and scaled by their parents. What they do is told against a pose at rest, so that the tree's
+angles are 0 there: that in which the skin was bound to the skeleton, for instance.
+
+Legend: N nodes, M of them that are kept, T frames, F some of them. Frame: the scene's own world and unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrhubo.fast.plain.human import norm
+from mrhubo.fast.rotations import orthonormal
+from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
+
+MAX_NODES = 20_000
+"""Of a scene."""
+_MAX_DEPTH = 500
+"""Nodes on the way from a root to an end."""
+_MAX_NUMBERS = 100_000_000
+_BLOCK_NUMBERS = 4_000_000
+"""Numbers that are worked out at a time."""
+_LARGEST = 1e7
+"""No coordinate is beyond this."""
+_FLAT = 1e-9
+"""Scales that are as small as this, of the largest, leave no axes."""
+_STILL = 1e-4
+"""Turns [rad], and shares of the skeleton's size, that are none."""
+_FEWEST_BONES = 10
+"""A skeleton of a body has at least so many bones; where a scene has fewer, any node may be one."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node of a scene."""
+
+    name: str
+    parent: int
+    """Place of its parent, which comes before it; -1 for a root."""
+    is_bone: bool
+    """Whether the file says that it is a part of a skeleton."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A pose in which a body may stand at rest."""
+
+    name: str
+    """In words, for instance `the pose in which its skin was bound`."""
+    world_N34: np.ndarray
+    """Where nodes are: affine maps from their axes to the world."""
+    may_move: bool = False
+    """Whether it may be a pose of the motion, such as its first, that a program left in the nodes."""
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A motion of a scene's nodes."""
+
+    name: str
+    start: float
+    """Of its first key [s]."""
+    end: float
+    """Of its last key [s]."""
+    rate: float
+    """Keys a second, of most nodes."""
+    local_FN34: Callable[[np.ndarray], np.ndarray]
+    """Times (F,) [s] to where nodes are in their parents: affine maps (F, N, 3, 4)."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a file holds."""
+
+    nodes: tuple[Node, ...]
+    """Parents before children."""
+    rests: tuple[Rest, ...]
+    """Poses at rest, the likeliest first; at least one."""
+    animations: tuple[Animation, ...]
+
+
+def parents_first(parents: Sequence[int]) -> list[int] | None:
+    """The places of nodes in an order in which parents come before children; None where they go round in a circle, or
+    deeper than is read.
+    """
+    children: list[list[int]] = [[] for _ in parents]
+    for place, parent in enumerate(parents):
+        if parent >= 0:
+            children[parent].append(place)
+    order, level, depth = [], [place for place, parent in enumerate(parents) if parent < 0], 0
+    while level and depth < _MAX_DEPTH:
+        order += level
+        level, depth = [child for place in level for child in children[place]], depth + 1
+    return order if len(order) == len(parents) else None
+
+
+def affine(translation_X3: np.ndarray, rotation_X33: np.ndarray, scale_X3: np.ndarray) -> np.ndarray:
+    """Maps (..., 3, 4) that scale, then turn, then move."""
+    return np.concatenate([rotation_X33 * scale_X3[..., None, :], translation_X3[..., None]], axis=-1)
+
+
+def in_world(local_FN34: np.ndarray, parents: Sequence[int]) -> np.ndarray:
+    """Where nodes (F, N, 3, 4) are in the world, of where they are in their parents, which come before them."""
+    world_FN34 = local_FN34.copy()
+    for place, parent in enumerate(parents):
+        if parent >= 0:
+            above_F34 = world_FN34[:, parent]
+            world_FN34[:, place] = above_F34[..., :3] @ local_FN34[:, place]
+            world_FN34[:, place, :, 3] += above_F34[..., 3]
+    return world_FN34
+
+
+def kept_nodes(scene: Scene) -> list[int]:
+    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones."""
+    bones = [place for place, node in enumerate(scene.nodes) if node.is_bone]
+    if len(bones) < _FEWEST_BONES:
+        return list(range(len(scene.nodes)))
+    kept: set[int] = set()
+    for bone in bones:
+        place = bone
+        while place >= 0 and place not in kept:
+            kept.add(place)
+            place = scene.nodes[place].parent
+    return sorted(kept)
+
+
+class TooLarge(ValueError):
+    """A scene moves in more numbers than are read."""
+
+
+def scene_tree(scene: Scene, animation: Animation, time_T: np.ndarray, rest: Rest, kept: Sequence[int]) -> JointTree:
+    """The tree of some nodes, whose angles are 0 at rest.
+
+    Args:
+        scene: the nodes.
+        animation: what moves them.
+        time_T: times (T,) of the frames [s].
+        rest: the pose at rest.
+        kept: places of the nodes (M,), parents before children, and with each its parent.
+
+    Raises:
+        TooLarge: there are too many frames and nodes.
+        ValueError: nodes are nowhere, or scaled to nothing; says which.
+    """
+    number = {place: i for i, place in enumerate(kept)}
+    parents = [number.get(scene.nodes[place].parent, -1) for place in kept]
+    if 6 * len(kept) * len(time_T) > _MAX_NUMBERS:
+        raise TooLarge(f"{len(time_T):,} frames of {len(kept):,} nodes")
+    rest_M34 = rest.world_N34[list(kept)]
+    _check(scene, kept, rest_M34[None])
+    inverse_M33 = np.linalg.inv(rest_M34[..., :3])
+    value_TM6 = np.zeros((len(time_T), len(kept), 6), np.float32)
+    """Places in the parent's axes, and angles about z, y, x [deg]."""
+    all_parents = [node.parent for node in scene.nodes]
+    size = max(1, _BLOCK_NUMBERS // (12 * len(scene.nodes)))
+    for begin in range(0, len(time_T), size):
+        block = slice(begin, begin + size)
+        world_FM34 = in_world(animation.local_FN34(time_T[block]), all_parents)[:, list(kept)]
+        _check(scene, kept, world_FM34)
+        turn_FM33 = orthonormal(world_FM34[..., :3] @ inverse_M33)
+        for place, parent in enumerate(parents):
+            point_F3, turn_F33 = world_FM34[:, place, :, 3], turn_FM33[:, place]
+            if parent >= 0:
+                back_F33 = turn_FM33[:, parent].mT
+                point_F3 = (back_F33 @ (point_F3 - world_FM34[:, parent, :, 3])[..., None])[..., 0]
+                turn_F33 = back_F33 @ turn_F33
+            value_TM6[block, place] = np.concatenate([point_F3, _angles(turn_F33)], axis=-1)
+    return _tree([scene.nodes[place].name for place in kept], parents, rest_M34[..., 3], value_TM6, rest.name)
+
+
+def _tree(
+    names: list[str], parents: list[int], rest_M3: np.ndarray, value_TM6: np.ndarray, rest_name: str
+) -> JointTree:
+    """The joints, with numbers for what moves alone."""
+    extent = float(norm(np.ptp(rest_M3, axis=0)))
+    joints, columns = [], []
+    for place, (name, parent) in enumerate(zip(names, parents, strict=True)):
+        offset_3 = rest_M3[place] - (rest_M3[parent] if parent >= 0 else 0.0)
+        rows_T6 = value_TM6[:, place]
+        position, rotation = (), ()
+        if parent < 0 or norm(rows_T6[:, :3] - offset_3).max() > _STILL * extent:
+            # a position takes the place of an offset
+            position = tuple((axis, len(columns) + i) for i, axis in enumerate("xyz"))
+            columns += [rows_T6[:, i] for i in range(3)]
+            offset_3 = np.zeros(3)
+        if np.abs(rows_T6[:, 3:]).max() > np.degrees(_STILL):
+            rotation = tuple((axis, len(columns) + i) for i, axis in enumerate("zyx"))
+            columns += [rows_T6[:, 3 + i] for i in range(3)]
+        x, y, z = offset_3.tolist()
+        joints.append(Joint(name, parent, (x, y, z), rotation, position))
+    return JointTree(tuple(joints), np.stack(columns, axis=1), rest_name)
+
+
+def _check(scene: Scene, kept: Sequence[int], world_FM34: np.ndarray) -> None:
+    """Refuses nodes that are nowhere or have no axes."""
+    place_FM3 = world_FM34[..., 3]
+    with np.errstate(all="ignore"):
+        volume_FM = np.abs(np.linalg.det(world_FM34[..., :3]))
+        length_FM = np.abs(world_FM34[..., :3]).max(axis=(-1, -2))
+        good_FM = (np.abs(place_FM3) < _LARGEST).all(-1) & (length_FM < _LARGEST) & (volume_FM > _FLAT * length_FM**3)
+    if not good_FM.all():
+        node = scene.nodes[kept[int(np.argwhere(~good_FM)[0][1])]]
+        raise ValueError(f"'{node.name}' is at no place, or scaled to nothing")
+
+
+def _angles(turn_F33: np.ndarray) -> np.ndarray:
+    """Angles (F, 3) about z, y and x [deg], the outermost first, also where they are not unique."""
+    z_F = np.arctan2(turn_F33[:, 1, 0], turn_F33[:, 0, 0])
+    y_F = np.arctan2(-turn_F33[:, 2, 0], np.hypot(turn_F33[:, 0, 0], turn_F33[:, 1, 0]))
+    sine_F, cosine_F = np.sin(z_F), np.cos(z_F)
+    x_F = np.arctan2(
+        sine_F * turn_F33[:, 0, 2] - cosine_F * turn_F33[:, 1, 2],
+        cosine_F * turn_F33[:, 1, 1] - sine_F * turn_F33[:, 0, 1],
+    )
+    return np.degrees(np.stack([z_F, y_F, x_F], axis=-1))

@@ -1,0 +1,76 @@
+"""The pose in which a skin was bound to a skeleton: most often a body at rest, arms held out.
+
+Files tell it of the bones that turn the skin, in the skin's own axes and unit.
+
+Legend: N nodes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mrhubo.fast.plain.human import norm
+from mrhubo.fast.rotations import orthonormal
+from mrhubo.motion.readers.scene.nodes import in_world
+
+FEWEST_BOUND = 10
+"""Bones that a skin of a body is bound to, at least."""
+_SAME = 0.02
+"""Lengths that differ by less, as a share, are in the same unit."""
+
+
+def _quarter_turns() -> np.ndarray:
+    """The rotations (24, 3, 3) that lead axes to axes."""
+    found = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            matrix_33 = np.zeros((3, 3))
+            matrix_33[range(3), order] = signs
+            found.append(matrix_33)
+    return np.stack([matrix_33 for matrix_33 in found if np.linalg.det(matrix_33) > 0])
+
+
+_QUARTERS_Q33 = _quarter_turns()
+
+
+def bound_pose(local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int, np.ndarray]) -> np.ndarray | None:
+    """Where nodes (N, 3, 4) are in the world when the skin is bound; None where too few bones are bound.
+
+    The skin's axes are those of the world but for quarter turns, and a unit.
+
+    Args:
+        local_N34: where nodes are in their parents when nothing moves them.
+        parents: of the nodes, which come before them.
+        bound: where bones (3, 4) are in the skin's axes, by their place.
+    """
+    with np.errstate(all="ignore"):
+        bound = {p: b for p, b in bound.items() if np.isfinite(b).all() and abs(np.linalg.det(b[:, :3])) > 0}
+    if len(bound) < FEWEST_BOUND:
+        return None
+    world_N34 = in_world(local_N34[None], parents)[0]
+    top = min(bound)
+    turn_33 = orthonormal(world_N34[top, :, :3] @ np.linalg.inv(bound[top][:, :3]))
+    turn_33 = _QUARTERS_Q33[int(np.einsum("qij,ij->q", _QUARTERS_Q33, turn_33).argmax())]
+    pairs = [(place, parents[place]) for place in bound if parents[place] in bound]
+    lengths = [
+        sum(float(norm(pose[place][:, 3] - pose[parent][:, 3])) for place, parent in pairs)
+        for pose in (world_N34, bound)
+    ]
+    scale = lengths[0] / lengths[1] if min(lengths) > 0 else 1.0
+    scale = 1.0 if abs(scale - 1) < _SAME else scale
+    place_33 = scale * turn_33
+    found_N34 = np.empty_like(world_N34)
+    below = np.zeros(len(parents), bool)  # bones that are bound, and what hangs on them
+    for place, parent in enumerate(parents):
+        if place in bound:
+            found_N34[place] = place_33 @ bound[place]
+        elif parent >= 0 and below[parent]:
+            found_N34[place] = found_N34[parent, :, :3] @ local_N34[place]
+            found_N34[place, :, 3] += found_N34[parent, :, 3]
+        else:
+            found_N34[place] = world_N34[place]
+        below[place] = place in bound or (parent >= 0 and below[parent])
+    return found_N34
