@@ -28,6 +28,7 @@ from mrhubo.motion import trim
 from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.robot_motion import FORMATS, write_robot_motion
 from tests.files.bounded import bounded
+from tests.motion import gltf_writer
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.motion.damage import altered_words, damaged_by, read_or_refused
 from tests.motion.fbx_writer import Manner, write_fbx
@@ -69,6 +70,16 @@ def _fbx(manner: Manner) -> Callable[[Path], None]:
         whole = mrhubo.read_motion(_MOTION)
         short = trim(whole, end=(_FRAMES - 1) / whole.frame_rate)
         write_fbx(short, Style(t_pose_first=True, fingers=False), manner, path)
+
+    return write
+
+
+def _gltf(manner: gltf_writer.Manner, is_text: bool = False) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        whole = mrhubo.read_motion(_MOTION)
+        short = trim(whole, end=(_FRAMES - 1) / whole.frame_rate)
+        parts = gltf_writer.write_gltf(short, Style(unit=1.0, fingers=False), manner)
+        path.write_bytes(parts.gltf() if is_text else parts.glb())
 
     return write
 
@@ -184,6 +195,8 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "fbx, text": ("damaged", _fbx(Manner(is_text=True, own_axes=True, weighted=True))),
     "fbx of 2009": ("damaged.fbx", _fbx(Manner(version=6100))),
     "fbx of 2009, text": ("damaged", _fbx(Manner(version=6100, is_text=True))),
+    "glb": ("damaged.glb", _gltf(gltf_writer.Manner(skin="a", method="CUBICSPLINE"))),
+    "gltf": ("damaged", _gltf(gltf_writer.Manner(vrm="VRM", matrices=True), is_text=True)),
     "amc": ("07_01.amc", _acclaim),
     "asf": ("07.asf", _acclaim),
     "points.json": ("damaged.json", _points_json),

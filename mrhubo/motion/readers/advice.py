@@ -13,8 +13,6 @@ _MARKERS = f"it has markers, and not joints; {SOLVE}"
 _VICON = "solve it for a skeleton, and export that as BVH or FBX, for instance from Vicon Shogun or Blade"
 _FILM = "convert it to MP4, by ffmpeg for instance: ffmpeg -i FILE film.mp4"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
-    (r"glTF", "a GLB file", _BLENDER),
-    (r'\s*\{(?=.*"asset"\s*:)(?=.*"(?:nodes|scenes|meshes|animations|buffers)"\s*:)', "a glTF file", _BLENDER),
     (r"\s*<\?xml.{0,400}<COLLADA|\s*<COLLADA", "a COLLADA file", _BLENDER),
     (r"PXR-USDC|#usda", "a USD file", _BLENDER),
     (r"FLV\x01", "a video (FLV)", _FILM),

@@ -54,6 +54,7 @@ FORMATS: tuple[Format, ...] = (
     Format("AMASS and SMPL-family .npz", "amass", "is_amass", "read_amass", (".npz",)),
     Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
     Format("FBX", "scene.fbx", "is_fbx", "read_fbx", (".fbx",)),
+    Format("glTF and VRM", "scene.gltf", "is_gltf", "read_gltf", (".glb", ".gltf", ".vrm", ".vrma")),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints, SMPL parameters and DeepMimic's motions in JSON", "json_file", "is_json", "read_json", ()),

@@ -20,13 +20,6 @@ def _zipped(name: str) -> bytes:
 
 
 _FILES = {
-    "GLB": (b"glTF\x02\0\0\0", "Blender"),
-    "glTF": (b'{"asset": {"version": "2.0"}, "nodes": []}', "Blender"),
-    "a glTF": (  # whose skin has joints
-        b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"name": "Armature"}],'
-        b' "skins": [{"joints": [0, 1, 2], "skeleton": 0}], "animations": []}',
-        "Blender",
-    ),
     "C3D": (b"\x02P\0\0\0", "markers"),
     "a robot's joints": (
         b"Frame,root_translateX,root_translateY,left_hip_pitch_joint_dof\n0,0,1,0.5\n",
@@ -71,7 +64,7 @@ def test_a_style_sheet_is_no_skeleton(start: str, tmp_path: Path) -> None:
 
 def test_a_skeleton_beside_its_motion_is_no_motion_of_a_folder(tmp_path: Path) -> None:
     (tmp_path / "07.asf").write_text(":version 1.10\n")
-    (tmp_path / "scene.glb").write_bytes(b"glTF\x02\0\0\0")
+    (tmp_path / "scene.dae").write_text("<COLLADA>")
     (tmp_path / "notes.json").write_text('{"title": "a dance"}')
     with pytest.raises(mrhubo.UserError, match="holds no motion file"):
         mrhubo.motion.load.motion_files(tmp_path)

@@ -5,6 +5,8 @@ Legend: T frames.
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +17,9 @@ from mrhubo.motion.readers.assemble import MAX_FRAMES
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.scene.nodes import Animation, Rest, Scene, TooLarge, kept_nodes, scene_tree
-from mrhubo.motion.readers.tree.anatomy import find_anatomy
+from mrhubo.motion.readers.rate import told_rate
+from mrhubo.motion.readers.scene.nodes import Animation, BadScene, Rest, Scene, TooLarge, scene_tree
+from mrhubo.motion.readers.tree.anatomy import NEEDED, NoBody, find_anatomy
 from mrhubo.motion.readers.tree.convert import Given, tree_motion
 from mrhubo.motion.readers.tree.given import read_map
 from mrhubo.motion.readers.tree.hierarchy import JointTree
@@ -24,6 +27,8 @@ from mrhubo.motion.readers.tree.people import of_person
 from mrhubo.motion.readers.tree.reference import find_reference
 
 _LISTED = 10
+_NEARLY = 1e-3
+"""Of a frame: times are rounded."""
 _TESTED = 64
 """Frames by which a pose at rest is looked at."""
 _SAME_DEG, _MOST = 0.5, 0.9
@@ -41,36 +46,53 @@ def scene_motion(path: Path, scene: Scene, kind: str, options: ReadOptions, note
         notes: is told what the file leaves open.
 
     Raises:
-        NoMotion: nothing moves in it.
-        UserError: it is too large, no body is found in it, or it has no animation or person that is asked for.
+        NoMotion: nothing moves in it, or no body is found.
+        UserError: it is too large, or has no animation or person that is asked for.
     """
     animation = _chosen(path, scene, options, notes)
-    rate = float(options.rate or animation.rate)
-    if options.rate is not None and abs(options.rate / animation.rate - 1) > 1e-3:
-        notes.append(f"its animation has {animation.rate:.6g} keys a second: read at {rate:g}")
-    frames = int(np.floor((animation.end - animation.start) * rate + 1e-3)) + 1
+    name = shortened(animation.name, 40)
+    rate = _rate(path, animation, name, options, notes)
+    frames = int(np.floor((animation.end - animation.start) * rate + _NEARLY)) + 1
     if frames > MAX_FRAMES:
-        what = shortened(animation.name, 40)
-        raise UserError(f"{path}: '{what}' has {frames:,} frames; at most {MAX_FRAMES:,} are read")
+        raise UserError(f"{path}: '{name}' has {frames:,} frames; at most {MAX_FRAMES:,} are read")
     time_T = np.minimum(animation.start + np.arange(frames) / rate, animation.end)
-    kept = kept_nodes(scene)
+    body = scene.body if scene.body.keys() >= set(NEEDED) else {}
     try:
-        rest = _standing(path, scene, animation, time_T, kept)
-        tree = scene_tree(scene, animation, time_T, rest, kept)
+        rest = _standing(path, scene, animation, time_T, body)
+        tree = scene_tree(scene, animation, time_T, rest)
+        if body:
+            notes += options.of_one()
+        else:
+            tree = of_person(path, tree, options, notes)
+        given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
+        given = dataclasses.replace(given, place={**body, **given.place})
+        said = f"{kind} '{name}':" if name else f"{kind}:"
+        return tree_motion(tree, motion_name(path), str(path), rate, said, given, tuple(notes))
     except TooLarge as error:
-        raise UserError(f"{path}: has {error}, more than are read; cut it, or give a lower --rate") from error
-    except ValueError as error:
+        raise UserError(f"{path}: has {error}, more than are read; cut it, or export the skeleton alone") from error
+    except NoBody as error:
+        raise NoMotion(str(error)) from error
+    except BadScene as error:
         raise UserError(f"{path}: {error}") from error
-    tree = of_person(path, tree, options, notes)
-    given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
-    named = f"{kind} '{shortened(animation.name, 40)}':" if animation.name else f"{kind}:"
-    return tree_motion(tree, motion_name(path), str(path), rate, named, given, tuple(notes))
+
+
+def _rate(path: Path, animation: Animation, name: str, options: ReadOptions, notes: list[str]) -> float:
+    """Frames per second: what the keys tell, or the options, or else what is usual, with a note."""
+    if not animation.note:
+        return told_rate(path, f"animation '{name}' has", animation.rate, options, notes)
+    if options.rate is not None:
+        return float(options.rate)
+    if animation.end > animation.start:
+        notes.append(
+            f"'{name}' {animation.note}: it is read at {animation.rate:g} frames a second; --rate says otherwise"
+        )
+    return animation.rate
 
 
 def _chosen(path: Path, scene: Scene, options: ReadOptions, notes: list[str]) -> Animation:
     """The animation that is asked for, or the longest."""
     if not scene.animations:
-        raise NoMotion(f"{path}: holds {len(scene.nodes):,} nodes, none of which moves; export the animation with them")
+        raise NoMotion(f"{path}: holds a scene in which nothing moves; export the animation with it")
     by_length = sorted(scene.animations, key=lambda animation: animation.start - animation.end)
     names = [shortened(animation.name, 40) for animation in by_length]
     present = ", ".join(
@@ -93,19 +115,19 @@ def _chosen(path: Path, scene: Scene, options: ReadOptions, notes: list[str]) ->
     raise UserError(f"{path}: has no animation '{shortened(options.animation, 40)}'; there are {present}{also}")
 
 
-def _standing(path: Path, scene: Scene, animation: Animation, time_T: np.ndarray, kept: list[int]) -> Rest:
-    """The first of the poses at rest in which a body stands at rest; where it does in none, the first."""
+def _standing(path: Path, scene: Scene, animation: Animation, time_T: np.ndarray, body: Mapping[str, int]) -> Rest:
+    """The first pose at rest in which a body stands so; where it does in none, the first pose, without a name."""
     some_T = time_T[np.unique(np.linspace(0, len(time_T) - 1, _TESTED).astype(int))]
     for rest in scene.rests:
-        tree = scene_tree(scene, animation, some_T, rest, kept)
-        if _is_rest(path, tree) and not (rest.may_move and _begins_so(tree)):
+        tree = scene_tree(scene, animation, some_T, rest)
+        if _is_rest(path, tree, body) and not (rest.may_move and _begins_so(tree)):
             return rest
-    return scene.rests[0]
+    return dataclasses.replace(scene.rests[0], name="")
 
 
-def _is_rest(path: Path, tree: JointTree) -> bool:
+def _is_rest(path: Path, tree: JointTree, body: Mapping[str, int]) -> bool:
     try:
-        anatomy = find_anatomy(tree, None, str(path))
+        anatomy = find_anatomy(tree, body, str(path))
     except UserError:  # said by who reads the tree
         return False
     found = find_reference(tree, anatomy.place)

@@ -24,7 +24,16 @@ from mrhubo.motion.readers.scene.fbx_curves import Curve, read_curve
 from mrhubo.motion.readers.scene.fbx_file import BINARY, OLD, BadFbx, Record, is_text_fbx, read_fbx_file
 from mrhubo.motion.readers.scene.fbx_nodes import FbxNode, plain_name, properties, read_node
 from mrhubo.motion.readers.scene.fbx_old import modernised
-from mrhubo.motion.readers.scene.nodes import MAX_NODES, Animation, Node, Rest, Scene, in_world, parents_first
+from mrhubo.motion.readers.scene.nodes import (
+    MAX_NODES,
+    Animation,
+    Node,
+    Rest,
+    Scene,
+    in_world,
+    may_be_joints,
+    parents_first,
+)
 from mrhubo.motion.readers.scene.rests import bound_pose
 
 _SECOND, _NEW_SECOND = 46_186_158_000, 141_120_000
@@ -179,9 +188,7 @@ class _File:
         Raises:
             BadFbx: it is damaged.
         """
-        nodes, parents = self.nodes()
-        place = {node.number: i for i, node in enumerate(nodes)}
-        bound = self.bound(place)
+        nodes, parents, bound = self.joints()
         own_N34 = _local(nodes, parents, {}, np.zeros(1))[0]
         bound_N34 = bound_pose(own_N34, parents, bound)
         unturned_N34 = _local([node.with_no_turn() for node in nodes], parents, {}, np.zeros(1))[0]
@@ -193,12 +200,28 @@ class _File:
         animations = [self._animation(number, record, nodes, parents, notes)
                       for number, record in self.named("AnimationStack")]  # fmt: skip
         return Scene(
-            tuple(
-                Node(node.name, parent, node.is_bone or i in bound)
-                for i, (node, parent) in enumerate(zip(nodes, parents, strict=True))
-            ),
+            tuple(Node(node.name, parent, node.is_bone) for node, parent in zip(nodes, parents, strict=True)),
             tuple(rests),
             tuple(animation for animation in animations if animation is not None),
+        )
+
+    def joints(self) -> tuple[list[FbxNode], list[int], dict[int, np.ndarray]]:
+        """Nodes that may be joints, parents first, the places of their parents, and where those that a skin is bound
+        to are then.
+        """
+        nodes, parents = self.nodes()
+        bound = self.bound({node.number: i for i, node in enumerate(nodes)})
+        kept = may_be_joints(
+            [
+                Node(node.name, parent, node.is_bone or i in bound)
+                for i, (node, parent) in enumerate(zip(nodes, parents, strict=True))
+            ]
+        )
+        new = {old: i for i, old in enumerate(kept)}
+        return (
+            [nodes[old] for old in kept],
+            [new.get(parents[old], -1) for old in kept],
+            {new[old]: place_34 for old, place_34 in bound.items() if old in new},
         )
 
     def _animation(

@@ -3,26 +3,30 @@
 Nodes are turned, moved and scaled by their parents. What they do is told against a pose at rest, so that the tree's
 angles are 0 there: that in which the skin was bound to the skeleton, for instance.
 
-Legend: N nodes, M of them that are kept, T frames, F some of them. Frame: the scene's own world and unit.
+Legend: N nodes, T frames, F some of them. Frame: the scene's own world and unit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.errors import shortened
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.rotations import orthonormal
 from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
 
 MAX_NODES = 20_000
 """Of a scene."""
+_MAX_JOINTS = 5_000
+"""Nodes that may be joints."""
 _MAX_DEPTH = 500
 """Nodes on the way from a root to an end."""
 _MAX_NUMBERS = 100_000_000
-_BLOCK_NUMBERS = 4_000_000
+_BLOCK_NUMBERS = 1_000_000
 """Numbers that are worked out at a time."""
 _LARGEST = 1e7
 """No coordinate is beyond this."""
@@ -67,9 +71,11 @@ class Animation:
     end: float
     """Of its last key [s]."""
     rate: float
-    """Keys a second, of most nodes."""
+    """Keys a second, of most nodes; or a usual rate, with a note."""
     local_FN34: Callable[[np.ndarray], np.ndarray]
     """Times (F,) [s] to where nodes are in their parents: affine maps (F, N, 3, 4)."""
+    note: str = ""
+    """Why the rate is not told, for a sentence about the animation; empty where it is."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +87,8 @@ class Scene:
     rests: tuple[Rest, ...]
     """Poses at rest, the likeliest first; at least one."""
     animations: tuple[Animation, ...]
+    body: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """Nodes by the names of our joints, as far as the file itself says which is which."""
 
 
 def parents_first(parents: Sequence[int]) -> list[int] | None:
@@ -106,81 +114,84 @@ def affine(translation_X3: np.ndarray, rotation_X33: np.ndarray, scale_X3: np.nd
 def in_world(local_FN34: np.ndarray, parents: Sequence[int]) -> np.ndarray:
     """Where nodes (F, N, 3, 4) are in the world, of where they are in their parents, which come before them."""
     world_FN34 = local_FN34.copy()
-    for place, parent in enumerate(parents):
-        if parent >= 0:
-            above_F34 = world_FN34[:, parent]
-            world_FN34[:, place] = above_F34[..., :3] @ local_FN34[:, place]
-            world_FN34[:, place, :, 3] += above_F34[..., 3]
+    with np.errstate(all="ignore"):  # what is beyond all bounds is refused afterwards
+        for place, parent in enumerate(parents):
+            if parent >= 0:
+                above_F34 = world_FN34[:, parent]
+                world_FN34[:, place] = above_F34[..., :3] @ local_FN34[:, place]
+                world_FN34[:, place, :, 3] += above_F34[..., 3]
     return world_FN34
 
 
-def kept_nodes(scene: Scene) -> list[int]:
-    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones."""
-    bones = [place for place, node in enumerate(scene.nodes) if node.is_bone]
+def may_be_joints(nodes: Sequence[Node]) -> list[int]:
+    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones. The rest
+    of a large scene, a house for instance, need not be worked out.
+    """
+    bones = [place for place, node in enumerate(nodes) if node.is_bone]
     if len(bones) < _FEWEST_BONES:
-        return list(range(len(scene.nodes)))
+        return list(range(len(nodes)))
     kept: set[int] = set()
     for bone in bones:
         place = bone
         while place >= 0 and place not in kept:
             kept.add(place)
-            place = scene.nodes[place].parent
+            place = nodes[place].parent
     return sorted(kept)
+
+
+class BadScene(ValueError):
+    """Nodes of a scene cannot be; says why, for a sentence about the file."""
 
 
 class TooLarge(ValueError):
     """A scene moves in more numbers than are read."""
 
 
-def scene_tree(scene: Scene, animation: Animation, time_T: np.ndarray, rest: Rest, kept: Sequence[int]) -> JointTree:
-    """The tree of some nodes, whose angles are 0 at rest.
+def scene_tree(scene: Scene, animation: Animation, time_T: np.ndarray, rest: Rest) -> JointTree:
+    """The tree of a scene's nodes, whose angles are 0 at rest.
 
     Args:
         scene: the nodes.
         animation: what moves them.
         time_T: times (T,) of the frames [s].
         rest: the pose at rest.
-        kept: places of the nodes (M,), parents before children, and with each its parent.
 
     Raises:
         TooLarge: there are too many frames and nodes.
-        ValueError: nodes are nowhere, or scaled to nothing; says which.
+        BadScene: nodes are nowhere, or scaled to nothing; says which.
     """
-    number = {place: i for i, place in enumerate(kept)}
-    parents = [number.get(scene.nodes[place].parent, -1) for place in kept]
-    if 6 * len(kept) * len(time_T) > _MAX_NUMBERS:
-        raise TooLarge(f"{len(time_T):,} frames of {len(kept):,} nodes")
-    rest_M34 = rest.world_N34[list(kept)]
-    _check(scene, kept, rest_M34[None])
-    inverse_M33 = np.linalg.inv(rest_M34[..., :3])
-    value_TM6 = np.zeros((len(time_T), len(kept), 6), np.float32)
+    count, parents = len(scene.nodes), [node.parent for node in scene.nodes]
+    if count > _MAX_JOINTS or 6 * count * len(time_T) > _MAX_NUMBERS:
+        raise TooLarge(f"{len(time_T):,} frames of {count:,} nodes")
+    _check(scene, rest.world_N34[None])
+    inverse_N33 = np.linalg.inv(rest.world_N34[..., :3])
+    value_TN6 = np.zeros((len(time_T), count, 6), np.float32)
     """Places in the parent's axes, and angles about z, y, x [deg]."""
-    all_parents = [node.parent for node in scene.nodes]
-    size = max(1, _BLOCK_NUMBERS // (12 * len(scene.nodes)))
+    size = max(1, _BLOCK_NUMBERS // (12 * count))
     for begin in range(0, len(time_T), size):
         block = slice(begin, begin + size)
-        world_FM34 = in_world(animation.local_FN34(time_T[block]), all_parents)[:, list(kept)]
-        _check(scene, kept, world_FM34)
-        turn_FM33 = orthonormal(world_FM34[..., :3] @ inverse_M33)
+        world_FN34 = in_world(animation.local_FN34(time_T[block]), parents)
+        _check(scene, world_FN34)
+        turn_FN33 = orthonormal(world_FN34[..., :3] @ inverse_N33)
         for place, parent in enumerate(parents):
-            point_F3, turn_F33 = world_FM34[:, place, :, 3], turn_FM33[:, place]
+            point_F3, turn_F33 = world_FN34[:, place, :, 3], turn_FN33[:, place]
             if parent >= 0:
-                back_F33 = turn_FM33[:, parent].mT
-                point_F3 = (back_F33 @ (point_F3 - world_FM34[:, parent, :, 3])[..., None])[..., 0]
+                back_F33 = turn_FN33[:, parent].mT
+                point_F3 = (back_F33 @ (point_F3 - world_FN34[:, parent, :, 3])[..., None])[..., 0]
                 turn_F33 = back_F33 @ turn_F33
-            value_TM6[block, place] = np.concatenate([point_F3, _angles(turn_F33)], axis=-1)
-    return _tree([scene.nodes[place].name for place in kept], parents, rest_M34[..., 3], value_TM6, rest.name)
+            value_TN6[block, place] = np.concatenate([point_F3, _angles(turn_F33)], axis=-1)
+    return _tree([node.name for node in scene.nodes], parents, rest.world_N34[..., 3], value_TN6, rest.name)
 
 
 def _tree(
-    names: list[str], parents: list[int], rest_M3: np.ndarray, value_TM6: np.ndarray, rest_name: str
+    names: list[str], parents: list[int], rest_N3: np.ndarray, value_TN6: np.ndarray, rest_name: str
 ) -> JointTree:
     """The joints, with numbers for what moves alone."""
-    extent = float(norm(np.ptp(rest_M3, axis=0)))
+    extent = float(norm(np.ptp(rest_N3, axis=0)))
     joints, columns = [], []
     for place, (name, parent) in enumerate(zip(names, parents, strict=True)):
-        offset_3 = rest_M3[place] - (rest_M3[parent] if parent >= 0 else 0.0)
-        rows_T6 = value_TM6[:, place]
+        offset_3 = rest_N3[place] - (rest_N3[parent] if parent >= 0 else 0.0)
+        rows_T6 = value_TN6[:, place]
         position, rotation = (), ()
         if parent < 0 or norm(rows_T6[:, :3] - offset_3).max() > _STILL * extent:
             # a position takes the place of an offset
@@ -195,16 +206,16 @@ def _tree(
     return JointTree(tuple(joints), np.stack(columns, axis=1), rest_name)
 
 
-def _check(scene: Scene, kept: Sequence[int], world_FM34: np.ndarray) -> None:
+def _check(scene: Scene, world_FN34: np.ndarray) -> None:
     """Refuses nodes that are nowhere or have no axes."""
-    place_FM3 = world_FM34[..., 3]
     with np.errstate(all="ignore"):
-        volume_FM = np.abs(np.linalg.det(world_FM34[..., :3]))
-        length_FM = np.abs(world_FM34[..., :3]).max(axis=(-1, -2))
-        good_FM = (np.abs(place_FM3) < _LARGEST).all(-1) & (length_FM < _LARGEST) & (volume_FM > _FLAT * length_FM**3)
-    if not good_FM.all():
-        node = scene.nodes[kept[int(np.argwhere(~good_FM)[0][1])]]
-        raise ValueError(f"'{node.name}' is at no place, or scaled to nothing")
+        volume_FN = np.abs(np.linalg.det(world_FN34[..., :3]))
+        length_FN = np.abs(world_FN34[..., :3]).max(axis=(-1, -2))
+        good_FN = (np.abs(world_FN34[..., 3]) < _LARGEST).all(-1)
+        good_FN &= (length_FN < _LARGEST) & (volume_FN > _FLAT * length_FN**3)
+    if not good_FN.all():
+        node = scene.nodes[int(np.argwhere(~good_FN)[0][1])]
+        raise BadScene(f"'{shortened(node.name, 40)}' is at no place, or scaled to nothing")
 
 
 def _angles(turn_F33: np.ndarray) -> np.ndarray:

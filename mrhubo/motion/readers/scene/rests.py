@@ -2,7 +2,7 @@
 
 Files tell it of the bones that turn the skin, in the skin's own axes and unit.
 
-Legend: N nodes.
+Legend: N nodes, B bones that are bound, Q quarter turns.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _QUARTERS_Q33 = _quarter_turns()
 def bound_pose(local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int, np.ndarray]) -> np.ndarray | None:
     """Where nodes (N, 3, 4) are in the world when the skin is bound; None where too few bones are bound.
 
-    The skin's axes are those of the world but for quarter turns, and a unit.
+    The skin's axes are those of the world but for quarter turns, which most bones tell, and a unit.
 
     Args:
         local_N34: where nodes are in their parents when nothing moves them.
@@ -51,9 +51,11 @@ def bound_pose(local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int
     if len(bound) < FEWEST_BOUND:
         return None
     world_N34 = in_world(local_N34[None], parents)[0]
-    top = min(bound)
-    turn_33 = orthonormal(world_N34[top, :, :3] @ np.linalg.inv(bound[top][:, :3]))
-    turn_33 = _QUARTERS_Q33[int(np.einsum("qij,ij->q", _QUARTERS_Q33, turn_33).argmax())]
+    places = list(bound)
+    with np.errstate(all="ignore"):
+        turn_B33 = orthonormal(world_N34[places, :, :3] @ np.linalg.inv(np.stack([b[:, :3] for b in bound.values()])))
+    near_Q = np.einsum("qij,bij->q", _QUARTERS_Q33, np.nan_to_num(turn_B33))
+    turn_33 = _QUARTERS_Q33[int(near_Q.argmax())]
     pairs = [(place, parents[place]) for place in bound if parents[place] in bound]
     lengths = [
         sum(float(norm(pose[place][:, 3] - pose[parent][:, 3])) for place, parent in pairs)

@@ -41,6 +41,10 @@ ROLES = (*NEEDED, "neck", "head", "left_foot", "right_foot", "left_collar", "rig
 """Joints that are looked for; `spine3` is the chest, `foot` where toes begin, `collar` the first joint of the arm."""
 
 
+class NoBody(UserError):
+    """A tree has no arms and legs."""
+
+
 @dataclass(frozen=True)
 class Anatomy:
     """Which joint of a file stands for which of ours."""
@@ -59,7 +63,8 @@ def find_anatomy(tree: JointTree, given: Mapping[str, int] | None = None, what: 
         what: the file, for a sentence.
 
     Raises:
-        UserError: the tree has no two pairs of limbs that fit a body, or nothing tells left from right.
+        NoBody: the tree has no two pairs of limbs that fit a body.
+        UserError: nothing tells left from right.
     """
     given = dict(given or {})
     if given.keys() >= set(NEEDED):
@@ -67,7 +72,7 @@ def find_anatomy(tree: JointTree, given: Mapping[str, int] | None = None, what: 
     shape = Shape(tree)
     limbs = find_limbs(shape)
     if limbs is None:
-        raise UserError(
+        raise NoBody(
             f"{what}: no arms and legs, of which two each are needed, are found among its {len(tree.joints)} joints; "
             "name them in a YAML file with --bvh-map"
         )

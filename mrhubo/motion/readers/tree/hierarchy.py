@@ -42,7 +42,7 @@ class JointTree:
     value_TC: np.ndarray
     """Angles [deg] and coordinates, a row a frame."""
     rest_name: str = "its pose at all angles 0"
-    """What the pose is, in words, in which all angles are 0."""
+    """What the pose is, in words, in which all angles are 0; empty where that is known to be none of rest."""
 
     def __len__(self) -> int:
         return len(self.value_TC)

@@ -1,4 +1,4 @@
-"""Several people in a tree of joints, who have a root each."""
+"""Several people in a tree of joints, who have a root each, or hang on one node that carries them."""
 
 from __future__ import annotations
 
@@ -10,23 +10,49 @@ from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.limbs import find_limbs
 from mrhubo.motion.readers.tree.shape import Shape
 
+_FEWEST_JOINTS = 14
+"""Pelvis, chest, and three of each limb."""
+_LESS_LIKE = 6.0
+"""How much worse limbs may fit a body than the best of the whole tree, of another person: the fingers of two hands do
+not look like two people."""
+
 
 def of_person(path: Path, tree: JointTree, options: ReadOptions, notes: list[str]) -> JointTree:
-    """The tree of one of the people in a file, who have a root each; the whole tree where it has one root.
+    """The tree of one of the people in a file; the whole tree where there is one.
 
     Raises:
-        UserError: there is nobody whose root has the name that is asked for.
+        UserError: there is nobody whose topmost joint has the name that is asked for.
     """
-    roots = tree.roots
-    if len(roots) < 2:
-        notes += options.of_one()
-        return tree
     people: dict[str, JointTree] = {}
-    for root in roots:
-        under, name = tree.under(root), tree.names[root]
-        if find_limbs(Shape(under)) is not None:
-            people[name if name not in people else f"{name} {len(people) + 1}"] = under
-    if not people:
+    for root, under in _bodies(tree).items():
+        name = tree.names[root]
+        people[name if name not in people else f"{name} {len(people) + 1}"] = under
+    if len(people) < 2 and (len(tree.roots) < 2 or not people):
+        notes += options.of_one()
         return tree
     chosen = choose(path, [Person(name, len(tree)) for name in people], options, notes)
     return people[chosen.person]
+
+
+def _bodies(tree: JointTree) -> dict[int, JointTree]:
+    """The trees of those who hang side by side on nothing, or on one node, by their topmost joints."""
+    sizes = [1] * len(tree.joints)
+    for place in range(len(tree.joints) - 1, 0, -1):
+        if tree.joints[place].parent >= 0:
+            sizes[tree.joints[place].parent] += sizes[place]
+    level = [place for place in tree.roots if sizes[place] >= _FEWEST_JOINTS]
+    while len(level) == 1 and sizes[level[0]] >= 2 * _FEWEST_JOINTS:
+        below = [place for place in tree.children[level[0]] if sizes[place] >= _FEWEST_JOINTS]
+        if not below:
+            break
+        level = below
+    if len(level) < 2:
+        return {root: tree.under(root) for root in tree.roots if len(tree.roots) > 1 and sizes[root] >= _FEWEST_JOINTS}
+    best = find_limbs(Shape(tree))
+    found = {}
+    for place in level:
+        under = tree.under(place)
+        limbs = find_limbs(Shape(under))
+        if best is not None and limbs is not None and limbs.cost < best.cost + _LESS_LIKE:
+            found[place] = under
+    return found

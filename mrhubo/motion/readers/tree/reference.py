@@ -71,7 +71,7 @@ def find_reference(tree: JointTree, place: Mapping[str, int]) -> Reference | Non
         (tree.rest(), tree.rest_name, False),
         (tree.pose(slice(0, 1), list(place.values())), "its first frame", True),
     ):
-        found = _read(pose, place, what, strict)
+        found = _read(pose, place, what, strict) if what else None
         if found is not None:
             return found
     return None
