@@ -10,8 +10,10 @@ from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.limbs import find_limbs
 from mrhubo.motion.readers.tree.shape import Shape
 
-_FEWEST_JOINTS = 14
-"""Pelvis, chest, and three of each limb."""
+_FEWEST_JOINTS = 13
+"""The trunk, and three of each limb."""
+_ALL = 0.9
+"""People who hang on one node have this share of all joints at least; two arms with all their fingers have less."""
 _LESS_LIKE = 6.0
 """How much worse limbs may fit a body than the best of the whole tree, of another person: the fingers of two hands do
 not look like two people."""
@@ -41,13 +43,10 @@ def _bodies(tree: JointTree) -> dict[int, JointTree]:
         if tree.joints[place].parent >= 0:
             sizes[tree.joints[place].parent] += sizes[place]
     level = [place for place in tree.roots if sizes[place] >= _FEWEST_JOINTS]
-    while len(level) == 1 and sizes[level[0]] >= 2 * _FEWEST_JOINTS:
-        below = [place for place in tree.children[level[0]] if sizes[place] >= _FEWEST_JOINTS]
-        if not below:
-            break
-        level = below
-    if len(level) < 2:
-        return {root: tree.under(root) for root in tree.roots if len(tree.roots) > 1 and sizes[root] >= _FEWEST_JOINTS}
+    while len(level) == 1 and len(tree.roots) < 2:
+        level = [place for place in tree.children[level[0]] if sizes[place] >= _FEWEST_JOINTS]
+    if len(tree.roots) < 2 and (len(level) < 2 or sum(sizes[place] for place in level) < _ALL * len(tree.joints)):
+        return {}
     best = find_limbs(Shape(tree))
     found = {}
     for place in level:
