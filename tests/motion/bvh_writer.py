@@ -137,7 +137,7 @@ def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
                 row = _INDEX[f"{side}_{joint}"]
                 nodes[f"{side}{joint}Twist*"] = (f"{side}_{joint}", row, 0.5 * offsets[_INDEX[f"{side}_{end}"]])
     if style.cloth:
-        for kind, base, count, links in (("skirt", "pelvis", 12, 4), ("hair", "head", 8, 4)):
+        for kind, base, count, links in (("skirt", "pelvis", 6, 4), ("hair", "head", 4, 4)):
             for chain, angle in enumerate(np.linspace(0, 2 * np.pi, count, endpoint=False)):
                 way = np.array([np.cos(angle), 0.0, np.sin(angle)])
                 for link in range(links):

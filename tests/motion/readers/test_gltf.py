@@ -71,7 +71,7 @@ manners = st.builds(
 
 
 @given(style=styles, manner=manners)
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_limbs_point_as_in_the_file_whoever_wrote_it(
     motion: Motion, style: Style, manner: Manner, tmp_path: Path
 ) -> None:
