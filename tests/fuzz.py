@@ -39,6 +39,7 @@ from tests.motion.readers import (
     test_frame_lists,
     test_humanml,
     test_keypoints,
+    test_mvnx,
     test_nymeria,
     test_parameter_table,
     test_point_folders,
@@ -208,6 +209,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "clips.json": ("damaged.json", lambda path: path.write_text(json.dumps(test_frame_lists.clips(24)))),
     "deepmimic": ("damaged.json", _deepmimic),
     "points, a line each": ("damaged.csv", _point_table),
+    "mvnx": ("damaged.mvnx", lambda path: path.write_text(test_mvnx.mvnx(test_mvnx.subject()))),
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
@@ -240,7 +242,7 @@ def fuzz(name: str, first: int, accidents: int, folder: Path) -> tuple[float, li
         write(path)
     good, text = (
         path.read_bytes(),
-        not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv", ".skeleton", ".trc"},
+        not path.suffix or path.suffix in {".bvh", ".amc", ".asf", ".json", ".csv", ".skeleton", ".trc", ".mvnx"},
     )
     slowest, wrong = 0.0, []
     for seed in range(first, first + accidents):

@@ -29,7 +29,6 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "name the folder that holds them all; points in a picture (pose_keypoints_2d) have to be lifted to three"
         " dimensions first, for instance with MMPose or MotionBERT",
     ),
-    (r"\s*<\?xml.{0,400}<mvnx|\s*<mvnx", "an MVNX file of Xsens", "export BVH or FBX from MVN: File > Export"),
     (r"Vocaloid Motion Data", "a VMD file of MikuMikuDance", f"play it on a model, and {_BLENDER}"),
     (r"%YAML.{0,400}AnimationClip:", "an animation clip of Unity", "export the character as BVH or FBX first"),
     (r"//Maya ASCII", "a scene of Maya", "export the skeleton as FBX"),

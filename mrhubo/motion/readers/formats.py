@@ -55,6 +55,7 @@ FORMATS: tuple[Format, ...] = (
     Format("BVH", "bvh", "is_bvh", "read_bvh", (".bvh",)),
     Format("FBX", "scene.fbx", "is_fbx", "read_fbx", (".fbx",)),
     Format("glTF and VRM", "scene.gltf", "is_gltf", "read_gltf", (".glb", ".gltf", ".vrm", ".vrma")),
+    Format("Xsens' MVNX", "mvnx", "is_mvnx", "read_mvnx", (".mvnx",)),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints, SMPL parameters and DeepMimic's motions in JSON", "json_file", "is_json", "read_json", ()),
