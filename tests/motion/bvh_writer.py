@@ -57,6 +57,12 @@ class Style:
     extra_root: bool = False
     rolls: bool = False
     """Joints in the middle of upper arms and thighs that turn nothing."""
+    lower_rolls: bool = False
+    """Such joints in the middle of forearms and shins."""
+    copies: bool = False
+    """Limbs twice in the same place, as rigs have them for forward and inverse kinematics."""
+    ends: bool = True
+    """Whether bones of feet have an end."""
     doubled: bool = False
     """Joints of length 0 before hips and shoulders."""
     positions: bool = False
@@ -109,7 +115,7 @@ def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
             parent = "neck"
         if style.biped and kind == "hip":
             parent = "spine1"
-        if kind in ("knee", "elbow") and style.rolls:
+        if (kind in ("knee", "elbow") and style.rolls) or (kind in ("wrist", "ankle") and style.lower_rolls):
             assert parent is not None
             roll = f"{parent}_roll"
             nodes[roll] = (parent, _INDEX[parent], offsets[joint] / 2)
@@ -119,6 +125,9 @@ def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
             nodes[f"{name}_base"] = (parent, _INDEX[parent], offsets[joint])
             parent = f"{name}_base"
         nodes[name] = (parent, joint, offsets[joint])
+        if style.copies and kind in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist"):
+            above = f"{JOINT_NAMES[PARENTS[joint]]}_copy"
+            nodes[f"{name}_copy"] = (above if above in nodes else parent, joint, offsets[joint])
     for side, sign in (("left", 1), ("right", -1)):
         if style.fingers:
             for finger, way in (
@@ -131,7 +140,8 @@ def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
         else:
             nodes[f"{side}hand*"] = (f"{side}_wrist", _INDEX[f"{side}_wrist"], np.array([0.1 * sign, 0, 0]))
         end = f"{side}_foot" if style.toes else f"{side}_ankle"
-        nodes[f"{side}toe*"] = (end, _INDEX[end], np.array([0.0, -0.015, 0.07]))
+        if style.ends:
+            nodes[f"{side}toe*"] = (end, _INDEX[end], np.array([0.0, -0.015, 0.07]))
         for joint, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee")):
             if style.twists:
                 row = _INDEX[f"{side}_{joint}"]
@@ -198,6 +208,7 @@ def write_bvh(motion: Motion, style: Style) -> str:
         # all nodes between two joints of ours hang on the upper one
         if style.biped and parent in ("neck", "spine1") and key not in ("head", "spine2"):
             parent = "spine3" if parent == "neck" else "pelvis"
+        key = key.removesuffix("_copy")
         carrier = nodes[parent][1] if key in _INDEX or key.endswith(("_roll", "_base")) else joint
         base = points(parent)
         if key in _INDEX and (parent.endswith("_base")):

@@ -107,6 +107,8 @@ styles = st.builds(
     prop=st.booleans(),
     twists=st.booleans(),
     cloth=st.booleans(),
+    lower_rolls=st.booleans(),
+    copies=st.booleans(),
     seed=st.integers(0, 1000),
 )
 
@@ -169,6 +171,14 @@ def test_who_never_stands_is_upright_all_the_same(motion: Motion, what: str, tmp
     found = read(lying, Style(axes="world"), tmp_path)
     assert found.root_rotation_T33 is not None and torch.allclose(found.root_rotation_T33, turn, atol=1e-3)
     assert "lies along" in " ".join(found.notes)
+
+
+def test_feet_without_toes_are_flat_at_rest(motion: Motion, tmp_path: Path) -> None:
+    """Files without ends of bones, as glTF has none, tell nothing of toes."""
+    found = read(motion, Style(toes=False, ends=False), tmp_path)
+    for side in SIDES:
+        error = mrhubo.rotation.geodesic_distance(turned(found, f"{side}_ankle"), turned(motion, f"{side}_ankle"))
+        assert float(torch.rad2deg(error).max()) < 0.1
 
 
 @pytest.mark.parametrize("axes", ["world", "hanging"])

@@ -25,8 +25,11 @@ _SHARE_OF_LEG = 0.8
 """Thigh and shin, of the whole way from the top of the leg's bones to the end of the toes."""
 _BONES, _WHOLE, _WIDTH, _SHARE = 0.15, 0.15, 0.3, 0.25
 """Tolerances: standard deviations of the logarithms of these ratios."""
-_SKIPPED = 2.0
-"""Cost of a joint between two that are taken: bones are rarely cut into pieces."""
+_HIPS_LEG, _HIPS, _BESIDE = 0.22, 0.6, 8.0
+"""Distance of the hips over leg, its tolerance, and what it costs at most: rigs have limbs twice, in one place."""
+_SKIPPED, _ROLLED = 2.0, 0.25
+"""Cost of a joint between two that are taken, as bones are rarely cut into pieces; and of one that cuts a bone which
+never bends there."""
 _NAMED = 1.5
 """What it is worth that the end of the arm is called hand or wrist."""
 _CALLED = 6.0
@@ -98,6 +101,8 @@ def _fit(shape: Shape, legs: Pair, arms: Pair) -> Limbs | None:
     if len(arm_fits) < 2:
         return None
     cost = sum(cost for cost, _ in (*leg_fits, *arm_fits))
+    hips = [chain.places[fit[1][0]] for chain, fit in zip(legs.limbs, leg_fits, strict=True)]
+    cost += min(_off(shape.distance(*hips) / leg, _HIPS_LEG, _HIPS), _BESIDE)
     for pair, sign in ((legs, 1.0), (arms, -1.0)):
         cost -= sign * _CALLED * limb_votes(_names(shape, pair))
     way = {*tree.above(legs.carrier)}
@@ -136,16 +141,19 @@ def _best(chain: Chain, cost: Callable[[int, int, int], float]) -> tuple[float, 
     return least, (-i, -j, -k)
 
 
-def _skipped(chain: Chain, i: int, k: int) -> int:
-    """Joints between two, but for those in the place of another."""
+def _skipped(chain: Chain, i: int, k: int) -> float:
+    """What it costs to leave out the joints between two, but for those in the place of another."""
     nothing = 1e-3 * chain.below[-1]
-    places = [chain.below[place] for place in range(i, k + 1)]
-    return sum(after - before > nothing for before, after in zip(places, places[1:], strict=False)) - 1
+    return sum(
+        _ROLLED if chain.rolls[place] else _SKIPPED
+        for place in range(i + 1, k)
+        if chain.below[place] - chain.below[place - 1] > nothing and chain.below[k] - chain.below[place] > nothing
+    )
 
 
 def _bones(chain: Chain, i: int, j: int, k: int) -> tuple[float, float, float]:
     """Lengths of the two bones, and the cost of what is skipped in them."""
-    skipped = _SKIPPED * (_skipped(chain, i, j) + _skipped(chain, j, k))
+    skipped = _skipped(chain, i, j) + _skipped(chain, j, k)
     return chain.below[j] - chain.below[i], chain.below[k] - chain.below[j], skipped
 
 

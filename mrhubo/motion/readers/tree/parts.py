@@ -100,17 +100,17 @@ def find_hinges(sample: Frames, reference: Reference | None) -> dict[str, np.nda
 
 
 def _resting_parts(sample: Frames, reference: Reference) -> dict[str, np.ndarray]:
-    """At rest trunk and head are upright, and soles flat, though toes may point outward."""
+    """At rest trunk and head are upright, and soles flat, though toes may point outward, as far as they are there."""
     axes_33 = reference.axes_33
     at_rest = {name: turn.T for name, turn in reference.turn.items()}
     parts = {name: at_rest[name] @ axes_33 for name in ("pelvis", "spine3", "head") if name in sample.turn}
     for side in SIDES:
-        ankle, foot = f"{side}_ankle", f"{side}_foot"
+        ankle, foot, yaw = f"{side}_ankle", f"{side}_foot", 0.0
         if foot in sample.point:
             toe_3 = axes_33.T @ (reference.point[foot] - reference.point[ankle])
             level = norm(toe_3[[0, 2]]) > 0.1 * norm(toe_3)
             yaw = float(np.arctan2(toe_3[0], toe_3[2])) if level else 0.0
-            parts[ankle] = at_rest[ankle] @ axes_33 @ axis_angle_to_matrix(np.array([0.0, yaw, 0.0]))
+        parts[ankle] = at_rest[ankle] @ axes_33 @ axis_angle_to_matrix(np.array([0.0, yaw, 0.0]))
     return parts
 
 

@@ -21,6 +21,9 @@ _UNLIKE = 0.25
 """How far the bones of a pair may differ, as a mean logarithm of their ratio; people's differ by some hundredths."""
 _SAME = 0.05
 """The same of bones that were made as copies of each other."""
+_STRAIGHT_DEG, _BENT_DEG = 2.0, 15.0
+"""A joint at which two bones never bend by more than the first is none of the body's, in a limb in which others bend by
+more than the second."""
 _COMPARED = 2
 """Bones of a pair that are compared; what hangs on hands and feet may differ, as a hand with a stick does."""
 _MOST_CHILDREN = 40
@@ -35,6 +38,9 @@ class Chain:
     """The joints on it, from the top."""
     below: tuple[float, ...]
     """How far each is from the first, along the bones."""
+    rolls: tuple[bool, ...]
+    """Whether each lies on the line between its neighbours in all frames, as a joint does that cuts a bone into pieces;
+    known where the limb bends elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,19 @@ class Shape:
             place = max(self.tree.children[place], key=lambda child: (self.far(child), len(self.tree.children[child])))
             places.append(place)
             below.append(below[-1] + float(self.length[place]))
-        return Chain(tuple(places), tuple(below))
+        return Chain(tuple(places), tuple(below), self._rolls(places))
+
+    def _rolls(self, places: list[int]) -> tuple[bool, ...]:
+        """Which of the places on a way are `Chain.rolls`."""
+        bone_PF3 = np.diff(np.stack([self.pose.point[place] for place in places]), axis=0)
+        long_PF = np.linalg.norm(bone_PF3, axis=-1)
+        cosine_PF = (bone_PF3[1:] * bone_PF3[:-1]).sum(-1) / np.maximum(long_PF[1:] * long_PF[:-1], 1e-12)
+        bend_P = np.degrees(np.arccos(np.clip(cosine_PF, -1, 1))).max(axis=1, initial=0.0)
+        is_bone_P = np.median(long_PF, axis=1) > self.nothing
+        straight_P = (bend_P < _STRAIGHT_DEG) & is_bone_P[1:] & is_bone_P[:-1]
+        if bend_P.max(initial=0.0) < _BENT_DEG:
+            straight_P[:] = False
+        return (False, *straight_P.tolist(), False)[: len(places)]
 
     def far(self, place: int) -> float:
         """How far it is from a joint's parent, over the joint, to the end of the longest way down."""
