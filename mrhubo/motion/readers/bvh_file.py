@@ -28,7 +28,7 @@ MAX_BYTES = 2**30
 MAX_FRAMES = 500_000
 """Longest motion that is read: 70 minutes at 120 frames a second."""
 _MAX_HEADER = 4_000_000
-_MAX_JOINTS = 1_000
+_MAX_JOINTS = 5_000
 _MAX_DEPTH = 100
 """Joints on the way from a root to an end."""
 _MAX_CHANNELS = 12
@@ -101,7 +101,7 @@ def _read_hierarchy(path: Path, text: str) -> tuple[list[Joint], int]:
                 pending, words = None, words[1:]
                 if len(joints) > _MAX_JOINTS or len(open_joints) > _MAX_DEPTH:
                     raise UserError(
-                        f"{path}: has more than {_MAX_JOINTS} joints, or more than {_MAX_DEPTH} one inside the other"
+                        f"{path}: has more than {_MAX_JOINTS:,} joints, or more than {_MAX_DEPTH} one inside the other"
                     )
             elif keyword == "}":
                 if not open_joints:

@@ -47,7 +47,7 @@ class JointTree:
     def __len__(self) -> int:
         return len(self.value_TC)
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """The joints' names."""
         return [joint.name for joint in self.joints]

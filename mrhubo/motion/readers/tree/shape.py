@@ -59,6 +59,7 @@ class Shape:
         first = 1 if len(tree) > 2 else 0  # the first frame is often no part of the motion
         self.frames = np.unique(np.linspace(first, len(tree) - 1, _SAMPLES).astype(int))
         self.pose: Pose = tree.pose(self.frames)
+        self._distances: dict[tuple[int, int], float] = {}
         count = len(tree.joints)
         self.length = np.zeros(count)
         for place, joint in enumerate(tree.joints):
@@ -128,4 +129,8 @@ class Shape:
 
     def distance(self, one: int, other: int) -> float:
         """The median distance of two joints over the motion."""
-        return float(np.median(np.linalg.norm(self.pose.point[one] - self.pose.point[other], axis=-1)))
+        pair = (min(one, other), max(one, other))
+        if pair not in self._distances:
+            apart_F3 = self.pose.point[one] - self.pose.point[other]
+            self._distances[pair] = float(np.median(np.linalg.norm(apart_F3, axis=-1)))
+        return self._distances[pair]
