@@ -96,6 +96,8 @@ def test_rate_is_that_of_the_keys(motion: Motion, tmp_path: Path) -> None:
     path = tmp_path / "a.fbx"
     write_fbx(motion, _POSED, Manner(rate=30.0, time_mode=(6, 24.0)), path)
     assert mrhubo.read_motion(path).frame_rate == 30.0
+    write_fbx(motion.changed(frame_rate=30_000 / 1001), _POSED, Manner(time_mode=(6, 30.0)), path)
+    assert mrhubo.read_motion(path).frame_rate == pytest.approx(30_000 / 1001, rel=1e-9)
     write_fbx(motion, _POSED, Manner(rate=6.0, time_mode=(11, 24.0)), path)
     assert mrhubo.read_motion(path).frame_rate == 24.0
     write_fbx(motion, _POSED, Manner(rate=6.0, time_mode=(14, 47.5)), path)

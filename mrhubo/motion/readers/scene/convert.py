@@ -137,4 +137,4 @@ def _is_rest(path: Path, tree: JointTree, body: Mapping[str, int]) -> bool:
 def _begins_so(tree: JointTree) -> bool:
     """Whether a motion begins in its pose at rest: nodes that nobody put to rest are as in the first frame."""
     columns = [column for joint in tree.joints for _, column in joint.rotation]
-    return bool((np.abs(tree.value_TC[0, columns]) < _SAME_DEG).mean() > _MOST)
+    return not columns or bool((np.abs(tree.value_TC[0, columns]) < _SAME_DEG).mean() > _MOST)

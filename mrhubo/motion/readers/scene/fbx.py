@@ -35,6 +35,7 @@ from mrhubo.motion.readers.scene.nodes import (
     parents_first,
 )
 from mrhubo.motion.readers.scene.rests import bound_pose
+from mrhubo.robot_motion.clock import rate_of_step
 
 _SECOND, _NEW_SECOND = 46_186_158_000, 141_120_000
 """Units of time in a second; the second where files of version 7 say that they have that of version 8."""
@@ -46,6 +47,8 @@ _OWN_RATE = 14
 """The number of those that have a rate of their own."""
 _SLOWEST, _EVEN, _ALIKE = 10.0, 0.9, 1e-3
 """Keys a second, and the share of the steps between them that are alike, of a recording; and how much these differ."""
+_DIGITS, _SAME_RATE = 7, 1e-4
+"""Of a step between keys that are right; and how far apart rates are that are the same."""
 _AXES = ("d|X", "d|Y", "d|Z")
 
 Curves = dict[int, dict[str, tuple[Curve | None, ...]]]
@@ -263,7 +266,8 @@ class _File:
         usual = float(np.median(steps)) if len(steps) else 1.0
         if not _SLOWEST <= 1 / usual <= RATES[1] or np.mean(np.abs(steps / usual - 1) < _ALIKE) < _EVEN:
             return self.rate
-        return self.rate if abs(usual * self.rate - 1) < _ALIKE else round(1 / usual, 3)
+        rate = rate_of_step(f"{usual:.{_DIGITS}g}") or 1 / usual
+        return self.rate if abs(rate / self.rate - 1) < _SAME_RATE else rate
 
 
 def _add(found: dict[int, np.ndarray], place: int | None, record: Record) -> None:
