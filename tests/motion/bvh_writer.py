@@ -60,7 +60,7 @@ class Style:
     lower_rolls: bool = False
     """Such joints in the middle of forearms and shins."""
     copies: bool = False
-    """Limbs twice in the same place, as rigs have them for forward and inverse kinematics."""
+    """Limbs three times in the same place, as rigs have them for forward and inverse kinematics."""
     ends: bool = True
     """Whether bones of feet have an end."""
     doubled: bool = False
@@ -120,14 +120,16 @@ def _nodes(style: Style, offsets: list[np.ndarray]) -> dict[str, _Node]:
             roll = f"{parent}_roll"
             nodes[roll] = (parent, _INDEX[parent], offsets[joint] / 2)
             parent = roll
+        carrier = parent
         if kind in ("hip", "shoulder") and style.doubled:
             assert parent is not None
             nodes[f"{name}_base"] = (parent, _INDEX[parent], offsets[joint])
             parent = f"{name}_base"
         nodes[name] = (parent, joint, offsets[joint])
         if style.copies and kind in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist"):
-            above = f"{JOINT_NAMES[PARENTS[joint]]}_copy"
-            nodes[f"{name}_copy"] = (above if above in nodes else parent, joint, offsets[joint])
+            for copy, held in (("copy", parent), ("spare", carrier)):
+                above = f"{JOINT_NAMES[PARENTS[joint]]}_{copy}"
+                nodes[f"{name}_{copy}"] = (above if above in nodes else held, joint, offsets[joint])
     for side, sign in (("left", 1), ("right", -1)):
         if style.fingers:
             for finger, way in (
@@ -208,7 +210,7 @@ def write_bvh(motion: Motion, style: Style) -> str:
         # all nodes between two joints of ours hang on the upper one
         if style.biped and parent in ("neck", "spine1") and key not in ("head", "spine2"):
             parent = "spine3" if parent == "neck" else "pelvis"
-        key = key.removesuffix("_copy")
+        key = key.removesuffix("_copy").removesuffix("_spare")
         carrier = nodes[parent][1] if key in _INDEX or key.endswith(("_roll", "_base")) else joint
         base = points(parent)
         if key in _INDEX and (parent.endswith("_base")):

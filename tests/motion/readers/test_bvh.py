@@ -173,6 +173,18 @@ def test_who_never_stands_is_upright_all_the_same(motion: Motion, what: str, tmp
     assert "lies along" in " ".join(found.notes)
 
 
+_RIGS = {
+    "a skirt and hair": Style(cloth=True),
+    "bones in pieces": Style(rolls=True, lower_rolls=True, toes=False, fingers=False),
+    "limbs three times": Style(names="nameless", copies=True, doubled=True),
+}
+
+
+@pytest.mark.parametrize("rig", _RIGS)
+def test_rigs_of_animators(rig: str, motion: Motion, tmp_path: Path) -> None:
+    assert float(limb_error(read(motion, _RIGS[rig], tmp_path).local_TJ33, motion.local_TJ33).max()) < 0.1
+
+
 def test_feet_without_toes_are_flat_at_rest(motion: Motion, tmp_path: Path) -> None:
     """Files without ends of bones, as glTF has none, tell nothing of toes."""
     found = read(motion, Style(toes=False, ends=False), tmp_path)
