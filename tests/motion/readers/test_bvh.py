@@ -108,7 +108,6 @@ styles = st.builds(
     twists=st.booleans(),
     cloth=st.booleans(),
     lower_rolls=st.booleans(),
-    copies=st.booleans(),
     seed=st.integers(0, 1000),
 )
 

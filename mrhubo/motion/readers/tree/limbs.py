@@ -25,7 +25,7 @@ _SHARE_OF_LEG = 0.8
 """Thigh and shin, of the whole way from the top of the leg's bones to the end of the toes."""
 _BONES, _WHOLE, _WIDTH, _SHARE = 0.15, 0.15, 0.3, 0.25
 """Tolerances: standard deviations of the logarithms of these ratios."""
-_HIPS_LEG, _HIPS, _BESIDE = 0.22, 0.6, 8.0
+_HIPS_LEG, _HIPS, _BESIDE = 0.22, 0.6, 50.0
 """Distance of the hips over leg, its tolerance, and what it costs at most: rigs have limbs twice, in one place."""
 _SKIPPED, _ROLLED = 2.0, 0.25
 """Cost of a joint between two that are taken, as bones are rarely cut into pieces; and of one that cuts a bone which
@@ -40,8 +40,9 @@ _CROWDED = 20.0
 """Cost of a pair beside which there is a third one of the same bones: chains of a skirt, of hair, of a cape."""
 _MOST_JOINTS = 24
 """Of a limb, that are looked at."""
-_BEST_PAIRS = 8
-"""Pairs that are looked at, the longest of those without a third one beside them, of those called limbs, and of all."""
+_BEST_PAIRS, _MOST_PAIRS = 8, 24
+"""Pairs that are looked at, on one joint and in all: the longest of those without a third one beside them, of those
+called limbs, and of all."""
 
 Triple = tuple[int, int, int]
 
@@ -66,13 +67,24 @@ def find_limbs(shape: Shape) -> Limbs | None:
     crowded = {id(pair) for pair in pairs if any(partners[chain.places[0]] > 1 for chain in pair.limbs)}
     alone = [pair for pair in pairs if id(pair) not in crowded]
     called = [pair for pair in pairs if limb_votes(_names(shape, pair))]
-    looked_at = {id(pair): pair for kind in (alone, called, pairs) for pair in kind[:_BEST_PAIRS]}.values()
+    looked_at = {id(pair): pair for kind in (alone, called, pairs) for pair in _longest(kind)}.values()
     found = [
         dataclasses.replace(limbs, cost=limbs.cost + _CROWDED * sum(id(pair) in crowded for pair in (legs, arms)))
         for legs, arms in permutations(looked_at, 2)
         if (limbs := _fit(shape, legs, arms)) is not None
     ]
     return min(found, key=lambda limbs: limbs.cost, default=None)
+
+
+def _longest(pairs: list[Pair]) -> list[Pair]:
+    """The first of those that hang on each joint."""
+    on: Counter[int] = Counter()
+    kept = []
+    for pair in pairs:
+        on[pair.carrier] += 1
+        if on[pair.carrier] <= _BEST_PAIRS and len(kept) < _MOST_PAIRS:
+            kept.append(pair)
+    return kept
 
 
 def _names(shape: Shape, pair: Pair) -> list[str]:
