@@ -20,19 +20,19 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue] (compiled)
 
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.regular import open_regular
-from mrhubo.motion.motion import SOLE_POINTS, Motion
+from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.tracks import Person, choose
 from mrhubo.motion.readers.xsens import SEGMENTS, segments_motion
 
-MAX_BYTES = 8 * 2**30
+_MAX_BYTES = 8 * 2**30
 _MAX_FRAMES = 500_000
 _MAX_SEGMENTS = 200
 _START = re.compile(r"\s*+(?:<\?xml[^>]{0,400}+>)?\s*+(?:<!--.{0,2000}?-->\s*+)*<(?:\w+:)?mvnx\b", re.DOTALL)
 _POINTS = ("LeftFoot_Heel", "LeftFoot_Toe", "RightFoot_Heel", "RightFoot_Toe")
-"""What the file calls `SOLE_POINTS`."""
+"""What the file calls `mrhubo.motion.motion.SOLE_POINTS`."""
 _TURNS, _PLACES = "orientation", "position"
 
 
@@ -60,7 +60,7 @@ def read_mvnx(path: Path, options: ReadOptions) -> Motion:
         NoMotion: of nobody the whole body was recorded.
         UserError: the file is missing, damaged or too large, or the frame rate is not known.
     """
-    with open_regular(path, MAX_BYTES) as handle:
+    with open_regular(path, _MAX_BYTES) as handle:
         try:
             subjects = list(_subjects(path, handle))
         except (etree.XMLSyntaxError, ValueError) as error:
@@ -109,7 +109,7 @@ def _motion(path: Path, subject: _Subject, options: ReadOptions, notes: list[str
     if len(contacts) == frames and all(name in subject.contacts for name in _POINTS):
         contact_TX = _stacked(path, contacts, "footContacts", len(contacts[0]))
         columns = [subject.contacts[name] for name in _POINTS]
-        if max(columns) < contact_TX.shape[1] and len(columns) == len(SOLE_POINTS):
+        if max(columns) < contact_TX.shape[1]:
             motion = motion.changed(contact_T4=contact_TX[:, columns] > 0)
     return motion
 

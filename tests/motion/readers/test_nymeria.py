@@ -12,6 +12,7 @@ import mrhubo
 from mrhubo import UserError
 from mrhubo.body.joints import JOINT_NAMES, OFFSETS_J3, PARENTS
 from mrhubo.fast.rotations import angles_between, axis_angle_to_matrix
+from mrhubo.motion import Motion
 
 FRAMES = 12
 TO_ROBOT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -44,11 +45,8 @@ def write(path: Path, place_TJ3: np.ndarray, world_TJ33: np.ndarray, **more: obj
     np.savez(path, **{**arrays, **more})  # type: ignore[arg-type]
 
 
-def test_trunk_head_hands_and_limbs_are_turned_as_segments_are(tmp_path: Path) -> None:
-    place_TJ3, world_TJ33 = body()
-    write(tmp_path / "xdata.npz", place_TJ3, world_TJ33)
-    motion = mrhubo.read_motion(tmp_path / "xdata.npz")
-    assert motion.frame_rate == 240 and motion.source.startswith("Nymeria")
+def check(motion: Motion, place_TJ3: np.ndarray, world_TJ33: np.ndarray) -> None:
+    """Trunk, head, hands and limbs are turned as our body's."""
     root_T33, root_T3 = motion.arrays.root_rotation_T33, motion.arrays.root_position_T3
     assert root_T33 is not None and root_T3 is not None
     turns = {0: root_T33}
@@ -61,6 +59,14 @@ def test_trunk_head_hands_and_limbs_are_turned_as_segments_are(tmp_path: Path) -
         i, j = JOINT_NAMES.index(start), JOINT_NAMES.index(end)
         np.testing.assert_allclose(turns[i] @ OFFSETS_J3[j - 1], place_TJ3[:, j] - place_TJ3[:, i], atol=1e-3)
     np.testing.assert_allclose(root_T3, place_TJ3[:, 0], atol=1e-3)
+
+
+def test_trunk_head_hands_and_limbs_are_turned_as_segments_are(tmp_path: Path) -> None:
+    place_TJ3, world_TJ33 = body()
+    write(tmp_path / "xdata.npz", place_TJ3, world_TJ33)
+    motion = mrhubo.read_motion(tmp_path / "xdata.npz")
+    assert motion.frame_rate == 240 and motion.source.startswith("Nymeria")
+    check(motion, place_TJ3, world_TJ33)
 
 
 def test_places_that_are_none_are_refused_and_other_shapes_are_not_taken(tmp_path: Path) -> None:

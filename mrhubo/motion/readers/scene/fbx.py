@@ -34,7 +34,7 @@ from mrhubo.motion.readers.scene.nodes import (
     may_be_joints,
     parents_first,
 )
-from mrhubo.motion.readers.scene.rests import bound_pose
+from mrhubo.motion.readers.scene.rests import BOUND, OWN, bound_pose
 from mrhubo.robot_motion.clock import rate_of_step
 
 _SECOND, _NEW_SECOND = 46_186_158_000, 141_120_000
@@ -195,10 +195,10 @@ class _File:
         own_N34 = _local(nodes, parents, {}, np.zeros(1))[0]
         bound_N34 = bound_pose(own_N34, parents, bound)
         unturned_N34 = _local([node.with_no_turn() for node in nodes], parents, {}, np.zeros(1))[0]
-        rests = [Rest("the pose in which its skin was bound", bound_N34)] if bound_N34 is not None else []
+        rests = [Rest(BOUND, bound_N34)] if bound_N34 is not None else []
         rests += [
             Rest(name, in_world(local_N34[None], parents)[0], local_N34 is own_N34)
-            for name, local_N34 in (("its pose at all angles 0", unturned_N34), ("its nodes' own pose", own_N34))
+            for name, local_N34 in (("its pose at all angles 0", unturned_N34), (OWN, own_N34))
         ]
         animations = [self._animation(number, record, nodes, parents, notes)
                       for number, record in self.named("AnimationStack")]  # fmt: skip

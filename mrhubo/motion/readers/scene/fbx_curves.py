@@ -14,15 +14,16 @@ import numpy as np
 
 from mrhubo.motion.readers.scene.fbx_file import BadFbx, Record
 
-_CONSTANT, _LINEAR, _CUBIC = 0x2, 0x4, 0x8
-_NEXT = 0x100
+CONSTANT, LINEAR, CUBIC = 0x2, 0x4, 0x8
+"""How a curve goes from a key to the next."""
+NEXT = 0x100
 """Of what is constant: as the next key."""
-_USER = 0x400
+USER = 0x400
 """Of a cubic: with the slopes that the file has; else they are found from the keys beside."""
-_HEAVY_RIGHT, _HEAVY_LEFT = 0x1000000, 0x2000000
+HEAVY_RIGHT, HEAVY_LEFT = 0x1000000, 0x2000000
 """The tangent to the right, and that of the next key to the left, are not a third as long as the step."""
 _THIRD = 1 / 3
-_LIGHT = 1e-4
+LIGHT = 1e-4
 """Unit of the lengths of tangents, as a share of the step."""
 _HALVINGS = 40
 
@@ -50,10 +51,10 @@ class Curve:
         share_F = np.clip((time_F - self.time_K[key_F]) / np.maximum(step_F, 1e-12), 0.0, 1.0)
         from_F, to_F, kind_F = self.value_K[key_F], self.value_K[key_F + 1], self.kind_K[key_F]
         value_F = from_F + share_F * (to_F - from_F)
-        constant_F = (kind_F & _CONSTANT) > 0
-        value_F = np.where(constant_F, np.where((kind_F & _NEXT) > 0, to_F, from_F), value_F)
+        constant_F = (kind_F & CONSTANT) > 0
+        value_F = np.where(constant_F, np.where((kind_F & NEXT) > 0, to_F, from_F), value_F)
         value_F = np.where(share_F <= 0, from_F, np.where(share_F >= 1, to_F, value_F))
-        cubic_F = ~constant_F & ((kind_F & _CUBIC) > 0) & (share_F > 0) & (share_F < 1)
+        cubic_F = ~constant_F & ((kind_F & CUBIC) > 0) & (share_F > 0) & (share_F < 1)
         if cubic_F.any():
             key_C, step_C = key_F[cubic_F], step_F[cubic_F]
             weight_C2, slope_C2 = self.weight_K2[key_C], self.slope_K2[key_C]
@@ -83,7 +84,7 @@ def read_curve(record: Record, second: float) -> Curve | None:
     if not (np.isfinite(value_K).all() and np.isfinite(time_K).all() and (np.diff(time_K) >= 0).all()):
         raise BadFbx("has a curve with NaN, infinite numbers, or times that fall")
     kind_K, slope_K2, weight_K2 = _ways(record, len(time_K))
-    told_K = (kind_K & _USER) > 0
+    told_K = (kind_K & USER) > 0
     own_K = _smooth_slopes(time_K, value_K)
     beside_K2 = np.stack([own_K, np.append(own_K[1:], own_K[-1])], axis=-1)
     return Curve(time_K, value_K, kind_K, np.where(told_K[:, None], slope_K2, beside_K2), weight_K2)
@@ -93,10 +94,10 @@ def _ways(record: Record, keys: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     """Kinds (K,), slopes (K, 2) and weights (K, 2): lines where the file does not say. Keys alike are told once, with
     their number.
     """
-    names = ("KeyAttrFlags", "KeyAttrRefCount", "KeyAttrDataFloat")
-    found = [record.first(name).array() for name in names]
-    flags, counts, data = found
-    line = np.full(keys, _LINEAR), np.zeros((keys, 2)), np.full((keys, 2), _THIRD)
+    flags, counts, data = (
+        record.first(name).array() for name in ("KeyAttrFlags", "KeyAttrRefCount", "KeyAttrDataFloat")
+    )
+    line = np.full(keys, LINEAR), np.zeros((keys, 2)), np.full((keys, 2), _THIRD)
     if flags is None or counts is None or data is None or not len(counts):
         return line
     counts = counts.astype(np.int64)
@@ -111,8 +112,8 @@ def _ways(record: Record, keys: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
         packed = np.where(weights_X > 1e6, np.nan_to_num(weights_X), bits_X).astype(np.int64)
     weight_X2 = np.stack(
         [
-            np.where(flags & _HEAVY_RIGHT, (packed & 0xFFFF) * _LIGHT, _THIRD),
-            np.where(flags & _HEAVY_LEFT, (packed >> 16) * _LIGHT, _THIRD),
+            np.where(flags & HEAVY_RIGHT, (packed & 0xFFFF) * LIGHT, _THIRD),
+            np.where(flags & HEAVY_LEFT, (packed >> 16) * LIGHT, _THIRD),
         ],
         axis=-1,
     )

@@ -189,7 +189,7 @@ def _read_inside(
             above.children.append(record)
             _read_inside(content, start + size, after, head, record, depth + 1, left)
         place = after
-    if depth == 0 and above.first("Objects").values == [] and not above.children:
+    if depth == 0 and not above.children:
         raise BadFbx("holds no records")
 
 

@@ -11,7 +11,7 @@ Legend: F times.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,9 +81,7 @@ class FbxNode:
 
     def with_no_turn(self) -> FbxNode:
         """The same where its own angles are 0, which many make the pose at rest."""
-        return FbxNode(
-            self.number, self.name, self.is_bone, {**self.values, TURNED: np.zeros(3)}, self.order, self.inherits_scale
-        )
+        return replace(self, values={**self.values, TURNED: np.zeros(3)})
 
 
 def read_node(record: Record, usual: Mapping[str, Record]) -> FbxNode | None:

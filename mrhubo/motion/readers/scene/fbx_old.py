@@ -14,16 +14,15 @@ from typing import Any
 
 import numpy as np
 
+from mrhubo.motion.readers.scene.fbx_curves import CONSTANT, CUBIC, HEAVY_LEFT, HEAVY_RIGHT, LIGHT, LINEAR, NEXT, USER
 from mrhubo.motion.readers.scene.fbx_file import Array, BadFbx, Record
+from mrhubo.motion.readers.scene.fbx_nodes import MOVED, SCALED, TURNED
 
-_WHAT = {"T": "Lcl Translation", "R": "Lcl Rotation", "S": "Lcl Scaling"}
+_WHAT = {"T": MOVED, "R": TURNED, "S": SCALED}
 _AXES = ("X", "Y", "Z")
-_KINDS = {"L": 0x4, "C": 0x2, "U": 0x8}
-_NEXT, _TOLD, _HEAVY_RIGHT, _HEAVY_LEFT = 0x100, 0x400, 0x1000000, 0x2000000
+_KINDS = {"L": LINEAR, "C": CONSTANT, "U": CUBIC}
 _WEIGHTS = {"n": 0, "c": 0, "a": 2, "l": 1, "r": 1}
 """How many lengths of tangents follow a letter."""
-_UNIT = 1e4
-"""Of these lengths, where they are packed into a float."""
 
 
 def modernised(root: Record) -> Record:
@@ -144,13 +143,13 @@ def _read_way(words: Iterator[Any]) -> tuple[int, tuple[float, float, float, flo
     kind = _letter(words)
     bits = _KINDS[kind]
     if kind == "C":
-        return bits | _NEXT * (_letter(words) == "n"), (0.0, 0.0, 0.0, 0.0)
+        return bits | NEXT * (_letter(words) == "n"), (0.0, 0.0, 0.0, 0.0)
     if kind == "L":
         return bits, (0.0, 0.0, 0.0, 0.0)
     way = _letter(words)
     slopes, letters = [0.0, 0.0], 1
     if way in "sb":
-        slopes, bits = [float(next(words)) for _ in range(2)], bits | _TOLD
+        slopes, bits = [float(next(words)) for _ in range(2)], bits | USER
     elif way in "pt":  # of these nobody knows what their numbers are
         for _ in range(2 if way == "p" else 3):
             next(words)
@@ -160,11 +159,11 @@ def _read_way(words: Iterator[Any]) -> tuple[int, tuple[float, float, float, flo
     lengths = 0
     for _ in range(letters):
         letter = _letter(words)
-        told = [round(min(max(float(next(words)), 0.0), 1.0) * _UNIT) for _ in range(_WEIGHTS[letter])]
+        told = [round(min(max(float(next(words)), 0.0), 1.0) / LIGHT) for _ in range(_WEIGHTS[letter])]
         if letter in "ar":
-            bits, lengths = bits | _HEAVY_RIGHT, lengths | told[0]
+            bits, lengths = bits | HEAVY_RIGHT, lengths | told[0]
         if letter in "al":
-            bits, lengths = bits | _HEAVY_LEFT, lengths | told[-1] << 16
+            bits, lengths = bits | HEAVY_LEFT, lengths | told[-1] << 16
     packed = float(np.array([lengths], np.uint32).view(np.float32)[0])
     return bits, (slopes[0], slopes[1], packed, 0.0)
 

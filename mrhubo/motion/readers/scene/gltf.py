@@ -35,7 +35,7 @@ from mrhubo.motion.readers.scene.nodes import (
     may_be_joints,
     parents_first,
 )
-from mrhubo.motion.readers.scene.rests import bound_pose
+from mrhubo.motion.readers.scene.rests import BOUND, OWN, bound_pose
 from mrhubo.motion.readers.tree.anatomy import ROLES
 
 _KEYS = re.compile(
@@ -58,7 +58,6 @@ _VRM_JOINTS = {
     "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
 }  # fmt: skip
 """Our joints, by the names of VRM's bones without their sides."""
-_OWN, _BOUND = "its nodes' own pose", "the pose in which its skin was bound"
 _SHORTEST = 1e-6
 """Of quaternions that are none to be normalised."""
 _LARGEST = 1e9
@@ -115,11 +114,11 @@ def _scene(file: GltfFile) -> Scene:
     nodes = [Node(_name(told, place), number.get(parents[place], -1), place in bones) for place in order]
     places = _places([told[place] for place in order], [f"node {place}" for place in order])
     above = [node.parent for node in nodes]
-    rests = [Rest(_OWN, in_world(places.local_N34[None], above)[0], may_move=True)]
+    rests = [Rest(OWN, in_world(places.local_N34[None], above)[0], may_move=True)]
     bound = bound_pose(places.local_N34, above, _bound(file, number, len(told)))
     if bound is not None:
         is_vrm = any(name in inner(file.top, "extensions") for name in _VRM)
-        rests.insert(len(rests) if is_vrm else 0, Rest(_BOUND, bound))
+        rests.insert(len(rests) if is_vrm else 0, Rest(BOUND, bound))
     return Scene(tuple(nodes), tuple(rests), find_animations(file, places, number), _body(file, number))
 
 
@@ -147,10 +146,11 @@ def _human_bones(file: GltfFile) -> Iterator[tuple[str, int]]:
     """What VRM calls nodes that are parts of a human."""
     for extension in _VRM:
         told = inner(file.top, "extensions", extension, "humanoid").get("humanBones")
-        bones = (
-            told.items() if isinstance(told, dict) else ((b.get("bone"), b) for b in told or () if isinstance(b, dict))
-        )
-        for name, bone in bones if isinstance(told, dict | list) else ():
+        if isinstance(told, list):
+            bones = [(bone.get("bone"), bone) for bone in told if isinstance(bone, dict)]
+        else:
+            bones = told.items() if isinstance(told, dict) else ()
+        for name, bone in bones:
             if isinstance(bone, dict) and bone.get("node", -1) != -1:  # VRM 0 has -1 for those that are not there
                 yield str(name), whole(bone, "node", f"a bone of {extension}", len(file.top["nodes"]) - 1)
 

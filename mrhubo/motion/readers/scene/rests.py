@@ -16,7 +16,9 @@ from mrhubo.fast.plain.human import norm
 from mrhubo.fast.rotations import orthonormal
 from mrhubo.motion.readers.scene.nodes import in_world
 
-FEWEST_BOUND = 10
+OWN, BOUND = "its nodes' own pose", "the pose in which its skin was bound"
+"""Names of poses at rest."""
+_FEWEST_BOUND = 10
 """Bones that a skin of a body is bound to, at least."""
 _SAME = 0.02
 """Lengths that differ by less, as a share, are in the same unit."""
@@ -48,7 +50,7 @@ def bound_pose(local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int
     """
     with np.errstate(all="ignore"):
         bound = {p: b for p, b in bound.items() if np.isfinite(b).all() and abs(np.linalg.det(b[:, :3])) > 0}
-    if len(bound) < FEWEST_BOUND:
+    if len(bound) < _FEWEST_BOUND:
         return None
     world_N34 = in_world(local_N34[None], parents)[0]
     places = list(bound)
