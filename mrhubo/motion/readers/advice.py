@@ -45,7 +45,6 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"(?:Joints|Segments|Model Outputs|Trajectories)[,\s]*\n\s*[0-9.]+[,\s]*\n", "a .csv file of Vicon Nexus", _VICON),
     (r"NO_OF_FRAMES\b", "a .tsv file of Qualisys Track Manager", _MARKERS),
     (r"Coordinates\s.{0,2000}?endheader", "a .mot file of OpenSim", "name the recording from which it was made"),
-    (r"Format Version,", "a .csv file of OptiTrack Motive", "export the skeleton as BVH or FBX from Motive"),
     (
         r"[^\n]{0,4000}?(?:root_translate|_joint(?:_dof|_pos)?\b|_dof\b)[^\n]*+\n",
         "a table of a robot's joints",

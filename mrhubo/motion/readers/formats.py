@@ -56,6 +56,7 @@ FORMATS: tuple[Format, ...] = (
     Format("FBX", "scene.fbx", "is_fbx", "read_fbx", (".fbx",)),
     Format("glTF and VRM", "scene.gltf", "is_gltf", "read_gltf", (".glb", ".gltf", ".vrm", ".vrma")),
     Format("Xsens' MVNX", "mvnx", "is_mvnx", "read_mvnx", (".mvnx",)),
+    Format("skeletons of OptiTrack Motive (.csv)", "scene.motive", "is_motive", "read_motive", ()),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),
     Format("NTU RGB+D's .skeleton", "kinect_text", "is_skeleton", "read_skeleton", (".skeleton",)),
     Format("keypoints, SMPL parameters and DeepMimic's motions in JSON", "json_file", "is_json", "read_json", ()),

@@ -27,10 +27,10 @@ from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
-from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import by_names
+from mrhubo.motion.readers.rate import rate_of_seconds
 from mrhubo.motion.readers.sightings import check_size, placed
-from mrhubo.robot_motion.clock import find_rate
 
 _KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3}
 """What stands behind, or before, the name of a point: an axis, or how sure it is."""
@@ -97,7 +97,7 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
     numbers = numbers or list(range(len(point_TK4)))
     if time is not None and numbers == list(range(len(numbers))):
         unit = 1e-3 if _MILLISECONDS.search(header.columns[time][len("time") :]) else 1.0
-        rate = _rate(unit * value_TX[:, time])
+        rate = rate_of_seconds(unit * value_TX[:, time])
     placed_TK4 = placed(path, "the table", numbers, point_TK4)
     sure_TK = placed_TK4[..., 3] if None not in wanted else None
     names = list(header.points) if by_names(list(header.points)).keys() >= set(NEEDED) else None
@@ -181,17 +181,3 @@ def _read_header(line: str) -> _Header | None:
         points = dict(sorted(points.items(), key=lambda entry: int(parts[entry[0]][2])))
     enough = len(points) >= _FEWEST and (numbered or by_names(list(points)).keys() >= set(NEEDED))
     return _Header(separator, points, columns) if enough else None
-
-
-def _rate(time_T: np.ndarray) -> float | None:
-    """Frames per second of times in seconds; None where they are in other units, or not evenly spaced. Of no other unit
-    are steps as long as those of a frame.
-    """
-    low, high = RATES
-    step_T = np.diff(time_T)
-    if not len(step_T) or not np.isfinite(step_T).all() or not 1 / high <= np.median(step_T) <= 1 / low:
-        return None
-    try:
-        return find_rate(time_T, lambda frame_T, rate: frame_T / rate)
-    except UserError:
-        return None

@@ -99,6 +99,20 @@ def rate_of_times(node: Tree) -> float | None:
         return None
 
 
+def rate_of_seconds(time_T: np.ndarray) -> float | None:
+    """Frames per second of times in seconds; None where they are in other units, or not evenly spaced. Of no other unit
+    are steps as long as those of a frame.
+    """
+    low, high = RATES
+    step_T = np.diff(time_T)
+    if not len(step_T) or not np.isfinite(step_T).all() or not 1 / high <= np.median(step_T) <= 1 / low:
+        return None
+    try:
+        return find_even_rate(time_T, lambda frame_T, rate: frame_T / rate)
+    except UserError:
+        return None
+
+
 def number_told(node: Tree) -> float | None:
     """The number above 0 that a node tells, also as a text or as many that are equal; None where it leaves that open,
     as `None`, 0, NaN, an empty text, or whatever else is none.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -45,14 +46,17 @@ def write(path: Path, place_TJ3: np.ndarray, world_TJ33: np.ndarray, **more: obj
     np.savez(path, **{**arrays, **more})  # type: ignore[arg-type]
 
 
-def check(motion: Motion, place_TJ3: np.ndarray, world_TJ33: np.ndarray) -> None:
+TURNED = ("pelvis", "spine3", "neck", "head", "left_wrist", "right_wrist", "left_ankle")
+
+
+def check(motion: Motion, place_TJ3: np.ndarray, world_TJ33: np.ndarray, turned: Iterable[str] = TURNED) -> None:
     """Trunk, head, hands and limbs are turned as our body's."""
     root_T33, root_T3 = motion.arrays.root_rotation_T33, motion.arrays.root_position_T3
     assert root_T33 is not None and root_T3 is not None
     turns = {0: root_T33}
     for joint in range(1, 22):
         turns[joint] = turns[PARENTS[joint]] @ motion.arrays.local_TJ33[:, joint - 1]
-    for name in ("pelvis", "spine3", "neck", "head", "left_wrist", "right_wrist", "left_ankle"):
+    for name in turned:
         joint = JOINT_NAMES.index(name)
         assert angles_between(turns[joint].astype(float), world_TJ33[:, joint]).max() < 1e-3, name
     for start, end in (("left_shoulder", "left_elbow"), ("right_elbow", "right_wrist"), ("left_hip", "left_knee")):

@@ -10,7 +10,7 @@ from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.limbs import find_limbs
 from mrhubo.motion.readers.tree.shape import Shape
 
-_FEWEST_JOINTS = 13
+FEWEST_JOINTS = 13
 """The trunk, and three of each limb."""
 _ALL = 0.9
 """People who hang on one node have this share of all joints at least; two arms with all their fingers have less."""
@@ -42,9 +42,9 @@ def _bodies(tree: JointTree) -> dict[int, JointTree]:
     for place in range(len(tree.joints) - 1, 0, -1):
         if tree.joints[place].parent >= 0:
             sizes[tree.joints[place].parent] += sizes[place]
-    level = [place for place in tree.roots if sizes[place] >= _FEWEST_JOINTS]
+    level = [place for place in tree.roots if sizes[place] >= FEWEST_JOINTS]
     while len(level) == 1 and len(tree.roots) < 2:
-        level = [place for place in tree.children[level[0]] if sizes[place] >= _FEWEST_JOINTS]
+        level = [place for place in tree.children[level[0]] if sizes[place] >= FEWEST_JOINTS]
     if len(tree.roots) < 2 and (len(level) < 2 or sum(sizes[place] for place in level) < _ALL * len(tree.joints)):
         return {}
     best = find_limbs(Shape(tree))

@@ -1,0 +1,209 @@
+"""Human motions from OptiTrack's Motive: the bones of a skeleton, of which no line says which carries which.
+
+A bone turns about where it begins, and that keeps its place on the bone that carries it. Where somebody stands in a
+T-pose, all bones are turned as the world is.
+
+Legend: T frames, F some of them, B bones, N bones in an order in which parents come before children.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.fast.plain.human import norm
+from mrhubo.motion.gaps import fill_numbers, fill_rotations
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.rate import asked_rate, rate_of_seconds, told_rate
+from mrhubo.motion.readers.scene.convert import scene_motion
+from mrhubo.motion.readers.scene.motive_file import BEGINS, MotiveTable, read_motive_table
+from mrhubo.motion.readers.scene.nodes import Animation, Node, Rest, Scene, affine
+from mrhubo.motion.readers.tracks import Person, check_span, choose
+from mrhubo.motion.readers.tree.people import FEWEST_JOINTS
+
+_TOPMOST = ("", "hip", "hips", "pelvis", "root", "reference")
+"""What the bone that carries all others is called, after the skeleton's name, which may be all that it has."""
+_SAMPLES = 64
+"""Frames by which it is told which bone carries which."""
+_NEAR = 0.02
+"""Of a distance, as if a bone's beginning moved by that: of bones on which it keeps its place, the nearest carries."""
+_MIDDLE = 2.0
+"""How much farther a bone of the middle counts from one of a side."""
+
+
+def is_motive(content: Content) -> bool:
+    """Whether a text begins as Motive's tables do."""
+    return content.text is not None and content.text.startswith((BEGINS, f'"{BEGINS}'))
+
+
+def read_motive(path: Path, options: ReadOptions) -> Motion:
+    """Reads the motion of a skeleton.
+
+    Raises:
+        NoMotion: there are no bones, or they are none of a body.
+        UserError: the file is missing, damaged or too large, or has nobody of the name that is asked for.
+    """
+    table, notes = read_motive_table(path), list[str]()
+    skeletons = _skeletons(table.bones)
+    known = {name: _known(table, bones) for name, bones in skeletons.items()}
+    tracks = [Person(name, int(known_T.sum())) for name, known_T in known.items() if known_T.any()]
+    if len(tracks) > 1 or options.person in skeletons:
+        name = choose(path, tracks, options, notes).person
+    elif tracks:
+        notes += options.of_one()
+        name = tracks[0].person
+    else:
+        raise UserError(f"{path}: nobody is tracked with all bones in any frame")
+    seen_S = np.flatnonzero(known[name])
+    span = slice(int(seen_S[0]), int(seen_S[-1]) + 1)
+    check_span(path, len(seen_S), span.stop - span.start)
+    known_T = known[name][span]
+    rate = _rate(path, table, options, notes)
+    bones, place_TB3, turn_TB33, parents = _ordered(table, skeletons[name], span, known_T, name)
+    animation = _animation(place_TB3, turn_TB33, parents, rate)
+    nodes = tuple(Node(bone, parent, True) for bone, parent in zip(bones, parents, strict=True))
+    scene = Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,))
+    kind = f"table of OptiTrack Motive, skeleton '{name}':" if name else "table of OptiTrack Motive:"
+    options = dataclasses.replace(options, person=None, animation=None, rate=None)
+    motion = scene_motion(path, scene, kind.removesuffix(":"), options, notes)
+    if known_T.all():
+        return motion
+    sure_TJ = np.repeat(known_T[-len(motion) :, None].astype(np.float32), motion.arrays.local_TJ33.shape[1], axis=1)
+    return motion.changed(confidence_TJ=sure_TJ)
+
+
+def _skeletons(bones: Sequence[str]) -> dict[str, list[int]]:
+    """The places of bones by the name of their skeleton, which is before a colon, or, in old files, a line."""
+    if not any(":" in bone for bone in bones):
+        old = _by_heads(bones, "_")
+        return old if all(len(places) >= FEWEST_JOINTS for places in old.values()) else {"": list(range(len(bones)))}
+    return _by_heads(bones, ":")
+
+
+def _by_heads(bones: Sequence[str], mark: str) -> dict[str, list[int]]:
+    """The places of bones by what is before a mark in their names; one that is called so itself is of them."""
+    heads = {head for bone in bones if (head := bone.rpartition(mark)[0])}
+    found: dict[str, list[int]] = {}
+    for place, bone in enumerate(bones):
+        found.setdefault(bone if bone in heads else bone.rpartition(mark)[0], []).append(place)
+    return found
+
+
+def _known(table: MotiveTable, bones: list[int]) -> np.ndarray:
+    """Frames (T,) in which all of some bones are tracked."""
+    return np.logical_and(
+        np.isfinite(table.place_TB3[:, bones]).all((1, 2)), np.isfinite(table.turns[0][:, bones]).all((1, 2, 3))
+    )
+
+
+def _rate(path: Path, table: MotiveTable, options: ReadOptions, notes: list[str]) -> float:
+    """Frames per second: what the header says of the export, or of the recording, or what times say."""
+    for key in ("Export Frame Rate", "Capture Frame Rate"):
+        try:
+            rate = float(table.told.get(key.lower(), ""))
+        except ValueError:
+            continue
+        return told_rate(path, f"'{key}' is", rate, options, notes)
+    rate = rate_of_seconds(table.time_T)
+    return asked_rate(path, options) if rate is None else told_rate(path, "its times are at", rate, options, notes)
+
+
+def _ordered(
+    table: MotiveTable, bones: list[int], span: slice, known_T: np.ndarray, skeleton: str
+) -> tuple[list[str], np.ndarray, np.ndarray, list[int]]:
+    """Bones, parents before children: names, where they begin, how they are turned, and the places of their parents.
+
+    Of two ways to read angles, the one is taken in which bones keep their places better on those that carry them.
+    """
+    names = [table.bones[place] for place in bones]
+    plain = [name.removeprefix(skeleton).lstrip(":_").lower() for name in names]
+    top = next((i for i, name in enumerate(plain) if name in _TOPMOST), 0)
+    farther_BB = _farther(plain)
+    place_TB3 = fill_numbers(table.place_TB3[span][:, bones], known_T)
+    some_F = np.flatnonzero(known_T)[np.linspace(0, known_T.sum() - 1, _SAMPLES).astype(int)]
+    ways = [turn_TB33[span][:, bones] for turn_TB33 in table.turns]
+    found = [_carriers(place_TB3[some_F], turn_TB33[some_F], farther_BB, top) for turn_TB33 in ways]
+    best = min(range(len(ways)), key=lambda way: found[way][2])
+    order, parents, _ = found[best]
+    turn_TB33 = np.stack([fill_rotations(ways[best][:, bone], known_T) for bone in order], axis=1)
+    return [names[bone] for bone in order], place_TB3[:, order], turn_TB33, parents
+
+
+def _farther(names: Sequence[str]) -> np.ndarray:
+    """How much farther than they are bones count from others that may carry them (B, B), by their names: a bone of one
+    side carries none of the other and none of the middle, and is carried rather by its own side.
+    """
+    side_B = np.zeros(len(names), int)
+    for bone, name in enumerate(names):
+        for left, right in (("left", "right"), ("l", "r")):
+            for side, own, other in ((1, left, right), (-1, right, left)):
+                begins, ends = name.removeprefix(own), name.removesuffix(f"_{own}")
+                if (begins != name and other + begins in names) or (ends != name and f"{ends}_{other}" in names):
+                    side_B[bone] = side
+    return np.where(side_B[:, None] == side_B, 1.0, np.where(side_B[:, None] == 0, _MIDDLE, np.inf))
+
+
+def _carriers(
+    place_FB3: np.ndarray, turn_FB33: np.ndarray, farther_BB: np.ndarray, top: int
+) -> tuple[list[int], list[int], float]:
+    """An order of bones, the place of each one's parent in it (-1 of the first), and how far beginnings move on
+    parents.
+
+    From the topmost bone on, the bone comes next that keeps its place best on one that is there, or is nearest to it.
+    """
+    count = len(place_FB3[0])
+    cost_BB = np.empty((count, count))
+    """Of a bone (second) on another (first)."""
+    for bone in range(count):
+        seen_FB3 = np.einsum("fji,fbj->fbi", turn_FB33[:, bone], place_FB3 - place_FB3[:, bone, None])
+        cost_BB[bone] = seen_FB3.std(axis=0).max(axis=-1) + _NEAR * farther_BB[bone] * norm(seen_FB3.mean(axis=0))
+    order, parents, total = [top], [-1], 0.0
+    left = [bone for bone in range(count) if bone != top]
+    while left:
+        among = cost_BB[np.ix_(order, left)]
+        parent, bone = np.unravel_index(int(among.argmin()), among.shape)
+        total += float(among[parent, bone])
+        parents.append(int(parent))
+        order.append(left.pop(int(bone)))
+    return order, parents, total
+
+
+def _t_pose(place_TN3: np.ndarray, turn_TN33: np.ndarray, parents: list[int]) -> Rest:
+    """The pose in which all bones are turned as the world is."""
+    local_TN34 = _local(place_TN3, turn_TN33, parents)
+    world_N3 = np.median(local_TN34[..., 3], axis=0)
+    for node, parent in enumerate(parents):
+        if parent >= 0:
+            world_N3[node] += world_N3[parent]
+    count = len(parents)
+    return Rest(
+        "the pose in which its bones are turned as the world",
+        affine(world_N3, np.tile(np.eye(3), (count, 1, 1)), np.ones((count, 3))),
+    )
+
+
+def _local(place_FN3: np.ndarray, turn_FN33: np.ndarray, parents: list[int]) -> np.ndarray:
+    """Where bones are in their parents: maps (F, N, 3, 4)."""
+    local_FN34 = np.concatenate([turn_FN33, place_FN3[..., None]], axis=-1)
+    for node, parent in enumerate(parents):
+        if parent >= 0:
+            back_F33 = turn_FN33[:, parent].mT
+            local_FN34[:, node, :, :3] = back_F33 @ turn_FN33[:, node]
+            local_FN34[:, node, :, 3] = (back_F33 @ (place_FN3[:, node] - place_FN3[:, parent])[..., None])[..., 0]
+    return local_FN34
+
+
+def _animation(place_TN3: np.ndarray, turn_TN33: np.ndarray, parents: list[int], rate: float) -> Animation:
+    """The motion, frame by frame."""
+
+    def local_FN34(time_F: np.ndarray) -> np.ndarray:
+        frames = np.clip(np.rint(time_F * rate).astype(int), 0, len(place_TN3) - 1)
+        return _local(place_TN3[frames], turn_TN33[frames], parents)
+
+    return Animation("", 0.0, (len(place_TN3) - 1) / rate, rate, local_FN34)
