@@ -32,6 +32,7 @@ from tests.motion import gltf_writer
 from tests.motion.bvh_writer import Style, write_bvh
 from tests.motion.damage import altered_words, damaged_by, read_or_refused
 from tests.motion.fbx_writer import Manner, write_fbx
+from tests.motion.marker_writer import c3d, qualisys, vicon
 from tests.motion.readers import (
     estimator_files,
     test_amc,
@@ -50,6 +51,7 @@ from tests.motion.readers import (
     test_soma_and_points,
     test_trc_file,
 )
+from tests.motion.readers.markers import test_convert
 from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
 
@@ -212,6 +214,9 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "points, a line each": ("damaged.csv", _point_table),
     "mvnx": ("damaged.mvnx", lambda path: path.write_text(test_mvnx.mvnx(test_mvnx.subject()))),
     "motive": ("damaged.csv", lambda path: path.write_text(test_motive.motive())),
+    "c3d": ("damaged.c3d", lambda path: path.write_bytes(c3d(*test_convert.marked()))),
+    "qualisys": ("damaged.csv", lambda path: path.write_text(qualisys(*test_convert.marked()))),
+    "vicon": ("damaged.csv", lambda path: path.write_text(vicon(*test_convert.marked()))),
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),

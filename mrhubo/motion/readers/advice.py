@@ -9,8 +9,6 @@ from mrhubo.motion.readers.content import Content
 _BLENDER = "convert it to BVH, for instance in Blender: import it, then File > Export > Motion Capture (.bvh)"
 SOLVE = "solve it for a skeleton first, and export that as BVH or FBX, or convert it to SMPL with MoSh++ or SOMA"
 """What to do with a recording of markers."""
-_MARKERS = f"it has markers, and not joints; {SOLVE}"
-_VICON = "solve it for a skeleton, and export that as BVH or FBX, for instance from Vicon Shogun or Blade"
 _FILM = "convert it to MP4, by ffmpeg for instance: ffmpeg -i FILE film.mp4"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"\s*<\?xml.{0,400}<COLLADA|\s*<COLLADA", "a COLLADA file", _BLENDER),
@@ -21,7 +19,6 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"G.{187}G.{187}G|.{4}G.{191}G.{191}G", "a video (MPEG-TS, AVCHD)", _FILM),
     (r"GIF8", "a moving picture (GIF)", _FILM),
     (r"BLENDER", "a Blender file", "export the skeleton by File > Export > Motion Capture (.bvh)"),
-    (r"[\x02-\x05]P", "a C3D file", _MARKERS),
     (r"\xff\xfe|\xfe\xff", "text in UTF-16", "save it in UTF-8"),
     (
         r'\s*\{.{0,300}"(?:people|bodies)"\s*:\s*\[',
@@ -42,8 +39,6 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "a zip archive of files",
         "unpack it, and name the file in it",
     ),
-    (r"(?:Joints|Segments|Model Outputs|Trajectories)[,\s]*\n\s*[0-9.]+[,\s]*\n", "a .csv file of Vicon Nexus", _VICON),
-    (r"NO_OF_FRAMES\b", "a .tsv file of Qualisys Track Manager", _MARKERS),
     (r"Coordinates\s.{0,2000}?endheader", "a .mot file of OpenSim", "name the recording from which it was made"),
     (
         r"[^\n]{0,4000}?(?:root_translate|_joint(?:_dof|_pos)?\b|_dof\b)[^\n]*+\n",

@@ -129,6 +129,13 @@ def number_of(word: str, separator: str) -> float:
     return float(word.replace(",", ".") if separator != "," else word)
 
 
+def filled_row(row: list[str], count: int) -> list[str]:
+    """A line without empty columns at its end, and with those that programs leave out there."""
+    while len(row) > count and not row[-1].strip():
+        row.pop()
+    return row + [""] * (count - len(row))
+
+
 def numbers_of(
     path: Path, rows: Sequence[Sequence[str]], separator: str, columns: Sequence[str], needed: Collection[int | None]
 ) -> np.ndarray:

@@ -80,8 +80,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
         UserError: as for `read_keypoints`.
     """
     check_size(path, found.where, len(found.point_TK3), 1)
-    if (np.abs(np.nan_to_num(found.point_TK3)) > _LARGEST).any():
-        raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
+    refuse_far(path, found)
     _refuse_flat(path, found)
     places, what = _which(path, found)
     missing = [name for name in NEEDED if name not in places]
@@ -91,7 +90,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
     point_TK3 = known_points(found.point_TK3, found.confidence_TK)
     points = {name: _seldom_at_origin(name, point_TK3[:, place]) for name, place in places.items()}
     _refuse_shares(path, found, points)
-    points, world = _to_world(points, notes)
+    points, world = to_world(points, notes)
     sure = {} if found.confidence_TK is None else {n: found.confidence_TK[:, place] for n, place in places.items()}
     turns, whose = trunk_turns(points)
     body = BodyPoints(points, turns, confidence=sure)
@@ -129,6 +128,16 @@ def fits_a_body(point_TK3: np.ndarray, name: str) -> bool:
     return any(found == name and bad < NONSENSE for bad, found in fitting_sets(_some(point_TK3)))
 
 
+def refuse_far(path: Path, found: Keypoints) -> None:
+    """Refuses points that are farther away than anybody.
+
+    Raises:
+        UserError: one is.
+    """
+    if (np.abs(np.nan_to_num(found.point_TK3)) > _LARGEST).any():
+        raise UserError(f"{path}: {found.where} holds numbers beyond {_LARGEST:g}")
+
+
 def _refuse_flat(path: Path, found: Keypoints) -> None:
     """Refuses points in a picture, whose third number is a score."""
     known_X3 = found.point_TK3[np.isfinite(found.point_TK3).all(-1)]
@@ -147,7 +156,7 @@ def _refuse_shares(path: Path, found: Keypoints, points: Mapping[str, np.ndarray
     known_X2 = np.concatenate([x[np.isfinite(x).all(-1), :2] for x in points.values()])
     inside = float(((known_X2 > -_BESIDE) & (known_X2 < 1 + _BESIDE)).all(-1).mean()) if len(known_X2) else 0.0
     down_T = sum(points[f"{side}_hip"][:, 1] - points[f"{side}_shoulder"][:, 1] for side in SIDES)
-    if inside > _NEARLY_ALL and _typical(np.asarray(down_T)) > 0 and _typical(known_X2.min(axis=1)) > _BESIDE:
+    if inside > _NEARLY_ALL and typical(np.asarray(down_T)) > 0 and typical(known_X2.min(axis=1)) > _BESIDE:
         raise UserError(
             f"{path}: {found.where} has points as shares of a picture's width and height (0 to 1, y down), whose limbs "
             "point elsewhere than the person's; save points in space, such as MediaPipe's pose_world_landmarks"
@@ -161,8 +170,10 @@ def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
 
 
 @np.errstate(all="ignore")
-def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str, np.ndarray], str]:
-    """The points with y up, right-handed, in metres."""
+def to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str, np.ndarray], str]:
+    """The points with y up, right-handed, in metres, by those of shoulders, hips, knees, ankles, nose and toes; and in
+    words what they were in.
+    """
     if way_forward(points) < -_LEFT_HANDED:
         points = {name: point_T3 * [-1.0, 1.0, 1.0] for name, point_T3 in points.items()}
         notes.append("nose and feet point backward: the file's axes are taken to be left-handed, and x is mirrored")
@@ -173,7 +184,7 @@ def _to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str
         return points, "y up (a guess)"
     axis = named_axis(mean_direction(up_T3))
     trunk_T = np.linalg.norm(sum(points[f"{s}_shoulder"] - points[f"{s}_hip"] for s in SIDES), axis=-1) / 2
-    leg = _LEG_OVER_TRUNK * _typical(trunk_T)
+    leg = _LEG_OVER_TRUNK * typical(trunk_T)
     if _seen(points, "ankle") and _seen(points, "knee"):
         legs = [_bone(points, f"{s}_hip", f"{s}_knee") + _bone(points, f"{s}_knee", f"{s}_ankle") for s in SIDES]
         leg = float(np.mean(legs))
@@ -210,13 +221,13 @@ def way_forward(points: Mapping[str, np.ndarray]) -> float:
         for part in ("ear", "shoulder"):
             if all(f"{side}_{part}" in points for side in SIDES):
                 way = _unit(points["nose"] - (points[f"left_{part}"] + points[f"right_{part}"]) / 2)
-                ways.append(_typical((way * forward_T3).sum(-1)))
+                ways.append(typical((way * forward_T3).sum(-1)))
                 break
     for side in SIDES:
         for toe in ("toe", "foot"):
             if f"{side}_{toe}" in points and f"{side}_ankle" in points:
                 way = _unit(points[f"{side}_{toe}"] - points[f"{side}_ankle"])
-                ways.append(_typical((way * forward_T3).sum(-1)))
+                ways.append(typical((way * forward_T3).sum(-1)))
                 break
     known = [way for way in ways if np.isfinite(way)]
     return float(np.mean(known)) if known else 0.0
@@ -227,10 +238,10 @@ def _seen(points: Mapping[str, np.ndarray], joint: str) -> bool:
 
 
 def _bone(points: Mapping[str, np.ndarray], start: str, end: str) -> float:
-    return _typical(np.linalg.norm(points[end] - points[start], axis=-1))
+    return typical(np.linalg.norm(points[end] - points[start], axis=-1))
 
 
-def _typical(value_T: np.ndarray) -> float:
+def typical(value_T: np.ndarray) -> float:
     """The median of those that are known; NaN where none is."""
     known_X = value_T[np.isfinite(value_T)]
     return float(np.median(known_X)) if len(known_X) else np.nan

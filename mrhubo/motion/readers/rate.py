@@ -113,6 +113,15 @@ def rate_of_seconds(time_T: np.ndarray) -> float | None:
         return None
 
 
+def rate_in_words(word: str) -> float | None:
+    """Frames per second that a word tells, perhaps with a decimal comma; None where it is none that is believed."""
+    try:
+        rate = float(word.replace(",", "."))
+    except ValueError:
+        return None
+    return rate if RATES[0] <= rate <= RATES[1] else None
+
+
 def number_told(node: Tree) -> float | None:
     """The number above 0 that a node tells, also as a text or as many that are equal; None where it leaves that open,
     as `None`, 0, NaN, an empty text, or whatever else is none.

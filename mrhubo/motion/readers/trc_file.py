@@ -1,16 +1,15 @@
-"""Points in a TRC file, a line a frame, where they are joints as cameras without markers find them.
+"""Points in a TRC file, a line a frame: joints as cameras without markers find them, or markers on the skin.
 
 Pose2Sim and Sports2D (https://github.com/perfanalytics/pose2sim), OpenCap (https://www.opencap.ai) and others write
 such files for OpenSim: three lines that tell of the file, the names of points, their axes, and the frames, between tabs
 (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53089972). A place that is not known is left empty.
-Files whose points are markers on the skin alone, as most of OpenSim's, tell of no joints and are refused.
+Most files of OpenSim have markers on the skin, of which joints are worked out (`mrhubo.motion.readers.markers`).
 
 Legend: T frames, K points.
 """
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from mrhubo.errors import UserError, listed, shortened
@@ -21,10 +20,13 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
-from mrhubo.motion.readers.keypoint_table import numbers_of
+from mrhubo.motion.readers.keypoint_table import filled_row, numbers_of
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
-from mrhubo.motion.readers.options import RATES, ReadOptions
+from mrhubo.motion.readers.markers.convert import motion_of_markers
+from mrhubo.motion.readers.markers.labels import has_body
+from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import by_names
+from mrhubo.motion.readers.rate import rate_in_words
 from mrhubo.motion.readers.sightings import check_size, placed
 
 _BEGINS = "PathFileType"
@@ -57,38 +59,27 @@ def read_trc(path: Path, options: ReadOptions) -> Motion:
     names = [word.strip() for word in lines[3].split("\t")[_BEFORE:] if word.strip()]
     if len(names) > _MOST:
         raise UserError(f"{path}: has {len(names)} points; at most {_MOST} are read")
-    if not by_names(names).keys() >= set(NEEDED):
+    are_joints = by_names(names).keys() >= set(NEEDED)
+    if not are_joints and not has_body(names):
         raise UserError(
             f"{path}: is a TRC file whose points are no joints: {shortened(listed(names), 120)}; shoulders and hips are"
-            f" needed, by names such as RShoulder; if they are markers, {SOLVE}"
+            f" needed, by names such as RShoulder, or markers of shoulders and pelvis, as LSHO, LASI and LPSI; {SOLVE}"
         )
     rows = [line.split("\t") for line in lines[_HEADER:]]
     if not rows:
         raise UserError(f"{path}: has a header and no frames")
     check_size(path, "the file", len(rows), len(names))
     columns = ["Frame#", "Time", *(f"{name}'s {axis}" for name in names for axis in "XYZ")]
-    value_TX = numbers_of(path, [_filled(row, len(columns)) for row in rows], "\t", columns, {*range(len(columns))})
+    value_TX = numbers_of(path, [filled_row(row, len(columns)) for row in rows], "\t", columns, {*range(len(columns))})
     point_TK3 = value_TX[:, _BEFORE:].reshape(len(value_TX), len(names), 3)
     numbers = numbers_in_column(path, value_TX[:, 0]) or list(range(len(value_TX)))
     if max(numbers) + 1 > _GAPS * len(numbers):
         raise UserError(f"{path}: has {len(numbers)} frames, numbered from 0 to {max(numbers):,}; is one wrong?")
     placed_TK3 = placed(path, "the file", numbers, point_TK3)
     called = ["head_top" if name == "Head" and set(names) >= _OF_HALPE else name for name in names]
-    found = Keypoints(placed_TK3, called, None, _rate(told.get("DataRate", "")), "the TRC file", options.of_one())
+    found = Keypoints(
+        placed_TK3, called, None, rate_in_words(told.get("DataRate", "")), "the TRC file", options.of_one()
+    )
+    if not are_joints:
+        return motion_of_markers(path, found, "TRC file", options)
     return motion_of_points(path, checked(path, found), options)
-
-
-def _filled(row: list[str], count: int) -> list[str]:
-    """A line without empty columns at its end, and with those that programs leave out there."""
-    while len(row) > count and not row[-1].strip():
-        row.pop()
-    return row + [""] * (count - len(row))
-
-
-def _rate(word: str) -> float | None:
-    """Frames per second; None where the header does not tell."""
-    try:
-        rate = float(word.replace(",", "."))
-    except ValueError:
-        return None
-    return rate if math.isfinite(rate) and RATES[0] <= rate <= RATES[1] else None

@@ -20,7 +20,6 @@ def _zipped(name: str) -> bytes:
 
 
 _FILES = {
-    "C3D": (b"\x02P\0\0\0", "markers"),
     "a robot's joints": (
         b"Frame,root_translateX,root_translateY,left_hip_pitch_joint_dof\n0,0,1,0.5\n",
         "human motion",
@@ -30,9 +29,7 @@ _FILES = {
     "COLLADA": (b'<?xml version="1.0"?>\n<COLLADA xmlns="x">', "Blender"),
     "web page": (b"<!DOCTYPE html><html><head><title>Sign in</title>", "downloaded"),
     "zip archive": (_zipped("clips/walk 01.bvh"), "unpack it"),
-    "Vicon": (b"Trajectories\n100\n,,a:LFHD,,,a:RFHD\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n", "BVH"),
-    "a .csv file of Vicon": (b"Joints,,\r\n120,,\r\n,,Hips,,,\r\n", "BVH"),
-    "Qualisys": (b"NO_OF_FRAMES\t100\nNO_OF_CAMERAS\t8\n", "markers"),
+    "a table of Vicon": (b"Joints,,\r\n120,,\r\n,,Hips,,,\r\n", "BVH"),
     "OpenSim": (b"Coordinates\nversion=1\nnRows=2\nendheader\ntime\tpelvis_tilt\n", "recording"),
     "FLV": (b"FLV\x01\x01\0\0\0\x09", "MP4"),
     "WMV": (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11\xa6\xd9", "MP4"),

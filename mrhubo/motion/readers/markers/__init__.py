@@ -1,0 +1,1 @@
+"""Human motions from markers on the skin."""

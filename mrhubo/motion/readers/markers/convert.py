@@ -1,0 +1,140 @@
+"""Human motions from markers on the skin: those of C3D files, and of other files that name them.
+
+Legend: T frames, K points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mrhubo.body.joints import SIDES
+from mrhubo.errors import UserError, listed, shortened
+from mrhubo.motion.motion import Motion
+from mrhubo.motion.positions import motion_from_points
+from mrhubo.motion.readers.advice import SOLVE
+from mrhubo.motion.readers.content import Content, NoMotion
+from mrhubo.motion.readers.keypoint_arrays import Keypoints
+from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points, refuse_far, to_world
+from mrhubo.motion.readers.markers.c3d_file import read_c3d_file
+from mrhubo.motion.readers.markers.joints import body_of_markers
+from mrhubo.motion.readers.markers.labels import has_body, marker_places
+from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.point_names import by_names
+from mrhubo.motion.readers.rate import asked_rate, told_rate
+from mrhubo.motion.readers.tracks import Person, check_span, choose
+
+_STANDS_FOR = {"shoulder": "acromion", "hip": "front_pelvis", "knee": "lateral_knee", "ankle": "lateral_ankle"}
+"""Markers near joints, by which up, left and the unit are told."""
+NOTE = "joints are worked out from markers on the skin: expect limbs to be off by some degrees"
+
+
+def is_c3d(content: Content) -> bool:
+    """Whether a file begins as C3D files do: with the block of its parameters, and a key."""
+    return content.start[1:2] == b"\x50" and 2 <= content.start[0] <= 9
+
+
+def read_c3d(path: Path, options: ReadOptions) -> Motion:
+    """Reads the motion of a body with markers, or with points that are joints, as cameras without markers find them.
+
+    Raises:
+        NoMotion: its points are neither.
+        UserError: the file is missing, damaged or too large, or its rate is not known.
+    """
+    file, notes = read_c3d_file(path), list[str]()
+    if len(file.point_TK3) < file.frames_told:
+        notes.append(f"the file ends after {len(file.point_TK3):,} of {file.frames_told:,} frames")
+    found = Keypoints(file.point_TK3, list(file.names), None, file.rate, "the C3D file", notes)
+    return motion_of_labelled(path, found, "C3D file", options)
+
+
+def motion_of_labelled(path: Path, found: Keypoints, kind: str, options: ReadOptions) -> Motion:
+    """The motion of one of those whose points a file has by labels, `LASI` or `Ann:LASI`.
+
+    Args:
+        path: the file.
+        found: points and their labels.
+        kind: what the file is, for sentences.
+        options: may tell the rate, and whose.
+
+    Raises:
+        NoMotion: they are no markers or joints of a body.
+        UserError: there is nobody of the name that is asked for, or the rate is not known.
+    """
+    labels = found.names or []
+    people = _people(labels)
+    if len(people) > 1:
+        seen = {name: int(np.isfinite(found.point_TK3[:, at]).all(-1).any(-1).sum()) for name, at in people.items()}
+        columns = people[
+            choose(path, [Person(name, count) for name, count in seen.items()], options, found.notes).person
+        ]
+    else:
+        columns = next(iter(people.values()), list(range(len(labels))))
+        found.notes.extend(options.of_one() if options.person not in people else [])
+    one = replace(found, point_TK3=found.point_TK3[:, columns], names=[labels[column] for column in columns])
+    if has_body(one.names or []):
+        return motion_of_markers(path, one, kind, options)
+    if _are_joints(one.names or []):
+        return motion_of_points(path, one, options)
+    raise NoMotion(
+        f"{path}: is a {kind} whose points are no markers or joints of a whole body that are known by their labels:"
+        f" {shortened(listed([label for label in labels if label]), 160) or 'they have none'}; shoulders and the"
+        " pelvis' front and back are needed, by labels such as LSHO, LASI and LPSI, or joints by names such as"
+        f" RShoulder and RHip; {SOLVE}"
+    )
+
+
+def motion_of_markers(path: Path, found: Keypoints, kind: str, options: ReadOptions) -> Motion:
+    """The motion of a body by its markers.
+
+    Args:
+        path: the file.
+        found: markers and their labels, which `has_body`; one that is not seen is NaN, or at the origin.
+        kind: what the file is, for `Motion.source`.
+        options: may tell the rate.
+
+    Raises:
+        UserError: markers are never seen together, or the rate is not known.
+    """
+    refuse_far(path, found)
+    if found.rate is None:
+        rate = asked_rate(path, options)
+    else:
+        rate = told_rate(path, "says", found.rate, options, found.notes)
+    places = marker_places(found.names or [])
+    point_TK3 = np.where((found.point_TK3 == 0).all(-1, keepdims=True), np.nan, found.point_TK3)
+    markers = {name: point_TK3[:, at] for name, at in places.items()}
+    beside = {
+        f"{side}_{joint}": markers[f"{side}_{place}"]
+        for side in SIDES
+        for joint, place in _STANDS_FOR.items()
+        if f"{side}_{place}" in markers
+    }
+    unseen = [name for name in NEEDED if not np.isfinite(beside[name]).all(-1).any()]
+    if unseen:
+        raise UserError(f"{path}: markers of {listed(unseen)} are not seen in any frame")
+    turned, world = to_world({**markers, **beside}, found.notes)
+    body = body_of_markers({name: turned[name] for name in markers})
+    seen_T = np.all([np.isfinite(body.points[name]).all(-1) for name in NEEDED], axis=0)
+    if not seen_T.any():
+        raise UserError(f"{path}: the markers of shoulders and pelvis are not seen together in any frame")
+    check_span(path, int(seen_T.sum()), len(seen_T))
+    source = f"{kind}, {len(places)} of {len(found.names or [])} points taken for markers by their labels, {world}"
+    return motion_from_points(body, motion_name(path), rate, source, (*found.notes, NOTE), str(path))
+
+
+def _people(labels: Sequence[str]) -> dict[str, list[int]]:
+    """The columns of those who have the points of a body, by what is before a colon."""
+    heads: dict[str, list[int]] = {}
+    for column, label in enumerate(labels):
+        heads.setdefault(label.rpartition(":")[0], []).append(column)
+    named = {head: [labels[column] for column in columns] for head, columns in heads.items()}
+    return {head: columns for head, columns in heads.items() if has_body(named[head]) or _are_joints(named[head])}
+
+
+def _are_joints(names: Sequence[str]) -> bool:
+    return by_names(names).keys() >= set(NEEDED)
