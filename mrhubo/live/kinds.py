@@ -6,6 +6,7 @@ SOURCES = {
     "ws": "ws[:PORT]: JSON messages by WebSocket, with a page for the browser (port 8765)",
     "udp": "udp[:PORT]: JSON messages in UDP datagrams (port 8766)",
     "vmc": "vmc[:PORT]: an avatar's bones by the VMC protocol, from this machine (port 39539)",
+    "xsens": "xsens[:PORT]: a body of Xsens MVN's Network Streamer, from this machine (port 9763)",
     "pico": "pico: body tracking of a PICO headset by XRoboToolkit",
     "camera": "camera[:DEVICE][@MODEL]: a person before a camera of this machine (0; model lite, full or heavy)",
     "video": "video:FILE[@MODEL]: a person in a film, as if a camera saw it now",

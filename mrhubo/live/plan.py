@@ -58,7 +58,8 @@ class Plan:
         makers: dict[str, Callable[[str], NamedSource]] = {
             "ws": lambda where: PageSource(self._server(where, text)),
             "udp": self._udp_source,
-            "vmc": self._vmc_source,
+            "vmc": _vmc,
+            "xsens": _xsens,
             "pico": _pico,
             "camera": _camera,
             "video": self._video,
@@ -140,11 +141,6 @@ class Plan:
 
         return UdpSource(Endpoint.read(where, "--source udp", UDP_PORT, self._host))
 
-    def _vmc_source(self, where: str) -> NamedSource:
-        from mrhubo.live.sources.vmc import PORT, VmcSource
-
-        return VmcSource(Endpoint.read(where, "--source vmc", PORT))
-
     def _replay(self, where: str, loop: bool) -> NamedSource:
         from mrhubo.live.sources.replay import ReplaySource
 
@@ -184,6 +180,18 @@ def _refuse_loop(to: Endpoint, listening: Iterable[Endpoint]) -> None:
                 f"--sink udp:{to.shown}: this session's own --source listens there, and would hear what it sends; name"
                 " another port"
             )
+
+
+def _vmc(where: str) -> NamedSource:
+    from mrhubo.live.sources.vmc import PORT, VmcSource
+
+    return VmcSource(Endpoint.read(where, "--source vmc", PORT))
+
+
+def _xsens(where: str) -> NamedSource:
+    from mrhubo.live.sources.xsens import PORT, XsensSource
+
+    return XsensSource(Endpoint.read(where, "--source xsens", PORT))
 
 
 def _pico(where: str) -> NamedSource:

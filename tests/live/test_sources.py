@@ -210,7 +210,7 @@ def test_two_avatars_do_not_become_one(source: VmcSource) -> None:
             two.sendto(osc("RightUpperArm", turned).dgram, address)
             source.read(inbox, 0.1 * step)
         assert inbox.counts["frames"] == 3 and inbox.counts["other_sender"] == 3
-        assert np.isfinite(source._bones._at_J).sum() == 1
+        assert np.isfinite(source._feed._at_J).sum() == 1
         two.sendto(osc("RightUpperArm", turned).dgram, address)
         source.read(inbox, 2.0)  # the first one has been silent
         one.sendto(osc("LeftUpperArm", unit).dgram, address)

@@ -12,19 +12,16 @@ not told is so. An avatar that waits for that stands in its T-pose, which nobody
 from __future__ import annotations
 
 import math
-import time
 from typing import Any
 
 import numpy as np
 
 from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
-from mrhubo.errors import UserError
 from mrhubo.lazy import import_optional
 from mrhubo.live.body import LEG_LENGTH, Root, SeenPose
 from mrhubo.live.endpoints import Endpoint
-from mrhubo.live.inbox import LEASE, Inbox
-from mrhubo.live.messages import MAX_BYTES, Message, Nobody, Refused, of_quaternions
-from mrhubo.live.sources.udp import DatagramSource
+from mrhubo.live.messages import MAX_BYTES, Content, Nobody, Refused, of_quaternions
+from mrhubo.live.sources.tokenless import TokenlessSource
 
 PORT = 39_539
 """On which programs that receive VMC listen by default."""
@@ -128,6 +125,11 @@ class Bones:
         sure_J[_LIMBS] = self._at_J[_LIMBS] >= self._now - _SILENT
         return SeenPose(of_quaternions(self._xyzw_J4).astype(np.float32), sure_J, self._root())
 
+    @property
+    def content(self) -> Content:
+        """What is seen: nobody, while its sender says so."""
+        return self.pose if self.shows_somebody else Nobody()
+
     def _root(self) -> Root | None:
         """Where the pelvis is, of a person whose legs are as long as our skeleton's; None as long as no hips came."""
         hips = self._poses.get(_HIPS)
@@ -216,10 +218,8 @@ def _osc(message: bytes) -> tuple[str, list[Any]]:
         raise Refused("malformed") from error
 
 
-class VmcSource(DatagramSource):
-    """A VMC receiver. The protocol knows no token, so it listens on loopback alone; it knows no heartbeat either."""
-
-    has_heartbeat = False
+class VmcSource(TokenlessSource):
+    """A VMC receiver."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         """Where to listen.
@@ -228,41 +228,4 @@ class VmcSource(DatagramSource):
             UserError: python-osc is not installed, or the host is reached by others.
         """
         import_optional("pythonosc.osc_message", "VMC needs python-osc: pip install 'mrhubo[live]'")
-        if not endpoint.is_loopback:
-            raise UserError(
-                f"--source vmc:{endpoint.shown}: VMC has no token, so it is taken on loopback alone; let a program on"
-                " this machine send it on to 127.0.0.1"
-            )
-        super().__init__(endpoint)
-        self._bones = Bones()
-        self._session, self._number = str(time.time_ns()), 0
-        self._owner: str | None = None
-        """Whose avatar it is: bones of two would make one that nobody has."""
-        self._at = -math.inf
-        """When the owner was heard of last [s]."""
-
-    def read(self, inbox: Inbox, now: float) -> bool:
-        """Empties the socket; all bones that have come are one frame."""
-        moved = False
-
-        def take(data: bytes, sender: str) -> None:
-            nonlocal moved
-            is_owner = sender == self._owner
-            if not is_owner and now - self._at <= LEASE:
-                inbox.counts["other_sender"] += 1
-                return
-            bones = self._bones if is_owner else Bones()
-            try:
-                if bones.take(data, now):
-                    self._bones, self._owner, self._at, moved = bones, sender, now, True
-            except Refused as fault:
-                inbox.counts[str(fault)] += 1
-            inbox.counts["malformed"] += bones.dropped
-            bones.dropped = 0
-
-        self._datagrams.read(take)
-        if moved and self._owner is not None:
-            self._number += 1
-            content = self._bones.pose if self._bones.shows_somebody else Nobody()
-            inbox.offer(Message(self._session, self._number, now, content), self._owner, now)
-        return True
+        super().__init__(endpoint, "vmc", "VMC", Bones)

@@ -26,7 +26,7 @@ SEGMENTS = (
     *(f"{side}{part}" for parts in (_ARM, _LEG) for side in ("Right", "Left") for part in parts),
 )  # fmt: skip
 """Names of the segments, in Xsens' order."""
-_BEGINS = {
+BEGINS = {
     "Shoulder": "collar", "UpperArm": "shoulder", "ForeArm": "elbow", "Hand": "wrist", "UpperLeg": "hip",
     "LowerLeg": "knee", "Foot": "ankle", "Toe": "foot",
 }  # fmt: skip
@@ -34,7 +34,7 @@ _BEGINS = {
 _TRUNK = {"Pelvis": "pelvis", "T8": "spine3", "Neck": "neck", "Head": "head"}
 """Ours that is turned as a segment; they begin elsewhere than ours, which turns tell."""
 _ENDS = ("Hand", "Foot")
-_HUMAN_33 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+HUMAN_33 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """From axes x forward, y left, z up to ours: x left, y up, z forward."""
 
 
@@ -66,13 +66,13 @@ def segments_motion(
     turn_TS33 = from_quaternions(turn_TS4)
     at = {name: segment for segment, name in enumerate(SEGMENTS)}
     limbs = {
-        f"{side.lower()}_{joint}": at[f"{side}{part}"] for side in ("Left", "Right") for part, joint in _BEGINS.items()
+        f"{side.lower()}_{joint}": at[f"{side}{part}"] for side in ("Left", "Right") for part, joint in BEGINS.items()
     }
     turned = {joint: at[name] for name, joint in _TRUNK.items()} | {
-        f"{side.lower()}_{_BEGINS[end]}": at[f"{side}{end}"] for side in ("Left", "Right") for end in _ENDS
+        f"{side.lower()}_{BEGINS[end]}": at[f"{side}{end}"] for side in ("Left", "Right") for end in _ENDS
     }
     body = BodyPoints(
-        {joint: place_TS3[:, segment] @ _HUMAN_33.T for joint, segment in limbs.items()},
-        {joint: _HUMAN_33 @ turn_TS33[:, segment] @ _HUMAN_33.T for joint, segment in turned.items()},
+        {joint: place_TS3[:, segment] @ HUMAN_33.T for joint, segment in limbs.items()},
+        {joint: HUMAN_33 @ turn_TS33[:, segment] @ HUMAN_33.T for joint, segment in turned.items()},
     )
     return motion_from_points(body, motion_name(path), frame_rate, source, notes, str(path))
