@@ -20,6 +20,8 @@ from mrhubo.fast.rotations import angles_between
 from mrhubo.motion import Motion, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from tests.motion.damage import Step, accidents, altered_words, damaged, read_or_refused
+from tests.motion.marker_writer import c3d
+from tests.motion.readers.markers.test_convert import marked
 from tests.motion.readers.test_nymeria import FRAMES, TO_ROBOT, TURNED, body, check
 
 _TRUNK = {"Hip": "pelvis", "Ab": "spine1", "Ab2": "spine2", "Chest": "spine3", "Neck": "neck", "Head": "head"}
@@ -214,10 +216,32 @@ def test_what_is_refused_is_told(how: Export, old: str, new: str, said: str, tmp
 
 
 def test_no_motion_of_rigid_bodies_and_markers_or_half_a_body(tmp_path: Path) -> None:
-    with pytest.raises(NoMotion, match="without bones, of Marker, Rigid Body; make a skeleton"):
+    with pytest.raises(NoMotion, match="without bones and markers, of rigid body; make a skeleton"):
+        read(motive().replace("Bone", "Rigid Body").replace(",Marker", ",Rigid Body"), tmp_path)
+    with pytest.raises(NoMotion, match="no markers or joints of a whole body .*: A, marker;"):
         read(motive().replace("Bone", "Rigid Body"), tmp_path)
     with pytest.raises(NoMotion, match="no arms and legs"):
         read(re.sub("Fred:R[^,]*", "Fred:Prop", motive()), tmp_path)
+
+
+def test_markers_are_read_where_there_are_no_skeletons(tmp_path: Path) -> None:
+    point_TK3, labels = marked(unit=1.0, world_33=np.eye(3))
+    point_TK3[3:6, labels.index("LFIN")] = np.nan
+    names = [f"Fred:{label}" for label in labels] + ["Unlabeled 1001"]
+    rows = [("Type", ["Marker"]), ("Name", names), ("ID", ['"1"']), ("", ["Position"])]
+    text = "Format Version,1.23,Capture Frame Rate,120.0,Coordinate Space,Global\n\n"
+    for name, cells in rows:
+        cells = cells if len(cells) > 1 else cells * len(names)
+        text += f",{name}," + ",".join(cell for cell in cells for _ in range(3)) + "\n"
+    text += "Frame,Time (Seconds)," + ",".join("XYZ" * len(names)) + "\n"
+    for frame, point_K3 in enumerate(point_TK3):
+        text += f"{frame},{frame / 120:.6f}," + ",".join("" if np.isnan(x) else f"{x:.6f}" for x in point_K3.ravel())
+        text += ",1,2,3\n"
+    motion = read(text, tmp_path)
+    (tmp_path / "box.c3d").write_bytes(c3d(point_TK3, labels))
+    wanted = mrhubo.read_motion(tmp_path / "box.c3d")
+    assert motion.frame_rate == 120 and motion.source.startswith("table of OptiTrack Motive, 30 of 30 points")
+    np.testing.assert_allclose(motion.arrays.local_TJ33, wanted.arrays.local_TJ33, atol=1e-3)
 
 
 @given(seed=st.integers(0, 2**31), steps=accidents)

@@ -8,6 +8,7 @@ Legend: T frames, F some of them, B bones, N bones in an order in which parents 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +20,8 @@ from mrhubo.fast.plain.human import norm
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
+from mrhubo.motion.readers.keypoint_arrays import Keypoints
+from mrhubo.motion.readers.markers.convert import motion_of_labelled
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, rate_of_seconds, told_rate
 from mrhubo.motion.readers.scene.convert import scene_motion
@@ -43,13 +46,19 @@ def is_motive(content: Content) -> bool:
 
 
 def read_motive(path: Path, options: ReadOptions) -> Motion:
-    """Reads the motion of a skeleton.
+    """Reads the motion of a skeleton, or of markers where a file has no skeletons.
 
     Raises:
-        NoMotion: there are no bones, or they are none of a body.
+        NoMotion: there are no bones and no markers, or they are none of a body.
         UserError: the file is missing, damaged or too large, or has nobody of the name that is asked for.
     """
     table, notes = read_motive_table(path), list[str]()
+    if not table.turns:
+        told = _told_rate(table)
+        found = Keypoints(
+            table.place_TB3, list(table.bones), None, None if told is None else told[1], "the table", notes
+        )
+        return motion_of_labelled(path, found, "table of OptiTrack Motive", options)
     skeletons = _skeletons(table.bones)
     known = {name: _known(table, bones) for name, bones in skeletons.items()}
     tracks = [Person(name, int(known_T.sum())) for name, known_T in known.items() if known_T.any()]
@@ -64,7 +73,8 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
     span = slice(int(seen_S[0]), int(seen_S[-1]) + 1)
     check_span(path, len(seen_S), span.stop - span.start)
     known_T = known[name][span]
-    rate = _rate(path, table, options, notes)
+    told = _told_rate(table)
+    rate = asked_rate(path, options) if told is None else told_rate(path, *told, options, notes)
     bones, place_TB3, turn_TB33, parents = _ordered(table, skeletons[name], span, known_T, name)
     animation = _animation(place_TB3, turn_TB33, parents, rate)
     nodes = tuple(Node(bone, parent, True) for bone, parent in zip(bones, parents, strict=True))
@@ -102,16 +112,15 @@ def _known(table: MotiveTable, bones: list[int]) -> np.ndarray:
     )
 
 
-def _rate(path: Path, table: MotiveTable, options: ReadOptions, notes: list[str]) -> float:
-    """Frames per second: what the header says of the export, or of the recording, or what times say."""
+def _told_rate(table: MotiveTable) -> tuple[str, float] | None:
+    """What tells frames per second, for a sentence, and how many: the header of the export, or of the recording, or
+    times.
+    """
     for key in ("Export Frame Rate", "Capture Frame Rate"):
-        try:
-            rate = float(table.told.get(key.lower(), ""))
-        except ValueError:
-            continue
-        return told_rate(path, f"'{key}' is", rate, options, notes)
+        with contextlib.suppress(ValueError):
+            return f"'{key}' is", float(table.told.get(key.lower(), ""))
     rate = rate_of_seconds(table.time_T)
-    return asked_rate(path, options) if rate is None else told_rate(path, "its times are at", rate, options, notes)
+    return None if rate is None else ("its times are at", rate)
 
 
 def _ordered(

@@ -1,4 +1,4 @@
-"""A table that OptiTrack's Motive exports (.csv): the bones of skeletons, how they are turned and where they begin.
+"""A table that OptiTrack's Motive exports (.csv): skeletons' bones, or markers.
 
 The first line has what the file says of itself, a key and a value after the other. Lines of the header follow: of which
 `Type` each column is (`Bone`, `Rigid Body`, `Marker` ...), its `Name` (`Fred:LUArm`), further ones, `Rotation` or
@@ -29,9 +29,9 @@ from mrhubo.motion.readers.other_rotations import from_quaternions
 
 BEGINS = "Format Version"
 """How a file begins."""
-_BONE, _TURN, _PLACE = "bone", "rotation", "position"
+_BONE, _MARKER, _TURN, _PLACE = "bone", "marker", "rotation", "position"
 _MAX_BYTES, _MAX_LINE = 2 * 2**30, 2**21
-_MAX_FRAMES, _MAX_NUMBERS, _MAX_BONES = 500_000, 50_000_000, 400
+_MAX_FRAMES, _MAX_NUMBERS, _MAX_BONES = 500_000, 50_000_000, 1_000
 _HEADER = 20
 """Lines in which the header ends, with room."""
 _QUATERNION = ("w", "x", "y", "z")
@@ -40,7 +40,7 @@ _EXPORT = "export the skeleton with it from Motive, or as BVH or FBX"
 
 @dataclass(frozen=True)
 class MotiveTable:
-    """What a file has of skeletons' bones."""
+    """What a file has of skeletons' bones, or of markers where it has no bones."""
 
     told: Mapping[str, str]
     """What the file says of itself, by its keys in small letters."""
@@ -49,16 +49,17 @@ class MotiveTable:
     place_TB3: np.ndarray
     """Where bones begin, in the file's unit and world; NaN in frames in which they are not tracked."""
     turns: tuple[np.ndarray, ...]
-    """How bones are turned (T, B, 3, 3), NaN in such frames; of angles, in either way of reading their order."""
+    """How bones are turned (T, B, 3, 3), NaN in such frames; of angles, in either way of reading their order; none
+    of markers."""
     time_T: np.ndarray
     """Seconds; NaN where the file does not say."""
 
 
 def read_motive_table(path: Path) -> MotiveTable:
-    """Reads the bones of a table.
+    """Reads the bones of a table, or its markers.
 
     Raises:
-        NoMotion: it has no bones.
+        NoMotion: it has neither.
         UserError: it is missing, damaged or too large, or bones are told in a form that is not read.
     """
     with open_regular(path, _MAX_BYTES) as handle, io.TextIOWrapper(handle, "utf-8-sig", "replace") as text:
@@ -69,24 +70,19 @@ def read_motive_table(path: Path) -> MotiveTable:
                 f"{path}: its 'Coordinate Space' is '{space}': bones are told from bone to bone; export it again with"
                 " the global one (World)"
             )
-        columns = _columns(path, header)
+        kind, columns = _columns(path, header)
         missing = [name for name, of in columns.items() if not of.keys() >= {(_PLACE, axis) for axis in "xyz"}]
-        missing += [name for name, of in columns.items() if not of.keys() >= {(_TURN, axis) for axis in "xyz"}]
+        if kind == _BONE:
+            missing += [name for name, of in columns.items() if not of.keys() >= {(_TURN, axis) for axis in "xyz"}]
         if missing:
             raise UserError(
-                f"{path}: has no rotation or no position of the bones {shortened(listed(missing), 100)}; {_EXPORT}"
+                f"{path}: has no rotation or no position of the {kind}s {shortened(listed(missing), 100)}; {_EXPORT}"
             )
-        axes = _QUATERNION if all((_TURN, "w") in of for of in columns.values()) else ("x", "y", "z")
-        order = told.get("rotation type", "").lower()
-        if axes != _QUATERNION and sorted(order[-3:]) != ["x", "y", "z"]:
-            raise UserError(
-                f"{path}: does not tell in which order the angles of bones are ('Rotation Type' is"
-                f" '{shortened(order, 30)}'); export it with quaternions"
-            )
+        axes, order = _turn_axes(path, columns, told) if kind == _BONE else ((), "")
         wanted = [
             of[key]
             for of in columns.values()
-            for key in [*((_PLACE, axis) for axis in "xyz"), *((_TURN, a) for a in axes)]
+            for key in [*((_PLACE, axis) for axis in "xyz"), *((_TURN, axis) for axis in axes)]
         ]
         rows_TX = _rows(path, text, [0, 1, *wanted], first)
     numbers = numbers_in_column(path, rows_TX[:, 0]) or list(range(len(rows_TX)))
@@ -96,7 +92,9 @@ def read_motive_table(path: Path) -> MotiveTable:
     placed_TX[numbers] = rows_TX
     value_TBX = placed_TX[:, 2:].reshape(len(placed_TX), len(columns), 3 + len(axes))
     place_TB3, turn_TBX = value_TBX[..., :3], value_TBX[..., 3:]
-    turns = (from_quaternions(turn_TBX),) if axes == _QUATERNION else _of_angles(turn_TBX, order[-3:])
+    turns = ()
+    if axes:
+        turns = (from_quaternions(turn_TBX),) if axes == _QUATERNION else _of_angles(turn_TBX, order)
     return MotiveTable(told, tuple(columns), place_TB3, turns, placed_TX[:, 1])
 
 
@@ -113,25 +111,42 @@ def _header(path: Path, text: TextIO) -> tuple[list[list[str]], int]:
     raise UserError(f"{path}: is a table of OptiTrack Motive without a line that begins with 'Frame'; was it cut off?")
 
 
-def _columns(path: Path, header: Sequence[Sequence[str]]) -> dict[str, dict[tuple[str, str], int]]:
-    """The columns of bones, by their names, and by what is told along which axis."""
-    types = next((i for i, row in enumerate(header[:-2]) if _BONE in {cell.strip().lower() for cell in row}), None)
-    if types is None:
-        kinds = {cell.strip() for row in header[1:2] for cell in row[2:]} - {""}
+def _columns(path: Path, header: Sequence[Sequence[str]]) -> tuple[str, dict[str, dict[tuple[str, str], int]]]:
+    """Whether there are bones, or else markers; and their columns, by names, and by what is told along which axis."""
+    kinds_at = next((i for i, row in enumerate(header[:-2]) if i and any(map(str.strip, row[2:]))), None)
+    kinds = [] if kinds_at is None else [cell.strip().lower() for cell in header[kinds_at]]
+    kind = next((kind for kind in (_BONE, _MARKER) if kind in kinds), None)
+    if kinds_at is None or kind is None:
         raise NoMotion(
-            f"{path}: is a table of OptiTrack Motive without bones, of {shortened(listed(kinds), 80) or 'nothing'};"
-            f" make a skeleton of the person in Motive, and {_EXPORT}"
+            f"{path}: is a table of OptiTrack Motive without bones and markers, of"
+            f" {shortened(listed({*kinds[2:]} - {''}), 80) or 'nothing'}; make a skeleton of the person in Motive, and"
+            f" {_EXPORT}"
         )
     columns: dict[str, dict[tuple[str, str], int]] = {}
-    for column, (kind, name, what, axis) in enumerate(
-        zip(header[types], header[types + 1], header[-2], header[-1], strict=False)
+    for column, (of, name, what, axis) in enumerate(
+        zip(kinds, header[kinds_at + 1], header[-2], header[-1], strict=False)
     ):
-        if kind.strip().lower() == _BONE:
+        if of == kind:
             key = what.strip().lower(), axis.strip().lower()
-            columns.setdefault(name.strip(), {}).setdefault(key, column)
+            columns.setdefault(name.strip(' "'), {}).setdefault(key, column)
     if len(columns) > _MAX_BONES:
-        raise UserError(f"{path}: has {len(columns)} bones; at most {_MAX_BONES} are read")
-    return columns
+        raise UserError(f"{path}: has {len(columns)} {kind}s; at most {_MAX_BONES} are read")
+    return kind, columns
+
+
+def _turn_axes(
+    path: Path, columns: Mapping[str, Mapping[tuple[str, str], int]], told: Mapping[str, str]
+) -> tuple[tuple[str, ...], str]:
+    """The columns of rotations; and of angles, in which order they follow each other."""
+    if all((_TURN, "w") in of for of in columns.values()):
+        return _QUATERNION, ""
+    order = told.get("rotation type", "").lower()
+    if sorted(order[-3:]) != ["x", "y", "z"]:
+        raise UserError(
+            f"{path}: does not tell in which order the angles of bones are ('Rotation Type' is"
+            f" '{shortened(order, 30)}'); export it with quaternions"
+        )
+    return ("x", "y", "z"), order[-3:]
 
 
 def _lines(text: TextIO) -> Iterator[str]:
