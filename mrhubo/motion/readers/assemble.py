@@ -27,9 +27,9 @@ LARGEST_BETA = 1e6
 """No number of a body's shape is that large."""
 _SEEN = 500
 """About how many frames tell which way is up."""
-_LOOKS = 30.0
+LOOKS = 30.0
 """How often a second it is looked whether feet stand: more often, those that swing would seem to."""
-_UPRIGHT_M = 0.6
+UPRIGHT_M = 0.6
 """How far an ankle is under the pelvis of who stands [m], and not sits or lies."""
 _FEET = (JOINT_NAMES.index("left_foot"), JOINT_NAMES.index("right_foot"))
 """Where toes begin, of all joints."""
@@ -59,8 +59,8 @@ def to_our_rest(motion: Motion) -> Motion:
     local_TJ33 = untilt_arms(motion.arrays.local_TJ33, tilt)
     notes = [f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"]
     root_T33 = motion.arrays.root_rotation_T33
-    few = slice(None, None, max(1, round(motion.frame_rate / _LOOKS)))
-    if root_T33 is not None and (up := rolled_up(standing_up(root_T33[few], local_TJ33[few], _UPRIGHT_M))) is not None:
+    few = slice(None, None, max(1, round(motion.frame_rate / LOOKS)))
+    if root_T33 is not None and (up := rolled_up(standing_up(root_T33[few], local_TJ33[few], UPRIGHT_M))) is not None:
         left, right = (math.degrees(math.acos(up_3[1])) for up_3 in up)
         notes.append(
             f"the feet stand rolled, the left one by {left:.0f} and the right one by {right:.0f} degrees: taken out"

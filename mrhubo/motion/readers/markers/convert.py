@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.body.joints import SIDES
+from mrhubo.body.level_feet import middle, standing_up, turn_feet
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import motion_from_points
 from mrhubo.motion.readers.advice import SOLVE
+from mrhubo.motion.readers.assemble import LOOKS, UPRIGHT_M
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points, refuse_far, to_world
@@ -30,7 +32,11 @@ from mrhubo.motion.readers.tracks import Person, check_span, choose
 
 _STANDS_FOR = {"shoulder": "acromion", "hip": "front_pelvis", "knee": "lateral_knee", "ankle": "lateral_ankle"}
 """Markers near joints, by which up, left and the unit are told."""
-NOTE = "joints are worked out from markers on the skin: expect limbs to be off by some degrees"
+_LEVEL = np.array([0.0, 1.0, 0.0], np.float32)
+_STANDS, _TILTED = 20, np.radians(20.0)
+"""Frames in which a foot stands, at least, to tell how it is turned then; and how far it may be from level: more is on
+purpose."""
+_NOTE = "joints are worked out from markers on the skin: expect limbs to be off by some degrees"
 
 
 def is_c3d(content: Content) -> bool:
@@ -124,7 +130,19 @@ def motion_of_markers(path: Path, found: Keypoints, kind: str, options: ReadOpti
         raise UserError(f"{path}: the markers of shoulders and pelvis are not seen together in any frame")
     check_span(path, int(seen_T.sum()), len(seen_T))
     source = f"{kind}, {len(places)} of {len(found.names or [])} points taken for markers by their labels, {world}"
-    return motion_from_points(body, motion_name(path), rate, source, (*found.notes, NOTE), str(path))
+    return _levelled(motion_from_points(body, motion_name(path), rate, source, (*found.notes, _NOTE), str(path)))
+
+
+def _levelled(motion: Motion) -> Motion:
+    """The motion with feet that are level where they stand: markers on heels and toes are rarely of one height."""
+    arrays = motion.arrays
+    if arrays.root_rotation_T33 is None:
+        return motion
+    few = slice(None, None, max(1, round(motion.frame_rate / LOOKS)))
+    feet = standing_up(arrays.root_rotation_T33[few], arrays.local_TJ33[few], UPRIGHT_M)
+    ups = [middle(up_X3) if len(up_X3) >= _STANDS else _LEVEL for up_X3 in feet]
+    left_3, right_3 = (up_3 if up_3 @ _LEVEL > np.cos(_TILTED) else _LEVEL for up_3 in ups)
+    return motion.changed(local_TJ33=turn_feet(arrays.local_TJ33, (left_3, right_3)))
 
 
 def _people(labels: Sequence[str]) -> dict[str, list[int]]:

@@ -108,6 +108,18 @@ def test_trc_with_markers_tells_the_same(tmp_path: Path) -> None:
     assert limbs_off(motion) < 4.0
 
 
+def test_feet_that_stand_are_level_whatever_the_height_of_their_markers(tmp_path: Path) -> None:
+    markers = markers_on(*moving_body("boxing"))
+    for place, higher in (("left_toe", 0.03), ("right_toe", 0.02), ("right_heel", -0.01)):
+        markers[place] = markers[place] + np.array([0, higher, 0])
+    motion = read(c3d(*marked(markers), Manner(rate=30.0)), tmp_path)
+    turns = {0: motion.arrays.root_rotation_T33}
+    for joint in range(1, 22):
+        turns[joint] = turns[PARENTS[joint]] @ motion.arrays.local_TJ33[:, joint - 1]
+    up_T3 = [turns[JOINT_NAMES.index(f"{side}_ankle")][:, 1, 1] for side in ("left", "right")]
+    assert np.degrees(np.arccos(np.clip(np.median(up_T3, axis=1), -1, 1))).max() < 2.0
+
+
 def test_markers_that_are_hidden_are_unsure(tmp_path: Path) -> None:
     """A pelvis' marker is told by the others; an elbow's is not, and is filled in."""
     point_TK3, labels = marked()
