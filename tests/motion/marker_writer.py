@@ -149,7 +149,7 @@ def qualisys(point_TK3: np.ndarray, labels: Sequence[str], with_time: bool = Tru
     if with_time:
         text += "Frame\tTime\t" + "\t".join(f"{label} {axis}" for label in labels for axis in "XYZ") + "\n"
     for frame, point_K3 in enumerate(point_TK3):
-        words = [f"{x:.3f}" for x in np.nan_to_num(point_K3).ravel()]
+        words = ["" if np.isnan(x) else f"{x:.3f}" for x in point_K3.ravel()]
         text += "\t".join([f"{frame + 1}", f"{frame / 100:.5f}", *words] if with_time else words) + "\n"
     return text
 

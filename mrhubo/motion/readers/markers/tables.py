@@ -49,14 +49,14 @@ def read_qualisys(path: Path, options: ReadOptions) -> Motion:
         NoMotion: the table is of something else, or its markers are those of no body.
         UserError: it is missing, damaged or too large.
     """
-    lines = _lines(path)
+    lines = [line for line in _lines(path) if line.strip(" ")]
     told: dict[str, list[str]] = {}
-    start = next((i for i, line in enumerate(lines) if _is_number(line.split("\t")[0])), len(lines))
+    start = next((i for i, line in enumerate(lines) if not line[0].isalpha()), len(lines))
     for line in lines[:start]:
         key, *words = line.split("\t")
         told.setdefault(key.strip().upper(), [word.strip() for word in words])
     kind = " ".join(told.get("DATA_INCLUDED", ["3D"]))
-    names = [name for name in told.get("MARKER_NAMES", []) if name]
+    names = _without_end(told.get("MARKER_NAMES", []))
     if "3D" not in kind or not names:
         raise NoMotion(f"{path}: is a table of Qualisys Track Manager without markers ({kind}); export their 3D data")
     before = 2 if [word.upper() for word in told.get("FRAME", [])[:1]] == ["TIME"] else 0
@@ -71,7 +71,7 @@ def read_vicon(path: Path, options: ReadOptions) -> Motion:
         NoMotion: there is no such part, or its markers are those of no body.
         UserError: it is missing, damaged or too large.
     """
-    text = "\n".join(_lines(path, keeps_empty=True))
+    text = "\n".join(_lines(path))
     found = _PART.search(text)
     if found is None:
         raise NoMotion(
@@ -83,9 +83,7 @@ def read_vicon(path: Path, options: ReadOptions) -> Motion:
     if len(part) < 4:
         raise UserError(f"{path}: ends within the header of its 'Trajectories'; was it cut off?")
     rate, labels = part[0].strip(" ,"), part[1].split(",")
-    names = [label.strip(' "') for label in labels[2::3]]
-    while names and not names[-1]:
-        names.pop()
+    names = _without_end([label.strip(' "') for label in labels[2::3]])
     rows = part[3 + (not _is_number(part[3].split(",")[0])) :]
     return _motion(path, rows, ",", names, 2, rate, "Vicon table", options)
 
@@ -106,9 +104,13 @@ def _motion(
     return motion_of_labelled(path, found, kind, options)
 
 
-def _lines(path: Path, keeps_empty: bool = False) -> list[str]:
-    text = read_regular(path, _MAX_BYTES).decode("utf-8-sig", "replace")
-    return [line for line in text.splitlines() if keeps_empty or line.strip()]
+def _lines(path: Path) -> list[str]:
+    return read_regular(path, _MAX_BYTES).decode("utf-8-sig", "replace").splitlines()
+
+
+def _without_end(names: list[str]) -> list[str]:
+    """Names without the empty ones at their end."""
+    return names[: max((place + 1 for place, name in enumerate(names) if name), default=0)]
 
 
 def _is_number(word: str) -> bool:

@@ -93,6 +93,7 @@ def test_hands_feet_and_head_are_turned_as_the_bodys(both_sides: bool, tmp_path:
 def test_tables_tell_the_same(write: Callable[[np.ndarray, list[str]], str], tmp_path: Path) -> None:
     point_TK3, labels = marked()
     point_TK3[10:14, labels.index("LFIN")] = np.nan
+    point_TK3[0, 0] = point_TK3[30] = np.nan  # the first cell, and a whole line
     wanted = read(c3d(point_TK3, labels, Manner(rate=100.0)), tmp_path)
     motion = read(write(point_TK3, labels), tmp_path, name="box.txt")
     assert motion.frame_rate == 100
