@@ -401,6 +401,40 @@ def test_pose_that_nodes_were_left_in_is_no_rest(motion: Motion, tmp_path: Path)
     assert "no pose at rest" in found.source and off(found, motion) < 0.5
 
 
+def _lying(motion: Motion, quarter: float, height: float) -> Motion:
+    """Somebody who does the same lying, face down (1) or up (-1), at a height, in one place."""
+    turn_33 = torch.tensor(Rotation.from_rotvec([quarter * np.pi / 2, 0.0, 0.0]).as_matrix(), dtype=torch.float32)
+    assert motion.root_rotation_T33 is not None
+    place_T3 = torch.tensor([0.0, height, 0.0]).repeat(len(motion), 1)
+    return motion.changed(root_rotation_T33=turn_33 @ motion.root_rotation_T33, root_position_T3=place_T3)
+
+
+@pytest.mark.parametrize("quarter", [1.0, -1.0])
+@pytest.mark.parametrize("height", [0.1, 1.0])
+@pytest.mark.parametrize("manner", [Manner(), Manner(own="first"), Manner(own="first", skin="a")])
+def test_who_lies_throughout_lies(
+    motion: Motion, quarter: float, height: float, manner: Manner, tmp_path: Path
+) -> None:
+    """On the floor, and on a bed or in water, also where nodes were left lying; glTF has y up."""
+    lying = _lying(motion, quarter, height)
+    style = Style(unit=1.0, axes="random", fingers=False)
+    found = read(write_gltf(lying, style, manner).glb(), tmp_path)
+    assert off(found, lying) < 0.1 and "y up" in found.source
+    assert found.root_rotation_T33 is not None and lying.root_rotation_T33 is not None
+    error = mrhubo.rotation.geodesic_distance(found.root_rotation_T33, lying.root_rotation_T33)
+    assert float(torch.rad2deg(error).max()) < 0.1
+
+
+def test_who_stands_in_another_axis_is_believed_where_a_floor_is(motion: Motion, tmp_path: Path) -> None:
+    """Scripts write what has z up as it is."""
+    for manner in (Manner(), Manner(own="first")):
+        found = read(write_gltf(motion, dataclasses.replace(_METRES, world=Z_UP), manner).glb(), tmp_path)
+        assert off(found, motion) < 0.1 and "z up" in found.source
+        assert found.root_rotation_T33 is not None and motion.root_rotation_T33 is not None
+        error = mrhubo.rotation.geodesic_distance(found.root_rotation_T33, motion.root_rotation_T33)
+        assert float(torch.rad2deg(error).max()) < 0.1
+
+
 def test_a_file_in_which_nobody_moves_is_no_motion(motion: Motion, tmp_path: Path) -> None:
     parts = write_gltf(motion, _METRES, Manner())
     animation = parts.top["animations"][0]

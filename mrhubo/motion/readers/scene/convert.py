@@ -25,6 +25,7 @@ from mrhubo.motion.readers.tree.given import read_map
 from mrhubo.motion.readers.tree.hierarchy import JointTree
 from mrhubo.motion.readers.tree.people import of_person
 from mrhubo.motion.readers.tree.reference import find_reference
+from mrhubo.motion.readers.tree.world import named_axis
 
 _LISTED = 10
 _NEARLY = 1e-3
@@ -67,7 +68,7 @@ def scene_motion(path: Path, scene: Scene, kind: str, options: ReadOptions, note
         given = read_map(options.bvh_map, tree, path) if options.bvh_map else Given()
         given = dataclasses.replace(given, place={**body, **given.place})
         said = f"{kind} '{name}':" if name else f"{kind}:"
-        return tree_motion(tree, motion_name(path), str(path), rate, said, given, tuple(notes))
+        return tree_motion(tree, motion_name(path), str(path), rate, said, given, tuple(notes), scene.up)
     except TooLarge as error:
         raise UserError(f"{path}: has {error}, more than are read; cut it, or export the skeleton alone") from error
     except NoBody as error:
@@ -120,18 +121,20 @@ def _standing(path: Path, scene: Scene, animation: Animation, time_T: np.ndarray
     some_T = time_T[np.unique(np.linspace(0, len(time_T) - 1, _TESTED).astype(int))]
     for rest in scene.rests:
         tree = scene_tree(scene, animation, some_T, rest)
-        if _is_rest(path, tree, body) and not (rest.may_move and _begins_so(tree)):
+        if _is_rest(path, tree, body, rest.up) and not (rest.may_move and _begins_so(tree)):
             return rest
     return dataclasses.replace(scene.rests[0], name="")
 
 
-def _is_rest(path: Path, tree: JointTree, body: Mapping[str, int]) -> bool:
+def _is_rest(path: Path, tree: JointTree, body: Mapping[str, int], up: str | None) -> bool:
     try:
         anatomy = find_anatomy(tree, body, str(path))
     except UserError:  # said by who reads the tree
         return False
     found = find_reference(tree, anatomy.place)
-    return found is not None and found.what == tree.rest_name
+    if found is None or found.what != tree.rest_name:
+        return False
+    return up is None or named_axis(found.axes_33[:, 1]) == up
 
 
 def _begins_so(tree: JointTree) -> bool:

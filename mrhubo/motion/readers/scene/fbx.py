@@ -34,7 +34,7 @@ from mrhubo.motion.readers.scene.nodes import (
     may_be_joints,
     parents_first,
 )
-from mrhubo.motion.readers.scene.rests import BOUND, OWN, bound_pose
+from mrhubo.motion.readers.scene.rests import OWN, bound_rests
 from mrhubo.robot_motion.clock import rate_of_step
 
 _SECOND, _NEW_SECOND = 46_186_158_000, 141_120_000
@@ -131,6 +131,13 @@ class _File:
             return float(own[0])
         return _RATES[mode] if mode is not None and 0 <= mode < len(_RATES) else _RATES[0]
 
+    @cached_property
+    def up(self) -> str | None:
+        """The axis that is up, for instance `z`; None where it is not told."""
+        told = properties(self.root.first("GlobalSettings"))
+        axis, sign = (told[key].whole(4) if key in told else None for key in ("UpAxis", "UpAxisSign"))
+        return f"{'-' if sign == -1 else ''}{'xyz'[axis]}" if axis is not None and 0 <= axis < 3 else None
+
     def nodes(self) -> tuple[list[FbxNode], list[int]]:
         """Nodes, parents first, and the places of their parents."""
         usual: dict[str, Record] = {}
@@ -193,9 +200,8 @@ class _File:
         """
         nodes, parents, bound = self.joints()
         own_N34 = _local(nodes, parents, {}, np.zeros(1))[0]
-        bound_N34 = bound_pose(own_N34, parents, bound)
         unturned_N34 = _local([node.with_no_turn() for node in nodes], parents, {}, np.zeros(1))[0]
-        rests = [Rest(BOUND, bound_N34)] if bound_N34 is not None else []
+        rests = bound_rests(own_N34, parents, bound, self.up)
         rests += [
             Rest(name, in_world(local_N34[None], parents)[0], local_N34 is own_N34)
             for name, local_N34 in (("its pose at all angles 0", unturned_N34), (OWN, own_N34))
@@ -206,6 +212,7 @@ class _File:
             tuple(Node(node.name, parent, node.is_bone) for node, parent in zip(nodes, parents, strict=True)),
             tuple(rests),
             tuple(animation for animation in animations if animation is not None),
+            up=self.up,
         )
 
     def joints(self) -> tuple[list[FbxNode], list[int], dict[int, np.ndarray]]:

@@ -35,7 +35,7 @@ from mrhubo.motion.readers.scene.nodes import (
     may_be_joints,
     parents_first,
 )
-from mrhubo.motion.readers.scene.rests import BOUND, OWN, bound_pose
+from mrhubo.motion.readers.scene.rests import OWN, bound_rests
 from mrhubo.motion.readers.tree.anatomy import ROLES
 
 _KEYS = re.compile(
@@ -58,6 +58,8 @@ _VRM_JOINTS = {
     "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
 }  # fmt: skip
 """Our joints, by the names of VRM's bones without their sides."""
+_UP = "y"
+"""As the specification says."""
 _SHORTEST = 1e-6
 """Of quaternions that are none to be normalised."""
 _LARGEST = 1e9
@@ -115,11 +117,10 @@ def _scene(file: GltfFile) -> Scene:
     places = _places([told[place] for place in order], [f"node {place}" for place in order])
     above = [node.parent for node in nodes]
     rests = [Rest(OWN, in_world(places.local_N34[None], above)[0], may_move=True)]
-    bound = bound_pose(places.local_N34, above, _bound(file, number, len(told)))
-    if bound is not None:
-        is_vrm = any(name in inner(file.top, "extensions") for name in _VRM)
-        rests.insert(len(rests) if is_vrm else 0, Rest(BOUND, bound))
-    return Scene(tuple(nodes), tuple(rests), find_animations(file, places, number), _body(file, number))
+    bound = bound_rests(places.local_N34, above, _bound(file, number, len(told)), _UP)
+    is_vrm = any(name in inner(file.top, "extensions") for name in _VRM)
+    rests = [*rests, *bound] if is_vrm else [*bound, *rests]
+    return Scene(tuple(nodes), tuple(rests), find_animations(file, places, number), _body(file, number), _UP)
 
 
 def _body(file: GltfFile, number: dict[int, int]) -> dict[str, int]:

@@ -26,6 +26,7 @@ from mrhubo.motion.readers.scene.motive_file import BEGINS, MotiveTable, read_mo
 from mrhubo.motion.readers.scene.nodes import Animation, Node, Rest, Scene, affine
 from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.motion.readers.tree.people import FEWEST_JOINTS
+from mrhubo.motion.readers.tree.world import AT_REST
 
 _TOPMOST = ("", "hip", "hips", "pelvis", "root", "reference")
 """What the bone that carries all others is called, after the skeleton's name, which may be all that it has."""
@@ -64,7 +65,7 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
     bones, place_TB3, turn_TB33, parents = _ordered(table, skeletons[name], span, known_T, name)
     animation = _animation(place_TB3, turn_TB33, parents, rate)
     nodes = tuple(Node(bone, parent, True) for bone, parent in zip(bones, parents, strict=True))
-    scene = Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,))
+    scene = Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,), up=AT_REST)
     kind = f"table of OptiTrack Motive, skeleton '{name}':" if name else "table of OptiTrack Motive:"
     options = dataclasses.replace(options, person=None, animation=None, rate=None)
     motion = scene_motion(path, scene, kind.removesuffix(":"), options, notes)

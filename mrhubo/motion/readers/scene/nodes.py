@@ -59,6 +59,8 @@ class Rest:
     """Where nodes are: affine maps from their axes to the world."""
     may_move: bool = False
     """Whether it may be a pose of the motion, such as its first, that a program left in the nodes."""
+    up: str | None = None
+    """The axis along which a body must stand in it; None where any will do."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,8 @@ class Scene:
     animations: tuple[Animation, ...]
     body: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """Nodes by the names of our joints, as far as the file itself says which is which."""
+    up: str | None = None
+    """The axis that is up, as the file says; `AT_REST` if it is the one along which a body stands at rest."""
 
 
 def parents_first(parents: Sequence[int]) -> list[int] | None:
