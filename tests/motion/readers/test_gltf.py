@@ -378,6 +378,18 @@ def test_two_people(motion: Motion, tmp_path: Path) -> None:
     assert "'mixamorig:Hips' is seen longest" in read(parts.glb(), tmp_path).notes[0]
 
 
+def test_who_moves_is_taken_before_who_does_not(motion: Motion, tmp_path: Path) -> None:
+    """Programs write an animation for each of those in a scene, in which the others stand still."""
+    parts, back = Parts(), motion.changed(local_TJ33=motion.local_TJ33.flip(0))
+    add_body(parts, motion, _METRES, Manner(prop=False), "Ann")
+    add_body(parts, back, dataclasses.replace(_METRES, names="xsens"), Manner(prop=False), "Ben")
+    for name, moves, who in (("Ann", motion, "mixamorig:Hips"), ("Ben", back, "Hips")):
+        found = read(parts.glb(), tmp_path, ReadOptions(animation=name))
+        assert off(found, moves) < 0.1 and f"'{who}' is seen longest" in found.notes[-1]
+    still = read(parts.glb(), tmp_path, ReadOptions(animation="Ben", person="mixamorig:Hips"))
+    assert len(still) == len(motion) and not still.notes
+
+
 def test_vrm_says_which_node_is_which(motion: Motion, tmp_path: Path) -> None:
     """Also where toes and knees say otherwise: of an avatar whose sides are exchanged, left is what is called so."""
     parts = write_gltf(motion, _METRES, Manner(vrm="VRMC_vrm"))
