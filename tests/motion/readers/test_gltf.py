@@ -360,6 +360,17 @@ def test_several_animations(motion: Motion, tmp_path: Path) -> None:
         read(parts.glb(), tmp_path, ReadOptions(animation="jump"))
 
 
+def test_a_take_that_holds_a_pose_is_not_taken(motion: Motion, tmp_path: Path) -> None:
+    """However long it is, as an empty `Take 001` beside the motion."""
+    parts = _several(motion, ("dance", "Take 001"))
+    for sampler in parts.top["animations"][1]["samplers"]:
+        width = 4 if parts.top["accessors"][sampler["output"]]["type"] == "VEC4" else 3
+        sampler["input"] = parts.accessor(np.array([0.0, 100.0]))
+        sampler["output"] = parts.accessor(np.tile([0.5] * width, (2, 1)))
+    found = read(parts.glb(), tmp_path)
+    assert off(found, motion) < 0.1 and "'dance' is the longest animation in which something turns" in found.notes[0]
+
+
 def test_two_people(motion: Motion, tmp_path: Path) -> None:
     parts, back = Parts(), motion.changed(local_TJ33=motion.local_TJ33.flip(0))
     add_body(parts, motion, _METRES, Manner(prop=False), "dance")

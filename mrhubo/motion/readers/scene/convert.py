@@ -32,6 +32,8 @@ _NEARLY = 1e-3
 """Of a frame: times are rounded."""
 _TESTED = 64
 """Frames by which a pose at rest is looked at."""
+_GLIMPSES, _TURNED = 8, 0.01
+"""Frames by which it is told whether nodes turn; and how much the axes of one must change, of the longest of them."""
 _SAME_DEG, _MOST = 0.5, 0.9
 """Angles that are as in another pose; and the share of them, in a pose that is the same."""
 
@@ -91,7 +93,7 @@ def _rate(path: Path, animation: Animation, name: str, options: ReadOptions, not
 
 
 def _chosen(path: Path, scene: Scene, options: ReadOptions, notes: list[str]) -> Animation:
-    """The animation that is asked for, or the longest."""
+    """The animation that is asked for, or the longest in which something turns."""
     if not scene.animations:
         raise NoMotion(f"{path}: holds a scene in which nothing moves; export the animation with it")
     by_length = sorted(scene.animations, key=lambda animation: animation.start - animation.end)
@@ -102,18 +104,28 @@ def _chosen(path: Path, scene: Scene, options: ReadOptions, notes: list[str]) ->
     )
     present += f", and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     if options.animation is None:
-        if len(by_length) > 1:
-            notes.append(
-                f"'{names[0]}' is the longest animation and was taken; there are {present}; --animation or"
-                " ReadOptions(animation=...) takes another"
-            )
-        return by_length[0]
+        if len(by_length) < 2:
+            return by_length[0]
+        longest = next((place for place, animation in enumerate(by_length) if _turns(animation)), 0)
+        still = " in which something turns" if longest else ""
+        notes.append(
+            f"'{names[longest]}' is the longest animation{still} and was taken; there are {present}; --animation or"
+            " ReadOptions(animation=...) takes another"
+        )
+        return by_length[longest]
     for animation in by_length:
         if animation.name == options.animation:
             return animation
     near = nearest(options.animation, [animation.name for animation in by_length]) if len(names) > _LISTED else None
     also = f"; nearest: '{near}'" if near is not None else ""
     raise UserError(f"{path}: has no animation '{shortened(options.animation, 40)}'; there are {present}{also}")
+
+
+def _turns(animation: Animation) -> bool:
+    """Whether nodes turn: programs leave takes beside the others that hold one pose for long."""
+    axes_FN33 = animation.local_FN34(np.linspace(animation.start, animation.end, _GLIMPSES))[..., :3]
+    changes_N, long_N = np.ptp(axes_FN33, axis=0).max(axis=(-1, -2)), np.abs(axes_FN33).max(axis=(0, -1, -2))
+    return bool((changes_N > _TURNED * long_N).any())
 
 
 def _standing(path: Path, scene: Scene, animation: Animation, time_T: np.ndarray, body: Mapping[str, int]) -> Rest:
