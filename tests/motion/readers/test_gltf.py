@@ -329,6 +329,43 @@ def test_most_channels_tell_the_rate_where_one_is_off(motion: Motion, tmp_path: 
     assert read(parts.glb(), tmp_path).frame_rate == 60.0
 
 
+def _with_more(parts: Parts, parent: str, name: str, place: list[float], own: list[float] | None = None) -> None:
+    """Adds a bone, and one at its end, to the parts of a file."""
+    nodes = parts.top["nodes"]
+    above = next(node for node in nodes if node["name"].endswith(parent))
+    above.setdefault("children", []).append(len(nodes))
+    nodes += [{"name": name, "translation": place, "children": [len(nodes) + 1]},
+              {"name": f"{name}_end", "translation": own or place}]  # fmt: skip
+    parts.top["skins"][0]["joints"] += [len(nodes) - 2, len(nodes) - 1]
+
+
+def test_what_a_hand_holds_is_no_finger(motion: Motion, tmp_path: Path) -> None:
+    style, manner = Style(unit=1.0), Manner(skin="t", own="bound")
+    alone = read(write_gltf(motion, style, manner).glb(), tmp_path)
+    parts = write_gltf(motion, style, manner)
+    del parts.top["skins"][0]["inverseBindMatrices"]  # of bones that are there
+    _with_more(parts, "RightHand", "Sword", [-0.05, 0.0, 0.1], [0.0, 0.0, 0.9])
+    found = read(parts.glb(), tmp_path)
+    error = mrhubo.rotation.geodesic_distance(turned(found, "right_wrist"), turned(alone, "right_wrist"))
+    assert float(torch.rad2deg(error).max()) < 0.1 and off(found, motion) < 0.1
+
+
+def test_feet_with_five_toes_point_where_the_middle_one_does(motion: Motion, tmp_path: Path) -> None:
+    parts = write_gltf(motion, _METRES, Manner())
+    del parts.top["skins"][0]["inverseBindMatrices"]
+    nodes = parts.top["nodes"]
+    for side, inner in (("Left", -1.0), ("Right", 1.0)):
+        toe = next(node for node in nodes if node["name"].endswith(f"{side}ToeBase"))
+        middle = np.array(toe["translation"])
+        for i in (-2, -1, 1, 2):  # the big toe is the longest
+            place = (middle + [0.015 * i, 0.0, 0.01 * i * inner]).tolist()
+            _with_more(parts, f"{side}Foot", f"{side}Toe{i}", place, [0.0, 0.0, 0.1 + 0.03 * i * inner])
+    found = read(parts.glb(), tmp_path)
+    for joint in ("left_ankle", "right_ankle"):
+        error = mrhubo.rotation.geodesic_distance(turned(found, joint), turned(motion, joint))
+        assert float(torch.rad2deg(error).max()) < 0.1, joint
+
+
 def _several(motion: Motion, names: tuple[str | None, ...]) -> Parts:
     """An animation of the same body for each name, each a little longer."""
     parts = write_gltf(motion, _METRES, Manner(prop=False), names[0])
