@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import mrhubo.rotation
 from mrhubo import UserError
+from mrhubo.body.joints import POSED_JOINT_NAMES
 from mrhubo.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
@@ -493,6 +494,29 @@ def test_who_stands_in_another_axis_is_believed_where_a_floor_is(motion: Motion,
         assert found.root_rotation_T33 is not None and motion.root_rotation_T33 is not None
         error = mrhubo.rotation.geodesic_distance(found.root_rotation_T33, motion.root_rotation_T33)
         assert float(torch.rad2deg(error).max()) < 0.1
+
+
+@pytest.mark.parametrize("held", [1, 10])
+def test_a_motion_that_begins_with_arms_half_down_tells_its_rest(held: int, motion: Motion, tmp_path: Path) -> None:
+    """As in an A-pose, in which both sides are alike to the degree."""
+    local_TJ33 = torch.eye(3).repeat(held, 21, 1, 1).to(motion.local_TJ33)
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        turn_33 = Rotation.from_rotvec([0.0, 0.0, sign * np.radians(45)]).as_matrix()
+        local_TJ33[:, POSED_JOINT_NAMES.index(f"{side}_shoulder")] = torch.tensor(turn_33).to(local_TJ33)
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    whole = motion.changed(
+        local_TJ33=torch.cat([local_TJ33, motion.local_TJ33]),
+        root_rotation_T33=torch.cat(
+            [torch.eye(3).repeat(held, 1, 1).to(motion.root_rotation_T33), motion.root_rotation_T33]
+        ),
+        root_position_T3=torch.cat([motion.root_position_T3[:1].repeat(held, 1), motion.root_position_T3]),
+    )
+    style = Style(unit=1.0, axes="random", fingers=False)
+    found = read(write_gltf(whole, style, Manner(own="first", skin=None)).glb(), tmp_path)
+    assert "rest is its first frame" in found.source
+    for joint in ("head", "left_wrist", "right_wrist", "left_ankle"):
+        one, other = turned(found, joint)[-len(motion) :], turned(motion, joint)
+        assert float(torch.rad2deg(mrhubo.rotation.geodesic_distance(one, other)).max()) < 0.5, joint
 
 
 def test_a_file_in_which_nobody_moves_is_no_motion(motion: Motion, tmp_path: Path) -> None:
