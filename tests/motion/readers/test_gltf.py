@@ -427,6 +427,36 @@ def test_two_people(motion: Motion, tmp_path: Path) -> None:
     assert "'mixamorig:Hips' is seen longest" in read(parts.glb(), tmp_path).notes[0]
 
 
+def test_people_go_with_what_carries_them(motion: Motion, tmp_path: Path) -> None:
+    """A node that moves them both, as one of a whole scene or that of a character's root motion."""
+    parts = Parts()
+    add_body(parts, motion, _METRES, Manner(prop=False), "dance")
+    add_body(parts, motion, dataclasses.replace(_METRES, names="xsens"), Manner(prop=False), "dance")
+    (first, second), nodes = parts.top["animations"], parts.top["nodes"]
+    for channel in second["channels"]:
+        channel["sampler"] += len(first["samplers"])
+    whole = {key: first[key] + second[key] for key in ("samplers", "channels")}
+    children = {child for node in nodes for child in node.get("children", ())}
+    roots = [place for place in range(len(nodes)) if place not in children]
+    angle_T, way_T3 = np.linspace(0.2, 1.5, len(motion)), np.linspace([1.0, 0.1, 0.0], [3.0, 0.1, 2.0], len(motion))
+    stage_T = Rotation.from_rotvec(angle_T[:, None] * [0.0, 1.0, 0.0])
+    times = parts.accessor(np.arange(len(motion)) / motion.frame_rate)
+    for path, value_TX in (("rotation", stage_T.as_quat()), ("translation", way_T3)):
+        whole["channels"].append({"sampler": len(whole["samplers"]), "target": {"node": len(nodes), "path": path}})
+        whole["samplers"].append({"input": times, "output": parts.accessor(value_TX)})
+    nodes.append({"name": "Stage", "children": roots})
+    parts.top["animations"] = [whole]
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    turn_T33 = torch.tensor(stage_T.as_matrix(), dtype=torch.float64)
+    place_T3 = (turn_T33 @ motion.root_position_T3.double()[..., None])[..., 0] + torch.tensor(way_T3)
+    for person in ("mixamorig:Hips", "Hips"):
+        found = read(parts.glb(), tmp_path, ReadOptions(person=person))
+        assert off(found, motion) < 0.1
+        assert found.root_rotation_T33 is not None and found.root_position_T3 is not None
+        assert (found.root_rotation_T33 - turn_T33 @ motion.root_rotation_T33.double()).abs().max() < 1e-3
+        assert (found.root_position_T3 - place_T3).abs().max() < 2e-3
+
+
 def test_who_moves_is_taken_before_who_does_not(motion: Motion, tmp_path: Path) -> None:
     """Programs write an animation for each of those in a scene, in which the others stand still."""
     parts, back = Parts(), motion.changed(local_TJ33=motion.local_TJ33.flip(0))

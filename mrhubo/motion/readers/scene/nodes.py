@@ -17,7 +17,7 @@ import numpy as np
 from mrhubo.errors import shortened
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.rotations import orthonormal
-from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
+from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree, angles_zyx
 
 MAX_NODES = 20_000
 """Of a scene."""
@@ -183,7 +183,7 @@ def scene_tree(scene: Scene, animation: Animation, time_T: np.ndarray, rest: Res
                 back_F33 = turn_FN33[:, parent].mT
                 point_F3 = (back_F33 @ (point_F3 - world_FN34[:, parent, :, 3])[..., None])[..., 0]
                 turn_F33 = back_F33 @ turn_F33
-            value_TN6[block, place] = np.concatenate([point_F3, _angles(turn_F33)], axis=-1)
+            value_TN6[block, place] = np.concatenate([point_F3, angles_zyx(turn_F33)], axis=-1)
     return _tree([node.name for node in scene.nodes], parents, rest.world_N34[..., 3], value_TN6, rest.name)
 
 
@@ -220,15 +220,3 @@ def _check(scene: Scene, world_FN34: np.ndarray) -> None:
     if not good_FN.all():
         node = scene.nodes[int(np.argwhere(~good_FN)[0][1])]
         raise BadScene(f"'{shortened(node.name, 40)}' is at no place, or scaled to nothing")
-
-
-def _angles(turn_F33: np.ndarray) -> np.ndarray:
-    """Angles (F, 3) about z, y and x [deg], the outermost first, also where they are not unique."""
-    z_F = np.arctan2(turn_F33[:, 1, 0], turn_F33[:, 0, 0])
-    y_F = np.arctan2(-turn_F33[:, 2, 0], np.hypot(turn_F33[:, 0, 0], turn_F33[:, 1, 0]))
-    sine_F, cosine_F = np.sin(z_F), np.cos(z_F)
-    x_F = np.arctan2(
-        sine_F * turn_F33[:, 0, 2] - cosine_F * turn_F33[:, 1, 2],
-        cosine_F * turn_F33[:, 1, 1] - sine_F * turn_F33[:, 0, 1],
-    )
-    return np.degrees(np.stack([z_F, y_F, x_F], axis=-1))
