@@ -409,6 +409,17 @@ def test_a_take_that_holds_a_pose_is_not_taken(motion: Motion, tmp_path: Path) -
     assert off(found, motion) < 0.1 and "'dance' is the longest animation in which something turns" in found.notes[0]
 
 
+def test_a_figure_of_rigid_parts_may_wear_a_skinned_cape(motion: Motion, tmp_path: Path) -> None:
+    """Bones of the cape alone are called such; the body's nodes are not."""
+    parts = write_gltf(motion, _METRES, Manner())
+    skin = parts.top["skins"][0]
+    skin["joints"], _ = [], skin.pop("inverseBindMatrices")
+    for i in range(6):
+        _with_more(parts, "Spine2", f"Cape{i}", [0.05 * i, 0.1, -0.1], [0.0, -0.4, 0.0])
+    found = read(parts.glb(), tmp_path)
+    assert off(found, motion) < 0.1 and not found.notes
+
+
 def test_two_people(motion: Motion, tmp_path: Path) -> None:
     parts, back = Parts(), motion.changed(local_TJ33=motion.local_TJ33.flip(0))
     add_body(parts, motion, _METRES, Manner(prop=False), "dance")

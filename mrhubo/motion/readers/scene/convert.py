@@ -5,8 +5,9 @@ Legend: T frames.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,34 @@ _GLIMPSES, _TURNED = 8, 0.01
 """Frames by which it is told whether nodes turn; and how much the axes of one must change, of the longest of them."""
 _SAME_DEG, _MOST = 0.5, 0.9
 """Angles that are as in another pose; and the share of them, in a pose that is the same."""
+
+
+def body_motion(
+    path: Path, scene_of: Callable[[bool], Scene], kind: str, options: ReadOptions, notes: list[str]
+) -> Motion:
+    """The motion of one body: of bones, or of all nodes where what a file calls bones makes no body, as of a figure
+    of rigid parts that wears a cape.
+
+    Args:
+        path: the file, for sentences.
+        scene_of: what it holds, of bones (False) or of all nodes (True).
+        kind: what the file is, for `Motion.source`.
+        options: as of `scene_motion`.
+        notes: is told what the file leaves open.
+
+    Raises:
+        NoMotion: nothing moves in it, or no body is found.
+        UserError: it is too large, or has no animation or person that is asked for.
+    """
+    bones = scene_of(False)
+    try:
+        return scene_motion(path, bones, kind, options, list(notes))
+    except NoMotion as error:
+        every = scene_of(True) if isinstance(error.__cause__, NoBody) else bones
+        if len(every.nodes) > len(bones.nodes):
+            with contextlib.suppress(UserError):
+                return scene_motion(path, every, kind, options, notes)
+        raise
 
 
 def scene_motion(path: Path, scene: Scene, kind: str, options: ReadOptions, notes: list[str]) -> Motion:

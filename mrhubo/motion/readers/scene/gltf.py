@@ -22,7 +22,7 @@ from mrhubo.files.regular import naming
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.scene.convert import scene_motion
+from mrhubo.motion.readers.scene.convert import body_motion
 from mrhubo.motion.readers.scene.gltf_file import DAMAGED, MAGIC, GltfFile, entries, inner, read_gltf_file, whole
 from mrhubo.motion.readers.scene.gltf_moves import Places, find_animations, with_axes
 from mrhubo.motion.readers.scene.nodes import (
@@ -86,9 +86,12 @@ def read_gltf(path: Path, options: ReadOptions) -> Motion:
     file, notes = read_gltf_file(path), []
     if not file.top.get("nodes"):
         raise NoMotion(f"{path}: is a glTF file without nodes, in which nothing can move; export the skeleton with it")
-    with naming(path):
-        scene = _scene(file)
-    return scene_motion(path, scene, f"{_kind(file)}, animation", options, notes)
+
+    def scene(every: bool) -> Scene:
+        with naming(path):
+            return _scene(file, every)
+
+    return body_motion(path, scene, f"{_kind(file)}, animation", options, notes)
 
 
 def _kind(file: GltfFile) -> str:
@@ -98,8 +101,8 @@ def _kind(file: GltfFile) -> str:
     return "VRM avatar" if any(name in extensions for name in _VRM) else "glTF scene"
 
 
-def _scene(file: GltfFile) -> Scene:
-    """What a file holds, of the nodes that may be joints."""
+def _scene(file: GltfFile, every: bool) -> Scene:
+    """What a file holds, of the nodes that may be joints, or of every node."""
     told = entries(file.top, "nodes")
     if len(told) > MAX_NODES:
         raise UserError(f"has {len(told):,} nodes; at most {MAX_NODES:,} are read; export the skeleton alone")
@@ -110,7 +113,7 @@ def _scene(file: GltfFile) -> Scene:
     bones = _bones(file, len(told))
     number = {place: i for i, place in enumerate(order)}
     nodes = [Node(_name(told, place), number.get(parents[place], -1), place in bones) for place in order]
-    kept = may_be_joints(nodes)
+    kept = may_be_joints(nodes, every)
     number = {order[place]: i for i, place in enumerate(kept)}
     order = [order[place] for place in kept]
     nodes = [Node(_name(told, place), number.get(parents[place], -1), place in bones) for place in order]

@@ -127,12 +127,12 @@ def in_world(local_FN34: np.ndarray, parents: Sequence[int]) -> np.ndarray:
     return world_FN34
 
 
-def may_be_joints(nodes: Sequence[Node]) -> list[int]:
-    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones. The rest
-    of a large scene, a house for instance, need not be worked out.
+def may_be_joints(nodes: Sequence[Node], every: bool) -> list[int]:
+    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones, or every
+    one is asked for. The rest of a large scene, a house for instance, need not be worked out.
     """
     bones = [place for place, node in enumerate(nodes) if node.is_bone]
-    if len(bones) < _FEWEST_BONES:
+    if every or len(bones) < _FEWEST_BONES:
         return list(range(len(nodes)))
     kept: set[int] = set()
     for bone in bones:
