@@ -218,6 +218,22 @@ def test_frames_that_are_not_tracked_are_unsure(tmp_path: Path) -> None:
     assert angles_between(gap_33, before_33) < angles_between(after_33, before_33)
 
 
+def test_toes_that_are_not_tracked_are_left_out(tmp_path: Path) -> None:
+    """Else there would be no frame in which all bones are tracked."""
+    lines = motive().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("Frame,"))
+    columns = [i for i, cell in enumerate(lines[start - 3].split(",")) if cell.endswith("Toe")]
+    for at in range(start + 1, len(lines)):
+        cells = lines[at].split(",")
+        lines[at] = ",".join("" if i in columns else cell for i, cell in enumerate(cells))
+    motion = read("\n".join(lines), tmp_path)
+    assert len(motion) == FRAMES and motion.confidence_TJ is None
+    assert motion.notes == (
+        "bones that are tracked in less than half of the frames are left out: Fred:LToe, Fred:RToe",
+    )
+    check(motion, *body(), [joint for joint in _TURNED if joint != "left_ankle"])
+
+
 def test_frames_that_are_left_out_stay_gaps(tmp_path: Path) -> None:
     text = re.sub(r"(?m)^[45],.*\n", "", motive())
     sure_TJ = read(text, tmp_path).arrays.confidence_TJ

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.errors import UserError
+from mrhubo.errors import UserError, listed, shortened
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
@@ -30,6 +30,8 @@ from mrhubo.motion.readers.tree.world import AT_REST
 
 _TOPMOST = ("", "hip", "hips", "pelvis", "root", "reference")
 """What the bone that carries all others is called, after the skeleton's name, which may be all that it has."""
+_OFTEN = 0.5
+"""Share of the frames in which a bone must be tracked not to be left out."""
 _SAMPLES = 64
 """Frames by which it is told which bone carries which."""
 
@@ -47,7 +49,13 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
         UserError: the file is missing, damaged or too large, or has nobody of the name that is asked for.
     """
     table, notes = read_motive_table(path), list[str]()
-    skeletons = _skeletons(table.bones)
+    skeletons, left_out = _skeletons(table.bones), list[int]()
+    for name, bones in skeletons.items():
+        skeletons[name] = _often(table, bones)
+        left_out += sorted({*bones} - {*skeletons[name]})
+    if left_out:
+        names = shortened(listed(table.bones[bone] for bone in left_out), 100)
+        notes.append(f"bones that are tracked in less than half of the frames are left out: {names}")
     known = {name: _known(table, bones) for name, bones in skeletons.items()}
     tracks = [Person(name, int(known_T.sum())) for name, known_T in known.items() if known_T.any()]
     if len(tracks) > 1 or options.person in skeletons:
@@ -90,6 +98,12 @@ def _by_heads(bones: Sequence[str], mark: str) -> dict[str, list[int]]:
     for place, bone in enumerate(bones):
         found.setdefault(bone if bone in heads else bone.rpartition(mark)[0], []).append(place)
     return found
+
+
+def _often(table: MotiveTable, bones: list[int]) -> list[int]:
+    """Bones that are tracked in half as many frames as the one that is most; toes and fingers may not be."""
+    count = {bone: int(_known(table, [bone]).sum()) for bone in bones}
+    return [bone for bone in bones if count[bone] >= _OFTEN * max(count.values())]
 
 
 def _known(table: MotiveTable, bones: list[int]) -> np.ndarray:
