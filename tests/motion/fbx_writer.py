@@ -142,6 +142,8 @@ def _aged(records: list[Rec]) -> list[Rec]:
             else:
                 told.append(_listed(row))
         objects.append((kind, [names[values[0]], *values[2:]], told))
+    up = record("Property", "UpAxis", "int", "", 1)
+    objects.append(record("GlobalSettings", inside=[record("Properties60", inside=[up])]))
     for number, (kind, values, _) in by_number.items():
         if kind != "AnimationStack":
             continue

@@ -138,7 +138,7 @@ def _subjects(path: Path, handle: BinaryIO) -> Iterator[_Subject]:
         UserError: there are too many frames, or something is no number.
     """
     subject = _Subject("", None)
-    is_motion = False
+    is_motion = is_body = False
     events = etree.iterparse(
         handle, events=("start", "end"), resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True
     )
@@ -149,8 +149,12 @@ def _subjects(path: Path, handle: BinaryIO) -> Iterator[_Subject]:
                 subject = _Subject(element.get("label", ""), element.get("frameRate"))
             elif tag == "frame":
                 is_motion = element.get("type", "normal").strip().lower() in ("normal", "")
+            elif tag == "segments":
+                is_body = True
             continue
-        if tag == "segment" and len(subject.segments) < _MAX_SEGMENTS:
+        if tag == "segments":
+            is_body = False  # fingers' segments come in lists of their own
+        elif tag == "segment" and is_body and len(subject.segments) < _MAX_SEGMENTS:
             subject.segments.append(element.get("label", "").strip().lower())
         elif tag == "contactDefinition":
             subject.contacts.setdefault(element.get("label", ""), len(subject.contacts))

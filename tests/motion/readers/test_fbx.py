@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -70,6 +71,20 @@ def test_source_says_what_was_found(motion: Motion, tmp_path: Path) -> None:
     found = mrhubo.read_motion(tmp_path / "a.fbx")
     assert "FBX file, animation 'Take 001': 38 joints, centimetres, y up" in found.source
     assert "rest is the pose in which its skin was bound" in found.source and not found.notes
+
+
+@pytest.mark.parametrize("version", [7400, 6100])
+def test_who_swims_throughout_lies(version: int, motion: Motion, tmp_path: Path) -> None:
+    """In the axis that is up as the file says; no floor tells it."""
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    turn_33 = torch.tensor([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]).to(motion.root_rotation_T33)
+    height_T3 = torch.tensor([0.0, 1.0, 0.0]).to(motion.root_position_T3).repeat(len(motion), 1)
+    turn_T33 = turn_33 @ motion.root_rotation_T33
+    swims = motion.changed(root_rotation_T33=turn_T33, root_position_T3=height_T3)
+    write_fbx(swims, _POSED, Manner(own_axes=True, version=version), tmp_path / "a.fbx")
+    found = mrhubo.read_motion(tmp_path / "a.fbx")
+    assert "y up (as the file says)" in found.source and found.root_rotation_T33 is not None
+    assert (found.root_rotation_T33 - turn_T33).abs().max() < 1e-3
 
 
 def test_pose_that_nodes_were_left_in_is_no_rest(motion: Motion, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import mrhubo.rotation
 from mrhubo import UserError
+from mrhubo.body.joints import POSED_JOINT_NAMES
 from mrhubo.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
@@ -329,6 +330,43 @@ def test_most_channels_tell_the_rate_where_one_is_off(motion: Motion, tmp_path: 
     assert read(parts.glb(), tmp_path).frame_rate == 60.0
 
 
+def _with_more(parts: Parts, parent: str, name: str, place: list[float], own: list[float] | None = None) -> None:
+    """Adds a bone, and one at its end, to the parts of a file."""
+    nodes = parts.top["nodes"]
+    above = next(node for node in nodes if node["name"].endswith(parent))
+    above.setdefault("children", []).append(len(nodes))
+    nodes += [{"name": name, "translation": place, "children": [len(nodes) + 1]},
+              {"name": f"{name}_end", "translation": own or place}]  # fmt: skip
+    parts.top["skins"][0]["joints"] += [len(nodes) - 2, len(nodes) - 1]
+
+
+def test_what_a_hand_holds_is_no_finger(motion: Motion, tmp_path: Path) -> None:
+    style, manner = Style(unit=1.0), Manner(skin="t", own="bound")
+    alone = read(write_gltf(motion, style, manner).glb(), tmp_path)
+    parts = write_gltf(motion, style, manner)
+    del parts.top["skins"][0]["inverseBindMatrices"]  # of bones that are there
+    _with_more(parts, "RightHand", "Sword", [-0.05, 0.0, 0.1], [0.0, 0.0, 0.9])
+    found = read(parts.glb(), tmp_path)
+    error = mrhubo.rotation.geodesic_distance(turned(found, "right_wrist"), turned(alone, "right_wrist"))
+    assert float(torch.rad2deg(error).max()) < 0.1 and off(found, motion) < 0.1
+
+
+def test_feet_with_five_toes_point_where_the_middle_one_does(motion: Motion, tmp_path: Path) -> None:
+    parts = write_gltf(motion, _METRES, Manner())
+    del parts.top["skins"][0]["inverseBindMatrices"]
+    nodes = parts.top["nodes"]
+    for side, inner in (("Left", -1.0), ("Right", 1.0)):
+        toe = next(node for node in nodes if node["name"].endswith(f"{side}ToeBase"))
+        middle = np.array(toe["translation"])
+        for i in (-2, -1, 1, 2):  # the big toe is the longest
+            place = (middle + [0.015 * i, 0.0, 0.01 * i * inner]).tolist()
+            _with_more(parts, f"{side}Foot", f"{side}Toe{i}", place, [0.0, 0.0, 0.1 + 0.03 * i * inner])
+    found = read(parts.glb(), tmp_path)
+    for joint in ("left_ankle", "right_ankle"):
+        error = mrhubo.rotation.geodesic_distance(turned(found, joint), turned(motion, joint))
+        assert float(torch.rad2deg(error).max()) < 0.1, joint
+
+
 def _several(motion: Motion, names: tuple[str | None, ...]) -> Parts:
     """An animation of the same body for each name, each a little longer."""
     parts = write_gltf(motion, _METRES, Manner(prop=False), names[0])
@@ -360,6 +398,28 @@ def test_several_animations(motion: Motion, tmp_path: Path) -> None:
         read(parts.glb(), tmp_path, ReadOptions(animation="jump"))
 
 
+def test_a_take_that_holds_a_pose_is_not_taken(motion: Motion, tmp_path: Path) -> None:
+    """However long it is, as an empty `Take 001` beside the motion."""
+    parts = _several(motion, ("dance", "Take 001"))
+    for sampler in parts.top["animations"][1]["samplers"]:
+        width = 4 if parts.top["accessors"][sampler["output"]]["type"] == "VEC4" else 3
+        sampler["input"] = parts.accessor(np.array([0.0, 100.0]))
+        sampler["output"] = parts.accessor(np.tile([0.5] * width, (2, 1)))
+    found = read(parts.glb(), tmp_path)
+    assert off(found, motion) < 0.1 and "'dance' is the longest animation in which something turns" in found.notes[0]
+
+
+def test_a_figure_of_rigid_parts_may_wear_a_skinned_cape(motion: Motion, tmp_path: Path) -> None:
+    """Bones of the cape alone are called such; the body's nodes are not."""
+    parts = write_gltf(motion, _METRES, Manner())
+    skin = parts.top["skins"][0]
+    skin["joints"], _ = [], skin.pop("inverseBindMatrices")
+    for i in range(6):
+        _with_more(parts, "Spine2", f"Cape{i}", [0.05 * i, 0.1, -0.1], [0.0, -0.4, 0.0])
+    found = read(parts.glb(), tmp_path)
+    assert off(found, motion) < 0.1 and not found.notes
+
+
 def test_two_people(motion: Motion, tmp_path: Path) -> None:
     parts, back = Parts(), motion.changed(local_TJ33=motion.local_TJ33.flip(0))
     add_body(parts, motion, _METRES, Manner(prop=False), "dance")
@@ -376,6 +436,48 @@ def test_two_people(motion: Motion, tmp_path: Path) -> None:
     found = read(parts.glb(), tmp_path, ReadOptions(person="Hips"))
     assert off(found, back) < 0.1 and not found.notes
     assert "'mixamorig:Hips' is seen longest" in read(parts.glb(), tmp_path).notes[0]
+
+
+def test_people_go_with_what_carries_them(motion: Motion, tmp_path: Path) -> None:
+    """A node that moves them both, as one of a whole scene or that of a character's root motion."""
+    parts = Parts()
+    add_body(parts, motion, _METRES, Manner(prop=False), "dance")
+    add_body(parts, motion, dataclasses.replace(_METRES, names="xsens"), Manner(prop=False), "dance")
+    (first, second), nodes = parts.top["animations"], parts.top["nodes"]
+    for channel in second["channels"]:
+        channel["sampler"] += len(first["samplers"])
+    whole = {key: first[key] + second[key] for key in ("samplers", "channels")}
+    children = {child for node in nodes for child in node.get("children", ())}
+    roots = [place for place in range(len(nodes)) if place not in children]
+    angle_T, way_T3 = np.linspace(0.2, 1.5, len(motion)), np.linspace([1.0, 0.1, 0.0], [3.0, 0.1, 2.0], len(motion))
+    stage_T = Rotation.from_rotvec(angle_T[:, None] * [0.0, 1.0, 0.0])
+    times = parts.accessor(np.arange(len(motion)) / motion.frame_rate)
+    for path, value_TX in (("rotation", stage_T.as_quat()), ("translation", way_T3)):
+        whole["channels"].append({"sampler": len(whole["samplers"]), "target": {"node": len(nodes), "path": path}})
+        whole["samplers"].append({"input": times, "output": parts.accessor(value_TX)})
+    nodes.append({"name": "Stage", "children": roots})
+    parts.top["animations"] = [whole]
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    turn_T33 = torch.tensor(stage_T.as_matrix(), dtype=torch.float64)
+    place_T3 = (turn_T33 @ motion.root_position_T3.double()[..., None])[..., 0] + torch.tensor(way_T3)
+    for person in ("mixamorig:Hips", "Hips"):
+        found = read(parts.glb(), tmp_path, ReadOptions(person=person))
+        assert off(found, motion) < 0.1
+        assert found.root_rotation_T33 is not None and found.root_position_T3 is not None
+        assert (found.root_rotation_T33 - turn_T33 @ motion.root_rotation_T33.double()).abs().max() < 1e-3
+        assert (found.root_position_T3 - place_T3).abs().max() < 2e-3
+
+
+def test_who_moves_is_taken_before_who_does_not(motion: Motion, tmp_path: Path) -> None:
+    """Programs write an animation for each of those in a scene, in which the others stand still."""
+    parts, back = Parts(), motion.changed(local_TJ33=motion.local_TJ33.flip(0))
+    add_body(parts, motion, _METRES, Manner(prop=False), "Ann")
+    add_body(parts, back, dataclasses.replace(_METRES, names="xsens"), Manner(prop=False), "Ben")
+    for name, moves, who in (("Ann", motion, "mixamorig:Hips"), ("Ben", back, "Hips")):
+        found = read(parts.glb(), tmp_path, ReadOptions(animation=name))
+        assert off(found, moves) < 0.1 and f"'{who}' is seen longest" in found.notes[-1]
+    still = read(parts.glb(), tmp_path, ReadOptions(animation="Ben", person="mixamorig:Hips"))
+    assert len(still) == len(motion) and not still.notes
 
 
 def test_vrm_says_which_node_is_which(motion: Motion, tmp_path: Path) -> None:
@@ -399,6 +501,63 @@ def test_pose_that_nodes_were_left_in_is_no_rest(motion: Motion, tmp_path: Path)
     """Nothing but the first frame is known of how bones are turned."""
     found = read(write_gltf(motion, _METRES, Manner(own="first", skin=None)).glb(), tmp_path)
     assert "no pose at rest" in found.source and off(found, motion) < 0.5
+
+
+def _lying(motion: Motion, quarter: float, height: float) -> Motion:
+    """Somebody who does the same lying, face down (1) or up (-1), at a height, in one place."""
+    turn_33 = torch.tensor(Rotation.from_rotvec([quarter * np.pi / 2, 0.0, 0.0]).as_matrix(), dtype=torch.float32)
+    assert motion.root_rotation_T33 is not None
+    place_T3 = torch.tensor([0.0, height, 0.0]).repeat(len(motion), 1)
+    return motion.changed(root_rotation_T33=turn_33 @ motion.root_rotation_T33, root_position_T3=place_T3)
+
+
+@pytest.mark.parametrize("quarter", [1.0, -1.0])
+@pytest.mark.parametrize("height", [0.1, 1.0])
+@pytest.mark.parametrize("manner", [Manner(), Manner(own="first"), Manner(own="first", skin="a")])
+def test_who_lies_throughout_lies(
+    motion: Motion, quarter: float, height: float, manner: Manner, tmp_path: Path
+) -> None:
+    """On the floor, and on a bed or in water, also where nodes were left lying; glTF has y up."""
+    lying = _lying(motion, quarter, height)
+    style = Style(unit=1.0, axes="random", fingers=False)
+    found = read(write_gltf(lying, style, manner).glb(), tmp_path)
+    assert off(found, lying) < 0.1 and "y up" in found.source
+    assert found.root_rotation_T33 is not None and lying.root_rotation_T33 is not None
+    error = mrhubo.rotation.geodesic_distance(found.root_rotation_T33, lying.root_rotation_T33)
+    assert float(torch.rad2deg(error).max()) < 0.1
+
+
+def test_who_stands_in_another_axis_is_believed_where_a_floor_is(motion: Motion, tmp_path: Path) -> None:
+    """Scripts write what has z up as it is."""
+    for manner in (Manner(), Manner(own="first")):
+        found = read(write_gltf(motion, dataclasses.replace(_METRES, world=Z_UP), manner).glb(), tmp_path)
+        assert off(found, motion) < 0.1 and "z up" in found.source
+        assert found.root_rotation_T33 is not None and motion.root_rotation_T33 is not None
+        error = mrhubo.rotation.geodesic_distance(found.root_rotation_T33, motion.root_rotation_T33)
+        assert float(torch.rad2deg(error).max()) < 0.1
+
+
+@pytest.mark.parametrize("held", [1, 10])
+def test_a_motion_that_begins_with_arms_half_down_tells_its_rest(held: int, motion: Motion, tmp_path: Path) -> None:
+    """As in an A-pose, in which both sides are alike to the degree."""
+    local_TJ33 = torch.eye(3).repeat(held, 21, 1, 1).to(motion.local_TJ33)
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        turn_33 = Rotation.from_rotvec([0.0, 0.0, sign * np.radians(45)]).as_matrix()
+        local_TJ33[:, POSED_JOINT_NAMES.index(f"{side}_shoulder")] = torch.tensor(turn_33).to(local_TJ33)
+    assert motion.root_rotation_T33 is not None and motion.root_position_T3 is not None
+    whole = motion.changed(
+        local_TJ33=torch.cat([local_TJ33, motion.local_TJ33]),
+        root_rotation_T33=torch.cat(
+            [torch.eye(3).repeat(held, 1, 1).to(motion.root_rotation_T33), motion.root_rotation_T33]
+        ),
+        root_position_T3=torch.cat([motion.root_position_T3[:1].repeat(held, 1), motion.root_position_T3]),
+    )
+    style = Style(unit=1.0, axes="random", fingers=False)
+    found = read(write_gltf(whole, style, Manner(own="first", skin=None)).glb(), tmp_path)
+    assert "rest is its first frame" in found.source
+    for joint in ("head", "left_wrist", "right_wrist", "left_ankle"):
+        one, other = turned(found, joint)[-len(motion) :], turned(motion, joint)
+        assert float(torch.rad2deg(mrhubo.rotation.geodesic_distance(one, other)).max()) < 0.5, joint
 
 
 def test_a_file_in_which_nobody_moves_is_no_motion(motion: Motion, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from mrhubo.body.joints import JOINT_NAMES
 from mrhubo.fast.rotations import angles_between
 from mrhubo.motion import Motion, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.scene.motive_bones import carriers, farther
 from tests.motion.damage import Step, accidents, altered_words, damaged, read_or_refused
 from tests.motion.marker_writer import c3d
 from tests.motion.readers.markers.test_convert import marked
@@ -148,6 +150,49 @@ def test_who_never_bends_the_back_is_read_as_well(tmp_path: Path) -> None:
     check(motion, place_TJ3[:1].repeat(FRAMES, 0), world_TJ33[:1].repeat(FRAMES, 0), _TURNED)
 
 
+_FINGERS = [f"{side}{finger}{i}" for side in "LR" for finger in ("Thumb", "Index", "Pinky") for i in (1, 2)]
+NAMINGS: dict[str, tuple[list[str], dict[str, str]]] = {
+    "Motive": ([*BONES, *_FINGERS], {}),
+    "FBX": (
+        ["Hips", "Spine", "Spine1", "Spine2", "Neck", "Head"],
+        dict(zip(_LIMBS, ("Shoulder", "Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase"), strict=True)),
+    ),
+    "BVH": (
+        ["Hips", "Chest", "Chest2", "Chest3", "Neck", "Head"],
+        dict(zip(_LIMBS, ("Collar", "Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle", "Toe"), strict=True)),
+    ),
+}
+"""The trunk's bones, and those of limbs in the order of ours, as Motive calls them in each way of naming."""
+
+
+@pytest.mark.parametrize("naming", NAMINGS)
+def test_names_tell_what_nearness_does_not(naming: str) -> None:
+    """Shoulders begin beside the neck, hands stay beside the thighs, and knuckles keep their places on each other."""
+    names, limbs = NAMINGS[naming]
+    sides = {"L": "Left", "R": "Right"}
+    names = names if not limbs else names + [sides[s] + limbs[part] for s in "LR" for part in _LIMBS]
+    ours = [*BONES, *(_FINGERS if not limbs else [])]
+    place_TJ3, _ = body()
+    place_3 = dict(zip(BONES, place_TJ3[0, [JOINT_NAMES.index(joint) for joint in BONES.values()]], strict=True))
+    for number, (side, sign) in enumerate((("L", 1), ("R", -1))):
+        place_3[f"{side}Shoulder"] = place_3["Neck"] + [0.03 * sign, -0.03, 0.0]
+        place_3[f"{side}Hand"] = place_3[f"{side}Thigh"] + [0.05 * sign, 0.0, 0.02]
+        for i, finger in enumerate(_FINGERS[6 * number : 6 * number + 6]):
+            place_3[finger] = place_3[f"{side}Hand"] + [0.0, -0.1 - 0.03 * (i % 2), 0.01 * (i // 2)]
+    place_FB3 = np.tile(np.stack([place_3[bone] for bone in ours]), (4, 1, 1))
+    turn_FB33 = np.tile(np.eye(3), (4, len(ours), 1, 1))
+    order, parents, total = carriers(place_FB3, turn_FB33, farther([name.lower() for name in names], 0), 0)
+    found = {ours[bone]: ours[order[parent]] for bone, parent in zip(order, parents, strict=True) if parent >= 0}
+    assert np.isfinite(total)
+    for side in "LR":
+        shoulder, *arm = (side + part for part in ("Shoulder", "UArm", "FArm", "Hand"))
+        assert found[shoulder] in _TRUNK.keys() - {"Neck", "Head"}
+        thigh, *leg = (side + part for part in ("Thigh", "Shin", "Foot", "Toe"))
+        for way in ([shoulder, *arm], [thigh, *leg], *([f"{side}Hand", f"{side}{f}1", f"{side}{f}2"]
+                    for f in ("Thumb", "Index", "Pinky") if not limbs)):  # fmt: skip
+            assert all(found[bone] == above for above, bone in itertools.pairwise(way))
+
+
 def test_who_is_asked_for_is_read(tmp_path: Path) -> None:
     text = motive(Export(("Ann", "Ben")))
     first = read(text, tmp_path)
@@ -173,6 +218,22 @@ def test_frames_that_are_not_tracked_are_unsure(tmp_path: Path) -> None:
     assert turned.max() < 1e-3
     gap_33, before_33, after_33 = (motion.arrays.local_TJ33[frame, 17].astype(float) for frame in (3, 2, 5))
     assert angles_between(gap_33, before_33) < angles_between(after_33, before_33)
+
+
+def test_toes_that_are_not_tracked_are_left_out(tmp_path: Path) -> None:
+    """Else there would be no frame in which all bones are tracked."""
+    lines = motive().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("Frame,"))
+    columns = [i for i, cell in enumerate(lines[start - 3].split(",")) if cell.endswith("Toe")]
+    for at in range(start + 1, len(lines)):
+        cells = lines[at].split(",")
+        lines[at] = ",".join("" if i in columns else cell for i, cell in enumerate(cells))
+    motion = read("\n".join(lines), tmp_path)
+    assert len(motion) == FRAMES and motion.confidence_TJ is None
+    assert motion.notes == (
+        "bones that are tracked in less than half of the frames are left out: Fred:LToe, Fred:RToe",
+    )
+    check(motion, *body(), [joint for joint in _TURNED if joint != "left_ankle"])
 
 
 def test_frames_that_are_left_out_stay_gaps(tmp_path: Path) -> None:

@@ -86,6 +86,15 @@ def test_trunk_head_hands_and_limbs_are_turned_as_segments_are(shuffled: bool, t
     check(motion, place_TJ3, world_TJ33)
 
 
+def test_fingers_are_passed_over(tmp_path: Path) -> None:
+    """Gloves have segments and numbers of their own."""
+    fingers = "".join(f'<segment label="{name}" id="1"/>' for name in ("LeftCarpus", "LeftFirstMC", "LeftFirstPP"))
+    text = mvnx(subject())
+    text = text.replace("</segments>", f"</segments><fingerTrackingSegmentsLeft>{fingers}</fingerTrackingSegmentsLeft>")
+    own = f"<orientationFingersLeft>{'1 0 0 0 ' * 3}</orientationFingersLeft>"
+    check(read(text.replace("<footContacts>", f"{own}<footContacts>"), tmp_path), *body())
+
+
 def test_planted_feet_are_read(tmp_path: Path) -> None:
     """By their names, which stand in another order than ours."""
     found = read(mvnx(subject()), tmp_path).arrays.contact_T4

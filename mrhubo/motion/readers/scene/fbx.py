@@ -19,7 +19,7 @@ from mrhubo.errors import UserError
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import RATES, ReadOptions
-from mrhubo.motion.readers.scene.convert import scene_motion
+from mrhubo.motion.readers.scene.convert import body_motion
 from mrhubo.motion.readers.scene.fbx_curves import Curve, read_curve
 from mrhubo.motion.readers.scene.fbx_file import BINARY, OLD, BadFbx, Record, is_text_fbx, read_fbx_file
 from mrhubo.motion.readers.scene.fbx_nodes import FbxNode, plain_name, properties, read_node
@@ -34,7 +34,7 @@ from mrhubo.motion.readers.scene.nodes import (
     may_be_joints,
     parents_first,
 )
-from mrhubo.motion.readers.scene.rests import BOUND, OWN, bound_pose
+from mrhubo.motion.readers.scene.rests import OWN, bound_rests
 from mrhubo.robot_motion.clock import rate_of_step
 
 _SECOND, _NEW_SECOND = 46_186_158_000, 141_120_000
@@ -69,13 +69,18 @@ def read_fbx(path: Path, options: ReadOptions) -> Motion:
     """
     notes: list[str] = []
     root, version = read_fbx_file(path)
-    try:
-        scene = _File(modernised(root) if version < OLD else root).scene(notes)
-    except BadFbx as error:
-        raise UserError(f"{path}: is a damaged FBX file: {error}") from error
-    if not scene.nodes:
-        raise NoMotion(f"{path}: is an FBX file without nodes")
-    return scene_motion(path, scene, "FBX file, animation", options, notes)
+
+    def scene(every: bool) -> Scene:
+        notes.clear()  # of the same file
+        try:
+            found = _File(modernised(root) if version < OLD else root).scene(every, notes)
+        except BadFbx as error:
+            raise UserError(f"{path}: is a damaged FBX file: {error}") from error
+        if not found.nodes:
+            raise NoMotion(f"{path}: is an FBX file without nodes")
+        return found
+
+    return body_motion(path, scene, "FBX file, animation", options, notes)
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,13 @@ class _File:
             return float(own[0])
         return _RATES[mode] if mode is not None and 0 <= mode < len(_RATES) else _RATES[0]
 
+    @cached_property
+    def up(self) -> str | None:
+        """The axis that is up, for instance `z`; None where it is not told."""
+        told = properties(self.root.first("GlobalSettings"))
+        axis, sign = (told[key].whole(4) if key in told else None for key in ("UpAxis", "UpAxisSign"))
+        return f"{'-' if sign == -1 else ''}{'xyz'[axis]}" if axis is not None and 0 <= axis < 3 else None
+
     def nodes(self) -> tuple[list[FbxNode], list[int]]:
         """Nodes, parents first, and the places of their parents."""
         usual: dict[str, Record] = {}
@@ -185,17 +197,12 @@ class _File:
     def _is(self, number: int, name: str) -> bool:
         return number in self.objects and self.objects[number].name == name
 
-    def scene(self, notes: list[str]) -> Scene:
-        """What the file holds.
-
-        Raises:
-            BadFbx: it is damaged.
-        """
-        nodes, parents, bound = self.joints()
+    def scene(self, every: bool, notes: list[str]) -> Scene:
+        """What the file holds, of the nodes that may be joints, or of every node; `BadFbx` if it is damaged."""
+        nodes, parents, bound = self.joints(every)
         own_N34 = _local(nodes, parents, {}, np.zeros(1))[0]
-        bound_N34 = bound_pose(own_N34, parents, bound)
         unturned_N34 = _local([node.with_no_turn() for node in nodes], parents, {}, np.zeros(1))[0]
-        rests = [Rest(BOUND, bound_N34)] if bound_N34 is not None else []
+        rests = bound_rests(own_N34, parents, bound, self.up)
         rests += [
             Rest(name, in_world(local_N34[None], parents)[0], local_N34 is own_N34)
             for name, local_N34 in (("its pose at all angles 0", unturned_N34), (OWN, own_N34))
@@ -206,20 +213,20 @@ class _File:
             tuple(Node(node.name, parent, node.is_bone) for node, parent in zip(nodes, parents, strict=True)),
             tuple(rests),
             tuple(animation for animation in animations if animation is not None),
+            up=self.up,
         )
 
-    def joints(self) -> tuple[list[FbxNode], list[int], dict[int, np.ndarray]]:
+    def joints(self, every: bool) -> tuple[list[FbxNode], list[int], dict[int, np.ndarray]]:
         """Nodes that may be joints, parents first, the places of their parents, and where those that a skin is bound
         to are then.
         """
         nodes, parents = self.nodes()
         bound = self.bound({node.number: i for i, node in enumerate(nodes)})
-        kept = may_be_joints(
-            [
-                Node(node.name, parent, node.is_bone or i in bound)
-                for i, (node, parent) in enumerate(zip(nodes, parents, strict=True))
-            ]
-        )
+        among = [
+            Node(node.name, parent, node.is_bone or i in bound)
+            for i, (node, parent) in enumerate(zip(nodes, parents, strict=True))
+        ]
+        kept = may_be_joints(among, every)
         new = {old: i for i, old in enumerate(kept)}
         return (
             [nodes[old] for old in kept],

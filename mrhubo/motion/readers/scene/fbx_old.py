@@ -35,20 +35,16 @@ def modernised(root: Record) -> Record:
     for record in root.first("Objects").children:
         if record.text(0):
             inside = [*record.named("TransformLink"), *(new.posed(row) for row in record.named("PoseNode"))]
-            rows = [_property(row) for row in record.first("Properties60").named("Property")]
-            new.add(record.name, new.number(record.text(0)), record.text(0), record.values[1:], [
-                *inside, Record("Properties70", [], [row for row in rows if row is not None])
-            ])  # fmt: skip
+            parts = [*inside, _properties(record)]
+            new.add(record.name, new.number(record.text(0)), record.text(0), record.values[1:], parts)
     for row in root.first("Connections").named("Connect"):
         if row.text(1) and row.text(2):
             new.link(row.text(0), new.number(row.text(1)), new.number(row.text(2)))
     for take in root.first("Takes").named("Take"):
         _read_take(take, new)
-    return Record(
-        "",
-        [],
-        [root.first("FBXHeaderExtension"), Record("Objects", [], new.objects), Record("Connections", [], new.links)],
-    )
+    settings = Record("GlobalSettings", [], [_properties(root.first("Objects").first("GlobalSettings"))])
+    parts = [Record("Objects", [], new.objects), Record("Connections", [], new.links)]
+    return Record("", [], [root.first("FBXHeaderExtension"), settings, *parts])
 
 
 @dataclass
@@ -82,6 +78,12 @@ class _New:
         """A node in a pose."""
         name = row.first("Node").text(0)
         return Record("PoseNode", [], [Record("Node", [self.number(name)] if name else []), row.first("Matrix")])
+
+
+def _properties(record: Record) -> Record:
+    """The properties of an object."""
+    rows = [_property(row) for row in record.first("Properties60").named("Property")]
+    return Record("Properties70", [], [row for row in rows if row is not None])
 
 
 def _property(row: Record) -> Record | None:

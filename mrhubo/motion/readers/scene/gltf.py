@@ -22,7 +22,7 @@ from mrhubo.files.regular import naming
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.scene.convert import scene_motion
+from mrhubo.motion.readers.scene.convert import body_motion
 from mrhubo.motion.readers.scene.gltf_file import DAMAGED, MAGIC, GltfFile, entries, inner, read_gltf_file, whole
 from mrhubo.motion.readers.scene.gltf_moves import Places, find_animations, with_axes
 from mrhubo.motion.readers.scene.nodes import (
@@ -35,7 +35,7 @@ from mrhubo.motion.readers.scene.nodes import (
     may_be_joints,
     parents_first,
 )
-from mrhubo.motion.readers.scene.rests import BOUND, OWN, bound_pose
+from mrhubo.motion.readers.scene.rests import OWN, bound_rests
 from mrhubo.motion.readers.tree.anatomy import ROLES
 
 _KEYS = re.compile(
@@ -58,6 +58,8 @@ _VRM_JOINTS = {
     "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
 }  # fmt: skip
 """Our joints, by the names of VRM's bones without their sides."""
+_UP = "y"
+"""As the specification says."""
 _SHORTEST = 1e-6
 """Of quaternions that are none to be normalised."""
 _LARGEST = 1e9
@@ -84,9 +86,12 @@ def read_gltf(path: Path, options: ReadOptions) -> Motion:
     file, notes = read_gltf_file(path), []
     if not file.top.get("nodes"):
         raise NoMotion(f"{path}: is a glTF file without nodes, in which nothing can move; export the skeleton with it")
-    with naming(path):
-        scene = _scene(file)
-    return scene_motion(path, scene, f"{_kind(file)}, animation", options, notes)
+
+    def scene(every: bool) -> Scene:
+        with naming(path):
+            return _scene(file, every)
+
+    return body_motion(path, scene, f"{_kind(file)}, animation", options, notes)
 
 
 def _kind(file: GltfFile) -> str:
@@ -96,8 +101,8 @@ def _kind(file: GltfFile) -> str:
     return "VRM avatar" if any(name in extensions for name in _VRM) else "glTF scene"
 
 
-def _scene(file: GltfFile) -> Scene:
-    """What a file holds, of the nodes that may be joints."""
+def _scene(file: GltfFile, every: bool) -> Scene:
+    """What a file holds, of the nodes that may be joints, or of every node."""
     told = entries(file.top, "nodes")
     if len(told) > MAX_NODES:
         raise UserError(f"has {len(told):,} nodes; at most {MAX_NODES:,} are read; export the skeleton alone")
@@ -108,18 +113,17 @@ def _scene(file: GltfFile) -> Scene:
     bones = _bones(file, len(told))
     number = {place: i for i, place in enumerate(order)}
     nodes = [Node(_name(told, place), number.get(parents[place], -1), place in bones) for place in order]
-    kept = may_be_joints(nodes)
+    kept = may_be_joints(nodes, every)
     number = {order[place]: i for i, place in enumerate(kept)}
     order = [order[place] for place in kept]
     nodes = [Node(_name(told, place), number.get(parents[place], -1), place in bones) for place in order]
     places = _places([told[place] for place in order], [f"node {place}" for place in order])
     above = [node.parent for node in nodes]
     rests = [Rest(OWN, in_world(places.local_N34[None], above)[0], may_move=True)]
-    bound = bound_pose(places.local_N34, above, _bound(file, number, len(told)))
-    if bound is not None:
-        is_vrm = any(name in inner(file.top, "extensions") for name in _VRM)
-        rests.insert(len(rests) if is_vrm else 0, Rest(BOUND, bound))
-    return Scene(tuple(nodes), tuple(rests), find_animations(file, places, number), _body(file, number))
+    bound = bound_rests(places.local_N34, above, _bound(file, number, len(told)), _UP)
+    is_vrm = any(name in inner(file.top, "extensions") for name in _VRM)
+    rests = [*rests, *bound] if is_vrm else [*bound, *rests]
+    return Scene(tuple(nodes), tuple(rests), find_animations(file, places, number), _body(file, number), _UP)
 
 
 def _body(file: GltfFile, number: dict[int, int]) -> dict[str, int]:

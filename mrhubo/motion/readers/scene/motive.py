@@ -15,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.errors import UserError
-from mrhubo.fast.plain.human import norm
+from mrhubo.errors import UserError, listed, shortened
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import Content
@@ -25,19 +24,19 @@ from mrhubo.motion.readers.markers.convert import motion_of_labelled
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, rate_of_seconds, told_rate
 from mrhubo.motion.readers.scene.convert import scene_motion
+from mrhubo.motion.readers.scene.motive_bones import carriers, farther
 from mrhubo.motion.readers.scene.motive_file import BEGINS, MotiveTable, read_motive_table
 from mrhubo.motion.readers.scene.nodes import Animation, Node, Rest, Scene, affine
 from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.motion.readers.tree.people import FEWEST_JOINTS
+from mrhubo.motion.readers.tree.world import AT_REST
 
 _TOPMOST = ("", "hip", "hips", "pelvis", "root", "reference")
 """What the bone that carries all others is called, after the skeleton's name, which may be all that it has."""
+_OFTEN = 0.5
+"""Share of the frames in which a bone must be tracked not to be left out."""
 _SAMPLES = 64
 """Frames by which it is told which bone carries which."""
-_NEAR = 0.02
-"""Of a distance, as if a bone's beginning moved by that: of bones on which it keeps its place, the nearest carries."""
-_MIDDLE = 2.0
-"""How much farther a bone of the middle counts from one of a side."""
 
 
 def is_motive(content: Content) -> bool:
@@ -59,7 +58,13 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
             table.place_TB3, list(table.bones), None, None if told is None else told[1], "the table", notes
         )
         return motion_of_labelled(path, found, "table of OptiTrack Motive", options)
-    skeletons = _skeletons(table.bones)
+    skeletons, left_out = _skeletons(table.bones), list[int]()
+    for name, bones in skeletons.items():
+        skeletons[name] = _often(table, bones)
+        left_out += sorted({*bones} - {*skeletons[name]})
+    if left_out:
+        names = shortened(listed(table.bones[bone] for bone in left_out), 100)
+        notes.append(f"bones that are tracked in less than half of the frames are left out: {names}")
     known = {name: _known(table, bones) for name, bones in skeletons.items()}
     tracks = [Person(name, int(known_T.sum())) for name, known_T in known.items() if known_T.any()]
     if len(tracks) > 1 or options.person in skeletons:
@@ -78,7 +83,7 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
     bones, place_TB3, turn_TB33, parents = _ordered(table, skeletons[name], span, known_T, name)
     animation = _animation(place_TB3, turn_TB33, parents, rate)
     nodes = tuple(Node(bone, parent, True) for bone, parent in zip(bones, parents, strict=True))
-    scene = Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,))
+    scene = Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,), up=AT_REST)
     kind = f"table of OptiTrack Motive, skeleton '{name}':" if name else "table of OptiTrack Motive:"
     options = dataclasses.replace(options, person=None, animation=None, rate=None)
     motion = scene_motion(path, scene, kind.removesuffix(":"), options, notes)
@@ -103,6 +108,12 @@ def _by_heads(bones: Sequence[str], mark: str) -> dict[str, list[int]]:
     for place, bone in enumerate(bones):
         found.setdefault(bone if bone in heads else bone.rpartition(mark)[0], []).append(place)
     return found
+
+
+def _often(table: MotiveTable, bones: list[int]) -> list[int]:
+    """Bones that are tracked in half as many frames as the one that is most; toes and fingers may not be."""
+    count = {bone: int(_known(table, [bone]).sum()) for bone in bones}
+    return [bone for bone in bones if count[bone] >= _OFTEN * max(count.values())]
 
 
 def _known(table: MotiveTable, bones: list[int]) -> np.ndarray:
@@ -133,54 +144,15 @@ def _ordered(
     names = [table.bones[place] for place in bones]
     plain = [name.removeprefix(skeleton).lstrip(":_").lower() for name in names]
     top = next((i for i, name in enumerate(plain) if name in _TOPMOST), 0)
-    farther_BB = _farther(plain)
+    farther_BB = farther(plain, top)
     place_TB3 = fill_numbers(table.place_TB3[span][:, bones], known_T)
     some_F = np.flatnonzero(known_T)[np.linspace(0, known_T.sum() - 1, _SAMPLES).astype(int)]
     ways = [turn_TB33[span][:, bones] for turn_TB33 in table.turns]
-    found = [_carriers(place_TB3[some_F], turn_TB33[some_F], farther_BB, top) for turn_TB33 in ways]
+    found = [carriers(place_TB3[some_F], turn_TB33[some_F], farther_BB, top) for turn_TB33 in ways]
     best = min(range(len(ways)), key=lambda way: found[way][2])
     order, parents, _ = found[best]
     turn_TB33 = np.stack([fill_rotations(ways[best][:, bone], known_T) for bone in order], axis=1)
     return [names[bone] for bone in order], place_TB3[:, order], turn_TB33, parents
-
-
-def _farther(names: Sequence[str]) -> np.ndarray:
-    """How much farther than they are bones count from others that may carry them (B, B), by their names: a bone of one
-    side carries none of the other and none of the middle, and is carried rather by its own side.
-    """
-    side_B = np.zeros(len(names), int)
-    for bone, name in enumerate(names):
-        for left, right in (("left", "right"), ("l", "r")):
-            for side, own, other in ((1, left, right), (-1, right, left)):
-                begins, ends = name.removeprefix(own), name.removesuffix(f"_{own}")
-                if (begins != name and other + begins in names) or (ends != name and f"{ends}_{other}" in names):
-                    side_B[bone] = side
-    return np.where(side_B[:, None] == side_B, 1.0, np.where(side_B[:, None] == 0, _MIDDLE, np.inf))
-
-
-def _carriers(
-    place_FB3: np.ndarray, turn_FB33: np.ndarray, farther_BB: np.ndarray, top: int
-) -> tuple[list[int], list[int], float]:
-    """An order of bones, the place of each one's parent in it (-1 of the first), and how far beginnings move on
-    parents.
-
-    From the topmost bone on, the bone comes next that keeps its place best on one that is there, or is nearest to it.
-    """
-    count = len(place_FB3[0])
-    cost_BB = np.empty((count, count))
-    """Of a bone (second) on another (first)."""
-    for bone in range(count):
-        seen_FB3 = np.einsum("fji,fbj->fbi", turn_FB33[:, bone], place_FB3 - place_FB3[:, bone, None])
-        cost_BB[bone] = seen_FB3.std(axis=0).max(axis=-1) + _NEAR * farther_BB[bone] * norm(seen_FB3.mean(axis=0))
-    order, parents, total = [top], [-1], 0.0
-    left = [bone for bone in range(count) if bone != top]
-    while left:
-        among = cost_BB[np.ix_(order, left)]
-        parent, bone = np.unravel_index(int(among.argmin()), among.shape)
-        total += float(among[parent, bone])
-        parents.append(int(parent))
-        order.append(left.pop(int(bone)))
-    return order, parents, total
 
 
 def _t_pose(place_TN3: np.ndarray, turn_TN33: np.ndarray, parents: list[int]) -> Rest:

@@ -17,7 +17,7 @@ import numpy as np
 from mrhubo.errors import shortened
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.rotations import orthonormal
-from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree
+from mrhubo.motion.readers.tree.hierarchy import Joint, JointTree, angles_zyx
 
 MAX_NODES = 20_000
 """Of a scene."""
@@ -59,6 +59,8 @@ class Rest:
     """Where nodes are: affine maps from their axes to the world."""
     may_move: bool = False
     """Whether it may be a pose of the motion, such as its first, that a program left in the nodes."""
+    up: str | None = None
+    """The axis along which a body must stand in it; None where any will do."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,8 @@ class Scene:
     animations: tuple[Animation, ...]
     body: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """Nodes by the names of our joints, as far as the file itself says which is which."""
+    up: str | None = None
+    """The axis that is up, as the file says; `AT_REST` if it is the one along which a body stands at rest."""
 
 
 def parents_first(parents: Sequence[int]) -> list[int] | None:
@@ -123,12 +127,12 @@ def in_world(local_FN34: np.ndarray, parents: Sequence[int]) -> np.ndarray:
     return world_FN34
 
 
-def may_be_joints(nodes: Sequence[Node]) -> list[int]:
-    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones. The rest
-    of a large scene, a house for instance, need not be worked out.
+def may_be_joints(nodes: Sequence[Node], every: bool) -> list[int]:
+    """The places of nodes that may be joints: bones and what they hang on; all nodes where too few are bones, or every
+    one is asked for. The rest of a large scene, a house for instance, need not be worked out.
     """
     bones = [place for place, node in enumerate(nodes) if node.is_bone]
-    if len(bones) < _FEWEST_BONES:
+    if every or len(bones) < _FEWEST_BONES:
         return list(range(len(nodes)))
     kept: set[int] = set()
     for bone in bones:
@@ -179,7 +183,7 @@ def scene_tree(scene: Scene, animation: Animation, time_T: np.ndarray, rest: Res
                 back_F33 = turn_FN33[:, parent].mT
                 point_F3 = (back_F33 @ (point_F3 - world_FN34[:, parent, :, 3])[..., None])[..., 0]
                 turn_F33 = back_F33 @ turn_F33
-            value_TN6[block, place] = np.concatenate([point_F3, _angles(turn_F33)], axis=-1)
+            value_TN6[block, place] = np.concatenate([point_F3, angles_zyx(turn_F33)], axis=-1)
     return _tree([node.name for node in scene.nodes], parents, rest.world_N34[..., 3], value_TN6, rest.name)
 
 
@@ -216,15 +220,3 @@ def _check(scene: Scene, world_FN34: np.ndarray) -> None:
     if not good_FN.all():
         node = scene.nodes[int(np.argwhere(~good_FN)[0][1])]
         raise BadScene(f"'{shortened(node.name, 40)}' is at no place, or scaled to nothing")
-
-
-def _angles(turn_F33: np.ndarray) -> np.ndarray:
-    """Angles (F, 3) about z, y and x [deg], the outermost first, also where they are not unique."""
-    z_F = np.arctan2(turn_F33[:, 1, 0], turn_F33[:, 0, 0])
-    y_F = np.arctan2(-turn_F33[:, 2, 0], np.hypot(turn_F33[:, 0, 0], turn_F33[:, 1, 0]))
-    sine_F, cosine_F = np.sin(z_F), np.cos(z_F)
-    x_F = np.arctan2(
-        sine_F * turn_F33[:, 0, 2] - cosine_F * turn_F33[:, 1, 2],
-        cosine_F * turn_F33[:, 1, 1] - sine_F * turn_F33[:, 0, 1],
-    )
-    return np.degrees(np.stack([z_F, y_F, x_F], axis=-1))

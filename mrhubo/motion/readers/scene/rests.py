@@ -14,7 +14,7 @@ import numpy as np
 
 from mrhubo.fast.plain.human import norm
 from mrhubo.fast.rotations import orthonormal
-from mrhubo.motion.readers.scene.nodes import in_world
+from mrhubo.motion.readers.scene.nodes import Rest, in_world
 
 OWN, BOUND = "its nodes' own pose", "the pose in which its skin was bound"
 """Names of poses at rest."""
@@ -38,20 +38,24 @@ def _quarter_turns() -> np.ndarray:
 _QUARTERS_Q33 = _quarter_turns()
 
 
-def bound_pose(local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int, np.ndarray]) -> np.ndarray | None:
-    """Where nodes (N, 3, 4) are in the world when the skin is bound; None where too few bones are bound.
+def bound_rests(
+    local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int, np.ndarray], up: str | None
+) -> list[Rest]:
+    """The pose in which the skin is bound; none where too few bones are bound, two where its axes are in doubt.
 
-    The skin's axes are those of the world but for quarter turns, which most bones tell, and a unit.
+    The skin's axes are those of the world but for quarter turns, and a unit. Most bones tell the turn, but for those of
+    somebody whom a program left lying or on all fours: if a body stands upright without a turn, there is none.
 
     Args:
         local_N34: where nodes are in their parents when nothing moves them.
         parents: of the nodes, which come before them.
         bound: where bones (3, 4) are in the skin's axes, by their place.
+        up: the axis that is up, as the file says.
     """
     with np.errstate(all="ignore"):
         bound = {p: b for p, b in bound.items() if np.isfinite(b).all() and abs(np.linalg.det(b[:, :3])) > 0}
     if len(bound) < _FEWEST_BOUND:
-        return None
+        return []
     world_N34 = in_world(local_N34[None], parents)[0]
     places = list(bound)
     with np.errstate(all="ignore"):
@@ -65,7 +69,20 @@ def bound_pose(local_N34: np.ndarray, parents: Sequence[int], bound: Mapping[int
     ]
     scale = lengths[0] / lengths[1] if min(lengths) > 0 else 1.0
     scale = 1.0 if abs(scale - 1) < _SAME else scale
-    place_33 = scale * turn_33
+    found = [Rest(BOUND, _posed(local_N34, world_N34, parents, bound, scale * turn_33))]
+    if up is not None and not np.array_equal(turn_33, np.eye(3)):
+        found.insert(0, Rest(BOUND, _posed(local_N34, world_N34, parents, bound, scale * np.eye(3)), up=up))
+    return found
+
+
+def _posed(
+    local_N34: np.ndarray,
+    world_N34: np.ndarray,
+    parents: Sequence[int],
+    bound: Mapping[int, np.ndarray],
+    place_33: np.ndarray,
+) -> np.ndarray:
+    """Where nodes (N, 3, 4) are, if a map leads from the axes of the skin, in which some are bound, to the world."""
     found_N34 = np.empty_like(world_N34)
     below = np.zeros(len(parents), bool)  # bones that are bound, and what hangs on them
     for place, parent in enumerate(parents):

@@ -34,6 +34,9 @@ _BENT = np.sin(np.radians(15.0))
 _OFTEN = 0.05
 """Share of the frames in which a knee must be bent so much to be believed by itself."""
 
+_TOES, _TOES_ALIKE = 3, 1.7
+"""Toes of which one is in the middle; and how much their distances from the ankle differ, as a ratio, at most."""
+
 _LEG, _ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 NEEDED = ("pelvis", "spine3", *(f"{side}_{name}" for side in ("left", "right") for name in (*_LEG, *_ARM)))
 """Joints without which nothing can be made of a tree."""
@@ -100,7 +103,21 @@ def _toes(shape: Shape, limbs: Limbs, leg: int) -> int | None:
     chain, ankle = limbs.chains["leg"][leg], limbs.legs[leg][2]
     start = chain.places.index(ankle)
     beyond = [i for i in range(start + 1, len(chain.places)) if chain.below[i] - chain.below[start] > shape.nothing]
-    return chain.places[beyond[0]] if beyond else None
+    return _middle_toe(shape, ankle, chain.places[beyond[0]]) if beyond else None
+
+
+def _middle_toe(shape: Shape, ankle: int, toe: int) -> int:
+    """The toe in the middle of those that begin beside one: feet of some models have five."""
+    far = shape.distance(ankle, toe)
+    toes = [
+        one
+        for one in shape.tree.children[shape.tree.joints[toe].parent]
+        if far / _TOES_ALIKE < shape.distance(ankle, one) < far * _TOES_ALIKE
+        and shape.distance(one, toe) < far / _TOES_ALIKE
+    ]
+    if len(toes) < _TOES:
+        return toe
+    return min(toes, key=lambda one: sum(shape.distance(one, other) for other in toes))
 
 
 def _steadiest(shape: Shape, carrier: int, ends: list[int], above: list[int], misplaced: Callable[[str], bool]) -> int:

@@ -41,7 +41,14 @@ class Given:
 
 
 def tree_motion(
-    tree: JointTree, name: str, what: str, frame_rate: float, kind: str, given: Given, notes: tuple[str, ...] = ()
+    tree: JointTree,
+    name: str,
+    what: str,
+    frame_rate: float,
+    kind: str,
+    given: Given,
+    notes: tuple[str, ...] = (),
+    told_up: str | None = None,
 ) -> Motion:
     """The motion of a tree.
 
@@ -53,6 +60,7 @@ def tree_motion(
         kind: what the file is, for `Motion.source`.
         given: what the user says.
         notes: what the reader has to say.
+        told_up: the axis that is up, as the file says; `AT_REST` if it is the one along which a body stands at rest.
 
     Raises:
         UserError: no body is found in the tree.
@@ -65,7 +73,7 @@ def tree_motion(
         remarks.append("the first frame is a pose at rest from which the motion jumps away: left out")
     frames = np.unique(np.linspace(0, len(tree) - 1, _SAMPLES).astype(int))
     pose = tree.pose(frames, list(place.values()))
-    axis, why = up_axis(pose, place, reference, given.up, remarks)
+    axis, why = up_axis(pose, place, reference, given.up, told_up, remarks)
     unit, unit_name = unit_of(pose, place, given.unit)
     world_33 = to_y_up(axis)
     spine = [above for above in tree.above(place["spine3"]) if place["pelvis"] in tree.above(above)[1:]]

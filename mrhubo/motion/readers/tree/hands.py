@@ -9,7 +9,7 @@ import numpy as np
 
 from mrhubo.motion.orientations import frame_of
 from mrhubo.motion.readers.tree.hierarchy import JointTree
-from mrhubo.motion.readers.tree.names import is_thumb
+from mrhubo.motion.readers.tree.names import is_finger, is_thumb
 from mrhubo.motion.readers.tree.reference import angle
 
 _APART_DEG = 15.0
@@ -25,7 +25,9 @@ def hand_axes(tree: JointTree, wrist: int) -> np.ndarray | None:
     be told from the fingers. Fingers are looked at as they are when all angles are 0: how they are bent in the motion
     says nothing about the hand.
     """
-    fingers = [chain for child in tree.children[wrist][:_MOST] if len(chain := _chain(tree, child)) > 0]
+    fingers = [_chain(tree, child) for child in tree.children[wrist][:_MOST]]
+    called = [chain for chain in fingers if any(is_finger(tree.names[place]) for place in chain)]
+    fingers = called if len(called) > 1 else fingers  # what a hand holds is none
     point = tree.rest().point
 
     def seen(place: int) -> np.ndarray:

@@ -75,11 +75,25 @@ class JointTree:
         return [place for place, joint in enumerate(self.joints) if joint.parent < 0]
 
     def under(self, root: int) -> JointTree:
-        """The tree of a joint and all that hang on it."""
+        """The tree of a joint and all that hang on it; it moves as those above move it."""
         kept = [place for place in range(len(self.joints)) if root in self.above(place)]
         moved = {place: number for number, place in enumerate(kept)}
         joints = [replace(self.joints[place], parent=moved.get(self.joints[place].parent, -1)) for place in kept]
-        return replace(self, joints=tuple(joints))
+        above = [self.joints[place] for place in self.above(root)[1:]]
+        if not any(joint.rotation or joint.position or any(joint.offset_3) for joint in above):
+            return replace(self, joints=tuple(joints))
+        pose, first = self.pose(slice(None), [root]), self.value_TC.shape[1]
+        value_T6 = np.concatenate([pose.point[root], angles_zyx(pose.matrix[root])], axis=-1)
+        columns = range(first, first + 6)
+        joints[0] = Joint(
+            joints[0].name,
+            -1,
+            (0.0, 0.0, 0.0),
+            tuple(zip("zyx", columns[3:], strict=True)),
+            tuple(zip("xyz", columns[:3], strict=True)),
+        )
+        value_TC = np.concatenate([self.value_TC, value_T6.astype(self.value_TC.dtype)], axis=1)
+        return replace(self, joints=tuple(joints), value_TC=value_TC)
 
     def pose(self, frames: slice | np.ndarray, places: Sequence[int] | None = None) -> Pose:
         """Some joints, or all, in some frames."""
@@ -164,3 +178,15 @@ def turn_about(matrix_33F: np.ndarray, axis: str, angle_F: np.ndarray | float) -
     one_3F, other_3F = matrix_33F[:, first].copy(), matrix_33F[:, second]
     matrix_33F[:, first] = cosine_F * one_3F + sine_F * other_3F
     matrix_33F[:, second] = cosine_F * other_3F - sine_F * one_3F
+
+
+def angles_zyx(turn_F33: np.ndarray) -> np.ndarray:
+    """Angles (F, 3) about z, y and x [deg], the outermost first, also where they are not unique."""
+    z_F = np.arctan2(turn_F33[:, 1, 0], turn_F33[:, 0, 0])
+    y_F = np.arctan2(-turn_F33[:, 2, 0], np.hypot(turn_F33[:, 0, 0], turn_F33[:, 1, 0]))
+    sine_F, cosine_F = np.sin(z_F), np.cos(z_F)
+    x_F = np.arctan2(
+        sine_F * turn_F33[:, 0, 2] - cosine_F * turn_F33[:, 1, 2],
+        cosine_F * turn_F33[:, 1, 1] - sine_F * turn_F33[:, 0, 1],
+    )
+    return np.degrees(np.stack([z_F, y_F, x_F], axis=-1))

@@ -30,9 +30,9 @@ _HIPS_LEG, _HIPS, _BESIDE = 0.22, 0.6, 50.0
 _SKIPPED, _ROLLED = 2.0, 0.25
 """Cost of a joint between two that are taken, as bones are rarely cut into pieces; and of one that cuts a bone which
 never bends there."""
-_NAMED = 1.5
+_NAMED = 5.0
 """What it is worth that the end of the arm is called hand or wrist."""
-_CALLED = 6.0
+_CALLED = 12.0
 """What it is worth that all joints of a leg are called after a leg, and all of an arm after an arm."""
 _HEADED = 6.0
 """What it is worth that a head hangs where the arms do, or that the arms hang farther from the root than the legs."""

@@ -27,7 +27,12 @@ def is_thumb(name: str) -> bool:
 
 def is_hand(name: str) -> bool:
     """Whether a name says hand or wrist, and no finger."""
-    return _has(name, _HAND) and not re.search(r"thumb|index|mid|ring|pinky|little|finger|\d", name, re.IGNORECASE)
+    return _has(name, _HAND) and not is_finger(name) and not re.search(r"\d", name)
+
+
+def is_finger(name: str) -> bool:
+    """Whether a name says finger, or one of them."""
+    return re.search(r"thumb|index|mid|ring|pinky|little|finger", name, re.IGNORECASE) is not None
 
 
 def is_head(name: str) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.tracks import Person, choose
 from mrhubo.motion.readers.tree.hierarchy import JointTree
@@ -12,6 +14,8 @@ from mrhubo.motion.readers.tree.shape import Shape
 
 FEWEST_JOINTS = 13
 """The trunk, and three of each limb."""
+_STILL_DEG = 0.01
+"""Angles that change by less in a whole motion do not."""
 _ALL = 0.9
 """People who hang on one node have this share of all joints at least; two arms with all their fingers have less."""
 _LESS_LIKE = 6.0
@@ -32,8 +36,15 @@ def of_person(path: Path, tree: JointTree, options: ReadOptions, notes: list[str
     if len(people) < 2 and (len(tree.roots) < 2 or not people):
         notes += options.of_one()
         return tree
-    chosen = choose(path, [Person(name, len(tree)) for name in people], options, notes)
+    chosen = choose(path, [Person(name, _length(under)) for name, under in people.items()], options, notes)
     return people[chosen.person]
+
+
+def _length(tree: JointTree) -> int:
+    """In how many frames somebody is seen; who never moves, as the others do in an animation of theirs, in one."""
+    columns = [column for joint in tree.joints for _, column in joint.rotation]
+    moves = bool(columns) and bool((np.ptp(tree.value_TC[:, columns], axis=0) > _STILL_DEG).any())
+    return len(tree) if moves else 1
 
 
 def _bodies(tree: JointTree) -> dict[int, JointTree]:

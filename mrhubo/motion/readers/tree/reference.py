@@ -8,11 +8,13 @@ Frame: the file's own world.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.body.joints import SIDES
 from mrhubo.fast.rotations import turned
 from mrhubo.motion.readers.tree.hierarchy import JointTree, Pose
 
@@ -24,10 +26,13 @@ _STRAIGHT_DEG = 45.0
 """How far arms and legs may be bent: models stand with loose elbows."""
 _ALIKE_DEG = 25.0
 """How far one arm may be from the mirror image of the other."""
+_MIRRORED_DEG = 1.0
+"""The same of all limbs in a pose that somebody made, and that is no moment of a motion."""
 _ARMS_UP_DEG = 50.0
 """Arms at rest hang, or are held out, at least by this angle from straight up."""
 _SNAP_DEG = 12.0
 """Trunk and hips that are as near to an axis of the file are meant to be along it."""
+_ARM, _LEG = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
 _JUMP = 2.0
 """How many times as far as in the next steps joints move from a first frame that is no part of the motion. Who really
 starts from a pose moves less in the first step than in those that follow."""
@@ -96,7 +101,9 @@ def first_frame_jumps(tree: JointTree, place: Mapping[str, int]) -> bool:
 
 
 def _read(pose: Pose, place: Mapping[str, int], what: str, strict: bool) -> Reference | None:
-    """The pose as one of rest, if it is. Strict: arms are held out and straight, as nobody does by chance."""
+    """The pose as one of rest, if it is. Strict: arms are straight, and held out, or else both sides are alike to the
+    degree, as nobody's are by chance.
+    """
     point = {name: pose.point[p][0] for name, p in place.items()}
     turn = {name: pose.matrix[p][0] for name, p in place.items()}
     hips = point["left_hip"] - point["right_hip"]
@@ -105,7 +112,7 @@ def _read(pose: Pose, place: Mapping[str, int], what: str, strict: bool) -> Refe
     if min(map(np.linalg.norm, (hips, shoulders, up))) < 1e-9:
         return None
     wrong = angle(hips, shoulders) > _LEVEL_DEG or any(abs(angle(up, x) - 90) > _LEVEL_DEG for x in (hips, shoulders))
-    arms = []
+    arms, level = [], True
     for side in ("left", "right"):
         hip, knee, ankle, shoulder, elbow, wrist = (
             point[f"{side}_{name}"] for name in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
@@ -114,7 +121,7 @@ def _read(pose: Pose, place: Mapping[str, int], what: str, strict: bool) -> Refe
         wrong |= angle(knee - hip, ankle - knee) > _STRAIGHT_DEG
         wrong |= angle(elbow - shoulder, wrist - elbow) > (_STRAIGHT_DEG if not strict else _LEVEL_DEG)
         wrong |= angle(wrist - shoulder, up) < _ARMS_UP_DEG
-        wrong |= strict and abs(angle(wrist - shoulder, up) - 90) > _UPRIGHT_DEG
+        level &= abs(angle(wrist - shoulder, up) - 90) <= _UPRIGHT_DEG
         arms.append(wrist - shoulder)
     if wrong:
         return None
@@ -122,7 +129,18 @@ def _read(pose: Pose, place: Mapping[str, int], what: str, strict: bool) -> Refe
     left, right = (axes_33.T @ arm for arm in arms)
     if angle(left * [-1, 1, 1], right) > _ALIKE_DEG or left[0] < right[0]:
         return None
+    if strict and not level and _unlike(point, axes_33) > _MIRRORED_DEG:
+        return None
     return Reference(point, turn, axes_33, what)
+
+
+def _unlike(point: Mapping[str, np.ndarray], axes_33: np.ndarray) -> float:
+    """The largest angle [deg] between a bone of a limb and the mirror image of the other side's."""
+    found = []
+    for start, end in (*itertools.pairwise(_ARM), *itertools.pairwise(_LEG)):
+        left, right = (axes_33.T @ (point[f"{side}_{end}"] - point[f"{side}_{start}"]) for side in SIDES)
+        found.append(angle(left * [-1, 1, 1], right))
+    return max(found)
 
 
 def _axes(left: np.ndarray, up: np.ndarray) -> np.ndarray:

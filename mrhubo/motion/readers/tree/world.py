@@ -36,6 +36,8 @@ _STEADY = 0.5
 """Length of the mean of upward unit vectors from which on people stand more than they lie."""
 _UPS = ("y", "z", "-y")
 """Axes that are up in some files: -y in what a camera sees."""
+AT_REST = "at rest"
+"""What is up where a pose at rest tells that for sure."""
 _FLOOR, _RISES = 0.35, 0.25
 """How far from 0 the lowest joint may be to be on a floor; and how much its height varies at most, of anybody who is
 not carried about; in lengths of a leg.
@@ -43,19 +45,27 @@ not carried about; in lengths of a leg.
 
 
 def up_axis(
-    pose: Pose, place: Mapping[str, int], reference: Reference | None, given: str | None, notes: list[str]
+    pose: Pose,
+    place: Mapping[str, int],
+    reference: Reference | None,
+    given: str | None,
+    told: str | None,
+    notes: list[str],
 ) -> tuple[str, str]:
     """Which axis is up, for instance `z` or `-y`, and in words how that is known.
 
     It is that along which people stand on the mean, but for those who lie or crawl throughout a motion. These stand
     along an axis that is up in no file, or along which the lowest joint goes up and down as that of nobody who walks;
-    then it is the axis along which the skeleton stands at rest, or y or z, if there is a floor at 0 across it.
+    then it is the axis along which the skeleton stands at rest, or y or z, if there is a floor at 0 across it. What the
+    file says is believed where nothing stands against it: a pose at rest along another axis, or a floor at 0 across the
+    one along which people stand.
 
     Args:
         pose: some frames.
         place: which joint is which.
         reference: the pose at rest, if there is one.
         given: what the user says.
+        told: what the file says; `AT_REST` if that along which the skeleton stands at rest is up.
         notes: is told where motion and rest disagree.
     """
     if given is not None:
@@ -68,11 +78,19 @@ def up_axis(
     stands = length >= _STEADY and np.abs(mean_3).max() >= _CLEAR * length
     found = named_axis(mean_3) if stands else None
     resting = None if reference is None else named_axis(reference.axes_33[:, 1])
-    if found is not None and found == resting:
+    told, who = (resting, "its pose at rest") if told == AT_REST else (told, "the file")
+    if found is not None and found == (resting or told):
         return found, "by how the body stands"
+    if told is not None and resting in (None, told) and (found is None or not _on_floor(pose, place, found)):
+        if found is not None:
+            notes.append(
+                f"the body lies along {found}, as {who} says that {told} is up, which is taken ('up: {found}' in"
+                " --bvh-map if it is not)"
+            )
+        return told, f"as {who} says"
     floor = {axis: _floor(pose, place, axis) for axis in (("y", "z") if resting is None else (resting,))}
     best = min(floor, key=lambda axis: sum(floor[axis]))
-    has_floor = floor[best][0] < _FLOOR and floor[best][1] < _RISES
+    has_floor = _on_floor(pose, place, best)
     if found is None and resting is not None:
         return resting, "by its pose at rest, as the body lies"
     if found is None:
@@ -90,6 +108,12 @@ def up_axis(
             " --bvh-map if it is not)"
         )
     return found, "by how the body stands"
+
+
+def _on_floor(pose: Pose, place: Mapping[str, int], axis: str) -> bool:
+    """Whether there is a floor at height 0, if an axis is up."""
+    low, rises = _floor(pose, place, axis)
+    return low < _FLOOR and rises < _RISES
 
 
 def _floor(pose: Pose, place: Mapping[str, int], axis: str) -> tuple[float, float]:
