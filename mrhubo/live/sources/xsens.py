@@ -39,10 +39,11 @@ _OF_JOINT = _TRUNK | {
 _SEGMENT_J = [SEGMENTS.index(_OF_JOINT[joint]) for joint in JOINT_NAMES]
 """The segment that is turned as each of our joints."""
 _STARTS, _ENDS = (
-    [JOINT_NAMES.index(f"{side}_{joint}") for side in SIDES for joint in joints]
+    [JOINT_NAMES.index(f"{side}_{joint}") for joint in joints for side in SIDES]
     for joints in (("shoulder", "elbow", "hip", "knee"), ("elbow", "wrist", "knee", "ankle"))
 )
-"""Bones of limbs."""
+"""Bones of limbs, those of the legs last."""
+_LEGS = slice(2 * len(SIDES), None)
 _BONES_L3 = normalize(OFFSETS_J3[[end - 1 for end in _ENDS]].astype(np.float64))
 _HIPS = [JOINT_NAMES.index(f"{side}_hip") for side in SIDES]
 _HIPS_3 = OFFSETS_J3[[hip - 1 for hip in _HIPS]].mean(axis=0).astype(np.float64)
@@ -125,8 +126,7 @@ def _pose(place_S3: np.ndarray, turn_S4: np.ndarray) -> SeenPose:
     here_L3 = (world_J33[_STARTS] @ _BONES_L3[..., None])[..., 0]
     turn_L33 = np.where((length_L > 1e-3)[:, None, None], shortest_turn(here_L3, there_L3), np.eye(3))
     world_J33[_STARTS] = turn_L33 @ world_J33[_STARTS]
-    legs = [number for number, start in enumerate(_STARTS) if JOINT_NAMES[start].endswith(("hip", "knee"))]
-    leg = float(length_L[legs].sum()) / 2
+    leg = float(length_L[_LEGS].sum()) / len(SIDES)
     hips_3 = place_J3[_HIPS].mean(axis=0) * (LEG_LENGTH / leg if leg > 0.05 else 1.0)
     local_J33 = local_rotations(world_J33[None])[0].astype(np.float32)
     root = Root(world_J33[0], hips_3 - world_J33[0] @ _HIPS_3)

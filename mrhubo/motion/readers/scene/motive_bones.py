@@ -33,8 +33,8 @@ _KINDS = (
     ("neck", r"neck"),
 )
 """What bones are called in the ways of naming that Motive offers; the first that is in a name counts."""
-_COLLAR = r"collar|clavicle"
-"""Beside one that is called so, a shoulder is an upper arm."""
+_COLLAR, _SHOULDER = r"collar|clavicle", r"shoulder"
+"""Beside a bone that is called as the first, one that is called as the second is an upper arm."""
 _CARRIED_BY = {
     "toe": "foot", "foot": "shin", "shin": "thigh", "hand": "lower arm", "lower arm": "upper arm",
     "upper arm": "collar", "head": "neck",
@@ -80,7 +80,7 @@ def farther(names: Sequence[str], top: int) -> np.ndarray:
     far_BB = np.where(side_B[:, None] == side_B, 1.0, np.where(side_B[:, None] == 0, _MIDDLE, np.inf))
     kinds = [_kind(name) if bone != top else "" for bone, name in enumerate(names)]
     if any(re.search(_COLLAR, name) for name in names):
-        kinds = ["upper arm" if "shoulder" in name else kind for name, kind in zip(names, kinds, strict=True)]
+        kinds = ["upper arm" if re.search(_SHOULDER, name) else kind for name, kind in zip(names, kinds, strict=True)]
     for bone in range(len(names)):
         may = _may_carry(bone, names, kinds, side_B)
         far_BB[[one for one in range(len(names)) if one not in may], bone] = np.inf
