@@ -25,10 +25,8 @@ from mrhubo.live.messages import Refused
 from mrhubo.live.sources.xsens import PORT, Segments, XsensSource
 from mrhubo.motion.readers.xsens import SEGMENTS
 from tests.motion.readers.test_mvnx import mvnx, subject
-from tests.motion.readers.test_nymeria import FRAMES, LIMBS, TO_ROBOT, body
+from tests.motion.readers.test_nymeria import FRAMES, JOINTS, TO_ROBOT, body
 
-_JOINTS = ["pelvis", "spine1", "spine1", "spine2", "spine3", "neck", "head"]
-_JOINTS += [f"{side}_{joint}" for limb in LIMBS for side in ("right", "left") for joint in limb]
 _ALL = tuple(range(1, len(SEGMENTS) + 1))
 
 
@@ -38,7 +36,7 @@ def datagram(
 ) -> bytes:  # fmt: skip
     """Segments of our body in a frame, by their numbers from 1 on."""
     place_TJ3, world_TJ33 = body()
-    joints = [JOINT_NAMES.index(name) for name in _JOINTS]
+    joints = [JOINT_NAMES.index(name) for name in JOINTS]
     places = place_TJ3[frame][joints] @ TO_ROBOT.T
     turns = np.roll(Rotation.from_matrix(TO_ROBOT @ world_TJ33[frame][joints] @ TO_ROBOT.T).as_quat(), 1, axis=1)
     data = b"".join(struct.pack(">I7f", number, *places[number - 1], *turns[number - 1]) for number in numbers)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrhubo.body.arm_axes import elbow_tilt, untilt_arms
 from mrhubo.body.joints import JOINT_NAMES, OFFSETS_J3, PARENTS
-from mrhubo.body.level_feet import rolled_up, standing_up, turn_feet
+from mrhubo.body.level_feet import Feet, rolled_up, standing_up, turn_feet
 from mrhubo.body.rest_directions import FAMILIES, from_family
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.units import find_unit
@@ -27,9 +27,9 @@ LARGEST_BETA = 1e6
 """No number of a body's shape is that large."""
 _SEEN = 500
 """About how many frames tell which way is up."""
-LOOKS = 30.0
+_LOOKS = 30.0
 """How often a second it is looked whether feet stand: more often, those that swing would seem to."""
-UPRIGHT_M = 0.6
+_UPRIGHT_M = 0.6
 """How far an ankle is under the pelvis of who stands [m], and not sits or lies."""
 _FEET = (JOINT_NAMES.index("left_foot"), JOINT_NAMES.index("right_foot"))
 """Where toes begin, of all joints."""
@@ -59,14 +59,26 @@ def to_our_rest(motion: Motion) -> Motion:
     local_TJ33 = untilt_arms(motion.arrays.local_TJ33, tilt)
     notes = [f"the elbows' axes are tilted by {math.degrees(tilt):.0f} degrees from SMPL's: taken out"]
     root_T33 = motion.arrays.root_rotation_T33
-    few = slice(None, None, max(1, round(motion.frame_rate / LOOKS)))
-    if root_T33 is not None and (up := rolled_up(standing_up(root_T33[few], local_TJ33[few], UPRIGHT_M))) is not None:
+    feet = None if root_T33 is None else standing_feet(root_T33, local_TJ33, motion.frame_rate)
+    if feet is not None and (up := rolled_up(feet)) is not None:
         left, right = (math.degrees(math.acos(up_3[1])) for up_3 in up)
         notes.append(
             f"the feet stand rolled, the left one by {left:.0f} and the right one by {right:.0f} degrees: taken out"
         )
         local_TJ33 = turn_feet(local_TJ33, up)
     return motion.changed(local_TJ33=local_TJ33, notes=(*motion.notes, *notes))
+
+
+def standing_feet(root_T33: np.ndarray, local_TJ33: np.ndarray, frame_rate: float) -> Feet:
+    """The world's up in the frame of each foot, in some frames (X, 3) in which somebody upright stands on it.
+
+    Args:
+        root_T33: rotations (T, 3, 3) of the pelvis in the world, y up.
+        local_TJ33: local rotations (T, 21, 3, 3).
+        frame_rate: frames per second.
+    """
+    few = slice(None, None, max(1, round(frame_rate / _LOOKS)))
+    return standing_up(root_T33[few], local_TJ33[few], _UPRIGHT_M)
 
 
 def in_metres(motion: Motion, where: str, beyond: float = 0.0) -> Motion:

@@ -86,7 +86,7 @@ def motion_of_points(path: Path, found: Keypoints, options: ReadOptions) -> Moti
     missing = [name for name in NEEDED if name not in places]
     if missing:
         raise UserError(f"{path}: has no point called {listed(missing)}; shoulders and hips are needed")
-    rate, notes = _rate(path, found, options), found.notes
+    rate, notes = rate_of_points(path, found, options), found.notes
     point_TK3 = known_points(found.point_TK3, found.confidence_TK)
     points = {name: _seldom_at_origin(name, point_TK3[:, place]) for name, place in places.items()}
     _refuse_shares(path, found, points)
@@ -163,7 +163,12 @@ def _refuse_shares(path: Path, found: Keypoints, points: Mapping[str, np.ndarray
         )
 
 
-def _rate(path: Path, found: Keypoints, options: ReadOptions) -> float:
+def rate_of_points(path: Path, found: Keypoints, options: ReadOptions) -> float:
+    """Frames per second: what the file tells, or the options.
+
+    Raises:
+        UserError: neither does.
+    """
     if found.rate is None:
         return asked_rate(path, options)
     return told_rate(path, "says", found.rate, options, found.notes)

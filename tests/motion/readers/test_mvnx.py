@@ -18,10 +18,8 @@ from mrhubo.motion import Motion, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.xsens import SEGMENTS
 from tests.motion.damage import Step, accidents, altered_words, damaged, read_or_refused
-from tests.motion.readers.test_nymeria import FRAMES, LIMBS, TO_ROBOT, body, check
+from tests.motion.readers.test_nymeria import FRAMES, JOINTS, TO_ROBOT, body, check
 
-_JOINTS = ["pelvis", "spine1", "spine1", "spine2", "spine3", "neck", "head"]
-_JOINTS += [f"{side}_{joint}" for limb in LIMBS for side in ("right", "left") for joint in limb]
 _CONTACTS = np.arange(4 * FRAMES).reshape(FRAMES, 4) % 3 == 0
 
 
@@ -35,7 +33,7 @@ def subject(
     """Somebody who moves as our body does, perhaps back in time, with segments in another order."""
     place_TJ3, world_TJ33 = body()
     frames = range(FRAMES)[:: -1 if backward else 1]
-    joints = [JOINT_NAMES.index(name) for name in _JOINTS]
+    joints = [JOINT_NAMES.index(name) for name in JOINTS]
     order = list(range(len(SEGMENTS))) if order is None else order
     names = [SEGMENTS[i] if i >= 0 else "Prop1" for i in order]
     text = f'<subject label="{label}" {rate} segmentCount="{len(order)}" configuration="FullBody"><segments>\n'

@@ -17,7 +17,10 @@ from mrhubo.motion import Motion
 
 FRAMES = 12
 TO_ROBOT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-LIMBS = [("collar", "shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "foot")]
+_LIMBS = [("collar", "shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "foot")]
+JOINTS = ["pelvis", "spine1", "spine1", "spine2", "spine3", "neck", "head"]
+JOINTS += [f"{side}_{joint}" for limb in _LIMBS for side in ("right", "left") for joint in limb]
+"""Ours that stand for Xsens' segments, in their order."""
 
 
 def body() -> tuple[np.ndarray, np.ndarray]:
@@ -32,9 +35,7 @@ def body() -> tuple[np.ndarray, np.ndarray]:
 
 
 def write(path: Path, place_TJ3: np.ndarray, world_TJ33: np.ndarray, **more: object) -> None:
-    names = ["pelvis", "spine1", "spine1", "spine2", "spine3", "neck", "head"]
-    names += [f"{side}_{joint}" for limb in LIMBS for side in ("right", "left") for joint in limb]
-    joints = [JOINT_NAMES.index(name) for name in names]
+    joints = [JOINT_NAMES.index(name) for name in JOINTS]
     turns = TO_ROBOT @ world_TJ33[:, joints] @ TO_ROBOT.T
     quaternion = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat()
     arrays: dict[str, object] = {

@@ -12,22 +12,21 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.body.joints import SIDES
-from mrhubo.body.level_feet import middle, standing_up, turn_feet
+from mrhubo.body.level_feet import middle, turn_feet
 from mrhubo.errors import UserError, listed, shortened
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import motion_from_points
 from mrhubo.motion.readers.advice import SOLVE
-from mrhubo.motion.readers.assemble import LOOKS, UPRIGHT_M
+from mrhubo.motion.readers.assemble import standing_feet
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
-from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points, refuse_far, to_world
+from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points, rate_of_points, refuse_far, to_world
 from mrhubo.motion.readers.markers.c3d_file import read_c3d_file
 from mrhubo.motion.readers.markers.joints import body_of_markers
 from mrhubo.motion.readers.markers.labels import has_body, marker_places
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import by_names
-from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.tracks import Person, check_span, choose
 
 _STANDS_FOR = {"shoulder": "acromion", "hip": "front_pelvis", "knee": "lateral_knee", "ankle": "lateral_ankle"}
@@ -107,10 +106,7 @@ def motion_of_markers(path: Path, found: Keypoints, kind: str, options: ReadOpti
         UserError: markers are never seen together, or the rate is not known.
     """
     refuse_far(path, found)
-    if found.rate is None:
-        rate = asked_rate(path, options)
-    else:
-        rate = told_rate(path, "says", found.rate, options, found.notes)
+    rate = rate_of_points(path, found, options)
     places = marker_places(found.names or [])
     point_TK3 = np.where((found.point_TK3 == 0).all(-1, keepdims=True), np.nan, found.point_TK3)
     markers = {name: point_TK3[:, at] for name, at in places.items()}
@@ -138,8 +134,7 @@ def _levelled(motion: Motion) -> Motion:
     arrays = motion.arrays
     if arrays.root_rotation_T33 is None:
         return motion
-    few = slice(None, None, max(1, round(motion.frame_rate / LOOKS)))
-    feet = standing_up(arrays.root_rotation_T33[few], arrays.local_TJ33[few], UPRIGHT_M)
+    feet = standing_feet(arrays.root_rotation_T33, arrays.local_TJ33, motion.frame_rate)
     ups = [middle(up_X3) if len(up_X3) >= _STANDS else _LEVEL for up_X3 in feet]
     left_3, right_3 = (up_3 if up_3 @ _LEVEL > np.cos(_TILTED) else _LEVEL for up_3 in ups)
     return motion.changed(local_TJ33=turn_feet(arrays.local_TJ33, (left_3, right_3)))

@@ -125,8 +125,7 @@ def _back(markers: Markers) -> np.ndarray:
 def _pelvis(markers: Markers) -> np.ndarray:
     """How the pelvis is turned (T, 3, 3): columns to the left, up and forward, in the plane of its markers."""
     left_T3, right_T3 = (markers[f"{side}_front_pelvis"] for side in SIDES)
-    frame_T33 = frame_of(left_T3 - right_T3, (left_T3 + right_T3) / 2 - _back(markers))
-    return np.stack([frame_T33[..., 0], -frame_T33[..., 2], frame_T33[..., 1]], axis=-1)
+    return _level(left_T3 - right_T3, (left_T3 + right_T3) / 2 - _back(markers))
 
 
 def _hips(markers: Markers, pelvis_T33: np.ndarray) -> dict[str, np.ndarray]:
@@ -171,8 +170,7 @@ def _head(markers: Markers) -> np.ndarray | None:
         forward_T3 = 2 * markers["brow"] - markers["left_side_head"] - markers["right_side_head"]
     else:
         return None
-    frame_T33 = frame_of(left_T3, forward_T3)
-    return np.stack([frame_T33[..., 0], -frame_T33[..., 2], frame_T33[..., 1]], axis=-1)
+    return _level(left_T3, forward_T3)
 
 
 def _size(markers: Markers, hips: Markers) -> float:
@@ -272,6 +270,12 @@ def _beside(
         known_T1 = known_frames(both_T3)[:, None]
         joint_T3, lateral_T3 = np.where(known_T1, both_T3, joint_T3), np.where(known_T1, way_T3, lateral_T3)
     return joint_T3, lateral_T3
+
+
+def _level(left_T3: np.ndarray, forward_T3: np.ndarray) -> np.ndarray:
+    """How a part is turned (T, 3, 3) whose vectors to the left and forward are level: columns left, up, forward."""
+    frame_T33 = frame_of(left_T3, forward_T3)
+    return np.stack([frame_T33[..., 0], -frame_T33[..., 2], frame_T33[..., 1]], axis=-1)
 
 
 def _about_x(angle_deg: float) -> np.ndarray:

@@ -32,14 +32,21 @@ def marked(
     return unit * np.stack(list(markers.values()), axis=1) @ world_33.T, [label_of(place) for place in markers]
 
 
-def limbs_off(motion: Motion, name: str = "boxing") -> float:
-    """By how much [deg] limbs point elsewhere than the body's, seen from the chest and the pelvis, at most."""
-    place_TJ3, world_TJ33 = moving_body(name)
+def world_turns(motion: Motion) -> dict[int, np.ndarray]:
+    """How the joints of a motion are turned in the world (T, 3, 3), by their places in `JOINT_NAMES`."""
     root_T33 = motion.arrays.root_rotation_T33
-    assert root_T33 is not None and len(motion) == len(place_TJ3)
+    assert root_T33 is not None
     turns = {0: root_T33.astype(float)}
     for joint in range(1, 22):
         turns[joint] = turns[PARENTS[joint]] @ motion.arrays.local_TJ33[:, joint - 1]
+    return turns
+
+
+def limbs_off(motion: Motion, name: str = "boxing") -> float:
+    """By how much [deg] limbs point elsewhere than the body's, seen from the chest and the pelvis, at most."""
+    place_TJ3, world_TJ33 = moving_body(name)
+    turns = world_turns(motion)
+    assert len(motion) == len(place_TJ3)
     worst = 0.0
     for side in ("left", "right"):
         for start, end, seen_from in (
@@ -78,13 +85,11 @@ def test_a_body_in_c3d(how: Manner, tmp_path: Path) -> None:
 def test_hands_feet_and_head_are_turned_as_the_bodys(both_sides: bool, tmp_path: Path) -> None:
     place_TJ3, world_TJ33 = moving_body("boxing")
     motion = read(c3d(*marked(markers_on(place_TJ3, world_TJ33, both_sides))), tmp_path)
-    turns = {0: motion.arrays.root_rotation_T33}
-    for joint in range(1, 22):
-        turns[joint] = turns[PARENTS[joint]] @ motion.arrays.local_TJ33[:, joint - 1]
+    turns = world_turns(motion)
     for name, most in (("head", 0.2), ("left_wrist", 4.0), ("right_wrist", 4.0), ("left_ankle", 4.0)):
         joint = JOINT_NAMES.index(name)
         turned = angles_between(  # seen from the pelvis: which way is forward in the world, the file does not tell
-            turns[0].mT.astype(float) @ turns[joint], world_TJ33[:, 0].mT @ world_TJ33[:, joint]
+            turns[0].mT @ turns[joint], world_TJ33[:, 0].mT @ world_TJ33[:, joint]
         )
         assert np.degrees(turned.max()) < most, name
 
@@ -114,9 +119,7 @@ def test_feet_that_stand_are_level_whatever_the_height_of_their_markers(tmp_path
     for place, higher in (("left_toe", 0.03), ("right_toe", 0.02), ("right_heel", -0.01)):
         markers[place] = markers[place] + np.array([0, higher, 0])
     motion = read(c3d(*marked(markers), Manner(rate=30.0)), tmp_path)
-    turns = {0: motion.arrays.root_rotation_T33}
-    for joint in range(1, 22):
-        turns[joint] = turns[PARENTS[joint]] @ motion.arrays.local_TJ33[:, joint - 1]
+    turns = world_turns(motion)
     up_T3 = [turns[JOINT_NAMES.index(f"{side}_ankle")][:, 1, 1] for side in ("left", "right")]
     assert np.degrees(np.arccos(np.clip(np.median(up_T3, axis=1), -1, 1))).max() < 2.0
 
