@@ -36,7 +36,8 @@ def test_poses_that_touch_become_free_and_others_stay(avoidances: dict[str, Avoi
     assert float(avoidance.collision.collides(found_BN).sum()) < 0.2 * float(touched_B.sum())
     cost = [avoidance.problem.cost(q, target_BD3).sum(dim=1) for q in (found_BN, q_BN)]
     assert bool((cost[0] <= cost[1]).all())
-    assert torch.equal(avoidance(q_BN[close_B][:3], target_BD3[close_B][:3]), found_BN[close_B][:3])
+    few_BN = avoidance(q_BN[close_B][:3], target_BD3[close_B][:3])
+    torch.testing.assert_close(few_BN, found_BN[close_B][:3], rtol=0, atol=1e-5)  # sums of few may round otherwise
 
 
 @pytest.mark.parametrize("name", ["nao", "coman", "reachy"])
