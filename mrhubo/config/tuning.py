@@ -7,7 +7,7 @@ import dataclasses
 from mrhubo.config.places import where
 from mrhubo.config.schema import Config, TrainerConfig
 
-TUNING = TrainerConfig(max_steps=200, batch_size=64, lr=1e-3, validate_every=100)
+TUNING = TrainerConfig(max_steps=200, batch_size=32, lr=1e-3, validate_every=100)
 """What `docs/universal.md` measures."""
 
 

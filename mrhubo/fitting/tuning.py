@@ -15,7 +15,7 @@ from mrhubo.config import TrainerConfig
 from mrhubo.fitting.module import LOG_EVERY
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.runtime.trainer import stop_at, with_schedule
-from mrhubo.universal.iterations import LEARNT, unroll
+from mrhubo.universal.iterations import unroll
 from mrhubo.universal.learning.loss import BETAS, loss
 
 
@@ -32,7 +32,7 @@ class TuningModule(lightning.LightningModule):
         optimiser = self.network.optimiser
         branches = optimiser.branches
         problem = branches.ask(features_BF.unflatten(1, (-1, 3)))
-        trace = unroll(optimiser.network, problem, LEARNT)
+        trace = unroll(optimiser.network, problem, learning=True)
         return {"loss": loss(trace, branches.apart(q_BN), problem.bounds.present_BN)}
 
     def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:

@@ -3,7 +3,7 @@
 1. The network answers K hypotheses.
 2. The cheapest of them are refined by the network and, beside, by a Gauss-Newton step; the cheaper of the two goes on.
 3. The cheapest three of these go by damped Gauss-Newton steps, the better of two dampings. A training has the network
-   refine them too, so that it learns from there.
+   refine them too, so that it learns from there, and ends with that.
 4., 5. Likewise the cheapest one.
 
 The answer is the cheapest of all angles that were come by, by the exact cost. Limits are never exceeded, as all steps
@@ -24,7 +24,7 @@ from mrhubo.universal.network import UniversalNetwork
 from mrhubo.universal.problem import Place, Problem, choose
 
 ITERATIONS = 1 + len(KEPT)
-LEARNT = 2
+_LEARNT = 2
 """In how many iterations after the first a training has the network answer."""
 
 
@@ -52,8 +52,9 @@ class Trace:
         self.best.append(self.cost_B)
 
 
-def unroll(network: UniversalNetwork, problem: Problem, refined: int = REFINED) -> Trace:
-    """Five iterations from the middle of all ranges; in so many after the first the network answers."""
+def unroll(network: UniversalNetwork, problem: Problem, learning: bool = False) -> Trace:
+    """Five iterations from the middle of all ranges, or the three that a training learns from."""
+    refined, further = (_LEARNT, _LEARNT) if learning else (REFINED, len(KEPT))
     place = problem.at(problem.bounds.middle_BN)
     count = len(place.q_BN)
     first_BKN = _answer(network, place, place.steps(place.q_BN.new_tensor([DAMPINGS])), first=True)
@@ -62,7 +63,7 @@ def unroll(network: UniversalNetwork, problem: Problem, refined: int = REFINED) 
     cost_BK = place.cost_B.unflatten(0, (count, -1))
     trace.learnt.append(cost_BK)
     trace.see(first_BKN, cost_BK)
-    for turn, keep in enumerate(KEPT):
+    for turn, keep in enumerate(KEPT[:further]):
         place = place.rows(_best(cost_BK, keep))
         if turn < refined:
             step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))

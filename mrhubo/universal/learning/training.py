@@ -25,7 +25,7 @@ from mrhubo.runtime.progress import SILENT, Reporter
 from mrhubo.runtime.run_logger import RunLogger
 from mrhubo.runtime.trainer import quiet_lightning, run_trainer, stop_at, with_schedule
 from mrhubo.runtime.workspace import Workspace
-from mrhubo.universal.iterations import LEARNT, unroll
+from mrhubo.universal.iterations import unroll
 from mrhubo.universal.learning.loss import BETAS, loss
 from mrhubo.universal.learning.problems import Lessons, load_lessons
 from mrhubo.universal.network import UniversalNetwork
@@ -51,7 +51,7 @@ class UniversalTraining(lightning.LightningModule):
     def training_step(self, rows_B: Tensor, _: int) -> Tensor:
         """One batch of problems, by their numbers (B,)."""
         lessons = self.learnt.rows(rows_B)
-        value = loss(unroll(self.network, lessons.problem, LEARNT), lessons.q_BN, lessons.chains.present_BN)
+        value = loss(unroll(self.network, lessons.problem, learning=True), lessons.q_BN, lessons.chains.present_BN)
         if (self.trainer.global_step + 1) % 50 == 0:
             self.log("train/loss", value.detach())
         return value
