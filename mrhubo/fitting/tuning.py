@@ -15,7 +15,6 @@ from mrhubo.config import TrainerConfig
 from mrhubo.fitting.module import LOG_EVERY
 from mrhubo.retargeter.universal import UniversalJoints
 from mrhubo.runtime.trainer import stop_at, with_schedule
-from mrhubo.universal.iterations import unroll
 from mrhubo.universal.learning.loss import BETAS, loss
 
 
@@ -30,10 +29,8 @@ class TuningModule(lightning.LightningModule):
     def losses(self, features_BF: Tensor, R_BM6: Tensor, q_BN: Tensor) -> dict[str, Tensor]:  # noqa: ARG002
         """`loss` of directions (B, F) and the joint angles that go with them (B, N); links tell it nothing more."""
         optimiser = self.network.optimiser
-        branches = optimiser.branches
-        problem = branches.ask(features_BF.unflatten(1, (-1, 3)))
-        trace = unroll(optimiser.network, problem, learning=True)
-        return {"loss": loss(trace, branches.apart(q_BN), problem.bounds.present_BN)}
+        problem = optimiser.branches.ask(features_BF.unflatten(1, (-1, 3)))
+        return {"loss": loss(optimiser.network, problem, optimiser.branches.apart(q_BN))}
 
     def training_step(self, batch: tuple[Tensor, Tensor, Tensor], _: int) -> Tensor:
         """One optimiser step on features (B, F), R (B, M, 6), q (B, N)."""

@@ -54,7 +54,6 @@ class Trace:
 
 def unroll(network: UniversalNetwork, problem: Problem, learning: bool = False) -> Trace:
     """Five iterations from the middle of all ranges, or the three that a training learns from."""
-    refined, further = (_LEARNT, _LEARNT) if learning else (REFINED, len(KEPT))
     place = problem.at(problem.bounds.middle_BN)
     count = len(place.q_BN)
     first_BKN = _answer(network, place, place.steps(place.q_BN.new_tensor([DAMPINGS])), first=True)
@@ -63,9 +62,9 @@ def unroll(network: UniversalNetwork, problem: Problem, learning: bool = False) 
     cost_BK = place.cost_B.unflatten(0, (count, -1))
     trace.learnt.append(cost_BK)
     trace.see(first_BKN, cost_BK)
-    for turn, keep in enumerate(KEPT[:further]):
+    for turn, keep in enumerate(KEPT[:_LEARNT] if learning else KEPT):
         place = place.rows(_best(cost_BK, keep))
-        if turn < refined:
+        if learning or turn < REFINED:
             step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))
             network_XN = _answer(network, place, step_XKN, first=False)[:, 0]
             tried = [place.problem.at(network_XN), place.moved(step_XKN[:, 0])]

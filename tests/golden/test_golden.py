@@ -58,16 +58,15 @@ def test_losses(fitted: tuple[Path, dict[str, Any]], recorded: tuple[dict[str, A
 @pytest.mark.parametrize("solver", ["direct", "reverse", "fine", "fast", "paper"])
 def test_shards(fitted: tuple[Path, dict[str, Any]], recorded: tuple[dict[str, Any], bool], solver: str) -> None:
     """Another rounding moves the mean of a tensor by 0.2% or less. The paper's solver takes one step length for all
-    poses, and so another path: residuals and costs move by up to 18% (six roundings of three processors).
+    poses, and so another path: residuals and costs move by up to 18%, latents by 3% (six roundings).
     """
     found, (golden, same_platform) = fitted[1]["shards"][solver], recorded
     if same_platform:
         assert found == golden["shards"][solver], explain(golden)
     else:
-        ours, theirs = (dict(shard["means"]) for shard in (found, golden["shards"][solver]))
-        for name in ("cost", "residual_m", "z_norm") if solver == "paper" else ():
-            assert ours.pop(name) == pytest.approx(theirs.pop(name), rel=0.4), name
-        assert ours == pytest.approx(theirs, rel=0.01)
+        rough = {"cost": 0.25, "residual_m": 0.25, "z_norm": 0.05} if solver == "paper" else {}
+        means = golden["shards"][solver]["means"]
+        assert found["means"] == {name: pytest.approx(mean, rel=rough.get(name, 0.01)) for name, mean in means.items()}
 
 
 def test_reference(fitted: tuple[Path, dict[str, Any]], recorded: tuple[dict[str, Any], bool]) -> None:

@@ -17,15 +17,18 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from mrhubo.universal.iterations import Trace
+from mrhubo.universal.iterations import unroll
+from mrhubo.universal.network import UniversalNetwork
+from mrhubo.universal.problem import Problem
 
 BETAS = (0.9, 0.98)
 """Of AdamW, in a training and in a tuning."""
 
 
-def loss(trace: Trace, known_BN: Tensor, present_BN: Tensor) -> Tensor:
-    """The mean of L over problems, whose best known answers [rad] are given; 1 where there is a joint, else 0."""
-    away_BKN = (trace.first_BKN - known_BN[:, None]) * present_BN[:, None]
+def loss(network: UniversalNetwork, problem: Problem, known_BN: Tensor) -> Tensor:
+    """The mean of L over problems, whose best known answers [rad] are given."""
+    trace = unroll(network, problem, learning=True)
+    away_BKN = (trace.first_BKN - known_BN[:, None]) * problem.bounds.present_BN[:, None]
     distance_BK = (away_BKN.square().sum(-1) + 0.01).sqrt()
     first_BK, second_BK, third_BK = ((cost_BK.clamp_min(0.0) + 1e-3).sqrt() for cost_BK in trace.learnt)
     near_BK = torch.softmax(-distance_BK.detach() / 0.1, dim=1)

@@ -51,7 +51,7 @@ class UniversalTraining(lightning.LightningModule):
     def training_step(self, rows_B: Tensor, _: int) -> Tensor:
         """One batch of problems, by their numbers (B,)."""
         lessons = self.learnt.rows(rows_B)
-        value = loss(unroll(self.network, lessons.problem, learning=True), lessons.q_BN, lessons.chains.present_BN)
+        value = loss(self.network, lessons.problem, lessons.q_BN)
         if (self.trainer.global_step + 1) % 50 == 0:
             self.log("train/loss", value.detach())
         return value
