@@ -35,6 +35,7 @@ from tests.motion.fbx_writer import Manner, write_fbx
 from tests.motion.marker_writer import c3d, qualisys, vicon
 from tests.motion.readers import (
     estimator_files,
+    simulated_files,
     test_amc,
     test_deepmimic,
     test_frame_lists,
@@ -176,6 +177,10 @@ def _deepmimic(path: Path) -> None:
     test_deepmimic.write(path, test_deepmimic.rows(_FRAMES))
 
 
+def _mimickit(path: Path) -> None:
+    simulated_files.write_mimickit(path, simulated_files.humanoid((0, 1, 0)))
+
+
 def _parameter_table(path: Path) -> None:
     path.write_text(test_parameter_table.table(test_parameter_table.columns(0, "flat", 24), rows=[*range(_FRAMES)]))
 
@@ -211,6 +216,10 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "parameters, a line each": ("damaged.csv", _parameter_table),
     "clips.json": ("damaged.json", lambda path: path.write_text(json.dumps(test_frame_lists.clips(24)))),
     "deepmimic": ("damaged.json", _deepmimic),
+    "poselib": ("damaged.npy", lambda path: simulated_files.write_poselib(path, simulated_files.smpl())),
+    "mimickit": ("damaged.pkl", _mimickit),
+    "mimickit, smpl": ("damaged.pkl", lambda path: simulated_files.write_mimickit(path, simulated_files.smpl())),
+    "protomotions": ("damaged.motion", lambda path: simulated_files.write_protomotions(path, simulated_files.smpl())),
     "points, a line each": ("damaged.csv", _point_table),
     "mvnx": ("damaged.mvnx", lambda path: path.write_text(test_mvnx.mvnx(test_mvnx.subject()))),
     "motive": ("damaged.csv", lambda path: path.write_text(test_motive.motive())),

@@ -29,6 +29,8 @@ from mrhubo.motion.readers.people import holds_parameters
 from mrhubo.motion.readers.rate import find_rate
 from mrhubo.motion.readers.rows import read_rows
 from mrhubo.motion.readers.sam3d import read_sam3d
+from mrhubo.motion.readers.scene.mimickit import read_mimickit
+from mrhubo.motion.readers.scene.poselib import read_poselib
 from mrhubo.motion.readers.six_rows import read_six_rows
 from mrhubo.motion.readers.smpl_names import first_entries, is_robot
 from mrhubo.motion.readers.soma import read_soma
@@ -77,6 +79,8 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         or read_soma(tree, options, rate)
         or read_sam3d(tree, options, rate)
         or read_nymeria(tree, rate)
+        or read_poselib(tree, options, rate)
+        or read_mimickit(tree, options, rate)
     )
     found = found or smpl_motion(path, tree, options)
     points = points_in(tree, options) if found is None else None

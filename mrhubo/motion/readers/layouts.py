@@ -24,6 +24,7 @@ from mrhubo.motion.readers.key_words import model_named
 from mrhubo.motion.readers.other_rotations import read_egoallo, read_six
 from mrhubo.motion.readers.people import has_twins, people_in
 from mrhubo.motion.readers.rotations import find_form
+from mrhubo.motion.readers.simulated import read_mimickit_smpl, read_protomotions
 from mrhubo.motion.readers.smpl_names import Found, clips_in, find_here, find_inside, forms_in, search
 from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import ANY_WORLD, CAMERAS, Y_UP
@@ -138,9 +139,9 @@ def _pair(tree: Tree) -> Layout | None:
 
 
 _FINDERS = (
-    read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf, read_cliff, read_six, read_egoallo,
-    _pair, _tracks, read_columns, _clips, _people, _single, read_listed, read_numbered,
-    read_clips,
+    read_protomotions, read_mimickit_smpl, read_phalp, read_romp, read_frame_list, read_pictures, read_pymaf,
+    read_cliff, read_six, read_egoallo, _pair, _tracks, read_columns, _clips, _people, _single, read_listed,
+    read_numbered, read_clips,
 )  # fmt: skip
 
 

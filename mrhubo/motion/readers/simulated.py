@@ -1,0 +1,120 @@
+"""Motions of SMPL's humanoid in simulators: ProtoMotions' and MimicKit's.
+
+Their 24 bodies are SMPL's joints in an order of their own, and are turned as those are, but with axes x forward, y
+left, z up where SMPL's are x left, y up, z forward. World: z up.
+
+Legend: T frames, J = 24 bodies, L of several motions.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from mrhubo.errors import UserError
+from mrhubo.fast.rotations import axis_angle_to_matrix, quaternion_to_matrix
+from mrhubo.files.tree import Tree, tree_of
+from mrhubo.motion.readers.rotations import Form
+from mrhubo.motion.readers.scene.mimickit import frames_of
+from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
+from mrhubo.motion.readers.world import Z_UP
+
+_JOINTS = (0, 1, 4, 7, 10, 2, 5, 8, 11, 3, 6, 9, 12, 15, 13, 16, 18, 20, 22, 14, 17, 19, 21, 23)
+"""SMPL's joints in the order of the bodies: left leg, right leg, trunk and head, left arm, right arm."""
+_PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 12, 11, 14, 15, 16, 17, 11, 19, 20, 21, 22)
+_AXES_33 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+"""From the bodies' axes to SMPL's."""
+_FORM = Form(len(_JOINTS), True)
+_LOOSE_M = 0.02
+"""By more than that [m] the places of joints on the bodies that carry them do not vary."""
+_SHORTEST = 0.1
+"""Of quaternions that are none to be normalised."""
+_MOST = 100_000
+
+
+def read_protomotions(tree: Tree) -> Layout | None:
+    """ProtoMotions' `.motion`, by `torch.save`: `rigid_body_pos` (T, J, 3) and `rigid_body_rot` (T, J, 4), quaternions
+    in the world, w last; or what it packs of many, `gts` and `grs`, of which motion i has `motion_num_frames[i]`
+    frames from `length_starts[i]` on, `motion_dt[i]` seconds each (https://github.com/NVlabs/ProtoMotions,
+    protomotions/components/motion_lib.py). None of other characters, such as robots, and of anything else.
+    """
+    place, turn = (tree.find_array(*keys) for keys in (("rigid_body_pos", "gts"), ("rigid_body_rot", "grs")))
+    count = len(_JOINTS)
+    if place is None or turn is None or place.ndim != 3 or place.shape[1:] != (count, 3) or not len(place):
+        return None
+    if turn.shape != (len(place), count, 4) or not _is_smpl(place, turn):
+        return None
+
+    def read(first: int, end: int) -> SmplArrays:
+        local_TJ33 = _turns(turn[first:end])
+        for body, parent in reversed(list(enumerate(_PARENTS))):
+            if parent >= 0:
+                local_TJ33[:, body] = local_TJ33[:, parent].mT @ local_TJ33[:, body]
+        return _smpl("rigid_body_rot", local_TJ33, place[first:end, 0])
+
+    kind = Kind("ProtoMotions' humanoid of SMPL", "smpl", Z_UP)
+    starts, frames, steps = (tree.find_array(key) for key in ("length_starts", "motion_num_frames", "motion_dt"))
+    if starts is None or frames is None:
+        return Layout(kind, [Track("", len(place), partial(read, 0, len(place)))])
+    bad = starts.ndim != 1 or starts.shape != frames.shape or not 0 < len(starts) <= _MOST
+    if bad or starts[0] < 0 or (frames < 1).any() or (starts + frames > len(place)).any():
+        raise UserError(f"{tree.path}: 'length_starts' and 'motion_num_frames' do not fit 'gts' of {len(place)} frames")
+    tracks = []
+    for number, (first, length) in enumerate(zip(starts.tolist(), frames.tolist(), strict=True)):
+        step = float(steps[number]) if steps is not None and steps.shape == starts.shape else 0.0
+        homes = (tree_of({"fps": round(1 / step, 3)}, tree.path, f"motion_dt[{number}]"),) if step > 0 else ()
+        read_one = partial(read, int(first), int(first + length))
+        tracks.append(Track(str(number) if len(starts) > 1 else "", int(length), read_one, homes))
+    return Layout(kind, tracks)
+
+
+def read_mimickit_smpl(tree: Tree) -> Layout | None:
+    """MimicKit's, as `mrhubo.motion.readers.scene.mimickit` says, `frames` (T, 75): the root's place [m], and axis
+    times angle [rad] of each body in the axes of the one before (tools/smpl_to_mimickit). None of anything else.
+    """
+    row_TX = frames_of(tree)
+    if row_TX is None or row_TX.shape[1] != 3 + 3 * len(_JOINTS):
+        return None
+
+    def read() -> SmplArrays:
+        local_TJ33 = axis_angle_to_matrix(row_TX[:, 3:].reshape(len(row_TX), -1, 3))
+        return _smpl("frames", local_TJ33, row_TX[:, :3])
+
+    return Layout(Kind("MimicKit's humanoid of SMPL", "smpl", Z_UP), [Track("", len(row_TX), read)])
+
+
+def _smpl(key: str, local_TJ33: np.ndarray, place_T3: np.ndarray) -> SmplArrays:
+    """SMPL's parameters of how bodies are turned in the axes of those that carry them."""
+    pose_TJ33 = np.empty_like(local_TJ33)
+    pose_TJ33[:, _JOINTS] = _AXES_33 @ local_TJ33 @ _AXES_33.T
+    pose_TJ33[:, 0] = local_TJ33[:, 0] @ _AXES_33.T
+    return SmplArrays(key, pose_TJ33, _FORM, 1, None, place_T3)
+
+
+def _turns(turn_TJ4: np.ndarray) -> np.ndarray:
+    """Matrices (T, J, 3, 3) of quaternions, w last; NaN where one is 0."""
+    turn_TJ4 = turn_TJ4.astype(np.float64)
+    length_TJ1 = np.linalg.norm(turn_TJ4, axis=-1, keepdims=True)
+    return quaternion_to_matrix(turn_TJ4 / np.where(length_TJ1 > _SHORTEST, length_TJ1, np.nan))
+
+
+def _is_smpl(place_TJ3: np.ndarray, turn_TJ4: np.ndarray) -> bool:
+    """Whether bodies hang on each other as SMPL's do: then each keeps its place on the one that carries it, at rest
+    legs point down and arms to the sides. Robots may have as many bodies.
+    """
+    some_F = np.unique(np.linspace(0, len(place_TJ3) - 1, 64).astype(int))
+    place_FJ3, turn_FJ33 = place_TJ3[some_F].astype(np.float64), _turns(turn_TJ4[some_F])
+    parents = list(_PARENTS[1:])
+    away_FX3 = (turn_FJ33[:, parents].mT @ (place_FJ3[:, 1:] - place_FJ3[:, parents])[..., None])[..., 0]
+    offset_X3 = np.median(away_FX3, axis=0)
+    if not np.isfinite(away_FX3).all() or np.abs(away_FX3 - offset_X3).max() > _LOOSE_M:
+        return False
+    unit_X3 = offset_X3 / np.maximum(np.linalg.norm(offset_X3, axis=-1, keepdims=True), 1e-6)
+    down = [-unit_X3[body - 1, 2] for body in (2, 3, 6, 7)]
+    left = [unit_X3[body - 1, 1] * sign for body, sign in ((16, 1), (17, 1), (21, -1), (22, -1))]
+    return min(*down, *left) > _STRAIGHT
+
+
+_STRAIGHT = 0.8
+"""Cosine between a limb at rest and the axis along which it points."""
