@@ -39,7 +39,6 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "a zip archive of files",
         "unpack it, and name the file in it",
     ),
-    (r"Coordinates\s.{0,2000}?endheader", "a .mot file of OpenSim", "name the recording from which it was made"),
     (
         r"[^\n]{0,4000}?(?:root_translate|_joint(?:_dof|_pos)?\b|_dof\b)[^\n]*+\n",
         "a table of a robot's joints",

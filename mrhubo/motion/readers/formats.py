@@ -67,6 +67,7 @@ FORMATS: tuple[Format, ...] = (
     Format("keypoints in tables (.csv)", "keypoint_table", "is_table", "read_table", ()),
     Format("keypoints in tables with a line a point", "point_table", "is_point_table", "read_point_table", ()),
     Format("joints in TRC", "trc_file", "is_trc", "read_trc", (".trc",)),
+    Format("angles of OpenSim (.mot, .sto)", "scene.opensim", "is_opensim", "read_opensim", (".mot",)),
     Format("keypoints (.npy, .npz)", "keypoints", "is_keypoints", "read_keypoints", ()),
     Format("videos (MP4, MOV, MKV, WebM, AVI)", "video", "is_video", "read_video", ()),
     # the last row: whatever else holds arrays in dictionaries

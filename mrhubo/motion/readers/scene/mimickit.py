@@ -111,7 +111,7 @@ def read_mimickit(tree: Tree, options: ReadOptions, find_rate: Callable[[list[st
         turn_TX = row_TX[:, column : column + width]
         local_TN33[:, place] = axis_angle_to_matrix(turn_TX if axis is None else turn_TX * axis)
         column += width
-    notes = options.of_one()
+    notes: list[str] = []
     rate = find_rate(notes)
     return turned_motion(
         tree.path, _SKELETON, local_TN33, row_TX[:, :3], rate, "motion of MimicKit's humanoid", options, notes

@@ -62,7 +62,7 @@ def read_poselib(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str
     is_local = node.get("is_local")
     if is_local is not None and not is_local.number():
         local_TN33 = in_parents(local_TN33, skeleton.parents)
-    notes = options.of_one()
+    notes: list[str] = []
     rate = find_rate(notes)
     return turned_motion(path, skeleton, local_TN33, root_T3, rate, "poselib's motion", options, notes)
 

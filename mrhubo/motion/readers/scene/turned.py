@@ -6,7 +6,7 @@ Legend: N joints, T frames, F some of them.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +30,8 @@ class Skeleton:
     """From the parent, in its axes [m]; that of the root counts nothing."""
     rest: str
     """In words, the pose in which no joint turns."""
+    body: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """Their places by the names of our joints, where that need not be found out."""
 
 
 def turned_motion(
@@ -77,4 +79,5 @@ def turned_motion(
     rest = Rest(skeleton.rest, in_world(still_N34[None], above)[0])
     animation = Animation("", 0.0, (len(local_TN33) - 1) / rate, rate, local_FN34)
     options = dataclasses.replace(options, animation=None, rate=None)
-    return scene_motion(path, Scene(nodes, (rest,), (animation,)), kind, options, notes)
+    body = {joint: number[place] for joint, place in skeleton.body.items()}
+    return scene_motion(path, Scene(nodes, (rest,), (animation,), body), kind, options, notes)
