@@ -17,6 +17,7 @@ from mrhubo.fast.rotations import axis_angle_to_matrix, quaternion_to_matrix
 from mrhubo.files.tree import Tree, tree_of
 from mrhubo.motion.readers.rotations import Form
 from mrhubo.motion.readers.scene.mimickit import frames_of
+from mrhubo.motion.readers.scene.turned import in_parents
 from mrhubo.motion.readers.tracks import Kind, Layout, SmplArrays, Track
 from mrhubo.motion.readers.world import Z_UP
 
@@ -28,9 +29,12 @@ _AXES_33 = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 _FORM = Form(len(_JOINTS), True)
 _LOOSE_M = 0.02
 """By more than that [m] the places of joints on the bodies that carry them do not vary."""
+_STRAIGHT = 0.8
+"""Cosine between a limb at rest and the axis along which it points."""
 _SHORTEST = 0.1
 """Of quaternions that are none to be normalised."""
 _MOST = 100_000
+"""Motions that are packed."""
 
 
 def read_protomotions(tree: Tree) -> Layout | None:
@@ -47,10 +51,7 @@ def read_protomotions(tree: Tree) -> Layout | None:
         return None
 
     def read(first: int, end: int) -> SmplArrays:
-        local_TJ33 = _turns(turn[first:end])
-        for body, parent in reversed(list(enumerate(_PARENTS))):
-            if parent >= 0:
-                local_TJ33[:, body] = local_TJ33[:, parent].mT @ local_TJ33[:, body]
+        local_TJ33 = in_parents(_turns(turn[first:end]), _PARENTS)
         return _smpl("rigid_body_rot", local_TJ33, place[first:end, 0])
 
     kind = Kind("ProtoMotions' humanoid of SMPL", "smpl", Z_UP)
@@ -114,7 +115,3 @@ def _is_smpl(place_TJ3: np.ndarray, turn_TJ4: np.ndarray) -> bool:
     down = [-unit_X3[body - 1, 2] for body in (2, 3, 6, 7)]
     left = [unit_X3[body - 1, 1] * sign for body, sign in ((16, 1), (17, 1), (21, -1), (22, -1))]
     return min(*down, *left) > _STRAIGHT
-
-
-_STRAIGHT = 0.8
-"""Cosine between a limb at rest and the axis along which it points."""

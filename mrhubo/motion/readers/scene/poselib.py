@@ -19,7 +19,7 @@ from mrhubo.fast.rotations import quaternion_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.scene.turned import Skeleton, turned_motion
+from mrhubo.motion.readers.scene.turned import Skeleton, in_parents, turned_motion
 from mrhubo.motion.readers.smpl_names import search
 
 _KEYS = {"rotation", "root_translation", "skeleton_tree"}
@@ -65,15 +65,6 @@ def read_poselib(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str
     notes: list[str] = []
     rate = find_rate(notes)
     return turned_motion(path, skeleton, local_TN33, root_T3, rate, "poselib's motion", options, notes)
-
-
-def in_parents(world_TN33: np.ndarray, parents: list[int]) -> np.ndarray:
-    """Rotations in the world as rotations in the parents' axes (T, N, 3, 3)."""
-    local_TN33 = world_TN33.copy()
-    for place, parent in enumerate(parents):
-        if parent >= 0:
-            local_TN33[:, place] = world_TN33[:, parent].mT @ world_TN33[:, place]
-    return local_TN33
 
 
 def _is_poselib(node: Tree) -> bool:

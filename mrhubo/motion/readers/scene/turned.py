@@ -81,3 +81,12 @@ def turned_motion(
     options = dataclasses.replace(options, animation=None, rate=None)
     body = {joint: number[place] for joint, place in skeleton.body.items()}
     return scene_motion(path, Scene(nodes, (rest,), (animation,), body), kind, options, notes)
+
+
+def in_parents(world_TN33: np.ndarray, parents: Sequence[int]) -> np.ndarray:
+    """Rotations in the world as rotations in the parents' axes (T, N, 3, 3)."""
+    local_TN33 = world_TN33.copy()
+    for place, parent in enumerate(parents):
+        if parent >= 0:
+            local_TN33[:, place] = world_TN33[:, parent].mT @ world_TN33[:, place]
+    return local_TN33
