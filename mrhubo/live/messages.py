@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -205,6 +206,30 @@ def of_quaternions(xyzw_J4: np.ndarray) -> np.ndarray:
     if not (length_J1 > 0.1).all():
         raise Refused("malformed")
     return quaternion_to_matrix(xyzw_J4 / length_J1)
+
+
+def numbers(values: Sequence[Any], count: int, most: float) -> list[float]:
+    """So many numbers that a stranger's message tells, none of them further from 0 than `most`.
+
+    Raises:
+        Refused: there are fewer or more, or one is none, NaN, or further.
+    """
+    found = [float(value) for value in values if isinstance(value, int | float) and abs(value) <= most]
+    if len(found) != count:
+        raise Refused("malformed")
+    return found
+
+
+def quaternion(values: Sequence[Any]) -> list[float]:
+    """Four such numbers, nearly of length 1.
+
+    Raises:
+        Refused: there are fewer or more, or they are no rotation.
+    """
+    found = numbers(values, 4, 2.0)
+    if not 0.5 < math.sqrt(sum(number * number for number in found)) < 2.0:
+        raise Refused("malformed")
+    return found
 
 
 def _heartbeat(told: dict[str, Any]) -> Heartbeat:
