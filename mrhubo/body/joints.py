@@ -122,12 +122,13 @@ def _levels() -> list[list[int]]:
 
 LEVELS: list[list[int]] = _levels()
 """Joints but the root by how far below it they are."""
-_OTHER_SIDE = {
+OTHER_SIDE = {
     f"{side}_{name}": f"{other}_{name}"
     for side, other in zip(SIDES, SIDES[::-1], strict=True)
     for name in PAIRED_JOINTS
 }
-MIRROR = [POSED_JOINT_NAMES.index(_OTHER_SIDE.get(name, name)) for name in POSED_JOINT_NAMES]
+"""The joint on the other side of each that there is on both."""
+MIRROR = [POSED_JOINT_NAMES.index(OTHER_SIDE.get(name, name)) for name in POSED_JOINT_NAMES]
 """The posed joint on the other side of each."""
 
 

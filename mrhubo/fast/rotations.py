@@ -67,6 +67,14 @@ def shortest_turn(start_X3: np.ndarray, end_X3: np.ndarray) -> np.ndarray:
     return axis_angle_to_matrix(axis_X3 * (angle_X1 / np.maximum(sine_X1, 1e-9)))
 
 
+def slerp(start_X33: np.ndarray, end_X33: np.ndarray, share_X: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) at shares of the shortest ways from some to others (K. Shoemake, "Animating rotation with
+    quaternion curves", SIGGRAPH 1985).
+    """
+    turn_X3 = matrix_to_axis_angle(start_X33.mT @ end_X33)
+    return start_X33 @ axis_angle_to_matrix(share_X.astype(turn_X3.dtype)[..., None] * turn_X3)
+
+
 def angles_between(one_B33: np.ndarray, other_B33: np.ndarray) -> np.ndarray:
     """Between rotations (B,) [rad], each given as (3, 3) or its nine numbers; within 3e-8 of 0 and pi in float64."""
     one_B9, other_B9 = one_B33.reshape(-1, 9), other_B33.reshape(-1, 9)

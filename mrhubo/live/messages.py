@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -48,6 +49,12 @@ class Landmarks:
     """Whether the points tell where the person is in the world, and not from the hips alone."""
     axes_known: bool = True
     """Whether the sender's axes surely are right-handed."""
+
+    @classmethod
+    def of(cls, told: Sequence[tuple[str, Vector, float]], **axes: bool) -> Landmarks:
+        """Those that are seen of some points, each with how sure the sender is of it; `axes` are the other fields."""
+        seen = [one for one in told if one[2] >= UNSURE]
+        return cls({name: point for name, point, _ in seen}, {name: sure for name, _, sure in seen}, **axes)
 
 
 @dataclass(frozen=True)
@@ -127,19 +134,17 @@ def _landmarks(told: dict[str, Any]) -> Landmarks:
     weights = [1.0] * len(triples) if weights is None else _list(weights)
     if len(names) != len(triples) or len(weights) != len(triples):
         raise Refused("malformed")
-    points, sure = {}, {}
+    found: list[tuple[str, Vector, float]] = []
     for ours, triple, weight in zip(names, triples, weights, strict=True):
         if ours is None or triple is None or weight is None:
             continue
         x, y, z = (_number(value, _FARTHEST) for value in _list(triple, 3))
-        weight = min(1.0, max(0.0, _number(weight, 1e6)))
-        if weight >= UNSURE:
-            points[ours] = known.signs[0] * x, known.signs[1] * y, known.signs[2] * z
-            sure[ours] = weight
+        point = known.signs[0] * x, known.signs[1] * y, known.signs[2] * z
+        found.append((ours, point, min(1.0, max(0.0, _number(weight, 1e6)))))
     in_world = told.get("world", known.in_world)
     if not isinstance(in_world, bool):
         raise Refused("malformed")
-    return Landmarks(points, sure, in_world, known.axes_known)
+    return Landmarks.of(found, in_world=in_world, axes_known=known.axes_known)
 
 
 def _names(known: PointSet, told: dict[str, Any], count: int) -> list[str | None]:
@@ -205,6 +210,30 @@ def of_quaternions(xyzw_J4: np.ndarray) -> np.ndarray:
     if not (length_J1 > 0.1).all():
         raise Refused("malformed")
     return quaternion_to_matrix(xyzw_J4 / length_J1)
+
+
+def numbers(values: Sequence[Any], count: int, most: float) -> list[float]:
+    """So many numbers that a stranger's message tells, none of them further from 0 than `most`.
+
+    Raises:
+        Refused: there are fewer or more, or one is none, NaN, or further.
+    """
+    found = [float(value) for value in values if isinstance(value, int | float) and abs(value) <= most]
+    if len(found) != count:
+        raise Refused("malformed")
+    return found
+
+
+def quaternion(values: Sequence[Any]) -> list[float]:
+    """Four such numbers, nearly of length 1.
+
+    Raises:
+        Refused: there are fewer or more, or they are no rotation.
+    """
+    found = numbers(values, 4, 2.0)
+    if not 0.5 < math.sqrt(sum(number * number for number in found)) < 2.0:
+        raise Refused("malformed")
+    return found
 
 
 def _heartbeat(told: dict[str, Any]) -> Heartbeat:

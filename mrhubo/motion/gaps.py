@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrhubo.fast.plain.human import normalize
-from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
+from mrhubo.fast.rotations import slerp
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,4 @@ def fill_rotations(rotation_T33: np.ndarray, known_T: np.ndarray) -> np.ndarray:
     if not known_T.any():
         return np.broadcast_to(np.eye(3, dtype=rotation_T33.dtype), rotation_T33.shape).copy()
     near = Neighbours.of(known_T)
-    first_T33 = rotation_T33[near.before_T]
-    turn_T3 = matrix_to_axis_angle(first_T33.mT @ rotation_T33[near.after_T])
-    return first_T33 @ axis_angle_to_matrix(near.share_T.astype(turn_T3.dtype)[:, None] * turn_T3)
+    return slerp(rotation_T33[near.before_T], rotation_T33[near.after_T], near.share_T)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrhubo.errors import UserError
 from mrhubo.fast.poses import check_frame_rate
-from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
+from mrhubo.fast.rotations import slerp
 from mrhubo.motion.motion import Motion
 
 _MOST_FRAMES = 2_000_000
@@ -23,8 +23,8 @@ _BLOCK = 2**14
 def resample(motion: Motion, frame_rate: float) -> Motion:
     """The motion with `frame_rate` frames per second, from its first frame to no later than its last.
 
-    Rotations are on the shortest way between those of the two frames around (slerp: K. Shoemake, "Animating rotation
-    with quaternion curves", SIGGRAPH 1985), places on the straight line. Frames that both rates share stay as they are.
+    Rotations are on the shortest way between those of the two frames around, places on the straight line. Frames that
+    both rates share stay as they are.
 
     Raises:
         UserError: the frame rate is not positive, or would make more than two million frames.
@@ -67,7 +67,7 @@ def _slerp(rotation_TX33: np.ndarray, before_S: np.ndarray, after_S: np.ndarray,
     for start in range(0, len(share_S), _BLOCK):
         block = slice(start, start + _BLOCK)
         first = rotation_TX33[before_S[block]]
-        turn = matrix_to_axis_angle(first.mT @ rotation_TX33[after_S[block]])
-        share = share_S[block].astype(turn.dtype).reshape(-1, *[1] * (turn.ndim - 1))
-        found_SX33[block] = np.where(share[..., None] == 0, first, first @ axis_angle_to_matrix(share * turn))
+        share = share_S[block].reshape(-1, *[1] * (first.ndim - 3))
+        between = slerp(first, rotation_TX33[after_S[block]], share)
+        found_SX33[block] = np.where(share[..., None, None] == 0, first, between)
     return found_SX33

@@ -107,6 +107,11 @@ def rate_of_step(text: str) -> float | None:
     return found or 1 / step
 
 
+def rate_of_rounded(step: float, digits: int) -> float:
+    """The same of a step above 0 that is right to so many digits."""
+    return rate_of_step(f"{step:.{digits}g}") or 1 / step
+
+
 def usual_rates(text: str) -> tuple[float, ...]:
     """The usual rates whose step a file may have rounded, or cut off, to the seconds that it writes, where these are so
     few digits that they do not tell one; none where they do, or are no time.

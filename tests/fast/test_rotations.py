@@ -54,6 +54,16 @@ def test_the_shortest_turn(axis_angles: np.ndarray) -> None:
     np.testing.assert_array_equal(rotations.shortest_turn(start, -start), np.broadcast_to(np.eye(3), found.shape))
 
 
+def test_slerp(axis_angles: np.ndarray) -> None:
+    turn_X3 = axis_angles[:5].astype(np.float32)  # further round, the shortest way is another one
+    start_X33 = np.broadcast_to(rotations.axis_angle_to_matrix(np.float32([0.3, -1.0, 2.0])), (*turn_X3.shape, 3))
+    end_X33 = start_X33 @ rotations.axis_angle_to_matrix(turn_X3)
+    for share in (0.0, 0.3, 1.0):
+        found = rotations.slerp(start_X33, end_X33, np.full(turn_X3.shape[:-1], share))
+        wanted = start_X33 @ rotations.axis_angle_to_matrix(np.float32(share) * turn_X3)
+        assert found.dtype == np.float32 and np.abs(found - wanted).max() < 1e-5
+
+
 def test_quaternions(axis_angles: np.ndarray) -> None:
     quaternions = rotation.matrix_to_quaternion(rotation.axis_angle_to_matrix(torch.from_numpy(axis_angles)))
     wanted = rotation.quaternion_to_matrix(quaternions).numpy()

@@ -19,7 +19,6 @@ from mrhubo.live.inbox import Inbox
 from mrhubo.live.messages import Landmarks, Message, Nobody
 from mrhubo.live.named import NamedSource
 from mrhubo.live.point_sets import POINT_SETS
-from mrhubo.motion.readers.sightings import UNSURE
 from mrhubo.video.camera import Camera
 from mrhubo.video.estimator import Estimate, PoseEstimator
 from mrhubo.video.frames import Frame, as_shown, frames
@@ -42,9 +41,9 @@ def to_content(found: Estimate, point_K3: np.ndarray) -> Landmarks | Nobody:
     told = [
         (name, (x, y, z), sure)
         for name, (x, y, z), sure in zip(_NAMES, point_K3.tolist(), found.visibility_K.tolist(), strict=True)
-        if name != "-" and sure >= UNSURE
+        if name != "-"
     ]
-    return Landmarks({name: point for name, point, _ in told}, {name: sure for name, _, sure in told})
+    return Landmarks.of(told)
 
 
 class CameraSource(NamedSource):

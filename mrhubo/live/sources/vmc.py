@@ -20,7 +20,7 @@ from mrhubo.body.joints import POSED_JOINT_NAMES, SIDES
 from mrhubo.lazy import import_optional
 from mrhubo.live.body import LEG_LENGTH, Root, SeenPose
 from mrhubo.live.endpoints import Endpoint
-from mrhubo.live.messages import MAX_BYTES, Content, Nobody, Refused, of_quaternions
+from mrhubo.live.messages import MAX_BYTES, Content, Nobody, Refused, numbers, of_quaternions, quaternion
 from mrhubo.live.sources.tokenless import TokenlessSource
 
 PORT = 39_539
@@ -107,7 +107,7 @@ class Bones:
         pose = _pose(position, rotation) if name in (ROOT, _HIPS) else None
         length = float(np.linalg.norm(_position(position))) if name in _LEG else None
         if place is not None:
-            x, y, z, w = _quaternion(rotation)
+            x, y, z, w = quaternion(rotation)
             self._xyzw_J4[place] = x, -y, -z, w  # mirrored in x
             self._at_J[place] = self._now
         if pose is not None:
@@ -154,22 +154,12 @@ def _shows_somebody(told: list[Any]) -> bool:
 
 
 def _position(values: list[Any]) -> np.ndarray:
-    numbers = [float(value) for value in values if isinstance(value, int | float) and abs(value) <= _FARTHEST]
-    if len(numbers) != 3:  # nor NaN
-        raise Refused("malformed")
-    return np.array(numbers) * [-1.0, 1.0, 1.0]
+    return np.array(numbers(values, 3, _FARTHEST)) * [-1.0, 1.0, 1.0]
 
 
 def _pose(position: list[Any], rotation: list[Any]) -> Root:
-    x, y, z, w = _quaternion(rotation)
+    x, y, z, w = quaternion(rotation)
     return Root(of_quaternions(np.array([[x, -y, -z, w]]))[0], _position(position))
-
-
-def _quaternion(values: list[Any]) -> tuple[float, ...]:
-    numbers = tuple(float(value) for value in values if isinstance(value, int | float) and abs(value) <= 2.0)
-    if len(numbers) != 4 or not 0.5 < math.sqrt(sum(n * n for n in numbers)) < 2.0:
-        raise Refused("malformed")
-    return numbers
 
 
 def _messages(datagram: bytes) -> list[bytes]:

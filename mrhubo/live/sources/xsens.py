@@ -8,7 +8,6 @@ counter, in one datagram or several. Other kinds that come beside it are passed 
 
 from __future__ import annotations
 
-import math
 import struct
 
 import numpy as np
@@ -18,7 +17,7 @@ from mrhubo.fast.plain.human import norm, normalize
 from mrhubo.fast.rotations import shortest_turn
 from mrhubo.live.body import LEG_LENGTH, Root, SeenPose
 from mrhubo.live.endpoints import Endpoint
-from mrhubo.live.messages import MAX_BYTES, Content, Nobody, Refused, of_quaternions
+from mrhubo.live.messages import MAX_BYTES, Content, Nobody, Refused, numbers, of_quaternions, quaternion
 from mrhubo.live.sources.tokenless import TokenlessSource
 from mrhubo.motion.readers.xsens import BEGINS, HUMAN_33, SEGMENTS
 
@@ -86,7 +85,7 @@ class Segments:
         for at in range(_HEADER.size, _HEADER.size + items * _SEGMENT.size, _SEGMENT.size):
             number, *values = _SEGMENT.unpack_from(datagram, at)
             if 1 <= number <= len(SEGMENTS):  # props and fingers come after them
-                found[number - 1] = _checked(values)
+                found[number - 1] = numbers(values[:3], 3, _FARTHEST), quaternion(values[3:])
         if (sample, character) != self._sample:
             self._came.clear()
         self._sample = sample, character
@@ -104,16 +103,6 @@ class Segments:
     def content(self) -> Content:
         """What is seen; nobody before a body was whole."""
         return _pose(*self._whole) if len(self._whole[0]) else Nobody()
-
-
-def _checked(values: list[float]) -> tuple[list[float], list[float]]:
-    """Place and quaternion of a segment."""
-    place, turn = values[:3], values[3:]
-    if not all(abs(value) <= _FARTHEST for value in place):  # nor NaN
-        raise Refused("malformed")
-    if not 0.5 < math.sqrt(sum(value * value for value in turn)) < 2.0:
-        raise Refused("malformed")
-    return place, turn
 
 
 def _pose(place_S3: np.ndarray, turn_S4: np.ndarray) -> SeenPose:

@@ -28,7 +28,7 @@ from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.other_rotations import from_quaternions
 from mrhubo.motion.readers.rate import asked_rate, told_rate
-from mrhubo.robot_motion.clock import STEADY, at_rate, rate_of_step, uneven_steps
+from mrhubo.robot_motion.clock import STEADY, at_rate, rate_of_rounded, uneven_steps
 
 _FRAMES = "Frames"
 _WIDTH = 44
@@ -119,7 +119,7 @@ def _steady(path: Path, row_TX: np.ndarray, options: ReadOptions, notes: list[st
     if step_T.min() <= 0:
         raise UserError(f"{path}: frame {int(step_T.argmin())} of '{_FRAMES}' lasts {step_T.min():g} s")
     usual = float(np.median(step_T))
-    exact = rate_of_step(f"{usual:.{_DIGITS}g}") or 1 / usual
+    exact = rate_of_rounded(usual, _DIGITS)
     rate = told_rate(path, "has", exact, options, notes)
     time_T = np.concatenate([[0.0], np.cumsum(row_TX[:-1, 0])])
     if rate != exact or np.abs(time_T / usual - np.arange(len(time_T))).max() <= STEADY:

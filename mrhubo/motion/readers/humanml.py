@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrhubo.body.joints import OTHER_SIDE
 from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
@@ -81,7 +82,7 @@ def read_features(tree: Tree, options: ReadOptions) -> Motion | None:
             " are normalised, multiply them by its Std.npy and add its Mean.npy"
         )
     if not kind.sides and way_forward(points) < 0:
-        points = {_other_side(name): point_T3 for name, point_T3 in points.items()}
+        points = {OTHER_SIDE.get(name, name): point_T3 for name, point_T3 in points.items()}
     notes = options.of_one()
     rate = rate_of_all(kind.rate, f"{kind.who} says of all its motions", options, notes)
     point_TK3 = np.stack(list(points.values()), axis=1)
@@ -105,8 +106,3 @@ def joints_of(row_TX: np.ndarray) -> np.ndarray:
         return place_TJ3
     root_T3[:, 1] = row_TX[:, 3]
     return np.concatenate([root_T3[:, None], place_TJ3], axis=1)
-
-
-def _other_side(name: str) -> str:
-    side, _, part = name.partition("_")
-    return {"left": f"right_{part}", "right": f"left_{part}"}.get(side, name)

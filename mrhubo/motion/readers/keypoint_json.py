@@ -60,7 +60,8 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
         key = point_key(value) or next((key for key in _FRAMES if key in value), None)
         if key is not None:
             value, where = value[key], f"'{key}'"
-    numbers, frames = _frames(path, where, value)
+    numbered = _frames(path, where, value)
+    numbers, frames = [number for number, _ in numbered], [frame for _, frame in numbered]
     people = [people_of(frame) for frame in frames]
     if any(here is not None for here in people):
         if isinstance(value, dict) and max(len(here or ()) for here in people) > len(frames):
@@ -86,7 +87,7 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     return found
 
 
-def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
+def _frames(path: Path, where: str, value: Any) -> list[tuple[int, Any]]:
     """Frames and their numbers, in order: of a list by what each says, or its place; of a dictionary by its keys."""
     if isinstance(value, dict) and value:
         if not all(_DIGIT.search(str(key)) and isinstance(one, dict | list | None) for key, one in value.items()):
@@ -96,8 +97,7 @@ def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
                 " docs/formats.md says how each is laid out"
             )
         check_size(path, where, len(value), 1)
-        numbered = in_order(path, [(str(key), one) for key, one in value.items()])
-        return [number for number, _ in numbered], [frame for _, frame in numbered]
+        return in_order(path, [(str(key), one) for key, one in value.items()])
     if not isinstance(value, list) or not value:
         raise UserError(f"{path}: {where} is no list of frames")
     check_size(path, where, len(value), 1)
@@ -106,14 +106,12 @@ def _frames(path: Path, where: str, value: Any) -> tuple[list[int], list[Any]]:
         people: dict[str, list[Any]] = {}
         for picture, one in zip(pictures, value, strict=True):
             people.setdefault(picture, []).append(one)
-        numbered = in_order(path, list(people.items()))
-        return [number for number, _ in numbered], [here for _, here in numbered]
+        return in_order(path, list(people.items()))
     for key in _NUMBERS:
         given = [frame.get(key) if isinstance(frame, dict) else None for frame in value]
         if all(type(number) is int and number >= 0 for number in given) and len(set(given)) == len(given):
-            numbered = in_order(path, list(zip(map(str, given), value, strict=True)))
-            return [number for number, _ in numbered], [frame for _, frame in numbered]
-    return list(range(len(value))), value
+            return in_order(path, list(zip(map(str, given), value, strict=True)))
+    return list(enumerate(value))
 
 
 def _of_one(

@@ -66,9 +66,13 @@ def known_points(point_XK3: np.ndarray, sure_XK: np.ndarray | None = None) -> np
     point_XK3 = np.where(np.isfinite(point_XK3).all(-1, keepdims=True), point_XK3, np.nan)
     zero_XK = (point_XK3 == 0).all(-1)
     missing_XK = zero_XK & (zero_XK.sum(-1, keepdims=True) > 1)
-    if sure_XK is not None:
-        missing_XK |= sure_XK < UNSURE
-    return np.where(missing_XK[..., None], np.nan, point_XK3)
+    point_XK3 = np.where(missing_XK[..., None], np.nan, point_XK3)
+    return point_XK3 if sure_XK is None else sure_points(point_XK3, sure_XK)
+
+
+def sure_points(point_XK3: np.ndarray, sure_XK: np.ndarray) -> np.ndarray:
+    """The points (..., K, 3) with NaN for those of which the source is not sure."""
+    return np.where(sure_XK[..., None] < UNSURE, np.nan, point_XK3)
 
 
 def check_size(path: Path, where: str, frames: int, points: int) -> None:

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from mrhubo.errors import UserError, nearest, shortened
+from mrhubo.errors import UserError, shortened
 from mrhubo.files.tree import Tree
 from mrhubo.motion.far_places import kept_places
 from mrhubo.motion.gaps import fill_numbers, fill_rotations
@@ -27,7 +27,7 @@ from mrhubo.motion.readers.assemble import (
     upright,
 )
 from mrhubo.motion.readers.family import rest_in_words
-from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.names import motion_name, several
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rotations import JOINTS, Form, read_local, rows_of, to_matrices
 
@@ -114,17 +114,13 @@ def choose(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: li
     """
     if not tracks:
         raise UserError(f"{path}: nobody is seen in any frame")
-    present = ", ".join(
-        f"'{shortened(track.person, 40)}' ({track.length:,} frames)"
-        for track in sorted(tracks, key=lambda track: -track.length)[:10]
-    )
-    present += f", and {len(tracks) - 10} more" if len(tracks) > 10 else ""
+    told = [(track.person, f"{track.length:,} frames") for track in sorted(tracks, key=lambda track: -track.length)]
     if options.person is None:
         chosen = max(tracks, key=lambda track: track.length)
         if len(tracks) > 1:
             notes.append(
-                f"'{shortened(chosen.person, 40)}' is seen longest and was taken; there are {present}; --person or"
-                " ReadOptions(person=...) takes another"
+                f"'{shortened(chosen.person, 40)}' is seen longest and was taken; there are {several(told)}; --person"
+                " or ReadOptions(person=...) takes another"
             )
         return chosen
     chosen = next((track for track in tracks if track.person == options.person), None)
@@ -132,9 +128,8 @@ def choose(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: li
         notes += options.of_one()
         return tracks[0]
     if chosen is None:
-        near = nearest(options.person, [track.person for track in tracks]) if len(tracks) > 10 else None
-        also = f"; nearest: '{near}'" if near is not None else ""
-        raise UserError(f"{path}: there is no person '{shortened(options.person, 40)}'; there are {present}{also}")
+        present = several(told, options.person)
+        raise UserError(f"{path}: there is no person '{shortened(options.person, 40)}'; there are {present}")
     return chosen
 
 

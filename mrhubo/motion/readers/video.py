@@ -14,7 +14,7 @@ from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import told_rate
-from mrhubo.motion.readers.sightings import UNSURE
+from mrhubo.motion.readers.sightings import sure_points
 from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.video.frames import video_kind
 from mrhubo.video.track import Track, track_body
@@ -64,7 +64,7 @@ def _one(path: Path, track: Track, options: ReadOptions, notes: list[str]) -> Tr
 
 def motion_of_track(name: str, track: Track, source: str, notes: tuple[str, ...], what: str = "") -> Motion:
     """The motion of a body that was followed; arguments as for `motion_from_points`."""
-    point_TK3 = np.where(track.visibility_TK[..., None] < UNSURE, np.nan, track.point_TK3)
+    point_TK3 = sure_points(track.point_TK3, track.visibility_TK)
     places = {our: place for place, our in enumerate(SETS["MediaPipe"]) if our != "-"}
     body = BodyPoints(
         {our: point_TK3[:, place] for our, place in places.items()},

@@ -115,6 +115,6 @@ def _without_end(names: list[str]) -> list[str]:
 
 def _is_number(word: str) -> bool:
     try:
-        return math.isfinite(float(word.replace(",", ".")))
+        return math.isfinite(float(word))
     except ValueError:
         return False

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mrhubo.errors import UserError, nearest, shortened
+from mrhubo.errors import UserError, shortened
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.assemble import MAX_FRAMES
 from mrhubo.motion.readers.content import NoMotion
-from mrhubo.motion.readers.names import motion_name
+from mrhubo.motion.readers.names import motion_name, several
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import told_rate
 from mrhubo.motion.readers.scene.nodes import Animation, BadScene, Rest, Scene, TooLarge, scene_tree
@@ -28,7 +28,6 @@ from mrhubo.motion.readers.tree.people import of_person
 from mrhubo.motion.readers.tree.reference import find_reference
 from mrhubo.motion.readers.tree.world import named_axis
 
-_LISTED = 10
 _NEARLY = 1e-3
 """Of a frame: times are rounded."""
 _TESTED = 64
@@ -126,28 +125,22 @@ def _chosen(path: Path, scene: Scene, options: ReadOptions, notes: list[str]) ->
     if not scene.animations:
         raise NoMotion(f"{path}: holds a scene in which nothing moves; export the animation with it")
     by_length = sorted(scene.animations, key=lambda animation: animation.start - animation.end)
-    names = [shortened(animation.name, 40) for animation in by_length]
-    present = ", ".join(
-        f"'{name}' ({animation.end - animation.start:.3g} s)"
-        for name, animation in zip(names[:_LISTED], by_length, strict=False)
-    )
-    present += f", and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    told = [(animation.name, f"{animation.end - animation.start:.3g} s") for animation in by_length]
     if options.animation is None:
         if len(by_length) < 2:
             return by_length[0]
-        longest = next((place for place, animation in enumerate(by_length) if _turns(animation)), 0)
-        still = " in which something turns" if longest else ""
+        longest = next(filter(_turns, by_length), by_length[0])
+        still = " in which something turns" if longest is not by_length[0] else ""
         notes.append(
-            f"'{names[longest]}' is the longest animation{still} and was taken; there are {present}; --animation or"
-            " ReadOptions(animation=...) takes another"
+            f"'{shortened(longest.name, 40)}' is the longest animation{still} and was taken; there are {several(told)};"
+            " --animation or ReadOptions(animation=...) takes another"
         )
-        return by_length[longest]
+        return longest
     for animation in by_length:
         if animation.name == options.animation:
             return animation
-    near = nearest(options.animation, [animation.name for animation in by_length]) if len(names) > _LISTED else None
-    also = f"; nearest: '{near}'" if near is not None else ""
-    raise UserError(f"{path}: has no animation '{shortened(options.animation, 40)}'; there are {present}{also}")
+    present = several(told, options.animation)
+    raise UserError(f"{path}: has no animation '{shortened(options.animation, 40)}'; there are {present}")
 
 
 def _turns(animation: Animation) -> bool:

@@ -35,7 +35,7 @@ from mrhubo.motion.readers.scene.nodes import (
     parents_first,
 )
 from mrhubo.motion.readers.scene.rests import OWN, bound_rests
-from mrhubo.robot_motion.clock import rate_of_step
+from mrhubo.robot_motion.clock import rate_of_rounded
 
 _SECOND, _NEW_SECOND = 46_186_158_000, 141_120_000
 """Units of time in a second; the second where files of version 7 say that they have that of version 8."""
@@ -273,7 +273,7 @@ class _File:
         usual = float(np.median(steps)) if len(steps) else 1.0
         if not _SLOWEST <= 1 / usual <= RATES[1] or np.mean(np.abs(steps / usual - 1) < _ALIKE) < _EVEN:
             return self.rate
-        rate = rate_of_step(f"{usual:.{_DIGITS}g}") or 1 / usual
+        rate = rate_of_rounded(usual, _DIGITS)
         return self.rate if abs(rate / self.rate - 1) < _SAME_RATE else rate
 
 

@@ -19,7 +19,7 @@ from mrhubo.fast.rotations import quaternion_to_matrix
 from mrhubo.motion.readers.options import RATES
 from mrhubo.motion.readers.scene.gltf_file import DAMAGED, GltfFile, entries, inner, whole
 from mrhubo.motion.readers.scene.nodes import Animation
-from mrhubo.robot_motion.clock import rate_of_step
+from mrhubo.robot_motion.clock import rate_of_rounded
 
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3"}
 _METHODS = {"STEP": 1, "LINEAR": 1, "CUBICSPLINE": 3}
@@ -199,7 +199,7 @@ def _even_rate(time_K: np.ndarray) -> float | None:
             continue
         rounded = step * float(off_K[is_near_K].max()) + float(np.abs(time_K).max()) * 2.0**-23
         digits = int(np.clip(-np.log10(rounded / (step * number_K.sum())), 2, 7))
-        rate = rate_of_step(f"{step:.{digits}g}") or 1 / step
+        rate = rate_of_rounded(step, digits)
         return rate if _SLOWEST <= rate <= RATES[1] else None
     return None
 

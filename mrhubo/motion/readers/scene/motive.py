@@ -31,6 +31,7 @@ from mrhubo.motion.readers.tracks import Person, check_span, choose
 from mrhubo.motion.readers.tree.people import FEWEST_JOINTS
 from mrhubo.motion.readers.tree.world import AT_REST
 
+_KIND = "table of OptiTrack Motive"
 _TOPMOST = ("", "hip", "hips", "pelvis", "root", "reference")
 """What the bone that carries all others is called, after the skeleton's name, which may be all that it has."""
 _OFTEN = 0.5
@@ -53,11 +54,39 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
     """
     table, notes = read_motive_table(path), list[str]()
     if not table.turns:
-        told = _told_rate(table)
-        found = Keypoints(
-            table.place_TB3, list(table.bones), None, None if told is None else told[1], "the table", notes
-        )
-        return motion_of_labelled(path, found, "table of OptiTrack Motive", options)
+        return _motion_of_markers(path, table, options)
+    name, bones, known_T = _chosen(path, table, options, notes)
+    seen_S = np.flatnonzero(known_T)
+    span = slice(int(seen_S[0]), int(seen_S[-1]) + 1)
+    check_span(path, len(seen_S), span.stop - span.start)
+    known_T, told = known_T[span], _told_rate(table)
+    rate = asked_rate(path, options) if told is None else told_rate(path, *told, options, notes)
+    scene = _scene(table, bones, span, known_T, name, rate)
+    kind = f"table of OptiTrack Motive, skeleton '{name}'" if name else _KIND
+    options = dataclasses.replace(options, person=None, animation=None, rate=None)
+    motion = scene_motion(path, scene, kind, options, notes)
+    if known_T.all():
+        return motion
+    sure_TJ = np.repeat(known_T[-len(motion) :, None].astype(np.float32), motion.arrays.local_TJ33.shape[1], axis=1)
+    return motion.changed(confidence_TJ=sure_TJ)
+
+
+def _motion_of_markers(path: Path, table: MotiveTable, options: ReadOptions) -> Motion:
+    """The motion of a body with markers, of a file without bones."""
+    told = _told_rate(table)
+    found = Keypoints(table.place_TB3, list(table.bones), None, None if told is None else told[1], "the table")
+    return motion_of_labelled(path, found, _KIND, options)
+
+
+def _chosen(
+    path: Path, table: MotiveTable, options: ReadOptions, notes: list[str]
+) -> tuple[str, list[int], np.ndarray]:
+    """The skeleton that is asked for, or tracked longest: its name, its bones that are tracked often, and the frames
+    (T,) in which they all are.
+
+    Raises:
+        UserError: nobody is tracked, or nobody of that name.
+    """
     skeletons, left_out = _skeletons(table.bones), list[int]()
     for name, bones in skeletons.items():
         skeletons[name] = _often(table, bones)
@@ -74,23 +103,7 @@ def read_motive(path: Path, options: ReadOptions) -> Motion:
         name = tracks[0].person
     else:
         raise UserError(f"{path}: nobody is tracked with all bones in any frame")
-    seen_S = np.flatnonzero(known[name])
-    span = slice(int(seen_S[0]), int(seen_S[-1]) + 1)
-    check_span(path, len(seen_S), span.stop - span.start)
-    known_T = known[name][span]
-    told = _told_rate(table)
-    rate = asked_rate(path, options) if told is None else told_rate(path, *told, options, notes)
-    bones, place_TB3, turn_TB33, parents = _ordered(table, skeletons[name], span, known_T, name)
-    animation = _animation(place_TB3, turn_TB33, parents, rate)
-    nodes = tuple(Node(bone, parent, True) for bone, parent in zip(bones, parents, strict=True))
-    scene = Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,), up=AT_REST)
-    kind = f"table of OptiTrack Motive, skeleton '{name}':" if name else "table of OptiTrack Motive:"
-    options = dataclasses.replace(options, person=None, animation=None, rate=None)
-    motion = scene_motion(path, scene, kind.removesuffix(":"), options, notes)
-    if known_T.all():
-        return motion
-    sure_TJ = np.repeat(known_T[-len(motion) :, None].astype(np.float32), motion.arrays.local_TJ33.shape[1], axis=1)
-    return motion.changed(confidence_TJ=sure_TJ)
+    return name, skeletons[name], known[name]
 
 
 def _skeletons(bones: Sequence[str]) -> dict[str, list[int]]:
@@ -132,6 +145,14 @@ def _told_rate(table: MotiveTable) -> tuple[str, float] | None:
             return f"'{key}' is", float(table.told.get(key.lower(), ""))
     rate = rate_of_seconds(table.time_T)
     return None if rate is None else ("its times are at", rate)
+
+
+def _scene(table: MotiveTable, bones: list[int], span: slice, known_T: np.ndarray, skeleton: str, rate: float) -> Scene:
+    """What is tracked of a skeleton in a span of frames, of which some are known, and filled in between."""
+    names, place_TB3, turn_TB33, parents = _ordered(table, bones, span, known_T, skeleton)
+    nodes = tuple(Node(name, parent, True) for name, parent in zip(names, parents, strict=True))
+    animation = _animation(place_TB3, turn_TB33, parents, rate)
+    return Scene(nodes, (_t_pose(place_TB3, turn_TB33, parents),), (animation,), up=AT_REST)
 
 
 def _ordered(
