@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 
 from mrhubo.errors import UserError
-from mrhubo.evaluation import Clip, mean_score, predict_clips, score_clip
+from mrhubo.evaluation import Clip, ClipScore, mean_score, predict_clips, score_clip
 from mrhubo.reference import angle_between
 from mrhubo.retargeter import JointNetwork
-from mrhubo.robot import BodyMap
+from mrhubo.robot import BodyMap, LinkPoses
 
 
 class ClipMetrics(lightning.Callback):
@@ -37,16 +37,14 @@ class ClipMetrics(lightning.Callback):
         assert isinstance(network, JointNetwork)
         if not all(bool(torch.isfinite(weights).all()) for weights in network.parameters()):
             raise UserError(f"the training came to NaN by step {trainer.global_step:,}; a lower trainer.lr helps")
-        predictions = predict_clips(network, self.clips)
-        robot = self.body_map.robot
-        mean = mean_score(
-            [score_clip(clip, q_TN, robot, self.key_links) for clip, q_TN in zip(self.clips, predictions, strict=True)]
-        )
-        angles_deg = [self._angle_deg(*found) for found in zip(self._human, predictions, strict=True)]
-        angle_deg = sum(angles_deg) / len(angles_deg)
+        robot, scores, angles_deg = self.body_map.robot, list[ClipScore](), list[float]()
+        for clip, human_TD3, q_TN in zip(self.clips, self._human, predict_clips(network, self.clips), strict=True):
+            poses = robot.forward(q_TN)
+            scores.append(score_clip(clip, q_TN, robot, self.key_links, (poses, robot.forward(clip.reference_TN))))
+            angles_deg.append(self._angle_deg(human_TD3, poses))
+        mean, angle_deg = mean_score(scores), sum(angles_deg) / len(angles_deg)
         pl_module.log_dict({"val/joint_rad": mean.joint_rad, "val/link_cm": mean.link_cm, "val/angle_deg": angle_deg})
 
-    def _angle_deg(self, human_TD3: Tensor, q_TN: Tensor) -> float:
-        columns = self.body_map.measured
-        robot_TD3 = self.body_map.robot_directions(self.body_map.robot.forward(q_TN))
+    def _angle_deg(self, human_TD3: Tensor, poses: LinkPoses) -> float:
+        columns, robot_TD3 = self.body_map.measured, self.body_map.robot_directions(poses)
         return float(torch.rad2deg(angle_between(robot_TD3[:, columns], human_TD3[:, columns])).mean())

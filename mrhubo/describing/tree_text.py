@@ -43,9 +43,7 @@ def tree_text(description: Description, source: str | None = None) -> str:
 def _walk(description: Description) -> Iterator[tuple[Joint, int, dict[str, np.ndarray]]]:
     """Every joint after the one above it, with its depth, and the poses (4, 4) of links."""
     poses = link_poses(description.parsed, {})
-    below: dict[str, list[Joint]] = {}
-    for joint in description.joints.values():
-        below.setdefault(joint.parent, []).append(joint)
+    below = description.joints_below
     waiting = [(joint, 0) for joint in reversed(below.get(description.root, []))]
     while waiting:
         joint, depth = waiting.pop()

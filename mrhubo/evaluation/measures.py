@@ -99,7 +99,7 @@ def evaluate_clip(clip: Clip, q_TN: Tensor, body_map: BodyMap, key_links: Sequen
         float(direction_jerk(d[:, body_map.measured], clip.motion.frame_rate).mean()) for d in (robot_TD3, human_TD3)
     )
     return Evaluation(
-        **vars(score_clip(clip, q_TN, robot, key_links)),
+        **vars(score_clip(clip, q_TN, robot, key_links, (poses, reference_poses))),
         limb_deg=mean(error_TD, "arm"),
         reference_limb_deg=mean(reference_TD, "arm"),
         hand_deg=mean(error_TD, "hand"),

@@ -15,7 +15,7 @@ from torch import Tensor
 from mrhubo.evaluation.clips import Clip
 from mrhubo.reference import joint_error, link_error
 from mrhubo.retargeter import JointNetwork
-from mrhubo.robot import Robot
+from mrhubo.robot import LinkPoses, Robot
 from mrhubo.rotation import matrix_to_sixd
 
 
@@ -70,8 +70,10 @@ def predict_clips(network: JointNetwork, clips: Sequence[Clip]) -> list[Tensor]:
     return list(joints.split([len(clip.motion) for clip in clips]))
 
 
-def score_clip(clip: Clip, q_TN: Tensor, robot: Robot, key_links: Sequence[str]) -> ClipScore:
-    """Errors of predicted joint angles (T, N) [rad] against the reference."""
+def score_clip(
+    clip: Clip, q_TN: Tensor, robot: Robot, key_links: Sequence[str], poses: Sequence[LinkPoses] = ()
+) -> ClipScore:
+    """Errors of predicted joint angles (T, N) [rad] against the reference; `poses` as for `link_error`."""
     joints = joint_error(q_TN, clip.reference_TN)
-    links = link_error(robot, q_TN, clip.reference_TN, key_links)
+    links = link_error(robot, q_TN, clip.reference_TN, key_links, poses)
     return ClipScore(clip.name, len(q_TN), float(joints.mean()), float(links.mean()))

@@ -83,7 +83,7 @@ class Inbox:
         Args:
             data: as it came, or as a source made it.
             sender: which connection or address it came from.
-            now: our clock [s].
+            now: our clock [s] as the period began; not asked where there is a `clock`.
         """
         now = now if self.clock is None else self.clock()
         try:

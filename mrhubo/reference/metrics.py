@@ -24,8 +24,12 @@ def joint_error(q_TN: Tensor, q_ref_TN: Tensor) -> Tensor:
     return wrap_angle(q_TN - q_ref_TN).abs().mean(dim=-1)
 
 
-def link_error(robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence[str]) -> Tensor:
+def link_error(
+    robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence[str], poses: Sequence[LinkPoses] = ()
+) -> Tensor:
     """Mean Euclidean distance (T,) [cm] of the key links in the robot's base frame.
+
+    `poses` are the robot's link poses at both, if they are there already.
 
     Raises:
         UserError: a key link is not among `robot.links`, or there is none.
@@ -36,7 +40,9 @@ def link_error(robot: Robot, q_TN: Tensor, q_ref_TN: Tensor, key_links: Sequence
         if link not in robot.links:
             raise UserError(f"robot.key_links: {unknown_name('link', link, robot.links)}")
     rows = [robot.link_index(link) for link in key_links]
-    position_TL3, reference_TL3 = (robot.forward(q).position_BL3[:, rows] for q in (q_TN, q_ref_TN))
+    position_TL3, reference_TL3 = (
+        found.position_BL3[:, rows] for found in poses or map(robot.forward, (q_TN, q_ref_TN))
+    )
     return 100 * (position_TL3 - reference_TL3).norm(dim=-1).mean(dim=-1)
 
 

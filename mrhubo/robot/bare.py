@@ -25,19 +25,15 @@ def bare_sticks(description: Description, shaped: Collection[str]) -> dict[str, 
         description: the robot.
         shaped: links that have a shape, or a mesh that can be drawn.
     """
-    joints = description.joints.values()
     if len(set(shaped)) < _FEWEST * len(description.links):
-        return {joint.child: joint.parent for joint in joints}
-    below: dict[str, list[str]] = {}
-    for joint in joints:
-        below.setdefault(joint.parent, []).append(joint.name)
+        return {joint.child: joint.parent for joint in description.joints.values()}
     root = description.root
     body_of, place_of, reach = {root: root}, {root: np.eye(4)}, {root: 0.0}
     # By body, the bodies that hang on it, and where [m], in its frame.
     outward: dict[str, dict[str, np.ndarray]] = {root: {}}
     order = [root]
     for link in order:
-        for joint in (description.joints[name] for name in below.get(link, [])):
+        for joint in description.joints_below.get(link, []):
             child, place_44 = joint.child, place_of[link] @ joint.origin_44
             reach[child] = reach[link] + float(np.linalg.norm(joint.origin_44[:3, 3]))
             if joint.kind == "fixed":

@@ -28,10 +28,9 @@ _WIDE = 1.7
 class Surface:
     """The surface of a convex hull: points on it, evenly by area, and its sides."""
 
-    def __init__(self, corners_H3: np.ndarray) -> None:
-        """Of its corners (H, 3) [m]; QhullError or ValueError where they have no room."""
-        hull = ConvexHull(corners_H3)
-        triangles_T33 = corners_H3[hull.simplices]
+    def __init__(self, hull: ConvexHull) -> None:
+        """Of a hull [m]; ValueError where its areas are 0."""
+        triangles_T33 = hull.points[hull.simplices]
         edges_T23 = triangles_T33[:, 1:] - triangles_T33[:, :1]
         areas_T = np.linalg.norm(np.cross(edges_T23[:, 0], edges_T23[:, 1]), axis=1)
         generator = np.random.default_rng(0)

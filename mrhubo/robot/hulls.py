@@ -45,24 +45,35 @@ def capsules_of(vertices_V3: np.ndarray, most: int = MOST_CAPSULES) -> list[Caps
     local_H3 = (corners_H3 - middle_3) @ turn_33
     unit_X3 = np.random.default_rng(0).uniform(-1, 1, (_POINTS, 3))
     points_X3 = unit_X3 * half_3
-    inside_X3 = points_X3[_inside_hull(points_X3, local_H3, half_3)]
+    hull = _hull(local_H3)
+    inside_X3 = points_X3[_inside(points_X3, hull, half_3)]
     room = 8 * float(half_3.prod()) * len(inside_X3) / _POINTS
     found = [capsules(shape, shape.origin_44) for shape in _candidates(local_H3, half_3)]
     found = [some for some in found if len(some) <= most]
     shared = [_shared(some, inside_X3, room, unit_X3) for some in found]
     first = int(np.argmax(shared))
-    fitted = _fitted(found[first], local_H3, inside_X3, most)
+    fitted = _fitted(found[first], hull, inside_X3, most)
     worth = [_shared(some, inside_X3, room, unit_X3) - _WORTH * len(some) for some in fitted]
     best = max(zip(worth, fitted, strict=True), key=lambda pair: pair[0], default=(-np.inf, []))
     chosen = best[1] if best[0] > shared[first] - _WORTH * len(found[first]) else found[first]
     return [(turn_33 @ start_3 + middle_3, turn_33 @ end_3 + middle_3, radius) for start_3, end_3, radius in chosen]
 
 
-def _fitted(found: list[Capsule], corners_H3: np.ndarray, inside_X3: np.ndarray, most: int) -> list[list[Capsule]]:
-    """Capsules that are fitted to a hull: those that were found, and others; none where it has no room."""
+def _hull(points_X3: np.ndarray) -> ConvexHull | None:
+    """The convex hull of points; None where they have no room."""
     try:
-        surface = Surface(corners_H3)
+        return ConvexHull(points_X3)
     except (QhullError, ValueError):
+        return None
+
+
+def _fitted(found: list[Capsule], hull: ConvexHull | None, inside_X3: np.ndarray, most: int) -> list[list[Capsule]]:
+    """Capsules that are fitted to a hull: those that were found, and others; none where it has no room."""
+    if hull is None:
+        return []
+    try:
+        surface = Surface(hull)
+    except ValueError:  # so small that its areas are 0
         return []
     others = [parted(inside_X3[:_PARTED], count) for count in range(2, most + 1)]
     return [surface.fitted(some) for some in (found, *others) if some]
@@ -88,10 +99,8 @@ def extremes(vertices_V3: np.ndarray) -> np.ndarray:
 def _corners(vertices_V3: np.ndarray) -> np.ndarray:
     """The vertices at the corners of their convex hull, which are few; all that differ, where they have no room."""
     vertices_V3 = np.unique(vertices_V3, axis=0)
-    try:
-        return vertices_V3[ConvexHull(vertices_V3).vertices]
-    except (QhullError, ValueError):
-        return vertices_V3
+    hull = _hull(vertices_V3)
+    return vertices_V3 if hull is None else vertices_V3[hull.vertices]
 
 
 def _outermost(vertices_V3: np.ndarray) -> np.ndarray:
@@ -137,9 +146,7 @@ def _sides(corners_H3: np.ndarray) -> np.ndarray:
     alone.
     """
     axes_33 = np.linalg.svd(corners_H3 - corners_H3.mean(axis=0))[2]
-    try:
-        hull = ConvexHull(corners_H3)
-    except (QhullError, ValueError):
+    if (hull := _hull(corners_H3)) is None:
         return axes_33
     edges_F23 = corners_H3[hull.simplices[:, 1:]] - corners_H3[hull.simplices[:, :1]]
     normals_F3 = hull.equations[:, :3]
@@ -151,12 +158,11 @@ def _sides(corners_H3: np.ndarray) -> np.ndarray:
     return np.concatenate((normals_F3[first], axes_33))
 
 
-def _inside_hull(points_X3: np.ndarray, corners_H3: np.ndarray, half_3: np.ndarray) -> np.ndarray:
+def _inside(points_X3: np.ndarray, hull: ConvexHull | None, half_3: np.ndarray) -> np.ndarray:
     """Which points lie in the hull (X,); what has no room is taken for its box."""
-    try:
-        sides_F4 = ConvexHull(corners_H3).equations
-    except (QhullError, ValueError):
+    if hull is None:
         return np.all(np.abs(points_X3) <= half_3, axis=1)
+    sides_F4 = hull.equations
     return np.all(points_X3 @ sides_F4[:, :3].T + sides_F4[:, 3] <= 0, axis=1)
 
 

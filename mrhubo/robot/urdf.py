@@ -92,6 +92,14 @@ class Description:
             joints.append([j.name, j.kind, j.parent, j.child, place, repr(j.lower), repr(j.upper), mimic])
         return fingerprint([self.root, joints])
 
+    @cached_property
+    def joints_below(self) -> dict[str, list[Joint]]:
+        """By link, the joints that hang on it, in the file's order; links without any are not in it."""
+        found: dict[str, list[Joint]] = {}
+        for joint in self.joints.values():
+            found.setdefault(joint.parent, []).append(joint)
+        return found
+
     def once(self, name: str, find: Callable[[], Found]) -> Found:
         """What `find` makes of this description, and of nothing else, no file either. It is asked once, also where the
         same text is read again; nobody may change what it gives.

@@ -3,7 +3,7 @@
 1. The network answers K hypotheses.
 2. The cheapest of them are refined by the network and, beside, by a Gauss-Newton step; the cheaper of the two goes on.
 3. The cheapest three of these go by damped Gauss-Newton steps, the better of two dampings. A training has the network
-   refine them too, so that it learns from there, and ends with that.
+   refine them too, so that it learns from there, and ends with what that answers.
 4., 5. Likewise the cheapest one.
 
 The answer is the cheapest of all angles that were come by, by the exact cost. Limits are never exceeded, as all steps
@@ -53,7 +53,9 @@ class Trace:
 
 
 def unroll(network: UniversalNetwork, problem: Problem, learning: bool = False) -> Trace:
-    """Five iterations from the middle of all ranges, or the three that a training learns from."""
+    """Five iterations from the middle of all ranges; or what a training learns from, which is the network's answers in
+    three, and not the best of the last.
+    """
     place = problem.at(problem.bounds.middle_BN)
     count = len(place.q_BN)
     first_BKN = _answer(network, place, place.steps(place.q_BN.new_tensor([DAMPINGS])), first=True)
@@ -62,13 +64,15 @@ def unroll(network: UniversalNetwork, problem: Problem, learning: bool = False) 
     cost_BK = place.cost_B.unflatten(0, (count, -1))
     trace.learnt.append(cost_BK)
     trace.see(first_BKN, cost_BK)
-    for turn, keep in enumerate(KEPT[:_LEARNT] if learning else KEPT):
+    for turn, keep in enumerate(KEPT):
         place = place.rows(_best(cost_BK, keep))
         if learning or turn < REFINED:
             step_XKN = place.steps(place.q_BN.new_tensor([DAMPINGS]))
-            network_XN = _answer(network, place, step_XKN, first=False)[:, 0]
-            tried = [place.problem.at(network_XN), place.moved(step_XKN[:, 0])]
-            trace.learnt.append(tried[0].cost_B.unflatten(0, (count, -1)))
+            answered = place.problem.at(_answer(network, place, step_XKN, first=False)[:, 0])
+            trace.learnt.append(answered.cost_B.unflatten(0, (count, -1)))
+            if learning and turn + 1 == _LEARNT:
+                break  # nothing that could be come by from here on is learnt from
+            tried = [answered, place.moved(step_XKN[:, 0])]
         else:
             tried = [place.moved(step_XN) for step_XN in place.steps(place.q_BN.new_tensor([FINAL_DAMPINGS])).unbind(1)]
         place = choose(*tried)

@@ -60,58 +60,88 @@ def track_body(path: Path, estimator: PoseEstimator) -> Track:
     Raises:
         UserError: the file is no video, or damaged (`mrhubo.video.frames`); it has one frame, or nobody is in it.
     """
-    estimator.reset()
-    times, points, pixels, visible = [], [], [], []
-    looks = list[bool]()
-    for time, image_HW3 in frames(path):
-        found = estimator.landmarks(image_HW3)
-        if time >= _LOOK_S * len(looks):
-            looks.append(estimator.sees_others(image_HW3))
-        pixels.append(found.pixel_K2)
-        times.append(time)
-        points.append(found.point_K3)
-        visible.append(found.visibility_K)
-    if len(times) < 2:
-        raise UserError(f"{path}: has one frame; a motion needs two at least")
-    seen = sum(bool(np.isfinite(point_K3).all()) for point_K3 in points)
-    if not seen:
-        raise UserError(
-            f"{path}: nobody is found in any of its {len(times):,} frames; a person has to be as tall as a sixth of"
-            " the picture's shorter side, and a film of smaller ones to be cut to them"
-        )
-    notes = [] if seen == len(times) else [f"nobody is found in {len(times) - seen:,} of {len(times):,} frames"]
-    if any(looks):
-        notes.append(
-            f"several people are seen in {sum(looks):,} of {len(looks):,} pictures that were looked through: one is"
-            " followed, the surest one at first, and may be mistaken for another where one covers the other"
-        )
-    tall = float(np.nanmedian(np.ptp(np.stack(pixels), axis=1).max(1)))
-    if 0 < tall < _SMALL:
-        notes.append(
-            f"the person is {tall:.0f} pixels tall: limbs may be far off, a larger picture of them would be better"
-        )
-    time_T, point_TK3, visibility_TK = np.array(times), np.stack(points), np.stack(visible)
-    who_T = tell_apart(time_T, point_TK3, np.stack(pixels), _TRUNK)
-    exchanged_TK = exchanged_points(time_T, point_TK3, who_T)
+    film = _watch(path, estimator)
+    notes, who_T = film.doubts(), tell_apart(film.time_T, film.point_TK3, film.pixel_TK2, _TRUNK)
+    exchanged_TK = exchanged_points(film.time_T, film.point_TK3, who_T)
+    point_TK3, visibility_TK = film.point_TK3, film.visibility_TK
     if exchanged_TK.any():
         point_TK3 = np.where(exchanged_TK[..., None], point_TK3[:, EXCHANGED], point_TK3)
         visibility_TK = np.where(exchanged_TK, visibility_TK[:, EXCHANGED], visibility_TK)
         notes.append(
-            f"left and right are exchanged for a moment, in {int(exchanged_TK.any(1).sum()):,} of {seen:,} frames: they"
-            " are put back"
+            f"left and right are exchanged for a moment, in {int(exchanged_TK.any(1).sum()):,} of {film.seen:,} frames:"
+            " they are put back"
         )
-    rate = rate_of_times(time_T, seconds)
-    if np.abs(time_T * rate - np.arange(len(time_T))).max() > STEADY:
-        rate = rate_of_step(f"{np.median(np.diff(time_T)):.3g}") or rate  # files round times to 1 ms
-        notes.append(
-            f"its {len(time_T):,} frames follow each other after {uneven_steps(time_T)} ms: points are interpolated to"
-            f" {rate:.4g} frames per second"
+    rate = rate_of_times(film.time_T, seconds)
+    track = Track(rate, point_TK3, visibility_TK, tuple(notes), who_T)
+    uneven = np.abs(film.time_T * rate - np.arange(len(film.time_T))).max() > STEADY
+    return _at_fixed_rate(track, film.time_T, who_T, path) if uneven else track
+
+
+@dataclass(frozen=True)
+class _Film:
+    """What is found in each frame, as `mrhubo.video.estimator.Estimate` has it."""
+
+    time_T: np.ndarray
+    """[s]"""
+    point_TK3: np.ndarray
+    visibility_TK: np.ndarray
+    pixel_TK2: np.ndarray
+    looks: list[bool]
+    """Whether others are there, in the pictures that were looked through for them."""
+    seen: int
+    """In how many frames somebody is found."""
+
+    def doubts(self) -> list[str]:
+        """What is to be known about it, a sentence each."""
+        count, looks = len(self.time_T), self.looks
+        notes = [] if self.seen == count else [f"nobody is found in {count - self.seen:,} of {count:,} frames"]
+        if any(looks):
+            notes.append(
+                f"several people are seen in {sum(looks):,} of {len(looks):,} pictures that were looked through: one is"
+                " followed, the surest one at first, and may be mistaken for another where one covers the other"
+            )
+        tall = float(np.nanmedian(np.ptp(self.pixel_TK2, axis=1).max(1)))
+        if 0 < tall < _SMALL:
+            notes.append(
+                f"the person is {tall:.0f} pixels tall: limbs may be far off, a larger picture of them would be better"
+            )
+        return notes
+
+
+def _watch(path: Path, estimator: PoseEstimator) -> _Film:
+    """Looks at all of a film; UserError as `track_body`."""
+    estimator.reset()
+    times, found = [], []
+    looks = list[bool]()
+    for time, image_HW3 in frames(path):
+        found.append(estimator.landmarks(image_HW3))
+        if time >= _LOOK_S * len(looks):
+            looks.append(estimator.sees_others(image_HW3))
+        times.append(time)
+    if len(times) < 2:
+        raise UserError(f"{path}: has one frame; a motion needs two at least")
+    point_TK3 = np.stack([each.point_K3 for each in found])
+    if not (seen := int(np.isfinite(point_TK3).all((1, 2)).sum())):
+        raise UserError(
+            f"{path}: nobody is found in any of its {len(times):,} frames; a person has to be as tall as a sixth of"
+            " the picture's shorter side, and a film of smaller ones to be cut to them"
         )
-        if time_T[-1] * rate > MAX_FRAMES:
-            raise UserError(f"{path}: its {len(times):,} frames are spread over {time_T[-1]:.3g} s; that is no film")
-        point_TK3, visibility_TK = (at_rate(time_T, value, rate) for value in (point_TK3, visibility_TK))
-        place_T = at_rate(time_T, np.arange(len(who_T)), rate)
-        before_T, after_T = (who_T[end(place_T).astype(int)] for end in (np.floor, np.ceil))
-        who_T = np.where(before_T == after_T, before_T, -1)
-        point_TK3[who_T < 0], visibility_TK[who_T < 0] = np.nan, 0.0
-    return Track(rate, point_TK3, visibility_TK, tuple(notes), who_T)
+    visibility_TK, pixel_TK2 = np.stack([each.visibility_K for each in found]), np.stack([e.pixel_K2 for e in found])
+    return _Film(np.array(times), point_TK3, visibility_TK, pixel_TK2, looks, seen)
+
+
+def _at_fixed_rate(track: Track, time_T: np.ndarray, who_T: np.ndarray, path: Path) -> Track:
+    """A track whose frames are at uneven times [s], at the rate at which most of them follow each other."""
+    rate = rate_of_step(f"{np.median(np.diff(time_T)):.3g}") or track.rate  # files round times to 1 ms
+    note = (
+        f"its {len(time_T):,} frames follow each other after {uneven_steps(time_T)} ms: points are interpolated to"
+        f" {rate:.4g} frames per second"
+    )
+    if time_T[-1] * rate > MAX_FRAMES:
+        raise UserError(f"{path}: its {len(time_T):,} frames are spread over {time_T[-1]:.3g} s; that is no film")
+    point_SK3, visibility_SK = (at_rate(time_T, value, rate) for value in (track.point_TK3, track.visibility_TK))
+    place_S = at_rate(time_T, np.arange(len(who_T)), rate)
+    before_S, after_S = (who_T[end(place_S).astype(int)] for end in (np.floor, np.ceil))
+    who_S = np.where(before_S == after_S, before_S, -1)
+    point_SK3[who_S < 0], visibility_SK[who_S < 0] = np.nan, 0.0
+    return Track(rate, point_SK3, visibility_SK, (*track.notes, note), who_S)

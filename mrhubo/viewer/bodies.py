@@ -70,14 +70,11 @@ def read_bodies(robot: Robot, joints: Sequence[str]) -> list[Body]:
         why = "is fixed" if joint.kind == "fixed" else None if joint.mimic is None else f"mimics '{joint.mimic.joint}'"
         if why is not None:
             raise UserError(f"joint '{name}' {why} in {description.path}, so nothing else can move it")
-    below: dict[str, list[str]] = {}
-    for joint in description.joints.values():
-        below.setdefault(joint.parent, []).append(joint.name)
     bodies = [Body(description.root, None, np.eye(4), np.array([1.0, 0.0, 0.0]), links={description.root: np.eye(4)})]
     order = [(description.root, 0)]
     for link, body in order:
         place_44 = bodies[body].links[link]
-        for joint in (description.joints[name] for name in below.get(link, [])):
+        for joint in description.joints_below.get(link, []):
             driver = _driver(description, joint.name)
             if joint.kind != "fixed" and driver.joint in joints:
                 bodies.append(

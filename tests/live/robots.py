@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrhubo.body.joints import POSED_JOINT_NAMES
+from mrhubo.config.live import LiveConfig
 from mrhubo.live.robot import Answer, LiveRobot
 from mrhubo.robot_motion import RobotFacts
 
@@ -15,6 +16,8 @@ NAMES = ("left_a", "left_b", "right_a", "right_b", "other")
 LOWER, UPPER = np.array([-1.0, -0.25, -2.0, 0.125, -3.0]), np.array([1.0, 0.25, 2.0, 2.5, 3.0])
 SPEED = np.array([2.0, 8.0, 20.0, 0.5, 5.0])
 """Numbers that float32 has exactly."""
+AT_ONCE = LiveConfig(ramp_time=0.0)
+"""The robot follows at full speed from the beginning."""
 
 
 def make_robot(answer: Callable[[Any, float], np.ndarray] | None = None) -> LiveRobot:

@@ -27,7 +27,7 @@ from mrhubo.live.sources.replay import ReplaySource
 from mrhubo.live.sources.udp import UdpSource
 from mrhubo.motion import read_motion
 from tests.live.messages import beat, message
-from tests.live.robots import NAMES, UPPER, make_robot, random_robot
+from tests.live.robots import AT_ONCE, NAMES, UPPER, make_robot, random_robot
 
 PERIOD = 1 / 60
 
@@ -112,7 +112,7 @@ def test_a_session_that_was_held_up_follows_again(clock: Clock) -> None:
                 inbox.offer(make(2 * self.step + number, time=clock.now), "a", now)
             return self.step < 120
 
-    session = loop.run(make_robot(lambda pose, time: UPPER), [Held()], [Kept()], LiveConfig(ramp_time=0.0))
+    session = loop.run(make_robot(lambda pose, time: UPPER), [Held()], [Kept()], AT_ONCE)
     assert session.states["following"] >= 118 and session.counts["late"] == 0
 
 
@@ -128,7 +128,7 @@ def test_no_two_outputs_are_closer_than_a_period() -> None:
 def test_a_broken_sink_stops_the_robot_for_all(clock: Clock, replay: ReplaySource) -> None:
     broken, other = Kept(breaks_at=90), Kept()
     with pytest.raises(UserError, match="come off"):
-        loop.run(random_robot(0), [replay], [broken, other], LiveConfig(ramp_time=0.0))
+        loop.run(random_robot(0), [replay], [broken, other], AT_ONCE)
     assert 90 <= len(other.outputs) < 100 and is_still(other.outputs[-1]) and other.closed == broken.closed == 1
 
 
@@ -136,7 +136,7 @@ def test_a_bug_in_a_sink_too(clock: Clock, replay: ReplaySource, monkeypatch: py
     broken, other = Kept(), Kept()
     monkeypatch.setattr(broken, "send", lambda output: other.outputs[99:] and 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        loop.run(random_robot(0), [replay], [broken, other], LiveConfig(ramp_time=0.0))
+        loop.run(random_robot(0), [replay], [broken, other], AT_ONCE)
     assert is_still(other.outputs[-1]) and len(other.outputs) < 115 and other.closed == broken.closed == 1
 
 
@@ -157,7 +157,7 @@ def test_a_bug_in_a_source_stops_the_robot(clock: Clock, replay: ReplaySource, m
 
     monkeypatch.setattr(replay, "read", failing)
     with pytest.raises(ZeroDivisionError):
-        loop.run(random_robot(0), [replay], [sink], LiveConfig(ramp_time=0.0))
+        loop.run(random_robot(0), [replay], [sink], AT_ONCE)
     assert not is_still(sink.outputs[99]) and is_still(sink.outputs[-1]) and sink.closed == 1
 
 
@@ -177,7 +177,7 @@ def test_a_signal_stops_the_robot_and_then_interrupts(clock: Clock, replay: Repl
 
         replay.read = reading
         with pytest.raises(KeyboardInterrupt):
-            loop.run(random_robot(0), [replay], [sink], LiveConfig(ramp_time=0.0))
+            loop.run(random_robot(0), [replay], [sink], AT_ONCE)
         assert signal.getsignal(number) is terminated
     finally:
         signal.signal(number, before)
@@ -220,7 +220,7 @@ def test_udp_from_end_to_end() -> None:
     receiver.bind(("127.0.0.1", 0))
     receiver.settimeout(30)
     source, sink = UdpSource(Endpoint("127.0.0.1", 0)), UdpSink(Endpoint(*receiver.getsockname()))
-    session = Session.of(make_robot(lambda pose, time: UPPER), [source], [sink], LiveConfig(ramp_time=0.0))
+    session = Session.of(make_robot(lambda pose, time: UPPER), [source], [sink], AT_ONCE)
     session.open()
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

@@ -16,7 +16,7 @@ from mrhubo.live.governor import Governor
 from mrhubo.live.pilot import Pilot
 from mrhubo.robot_motion import RobotFacts
 from tests.live.messages import beat, message
-from tests.live.robots import LOWER, SPEED, UPPER, make_robot, random_robot
+from tests.live.robots import AT_ONCE, LOWER, SPEED, UPPER, make_robot, random_robot
 
 PERIOD = 1 / 60
 CONFIGS = st.builds(
@@ -118,7 +118,7 @@ def test_it_stands_in_time(end: str, rate: float) -> None:
 
 
 def test_nothing_moves_before_the_button_is_held() -> None:
-    pilot = Pilot(random_robot(2), LiveConfig(ramp_time=0.0), False)
+    pilot = Pilot(random_robot(2), AT_ONCE, False)
     q_TN, _, states = follow(pilot, 30, 0.0, lambda step, now: pilot.inbox.offer(message(step, time=now), "a", now))
     assert (q_TN == pilot.robot.home_N).all() and set(states) == {"stopped"}
     pilot.inbox.offer(beat(0, 0.5), "b", 0.5)
@@ -233,7 +233,7 @@ def test_the_standstill_that_is_told_is_where_it_stands(seed: int, steps: int) -
 def test_duplicates_and_reordering_change_nothing() -> None:
     def outputs(extra: bool) -> list[Any]:
         generator = np.random.default_rng(5)
-        pilot, found = Pilot(random_robot(4), LiveConfig(ramp_time=0.0), False), []
+        pilot, found = Pilot(random_robot(4), AT_ONCE, False), []
         for step in range(60):
             now = step * PERIOD
             rotations = generator.normal(size=(21, 3)).tolist()

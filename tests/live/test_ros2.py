@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.sinks.ros2 import Ros2Sink
 from mrhubo.live.sinks.trajectory import trajectory
-from tests.live.robots import NAMES, make_robot
+from tests.live.robots import AT_ONCE, NAMES, make_robot
 
-CONFIG = LiveConfig(ramp_time=0.0)
 _PATIENCE_S = 20.0
 
 
@@ -150,7 +148,7 @@ def ros(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iter
 def test_trajectories_are_published_until_the_end(ros: StandIn | Real, outputs: list[Output]) -> None:
     ros.listen("/arm", "trajectory_msgs.msg.JointTrajectory")
     sink = Ros2Sink("/arm")
-    sink.open(make_robot(), CONFIG)
+    sink.open(make_robot(), AT_ONCE)
     told = ros.heard("/arm", lambda: sink.send(outputs[-1]))
     assert list(told.joint_names) == list(NAMES)
     wanted = trajectory(outputs[-1], 1 / 60, 0.0)["points"]
@@ -163,7 +161,7 @@ def test_trajectories_are_published_until_the_end(ros: StandIn | Real, outputs: 
     sink.close()
     sink.send(outputs[-1])  # nobody hears it
     again = Ros2Sink("/arm")
-    again.open(make_robot(), CONFIG)
+    again.open(make_robot(), AT_ONCE)
     assert list(ros.heard("/arm", lambda: again.send(outputs[-1])).points[0].positions) == wanted[0]["positions"]
     again.close()
 
@@ -171,7 +169,7 @@ def test_trajectories_are_published_until_the_end(ros: StandIn | Real, outputs: 
 def test_ctrl_c_is_left_to_the_session(ros: StandIn | Real, outputs: list[Output]) -> None:
     ros.listen("/arm", "trajectory_msgs.msg.JointTrajectory")
     sink = Ros2Sink("/arm")
-    sink.open(make_robot(), CONFIG)
+    sink.open(make_robot(), AT_ONCE)
     ros.heard("/arm", lambda: sink.send(outputs[-1]))
     ros.interrupt()
     assert ros.heard("/arm", lambda: sink.send(outputs[-1])).points  # as the robot still has to brake
@@ -189,7 +187,7 @@ def test_the_base_and_what_is_planted_are_published_too(
     for foot in feet:
         ros.listen(foot, "std_msgs.msg.Bool")
     sink = Ros2Sink()
-    sink.open(robot, CONFIG)
+    sink.open(robot, AT_ONCE)
     send = lambda: sink.send(outputs[-1])  # noqa: E731
     told = ros.heard("/base_pose", send)
     turn, place = told.pose.orientation, told.pose.position
@@ -207,7 +205,7 @@ def test_what_is_no_topic_is_said_at_once(ros: StandIn | Real) -> None:
 
 def test_ros_that_has_been_ended_is_one_sentence(ros: StandIn | Real, outputs: list[Output]) -> None:
     sink = Ros2Sink()
-    sink.open(make_robot(), CONFIG)
+    sink.open(make_robot(), AT_ONCE)
     sys.modules["rclpy"].try_shutdown()
     with pytest.raises(UserError, match="--sink ros2: ROS 2 can't"):
         sink.send(outputs[-1])

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import mrhubo
-from mrhubo.config.live import LiveConfig
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.live.output import Output
 from mrhubo.live.pilot import Pilot
@@ -23,17 +22,15 @@ from mrhubo.live.sinks.mcap import McapSink
 from mrhubo.live.sinks.mujoco import MujocoSink
 from mrhubo.live.sinks.trajectory import trajectory
 from mrhubo.robot_motion import FollowingJoint, RobotFacts
-from tests.live.robots import NAMES, make_robot
+from tests.live.robots import AT_ONCE, NAMES, make_robot
 from tests.reference.walkers import write_urdf
-
-CONFIG = LiveConfig(ramp_time=0.0)
 
 
 def test_a_bag_of_a_session_is_its_motion(tmp_path: Path, outputs: list[Output]) -> None:
     pytest.importorskip("mcap_ros2")
     path = tmp_path / "new" / "session.mcap"
     sink = McapSink(path)
-    sink.open(make_robot(), CONFIG)
+    sink.open(make_robot(), AT_ONCE)
     for output in outputs:
         sink.send(output)
     as_killed = path.read_bytes()
@@ -63,14 +60,14 @@ def test_a_file_has_one_sink(tmp_path: Path, outputs: list[Output], kind: type[F
     if kind is McapSink:
         pytest.importorskip("mcap_ros2")
     first, second = kind(path), kind(path)
-    first.open(make_robot(), CONFIG)
+    first.open(make_robot(), AT_ONCE)
     for output in outputs:
         first.send(output)
     with pytest.raises(UserError, match="another sink writes it"):
-        second.open(make_robot(), CONFIG)
+        second.open(make_robot(), AT_ONCE)
     first.close()
     assert len(mrhubo.read_robot_motion(path)) == len(outputs)
-    second.open(make_robot(), CONFIG)
+    second.open(make_robot(), AT_ONCE)
     for output in outputs[:3]:
         second.send(output)
     second.close()
@@ -79,7 +76,7 @@ def test_a_file_has_one_sink(tmp_path: Path, outputs: list[Output], kind: type[F
 
 def test_a_row_that_is_not_whole_is_left_out(tmp_path: Path, outputs: list[Output]) -> None:
     sink = FileSink(tmp_path / "a.npz")
-    sink.open(make_robot(), CONFIG)
+    sink.open(make_robot(), AT_ONCE)
     for output in outputs[:2]:
         sink.send(output)
     assert sink._file is not None
@@ -96,7 +93,7 @@ def test_files_and_bags_tell_where_the_base_is(
     robot, outputs = walking
     path = tmp_path / ("session.npz" if kind is FileSink else "session.mcap")
     sink = kind(path)
-    sink.open(robot, CONFIG)
+    sink.open(robot, AT_ONCE)
     for output in outputs:
         sink.send(output)
     as_killed = path.read_bytes() if kind is McapSink else b""
@@ -138,8 +135,8 @@ def test_a_simulated_robot_with_legs_begins_on_its_soles(
     inertial = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'  # fmt: skip
     (tmp_path / "walker.urdf").write_text(re.sub(r'<link name="([^"]*)">', rf'<link name="\1">{inertial}', text))
     sink = MujocoSink(tmp_path / "walker.urdf", free=True)
-    sink.open(robot, CONFIG)
-    pilot = Pilot(robot, CONFIG, True)
+    sink.open(robot, AT_ONCE)
+    pilot = Pilot(robot, AT_ONCE, True)
     home = pilot.tick(0.0).standing
     assert home is not None
     np.testing.assert_allclose(sink.data.qpos[:3], home.base.position_3, atol=1e-3)
@@ -183,7 +180,7 @@ def nao(root: Path) -> LiveRobot:
 def test_a_simulated_robot_follows(nao: LiveRobot, free: bool) -> None:
     pytest.importorskip("mujoco")
     sink = MujocoSink(free=free)
-    sink.open(nao, CONFIG)
+    sink.open(nao, AT_ONCE)
     assert sink.model.opt.gravity[2] < -9 and sink.model.nq - sink.model.nv == (1 if free else 0)
     assert np.allclose(sink.joints, nao.home_N)
     rest_N = nao.home_N
@@ -203,14 +200,14 @@ def test_a_simulated_robot_follows(nao: LiveRobot, free: bool) -> None:
 def test_simulation_without_a_model_or_with_another(nao: LiveRobot, root: Path, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     with pytest.raises(UserError, match="write mujoco:MODEL"):
-        MujocoSink().open(make_robot(), CONFIG)
+        MujocoSink().open(make_robot(), AT_ONCE)
     with pytest.raises(UserError, match="has no joint left_a"):
-        MujocoSink(root / "data/robots/nao/nao.urdf").open(make_robot(), CONFIG)
+        MujocoSink(root / "data/robots/nao/nao.urdf").open(make_robot(), AT_ONCE)
     (tmp_path / "broken.xml").write_text("<mujoco><worldbody><body>")
     with pytest.raises(UserError, match="cannot load"):
-        MujocoSink(tmp_path / "broken.xml").open(nao, CONFIG)
+        MujocoSink(tmp_path / "broken.xml").open(nao, AT_ONCE)
     with pytest.raises(UserError, match="no such file"):
-        MujocoSink(tmp_path / "none.xml").open(nao, CONFIG)
+        MujocoSink(tmp_path / "none.xml").open(nao, AT_ONCE)
 
 
 def test_a_model_whose_meshes_are_missing_still_moves(tmp_path: Path, nao: LiveRobot) -> None:
@@ -222,5 +219,5 @@ def test_a_model_whose_meshes_are_missing_still_moves(tmp_path: Path, nao: LiveR
     (tmp_path / "arm.urdf").write_text(f'<robot name="arm">{links}{joints}</robot>')
     sink = MujocoSink(tmp_path / "arm.urdf")
     with warnings.catch_warnings():
-        sink.open(nao, CONFIG)
+        sink.open(nao, AT_ONCE)
     assert sink.model.nu == 4 and np.allclose(sink.joints, nao.home_N)

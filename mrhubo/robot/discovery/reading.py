@@ -104,16 +104,12 @@ def _read(
     description: Description, gains: Mapping[str, float], fixed: Collection[str] = (),
     motors: Mapping[str, str] | None = None, springs: Mapping[str, str] | None = None,
 ) -> Bodies:  # fmt: skip
-    below: dict[str, list[str]] = {}
-    for joint in description.joints.values():
-        below.setdefault(joint.parent, []).append(joint.name)
     pose_44, body_of, order = {description.root: np.eye(4)}, {description.root: 0}, [description.root]
     hinges: list[Hinge] = []
     sources, degrees = _sources(description, fixed), in_degrees(description.joints.values())
     for link in order:
-        for name in below.get(link, []):
-            joint = description.joints[name]
-            child_44 = pose_44[link] @ joint.origin_44
+        for joint in description.joints_below.get(link, []):
+            name, child_44 = joint.name, pose_44[link] @ joint.origin_44
             pose_44[joint.child] = child_44
             order.append(joint.child)
             if joint.kind not in (*ROTARY, "prismatic") or name in description.faults or name in fixed:
