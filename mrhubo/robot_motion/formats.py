@@ -10,6 +10,7 @@ from pathlib import Path
 from mrhubo.errors import UserError, listed, shortened, unknown_name
 from mrhubo.files.npz import open_npz
 from mrhubo.files.regular import open_regular
+from mrhubo.robot_motion.gmr import read_gmr, write_gmr
 from mrhubo.robot_motion.json_file import read_json, write_json
 from mrhubo.robot_motion.lerobot import read_lerobot, write_lerobot
 from mrhubo.robot_motion.mcap import import_mcap, read_mcap, write_mcap
@@ -57,6 +58,7 @@ FORMATS: dict[str, Format] = {
     "mujoco": Format(".npz", "MuJoCo's qpos, quaternion w first", write_mujoco, preset=True),
     "unitree": Format(".csv", "no header, base and quaternion w last before the joints: Unitree, BeyondMimic",
                       write_unitree, preset=True),
+    "gmr": Format(".pkl", "GMR's pickle, quaternion w last: TWIST, MimicKit, ProtoMotions", write_gmr),
     "mcap": Format(".mcap", "ROS 2 bag with a JointTrajectory", _plain(write_mcap), library=import_mcap),
     "yaml": Format(".yaml", "ROS 2 JointTrajectory as YAML", write_yaml),
     "lerobot": Format("", "LeRobot dataset 3.0, a folder, an episode a motion",
@@ -119,7 +121,7 @@ def read_robot_motion(
 
     Args:
         path: a file, or the folder of a LeRobot dataset with one episode.
-        joint_names: of a file that does not tell them (Unitree's .csv).
+        joint_names: of a file that does not tell them (Unitree's .csv, GMR's own pickles).
         frame_rate: of a file that does not tell it.
 
     Raises:
@@ -136,6 +138,8 @@ def read_robot_motion(
     for magic, read in ((b"PAR1", read_parquet), (b"\x89MCAP", read_mcap), (b"PK", _read_zip)):
         if start.startswith(magic):
             return read(path)
+    if start.startswith(b"\x80"):
+        return read_gmr(path, joint_names)
     text = start.decode("utf-8-sig", "replace").lstrip()
     if text.startswith("{"):
         return read_json(path)

@@ -20,7 +20,7 @@ from mrhubo.robot_motion.order import JointOrder, left_out
 from mrhubo.robot_motion.plain import build
 from mrhubo.robot_motion.tables import read_rows, read_text, write_rows
 
-_XYZW, _WXYZ = [1, 2, 3, 0], [3, 0, 1, 2]
+W_LAST, W_FIRST = [1, 2, 3, 0], [3, 0, 1, 2]
 """Where w comes last or first, of a quaternion that has it the other way."""
 _ROOT = 7
 
@@ -29,7 +29,7 @@ def write_unitree(motion: RobotMotion, path: Path, order: JointOrder | None) -> 
     """Writes rows without a header; returns what had to be assumed, and what such a file cannot tell."""
     motion = motion.single()
     place, turn, notes = base_of(motion, order)
-    rows = np.concatenate([place, turn[:, _XYZW], motion.q], axis=1)
+    rows = np.concatenate([place, turn[:, W_LAST], motion.q], axis=1)
     write_rows(path, list(rows.T))
     rate = "unknown" if motion.frame_rate is None else in_full(motion.frame_rate)
     return (
@@ -50,6 +50,6 @@ def read_unitree(path: Path, joint_names: Sequence[str], frame_rate: float | Non
         raise UserError(
             f"{path}: has {rows.shape[1]} columns; expected {_ROOT} of the base and {len(joint_names)} joints"
         )
-    frames = {"q": rows[:, _ROOT:], "root_position": rows[:, :3], "root_quaternion_wxyz": rows[:, 3:_ROOT][:, _WXYZ]}
+    frames = {"q": rows[:, _ROOT:], "root_position": rows[:, :3], "root_quaternion_wxyz": rows[:, 3:_ROOT][:, W_FIRST]}
     facts = {"joint_names": list(joint_names)}
     return build(facts if frame_rate is None else {**facts, "frame_rate": frame_rate}, frames, path)

@@ -77,10 +77,10 @@ class Hostile:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "is no robot motion; expected one of: csv, json"),
+        (b"", "is no robot motion; expected one of: csv, gmr, json"),
         (b"\0\1\2\3", "is no robot motion"),
         (b"hello\n", "is no robot motion"),
-        (pickle.dumps(Hostile()), "is no robot motion"),
+        (pickle.dumps(Hostile()), "nothing was run"),
         (npz_with(q=np.array([[Hostile()]], object)), "pickled Python objects"),
         (npz_with(unit=np.array("deg")), "its unit is 'deg'; expected joint angles in 'rad'"),
         (npz_with(frame_rate=np.array([30.0, 30.0])), r"'frame_rate' has shape \(2,\)"),

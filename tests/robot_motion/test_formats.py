@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ from mrhubo.robot_motion.motion import PER_FRAME
 from tests.files.bounded import bounded
 from tests.robot_motion.motions import assert_same, motions, plain, standing
 
-WHOLE, TABLES, ANGLES = ("npz", "json", "parquet"), ("csv",), ("mujoco", "unitree", "yaml", "mcap")
+WHOLE, TABLES, ANGLES = ("npz", "json", "parquet"), ("csv",), ("mujoco", "unitree", "yaml", "mcap", "gmr")
 """Formats that hold everything, every number a frame, and joint angles alone."""
 ROOT = ("root_position", "root_quaternion_wxyz")
 
@@ -47,7 +48,7 @@ def there_and_back(motion: RobotMotion, folder: Path, name: str) -> RobotMotion:
 @given(motion=motions())
 def test_the_same_numbers_come_back(tmp_path: Path, name: str, motion: RobotMotion) -> None:
     need(name)
-    if name in ("yaml", "mcap") and motion.frame_rate is None:
+    if name in ("yaml", "mcap", "gmr") and motion.frame_rate is None:
         motion = dataclasses.replace(motion, frame_rate=30.0)
     found = there_and_back(motion, tmp_path, name)
     if name in WHOLE:
@@ -59,9 +60,9 @@ def test_the_same_numbers_come_back(tmp_path: Path, name: str, motion: RobotMoti
         for field in ("lower", "upper", "velocity"):
             np.testing.assert_array_equal(getattr(found.robot, field), getattr(motion.robot, field))
     else:
-        root = ROOT if motion.root_position is not None and name in ("mujoco", "unitree", "mcap") else ()
+        root = ROOT if motion.root_position is not None and name in ("mujoco", "unitree", "mcap", "gmr") else ()
         assert_same(found, motion, PER_FRAME if name in TABLES else ("q", *root))
-    if motion.frame_rate is not None and (len(motion) > 1 or name in (*WHOLE, "mujoco", "unitree")):
+    if motion.frame_rate is not None and (len(motion) > 1 or name in (*WHOLE, "mujoco", "unitree", "gmr")):
         exact = 1e-5 if name in ("yaml", "mcap") else 1e-14  # whole nanoseconds
         assert found.frame_rate == pytest.approx(motion.frame_rate, rel=exact)
 
@@ -84,7 +85,7 @@ def test_a_rate_comes_back_from_times(tmp_path: Path, name: str, rate: float) ->
     assert there_and_back(plain(50, rate), tmp_path, name).frame_rate == rate
 
 
-@pytest.mark.parametrize("name", [*WHOLE, "csv", "mujoco", "unitree"])
+@pytest.mark.parametrize("name", [*WHOLE, "csv", "mujoco", "unitree", "gmr"])
 def test_bytes_depend_on_the_motion_alone(tmp_path: Path, name: str) -> None:
     first, second = (tmp_path / f"{number}{FORMATS[name].ending}" for number in (1, 2))
     for path in (first, second):
@@ -144,7 +145,7 @@ def test_several_motions_fit_into_an_npz_alone(tmp_path: Path) -> None:
     assert_same(there_and_back(batch, tmp_path, "npz"), batch)
     assert_same(there_and_back(RobotMotion([0.5], ("a",)), tmp_path, "npz"), RobotMotion([0.5], ("a",)))
     assert there_and_back(RobotMotion([0.5], ("a",)), tmp_path, "csv").q.tolist() == [[0.5]]
-    for name in ("csv", "parquet", "mujoco", "unitree", "yaml"):
+    for name in ("csv", "parquet", "mujoco", "unitree", "yaml", "gmr"):
         with pytest.raises(UserError, match=r"x: .*holds one motion, found joint angles of shape \(2, 3, 1\)"):
             write_robot_motion(batch, tmp_path / "x", name)
     assert not (tmp_path / "x").exists()
@@ -157,6 +158,43 @@ def test_csv_is_a_table_that_people_read(tmp_path: Path) -> None:
     write_robot_motion(motion, tmp_path / "new" / "a.csv")
     lines = (tmp_path / "new" / "a.csv").read_text().splitlines()
     assert lines == ['time [s],"left, elbow [rad]",head [rad],collision', "0.0,0.1,-1.5,1", "0.25,0.33333334,1e-09,0"]
+
+
+def test_gmrs_pickle_is_what_its_readers_take(tmp_path: Path) -> None:
+    half = np.float32(np.sqrt(0.5))
+    motion = plain(1, root_position=[[1, 2, 3]], root_quaternion_wxyz=[[half, 0, 0, -half]])
+    write_robot_motion(motion, tmp_path / "a.pkl")
+    data = (tmp_path / "a.pkl").read_bytes()
+    assert b"numpy.core.multiarray" in data and b"numpy._core" not in data  # NumPy 1 knows no other
+    value = pickle.loads(data)
+    assert set(value) == {"fps", "root_pos", "root_rot", "dof_pos", "local_body_pos", "link_body_list", "joint_names"}
+    assert value["fps"] == 30 and isinstance(value["fps"], int) and value["local_body_pos"] is None
+    assert value["root_rot"][0].tolist() == pytest.approx([0, 0, -half, half])
+    np.testing.assert_array_equal(value["dof_pos"], motion.q)
+    value["root_pos"][:, 2] -= 0.1  # as they do
+    with pytest.raises(UserError, match="frame rate is not known"):
+        write_robot_motion(dataclasses.replace(motion, frame_rate=None), tmp_path / "b.pkl")
+
+
+def test_what_gmr_itself_writes_is_read_by_the_names_of_joints(tmp_path: Path) -> None:
+    motion = plain(5)
+    value = {
+        "fps": 30, "root_pos": np.zeros((5, 3)), "root_rot": np.tile([0.0, 0.0, 0.0, 1.0], (5, 1)),
+        "dof_pos": motion.q.astype(np.float64), "local_body_pos": None, "link_body_list": None,
+    }  # fmt: skip
+    path = tmp_path / "g1_walk.pkl"
+    path.write_bytes(pickle.dumps(value))
+    found = read_robot_motion(path, motion.joint_names)
+    assert_same(found, motion, ["q"])
+    assert found.frame_rate == 30 and found.root_quaternion_wxyz is not None
+    assert found.root_quaternion_wxyz[0].tolist() == [1, 0, 0, 0]
+    with pytest.raises(UserError, match="have to be named"):
+        read_robot_motion(path)
+    with pytest.raises(UserError, match="have shapes"):
+        read_robot_motion(path, ["a"])
+    path.write_bytes(pickle.dumps({"q": motion.q}))
+    with pytest.raises(UserError, match="'dof_pos' is missing"):
+        read_robot_motion(path, motion.joint_names)
 
 
 def test_unitree_has_the_base_first_and_w_last(tmp_path: Path) -> None:
@@ -227,7 +265,7 @@ def test_an_order_turns_what_follows_and_holds_what_is_held(tmp_path: Path) -> N
     assert not (tmp_path / "b.npz").exists()
 
 
-@pytest.mark.parametrize("name", ["mujoco", "unitree"])
+@pytest.mark.parametrize("name", ["mujoco", "unitree", "gmr"])
 def test_joints_that_a_simulator_would_leave_at_0_are_told(tmp_path: Path, name: str) -> None:
     """`knee` is held at 0, where whatever plays the file has it anyway."""
     motion, path = plain(), tmp_path / f"a{FORMATS[name].ending}"
@@ -252,7 +290,7 @@ def test_limits_are_those_of_the_order(tmp_path: Path) -> None:
     ("path", "name", "found"),
     [
         ("a.npz", None, "npz"), ("a.CSV", None, "csv"), ("a.yml", None, "yaml"), ("a.mcap", None, "mcap"),
-        ("a.anything", "unitree", "unitree"), ("a.npz", "mujoco", "mujoco"),
+        ("a.pkl", None, "gmr"), ("a.anything", "unitree", "unitree"), ("a.npz", "mujoco", "mujoco"),
     ],
 )  # fmt: skip
 def test_the_ending_says_the_format_unless_one_is_asked_for(path: str, name: str | None, found: str) -> None:

@@ -28,13 +28,13 @@ from mrhubo.motion.readers.keypoint_table import numbers_of
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import asked_rate, rate_of_seconds, told_rate
 from mrhubo.motion.readers.scene.turned import Skeleton, turned_motion
-from mrhubo.robot_motion.clock import at_rate
+from mrhubo.robot_motion.clock import at_rate, rate_of_rounded
 
 _BEGINS = re.compile(r"(?:[^\n]*\n){1,40}?[ \t]*endheader[ \t]*\r?\n(?:[ \t\r]*\n)*[ \t]*time\b", re.IGNORECASE)
 _END = "endheader"
 _MAX_BYTES, _MAX_FRAMES, _MOST = 2**28, 500_000, 3_000
-_DIGITS = 3
-"""Of times in frames, and of rates: files round them."""
+_DIGITS, _STEP_DIGITS = 3, 5
+"""Of times in frames, and of steps: files round them."""
 _LARGEST = 1_000.0
 """No angle is beyond this [rad], and no place [m]: angles that wind up are a few turns."""
 
@@ -164,7 +164,7 @@ def _steady(path: Path, value_TX: np.ndarray, options: ReadOptions, notes: list[
     step_T = np.diff(time_T)
     if not len(step_T) or step_T.min() <= 0 or options.rate is not None:
         return value_TX, asked_rate(path, options, "has times that do not rise evenly")
-    rate = told_rate(path, "has", round(1 / float(np.median(step_T)), _DIGITS), options, notes)
+    rate = told_rate(path, "has", rate_of_rounded(float(np.median(step_T)), _STEP_DIGITS), options, notes)
     if time_T[-1] * rate > _MAX_FRAMES:
         raise UserError(f"{path}: its {len(time_T):,} frames are spread over {time_T[-1]:.3g} s; that is no motion")
     notes.append(f"its {len(time_T):,} frames follow each other unevenly: they are interpolated to {rate:.4g} a second")
