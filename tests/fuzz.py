@@ -221,6 +221,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "poselib": ("damaged.npy", lambda path: simulated_files.write_poselib(path, simulated_files.smpl())),
     "mimickit": ("damaged.pkl", _mimickit),
     "mimickit, smpl": ("damaged.pkl", lambda path: simulated_files.write_mimickit(path, simulated_files.smpl())),
+    "protomotions, packed": ("damaged.pt", lambda path: simulated_files.write_packed(path, simulated_files.smpl())),
     "protomotions": ("damaged.motion", lambda path: simulated_files.write_protomotions(path, simulated_files.smpl())),
     "points, a line each": ("damaged.csv", _point_table),
     "mvnx": ("damaged.mvnx", lambda path: path.write_text(test_mvnx.mvnx(test_mvnx.subject()))),

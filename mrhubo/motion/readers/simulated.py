@@ -3,12 +3,14 @@
 Their 24 bodies are SMPL's joints in an order of their own, and are turned as those are, but with axes x forward, y
 left, z up where SMPL's are x left, y up, z forward. World: z up.
 
-Legend: T frames, J = 24 bodies, L of several motions.
+Legend: T frames, F some of them, J = 24 bodies, L motions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -40,7 +42,7 @@ _MOST = 100_000
 def read_protomotions(tree: Tree) -> Layout | None:
     """ProtoMotions' `.motion`, by `torch.save`: `rigid_body_pos` (T, J, 3) and `rigid_body_rot` (T, J, 4), quaternions
     in the world, w last; or what it packs of many, `gts` and `grs`, of which motion i has `motion_num_frames[i]`
-    frames from `length_starts[i]` on, `motion_dt[i]` seconds each (https://github.com/NVlabs/ProtoMotions,
+    frames from `length_starts[i]` on, `motion_dt[i]` seconds each, and came from `motion_files[i]` (https://github.com/NVlabs/ProtoMotions,
     protomotions/components/motion_lib.py). None of other characters, such as robots, and of anything else.
     """
     place, turn = (tree.find_array(*keys) for keys in (("rigid_body_pos", "gts"), ("rigid_body_rot", "grs")))
@@ -55,19 +57,33 @@ def read_protomotions(tree: Tree) -> Layout | None:
         return _smpl("rigid_body_rot", local_TJ33, place[first:end, 0])
 
     kind = Kind("ProtoMotions' humanoid of SMPL", "smpl", Z_UP)
-    starts, frames, steps = (tree.find_array(key) for key in ("length_starts", "motion_num_frames", "motion_dt"))
-    if starts is None or frames is None:
-        return Layout(kind, [Track("", len(place), partial(read, 0, len(place)))])
-    bad = starts.ndim != 1 or starts.shape != frames.shape or not 0 < len(starts) <= _MOST
-    if bad or starts[0] < 0 or (frames < 1).any() or (starts + frames > len(place)).any():
-        raise UserError(f"{tree.path}: 'length_starts' and 'motion_num_frames' do not fit 'gts' of {len(place)} frames")
+    if "length_starts" in tree.keys:
+        return Layout(kind, _packed(tree, len(place), read))
+    return Layout(kind, [Track("", len(place), partial(read, 0, len(place)))])
+
+
+def _packed(tree: Tree, count: int, read: Callable[[int, int], SmplArrays]) -> list[Track]:
+    """The motions that are packed into so many frames, by the names of the files that they came from, or else by their
+    numbers.
+    """
+    start_L, frames_L, step_L = (tree.find_array(key) for key in ("length_starts", "motion_num_frames", "motion_dt"))
+    if start_L is None or frames_L is None or start_L.ndim != 1 or start_L.shape != frames_L.shape:
+        raise UserError(f"{tree.path}: 'length_starts' and 'motion_num_frames' are no lists of the same length")
+    if not 0 < len(start_L) <= _MOST or (start_L % 1).any() or (frames_L % 1).any():
+        raise UserError(f"{tree.path}: 'length_starts' and 'motion_num_frames' are no lists of whole numbers")
+    if (start_L < 0).any() or (frames_L < 1).any() or (start_L.astype(np.float64) + frames_L > count).any():
+        raise UserError(f"{tree.path}: 'length_starts' and 'motion_num_frames' do not fit 'gts' of {count:,} frames")
+    told = tree.get("motion_files")
+    names = [] if told is None else [Path(name).stem for name in told.texts()]
+    if not len(set(names)) == len(names) == len(start_L):
+        names = [str(number) for number in range(len(start_L))]
     tracks = []
-    for number, (first, length) in enumerate(zip(starts.tolist(), frames.tolist(), strict=True)):
-        step = float(steps[number]) if steps is not None and steps.shape == starts.shape else 0.0
+    for number, name in enumerate(names):
+        first, length = int(start_L[number]), int(frames_L[number])
+        step = float(step_L[number]) if step_L is not None and step_L.shape == start_L.shape else 0.0
         homes = (tree_of({"fps": round(1 / step, 3)}, tree.path, f"motion_dt[{number}]"),) if step > 0 else ()
-        read_one = partial(read, int(first), int(first + length))
-        tracks.append(Track(str(number) if len(starts) > 1 else "", int(length), read_one, homes))
-    return Layout(kind, tracks)
+        tracks.append(Track(name, length, partial(read, first, first + length), homes))
+    return tracks
 
 
 def read_mimickit_smpl(tree: Tree) -> Layout | None:

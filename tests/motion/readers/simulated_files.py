@@ -170,6 +170,10 @@ def write_protomotions(path: Path, figure: Figure, seed: int = 0) -> None:
     torch.save(protomotions(figure, *moves(figure, seed)), path)
 
 
+def write_packed(path: Path, figure: Figure) -> None:
+    torch.save(packed_protomotions(figure), path)
+
+
 def packed_protomotions(figure: Figure, count: int = 3) -> dict[str, Any]:
     """As ProtoMotions packs several motions, each half as long again as the one before."""
     motions = [protomotions(figure, *moves(figure, seed, FRAMES + 20 * seed)) for seed in range(count)]

@@ -185,6 +185,7 @@ def test_frames_that_follow_each_other_unevenly_are_interpolated(tmp_path: Path)
         (lambda t: t[: t.index("pro_sup_l")], "no frames"),
         (lambda t: t[: len(t) // 2], "columns"),
         (lambda t: t.replace("0.01666667", "0.00000000"), "--rate"),
+        (lambda t: t.replace("0.03333333", "0.01666668"), "--rate"),
     ],
 )
 def test_what_is_no_motion_is_refused(tmp_path: Path, change: object, said: str) -> None:

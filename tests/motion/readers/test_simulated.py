@@ -226,9 +226,9 @@ def test_smpls_humanoid_has_smpls_rotations(
 def test_of_protomotions_packed_motions_the_longest_is_read_or_the_one_that_is_asked_for(tmp_path: Path) -> None:
     path = save(packed_protomotions(smpl()), tmp_path / "motions.pt")
     longest = mrhubo.read_motion(path)
-    assert len(longest) == FRAMES + 40 and longest.frame_rate == 30 and "'2'" in " ".join(longest.notes)
+    assert len(longest) == FRAMES + 40 and longest.frame_rate == 30 and "'clip2'" in " ".join(longest.notes)
     assert limb_angles(longest, smpl(), seed=2).max() < np.radians(3)
-    other = mrhubo.read_motion(path, ReadOptions(person="1"))
+    other = mrhubo.read_motion(path, ReadOptions(person="clip1"))
     assert len(other) == FRAMES + 20 and limb_angles(other, smpl(), seed=1).max() < np.radians(3)
 
 
@@ -239,11 +239,29 @@ def test_robots_with_as_many_bodies_are_no_humanoid_of_smpl(tmp_path: Path) -> N
         mrhubo.read_motion(save(value, tmp_path / "walk.motion"))
 
 
-def test_packed_motions_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda starts: starts + 30, "do not fit"),
+        (lambda starts: starts - 1, "do not fit"),
+        (lambda starts: starts * float("nan"), "no lists of whole numbers"),
+        (lambda starts: starts[:1], "no lists of the same length"),
+    ],
+)
+def test_packed_motions_that_do_not_fit_are_refused(
+    tmp_path: Path, change: Callable[[torch.Tensor], torch.Tensor], said: str
+) -> None:
     value = packed_protomotions(smpl())
-    value["length_starts"] = value["length_starts"] + 30
-    with pytest.raises(UserError, match="do not fit"):
+    value["length_starts"] = change(value["length_starts"])
+    with pytest.raises(UserError, match=said):
         mrhubo.read_motion(save(value, tmp_path / "motions.pt"))
+
+
+def test_packed_motions_without_names_go_by_their_numbers(tmp_path: Path) -> None:
+    value = packed_protomotions(smpl())
+    value["motion_files"] = ("same.npz",) * 3
+    motion = mrhubo.read_motion(save(value, tmp_path / "motions.pt"), ReadOptions(person="0"))
+    assert len(motion) == FRAMES
 
 
 def test_a_folder_of_protomotions_files_is_read(tmp_path: Path) -> None:

@@ -32,14 +32,15 @@ from mrhubo.robot_motion.clock import at_rate, rate_of_rounded
 
 _BEGINS = re.compile(r"(?:[^\n]*\n){1,40}?[ \t]*endheader[ \t]*\r?\n(?:[ \t\r]*\n)*[ \t]*time\b", re.IGNORECASE)
 _END = "endheader"
-_MAX_BYTES, _MAX_FRAMES, _MOST = 2**28, 500_000, 3_000
+_MAX_BYTES, _MAX_FRAMES, _MOST = 2**27, 500_000, 3_000
 _DIGITS, _STEP_DIGITS = 3, 5
 """Of times in frames, and of steps: files round them."""
 _LARGEST = 1_000.0
 """No angle is beyond this [rad], and no place [m]: angles that wind up are a few turns."""
 
 _Z, _X, _Y = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-_PARTS: tuple[tuple[str, str, tuple[float, float, float], tuple[tuple[str, tuple[float, float, float]], ...]], ...] = (
+_Vector = tuple[float, float, float]
+_PARTS: tuple[tuple[str, str, _Vector, tuple[tuple[str, _Vector], ...]], ...] = (
     ("pelvis", "", (0.0, 0.0, 0.0), (("pelvis_tilt", _Z), ("pelvis_list", _X), ("pelvis_rotation", _Y))),
     (
         "torso", "pelvis", (-0.1007, 0.0815, 0.0),
@@ -104,8 +105,8 @@ def read_opensim(path: Path, options: ReadOptions) -> Motion:
         )
     notes: list[str] = []
     value_TX, rate = _steady(path, value_TX, options, notes)
-    turns, names = _skeleton()
-    local_TN33 = np.tile(np.eye(3), (len(value_TX), len(names.names), 1, 1))
+    turns, skeleton = _skeleton()
+    local_TN33 = np.tile(np.eye(3), (len(value_TX), len(turns), 1, 1))
     for part, axes in enumerate(turns):
         for coordinate, axis_3 in axes:
             if coordinate not in place:
@@ -121,7 +122,7 @@ def read_opensim(path: Path, options: ReadOptions) -> Motion:
         notes.append("where the pelvis is is not told")
     else:
         root_T3 = value_TX[:, [column for column in at if column is not None]]
-    return turned_motion(path, names, local_TN33, root_T3, rate, "angles of OpenSim", options, notes)
+    return turned_motion(path, skeleton, local_TN33, root_T3, rate, "angles of OpenSim", options, notes)
 
 
 def _table(path: Path) -> tuple[list[str], np.ndarray, bool]:
@@ -161,14 +162,17 @@ def _steady(path: Path, value_TX: np.ndarray, options: ReadOptions, notes: list[
     rate = rate_of_seconds(time_T)
     if rate is not None:
         return value_TX, told_rate(path, "its times are at", rate, options, notes)
-    step_T = np.diff(time_T)
-    if not len(step_T) or step_T.min() <= 0 or options.rate is not None:
-        return value_TX, asked_rate(path, options, "has times that do not rise evenly")
-    rate = told_rate(path, "has", rate_of_rounded(float(np.median(step_T)), _STEP_DIGITS), options, notes)
-    if time_T[-1] * rate > _MAX_FRAMES:
+    why, usual = "has times that do not rise evenly", float(np.median(np.diff(time_T))) if len(time_T) > 1 else 0.0
+    if usual <= 0 or options.rate is not None:
+        return value_TX, asked_rate(path, options, why)
+    rate = told_rate(path, "has", rate_of_rounded(usual, _STEP_DIGITS), options, notes)
+    frame_T = np.round(time_T * rate, _DIGITS)
+    if np.diff(frame_T).min() <= 0:
+        return value_TX, asked_rate(path, options, why)
+    if frame_T[-1] > _MAX_FRAMES:
         raise UserError(f"{path}: its {len(time_T):,} frames are spread over {time_T[-1]:.3g} s; that is no motion")
     notes.append(f"its {len(time_T):,} frames follow each other unevenly: they are interpolated to {rate:.4g} a second")
-    return at_rate(np.round(time_T * rate, _DIGITS) / rate, value_TX, rate), rate
+    return at_rate(frame_T / rate, value_TX, rate), rate
 
 
 def _skeleton() -> tuple[list[list[tuple[str, np.ndarray]]], Skeleton]:
