@@ -6,14 +6,17 @@ import io
 from typing import Any, BinaryIO
 
 from mrhubo.files.joblib_stream import take_array
-from mrhubo.files.unpickler import unpickle
+from mrhubo.files.unpickler import OTHERS, unpickle
 
 MODULES = (
-    *("numpy", "torch", "collections", "joblib", "copyreg", "copy_reg", "_codecs", "pathlib"),
+    OTHERS,
+    *("collections", "copyreg", "copy_reg", "_codecs", "pathlib", "argparse", "datetime", "decimal", "enum", "uuid"),
     *(f"{module}.{name}" for module in ("builtins", "__builtin__") for name in ("dict", "list", "set", "object")),
     *(f"builtins.{name}" for name in ("bytearray", "slice", "range", "complex")),
+    *("types.SimpleNamespace", "time.struct_time"),
 )
-"""What such a pickle may mention: what arrays, tensors, plain values and paths are made of."""
+"""What such a pickle may mention: what arrays, tensors and plain values are made of, and whatever its writer's own
+programs keep beside them, which is passed over. Of Python's own modules there is no more that belongs there."""
 _FEW_STEPS, _BYTES_A_STEP, _MOST_STEPS = 2_000_000, 4, 20_000_000
 """Steps that any pickle may take, after how many bytes of its one more, and steps that none may exceed: numbers in
 lists take one each nine bytes, a video's small arrays, frame by frame, one each seven. So neither time nor memory is

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import sys
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Iterable
 from typing import Any, BinaryIO
@@ -19,8 +20,12 @@ from typing import Any, BinaryIO
 from mrhubo.errors import UserError, shortened
 from mrhubo.files.records import RecordedObject, Stream, UnreadablePickle
 
+OTHERS = "*"
+"""Among modules: all that are none of Python's own."""
 MAX_STEPS = 500_000
 """Steps that a pickle may take, unless more are allowed; those of body models and checkpoints take some thousands."""
+_PYTHONS = {*sys.stdlib_module_names, "__builtin__", "commands", "exceptions"}
+"""Python's own modules, and those of Python 2 that are called otherwise there and may do harm."""
 _MAX_NAMES = 1_000
 """Different functions and classes that it may name."""
 _LARGEST_INT_KEY = 2**63
@@ -47,8 +52,8 @@ def unpickle(
 
     Args:
         file: an open binary file; what follows the pickle is left unread, or not, as it happens.
-        modules: top-level modules whose names the pickle may mention, and single names of others with their module
-            (`builtins.dict`).
+        modules: top-level modules whose names the pickle may mention, single names of others with their module
+            (`builtins.dict`), and `OTHERS`.
         max_steps: how many steps it may take; default: `MAX_STEPS`.
         replace: is asked, when an object has been given its state, what shall stand in its place; formats that write
             raw bytes into a pickle's stream read them here.
@@ -112,7 +117,9 @@ class _RestrictedUnpickler(pickle._Unpickler):
 
     def find_class(self, module: str, name: str) -> type[Any]:
         """The class that records what a name is called with."""
-        if module.partition(".")[0] not in self.modules and f"{module}.{name}" not in self.modules:
+        top = module.partition(".")[0]
+        may_ask = top in self.modules or f"{module}.{name}" in self.modules
+        if not may_ask and (OTHERS not in self.modules or top in _PYTHONS):
             asked = shortened(f"{module}.{name}")
             raise UserError(f"it asks for '{asked}', which a file of this kind has no use for; nothing was run")
         if (module, name) in _MAPPINGS:

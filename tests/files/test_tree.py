@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 import bz2
+import datetime
+import enum
 import gzip
 import io
 import lzma
 import os
 import pickle
+import sys
+import types
 import zlib
 from collections import defaultdict
 from collections.abc import Callable
@@ -160,6 +165,40 @@ def test_only_harmless_builtins_may_be_named(tmp_path: Path, name: str) -> None:
         (tmp_path / "a.pkl").write_bytes(f"c{module}\n{name}\n.".encode())
         with pytest.raises(UserError, match="nothing was run"):
             read_tree(tmp_path / "a.pkl")
+
+
+@pytest.mark.parametrize("dump", ["pickle", "joblib", "torch", "npy"])
+def test_what_a_programs_own_classes_keep_is_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dump: str
+) -> None:
+    """Such as an enum of the simulator, which nobody else has; none of it is imported."""
+    theirs = types.ModuleType("somebodys_simulator")
+    monkeypatch.setitem(sys.modules, theirs.__name__, theirs)
+    made = {
+        "Order": enum.Enum("Order", {"COMMON": "common"}, module=theirs.__name__),
+        "Settings": type("Settings", (), {"__module__": theirs.__name__}),
+        "Entries": type("Entries", (dict,), {"__module__": theirs.__name__}),
+    }
+    for name, kind in made.items():
+        setattr(theirs, name, kind)
+    kept, path = made["Settings"](), tmp_path / "a.pkl"
+    kept.path, kept.entries = Path("x"), made["Entries"](a=1)
+    content = {
+        "order": made["Order"]("common"), "settings": kept, "args": argparse.Namespace(a=1),
+        "at": datetime.datetime(2026, 1, 1), "poses": ARRAY,
+    }  # fmt: skip
+    write: dict[str, Callable[[], Any]] = {
+        "pickle": lambda: path.write_bytes(pickle.dumps(content)),
+        "joblib": lambda: joblib.dump(content, path),
+        "torch": lambda: torch.save(content, path),
+        "npy": lambda: np.save(path.open("wb"), content, allow_pickle=True),  # type: ignore[arg-type]
+    }
+    write[dump]()
+    monkeypatch.delitem(sys.modules, theirs.__name__)
+    tree = read_tree(path)
+    np.testing.assert_array_equal(tree["poses"].array(), ARRAY)
+    assert tree["order"].shape() is None and "somebodys_simulator" in tree["settings"].described
+    assert theirs.__name__ not in sys.modules
 
 
 @pytest.mark.parametrize("name", BOMBS)

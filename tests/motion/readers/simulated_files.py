@@ -9,6 +9,7 @@ from __future__ import annotations
 import pickle
 from collections import OrderedDict
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -150,12 +151,19 @@ def write_mimickit(path: Path, figure: Figure, seed: int = 0) -> None:
     path.write_bytes(pickle.dumps(mimickit(figure, *moves(figure, seed))))
 
 
+class StateConversion(Enum):
+    """ProtoMotions', of its own class: in which order bodies are."""
+
+    COMMON = "common"
+
+
 def protomotions(figure: Figure, turn_TN3: np.ndarray, root_T3: np.ndarray) -> dict[str, Any]:
     """As a `.motion` of ProtoMotions has it."""
     places, turn_TN33 = pose(figure, turn_TN3, root_T3)
     place_TN3 = torch.tensor(np.stack(list(places.values()), axis=1), dtype=torch.float32)
     angles = torch.tensor(turn_TN3[:, 1:].reshape(len(turn_TN3), -1), dtype=torch.float32)
     return {
+        "state_conversion": StateConversion.COMMON,
         "fps": 30,
         "rigid_body_pos": place_TN3,
         "rigid_body_rot": torch.tensor(quaternions(turn_TN33)),
