@@ -10,7 +10,7 @@ from mrhubo.files.unpickler import OTHERS, unpickle
 
 MODULES = (
     OTHERS,
-    *("collections", "copyreg", "copy_reg", "_codecs", "pathlib", "argparse", "datetime", "decimal", "enum", "uuid"),
+    *("collections", "copyreg", "_codecs", "pathlib", "argparse", "datetime", "decimal", "enum", "uuid"),
     *(f"{module}.{name}" for module in ("builtins", "__builtin__") for name in ("dict", "list", "set", "object")),
     *(f"builtins.{name}" for name in ("bytearray", "slice", "range", "complex")),
     *("types.SimpleNamespace", "time.struct_time"),

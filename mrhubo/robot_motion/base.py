@@ -13,6 +13,8 @@ import numpy as np
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.order import ORIGIN, UPRIGHT, JointOrder
 
+W_LAST, W_FIRST = [1, 2, 3, 0], [3, 0, 1, 2]
+"""Where w comes last or first, of a quaternion that has it the other way."""
 _SAME = 1e-6
 """Links that are as near to each other [m, of 1] are in one place."""
 

@@ -19,11 +19,10 @@ import numpy as np
 from mrhubo.errors import UserError
 from mrhubo.files.atomic import atomic_path
 from mrhubo.files.tree import read_tree
-from mrhubo.robot_motion.base import base_of
+from mrhubo.robot_motion.base import W_FIRST, W_LAST, base_of
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.order import JointOrder, left_out
 from mrhubo.robot_motion.plain import build
-from mrhubo.robot_motion.unitree import W_FIRST, W_LAST
 
 _PROTOCOL = 2
 """In which names of modules are lines of text."""

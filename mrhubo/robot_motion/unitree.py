@@ -13,15 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.robot_motion.base import base_of
+from mrhubo.robot_motion.base import W_FIRST, W_LAST, base_of
 from mrhubo.robot_motion.clock import in_full
 from mrhubo.robot_motion.motion import RobotMotion
 from mrhubo.robot_motion.order import JointOrder, left_out
 from mrhubo.robot_motion.plain import build
 from mrhubo.robot_motion.tables import read_rows, read_text, write_rows
 
-W_LAST, W_FIRST = [1, 2, 3, 0], [3, 0, 1, 2]
-"""Where w comes last or first, of a quaternion that has it the other way."""
 _ROOT = 7
 
 

@@ -96,6 +96,10 @@ def from_rows(six_TJ6: np.ndarray) -> np.ndarray:
 
 def from_quaternions(quaternion_X4: np.ndarray) -> np.ndarray:
     """Matrices (..., 3, 3) of quaternions (..., 4), w first; NaN where one is 0."""
+    return from_xyzw(np.roll(quaternion_X4, -1, axis=-1))
+
+
+def from_xyzw(quaternion_X4: np.ndarray) -> np.ndarray:
+    """The same, w last."""
     length_X = np.linalg.norm(quaternion_X4, axis=-1)
-    unit_X4 = np.roll(quaternion_X4, -1, axis=-1) / np.where(length_X > _SHORTEST, length_X, np.nan)[..., None]
-    return quaternion_to_matrix(unit_X4)
+    return quaternion_to_matrix(quaternion_X4 / np.where(length_X > _SHORTEST, length_X, np.nan)[..., None])

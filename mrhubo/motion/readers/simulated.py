@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.fast.rotations import axis_angle_to_matrix, quaternion_to_matrix
+from mrhubo.fast.rotations import axis_angle_to_matrix
 from mrhubo.files.tree import Tree, tree_of
+from mrhubo.motion.readers.other_rotations import from_xyzw
 from mrhubo.motion.readers.rotations import Form
 from mrhubo.motion.readers.scene.mimickit import frames_of
 from mrhubo.motion.readers.scene.turned import in_parents
@@ -33,8 +34,6 @@ _LOOSE_M = 0.02
 """By more than that [m] the places of joints on the bodies that carry them do not vary."""
 _STRAIGHT = 0.8
 """Cosine between a limb at rest and the axis along which it points."""
-_SHORTEST = 0.1
-"""Of quaternions that are none to be normalised."""
 _MOST = 100_000
 """Motions that are packed."""
 
@@ -53,7 +52,7 @@ def read_protomotions(tree: Tree) -> Layout | None:
         return None
 
     def read(first: int, end: int) -> SmplArrays:
-        local_TJ33 = in_parents(_turns(turn[first:end]), _PARENTS)
+        local_TJ33 = in_parents(from_xyzw(turn[first:end].astype(np.float64)), _PARENTS)
         return _smpl("rigid_body_rot", local_TJ33, place[first:end, 0])
 
     kind = Kind("ProtoMotions' humanoid of SMPL", "smpl", Z_UP)
@@ -109,19 +108,12 @@ def _smpl(key: str, local_TJ33: np.ndarray, place_T3: np.ndarray) -> SmplArrays:
     return SmplArrays(key, pose_TJ33, _FORM, 1, None, place_T3)
 
 
-def _turns(turn_TJ4: np.ndarray) -> np.ndarray:
-    """Matrices (T, J, 3, 3) of quaternions, w last; NaN where one is 0."""
-    turn_TJ4 = turn_TJ4.astype(np.float64)
-    length_TJ1 = np.linalg.norm(turn_TJ4, axis=-1, keepdims=True)
-    return quaternion_to_matrix(turn_TJ4 / np.where(length_TJ1 > _SHORTEST, length_TJ1, np.nan))
-
-
 def _is_smpl(place_TJ3: np.ndarray, turn_TJ4: np.ndarray) -> bool:
     """Whether bodies hang on each other as SMPL's do: then each keeps its place on the one that carries it, at rest
     legs point down and arms to the sides. Robots may have as many bodies.
     """
     some_F = np.unique(np.linspace(0, len(place_TJ3) - 1, 64).astype(int))
-    place_FJ3, turn_FJ33 = place_TJ3[some_F].astype(np.float64), _turns(turn_TJ4[some_F])
+    place_FJ3, turn_FJ33 = place_TJ3[some_F].astype(np.float64), from_xyzw(turn_TJ4[some_F].astype(np.float64))
     parents = list(_PARENTS[1:])
     away_FX3 = (turn_FJ33[:, parents].mT @ (place_FJ3[:, 1:] - place_FJ3[:, parents])[..., None])[..., 0]
     offset_X3 = np.median(away_FX3, axis=0)

@@ -13,7 +13,6 @@ Legend: T frames, N parts.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +72,10 @@ _PARTS: tuple[tuple[str, str, _Vector, tuple[tuple[str, _Vector], ...]], ...] = 
 """Parts of the right side and of the middle: what carries each, where it begins there [m], and about what it is turned
 there, one after the other, in the axes of the right side."""
 _MIDDLE = ("pelvis", "torso", "head")
-_NEEDED = ("pelvis_tilt", "pelvis_list", "pelvis_rotation", "hip_flexion", "knee_angle", "arm_flex", "elbow_flex")
+_NEEDED = (
+    *("pelvis_tilt", "pelvis_list", "pelvis_rotation"),
+    *(f"{name}_{side[0]}" for name in ("hip_flexion", "knee_angle", "arm_flex", "elbow_flex") for side in SIDES),
+)
 _OURS = {
     "femur": "hip", "tibia": "knee", "foot": "ankle", "toes": "foot",
     "humerus": "shoulder", "forearm": "elbow", "hand": "wrist",
@@ -97,7 +99,7 @@ def read_opensim(path: Path, options: ReadOptions) -> Motion:
     """
     columns, value_TX, in_degrees = _table(path)
     place = {_coordinate(name): i for i, name in reversed(list(enumerate(columns)))}
-    missing = [name for name in _sided(_NEEDED) if name not in place]
+    missing = [name for name in _NEEDED if name not in place]
     if missing:
         raise NoMotion(
             f"{path}: is a table of OpenSim without {shortened(listed(missing), 120)}; a human motion is read from the"
@@ -116,12 +118,11 @@ def read_opensim(path: Path, options: ReadOptions) -> Motion:
             if coordinate.startswith(_KNEE):  # they bend one way, whatever its sign
                 angle_T = -angle_T if np.mean(angle_T) > 0 else angle_T
             local_TN33[:, part] = local_TN33[:, part] @ axis_angle_to_matrix(angle_T[:, None] * axis_3)
-    at = [place.get(name) for name in _PLACE]
-    root_T3 = np.zeros((len(value_TX), 3))
-    if None in at:
-        notes.append("where the pelvis is is not told")
+    if all(name in place for name in _PLACE):
+        root_T3 = value_TX[:, [place[name] for name in _PLACE]]
     else:
-        root_T3 = value_TX[:, [column for column in at if column is not None]]
+        root_T3 = np.zeros((len(value_TX), 3))
+        notes.append("where the pelvis is is not told")
     return turned_motion(path, skeleton, local_TN33, root_T3, rate, "angles of OpenSim", options, notes)
 
 
@@ -144,14 +145,7 @@ def _coordinate(column: str) -> str:
     """The coordinate that a column is of; OpenSim 4 has `/jointset/hip_r/hip_flexion_r/value` for `hip_flexion_r`, and
     speeds beside.
     """
-    return column.removesuffix("/value").rpartition("/")[2] if not column.endswith("/speed") else column
-
-
-def _sided(coordinates: tuple[str, ...]) -> Iterator[str]:
-    """Coordinates with the sides of those that have one."""
-    middle = {name for part, _, _, axes in _PARTS if part in _MIDDLE for name, _ in axes}
-    for name in coordinates:
-        yield from [name] if name in middle else [f"{name}_{side[0]}" for side in SIDES]
+    return column if column.endswith("/speed") else column.removesuffix("/value").rpartition("/")[2]
 
 
 def _steady(path: Path, value_TX: np.ndarray, options: ReadOptions, notes: list[str]) -> tuple[np.ndarray, float]:

@@ -15,10 +15,10 @@ from collections.abc import Callable
 import numpy as np
 
 from mrhubo.errors import UserError
-from mrhubo.fast.rotations import quaternion_to_matrix
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.other_rotations import from_xyzw
 from mrhubo.motion.readers.scene.turned import Skeleton, in_parents, turned_motion
 from mrhubo.motion.readers.smpl_names import search
 
@@ -26,8 +26,6 @@ _KEYS = {"rotation", "root_translation", "skeleton_tree"}
 _TREE_KEYS = {"node_names", "parent_indices", "local_translation"}
 _MAX_NUMBERS = 100_000_000
 """Of rotations as matrices."""
-_SHORTEST = 0.1
-"""Of quaternions that are none to be normalised."""
 
 
 def read_poselib(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str]], float]) -> Motion | None:
@@ -54,11 +52,9 @@ def read_poselib(tree: Tree, options: ReadOptions, find_rate: Callable[[list[str
         raise UserError(f"{path}: 'rotation' has shape {turn.shape}; expected (frames, {count}, 4)")
     if root_T3.shape != (len(turn), 3):
         raise UserError(f"{path}: 'root_translation' has shape {root_T3.shape}; expected ({len(turn)}, 3)")
-    turn_TN4 = turn.astype(np.float64)
-    length_TN1 = np.linalg.norm(turn_TN4, axis=-1, keepdims=True)
-    if not (np.isfinite(root_T3).all() and np.isfinite(length_TN1).all() and length_TN1.min() > _SHORTEST):
+    local_TN33 = from_xyzw(turn.astype(np.float64))
+    if not (np.isfinite(root_T3).all() and np.isfinite(local_TN33).all()):
         raise UserError(f"{path}: holds NaN or infinite numbers, or quaternions that are 0")
-    local_TN33 = quaternion_to_matrix(turn_TN4 / length_TN1)
     is_local = node.get("is_local")
     if is_local is not None and not is_local.number():
         local_TN33 = in_parents(local_TN33, skeleton.parents)
