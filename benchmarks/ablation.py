@@ -27,7 +27,8 @@ from mrhubo.errors import InputWarning
 from mrhubo.evaluation.whole_body import WholeBodyScore, score_whole_body
 from mrhubo.motion import Motion, read_motion, resample
 from mrhubo.reference import OptimizationRetargeter, retarget
-from mrhubo.reference.standing import Legs, human, stand
+from mrhubo.reference.standing import Legs, LowBody, human, stand
+from mrhubo.reference.standing.carried import Carried
 from mrhubo.reference.terms.soles import SoleTerm
 from mrhubo.robot import Robot
 
@@ -58,9 +59,10 @@ PARTS: dict[str, list[tuple[Any, str, Any]]] = {
     "4. planted feet carry the root": [(stand, "carry", _on_path)],
     "5. legs give way": [(stand, "ROUNDS", 0)],
     "6. legs give way again": [(stand, "ROUNDS", 1)],
-    "6. no sole under the floor": [(stand, "_lift", lambda carried: np.zeros(len(carried.low_TP)))],
+    "6. no sole under the floor": [(Carried, "lift_T", property(lambda carried: np.zeros(len(carried.low_TP))))],
+    "7. nothing else under the floor": [(LowBody, "near", lambda *_: False)],
 }
-"""What stands for a part that is switched off: names of modules and their values."""
+"""What stands for a part that is switched off: names of modules and classes, and their values."""
 
 
 def main(argv: list[str]) -> None:
@@ -73,7 +75,8 @@ def main(argv: list[str]) -> None:
     print_header()
     motions = [resample(read_motion(path), float(options["rate"])) for path in whole_body_clips(options["clips"])]
     columns = ["without", "thigh [deg]", "shin [deg]", "feet [deg]", "slide, own [cm/s]", "sunk (max [cm])",
-               "floats (max [cm])", "path [cm/m]", "speed", "base turns [deg a frame]", "legs' jerk"]  # fmt: skip
+               "body sunk (max [cm])", "floats (max [cm])", "path [cm/m]", "speed", "base turns [deg a frame]",
+               "legs' jerk"]  # fmt: skip
     for name in options["robots"].split(","):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InputWarning)  # collision meshes that are not there
@@ -135,6 +138,7 @@ def _row(part: str, found: list[tuple[WholeBodyScore, float, float, float]], smo
         *(f"{angle:.1f}" for angle in angles),
         f"{mean('slide_cm_s'):.1f}, {mean('human_slide_cm_s'):.1f}",
         f"{mean('sunk'):.1%} ({most('sunk_max_cm'):.1f})",
+        f"{mean('body_sunk'):.1%} ({most('body_sunk_max_cm'):.1f})",
         f"{mean('floating'):.1%} ({most('floating_max_cm'):.1f})",
         f"{mean('path_cm_m'):.1f}",
         f"{max(speed for *_, speed, _ in found):.2f}",

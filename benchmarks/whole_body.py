@@ -5,11 +5,11 @@
         [--picture FILE.png]
 
 A table a robot and way, with a row a clip and the mean over clips: angles to the person by part, horizontal speed of
-planted soles and the person's own, soles off the floor, the way gone, speeds of joints by their limits, steps of more
-than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
+planted soles and the person's own, soles off the floor, what else is under it, the way gone, speeds of joints by their
+limits, steps of more than 0.5 rad, CPU time. Clips are names of `data/external/cmu/whole_body`; robots are shipped as
 conf/ROBOT-whole-body.yaml. Of a robot without feet, whose base stays where it is, there are angles, speeds, steps and
-time alone. `--root`: a table for each `robot.root_follows`; `--balance`: `robot.balance`. The
-picture shows moments of the first clip, the person above the robots.
+time alone. `--root`: a table for each `robot.root_follows`; `--balance`: `robot.balance`. The picture shows moments of
+the first clip, the person above the robots.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def main(argv: list[str]) -> None:
             rows = [_row(motion.name, [score], parts) for motion, score in zip(motions, found, strict=True)]
             follows = "" if root == "pelvis" else f", whose root follows {root}"
             print(f"## {name}{follows}, as a {way}: {len(motions)} clips, {sum(map(len, motions)):,} frames\n")
-            heads = ["chest, in the world [deg]", "slide, own [cm/s]", "over 1 cm/s", "sunk",
+            heads = ["chest, in the world [deg]", "slide, own [cm/s]", "over 1 cm/s", "sunk", "body sunk (max [cm])",
                      "floats (max [cm])", "height [cm]", "path [cm/m]", "heading [deg]", "speed", "jumps", "touches",
                      "ms a frame"]  # fmt: skip
             columns = ["clip", *(f"{_PARTS[part]} [deg]" for part in parts), *heads]
@@ -248,6 +248,7 @@ def _row(name: str, found: list[tuple[WholeBodyScore, float, float]], parts: lis
         f"{mean('slide_cm_s'):.1f}, {mean('human_slide_cm_s'):.1f}",
         f"{mean('sliding'):.0%}",
         f"{mean('sunk'):.1%} ({most('sunk_max_cm'):.1f})",
+        f"{mean('body_sunk'):.1%} ({most('body_sunk_max_cm'):.1f})",
         f"{mean('floating'):.1%} ({most('floating_max_cm'):.1f})",
         f"{mean('height_cm'):.2f}",
         f"{mean('path_cm_m'):.1f}",

@@ -24,7 +24,7 @@ from mrhubo.errors import UserError
 from mrhubo.frames import human_axes, human_to_world
 from mrhubo.motion import Motion
 from mrhubo.reference import angle_between
-from mrhubo.reference.standing import HumanSteps, Legs, read_steps
+from mrhubo.reference.standing import HumanSteps, Legs, LowBody, read_steps
 from mrhubo.robot import BodyMap, LinkPoses
 from mrhubo.robot.parts import CHEST
 
@@ -55,6 +55,11 @@ class WholeBodyScore:
     sunk: float
     """Share of frames with a sole more than 1 cm under the floor."""
     sunk_max_cm: float
+    body_sunk: float
+    """Share of frames with anything but a sole more than 1 cm under the floor: hands, knees, the back, as far as
+    collision shapes tell.
+    """
+    body_sunk_max_cm: float
     floating: float
     """Share of frames with a planted sole more than 2 cm above the floor."""
     floating_max_cm: float
@@ -104,6 +109,7 @@ def score_whole_body(
     low_TP = lowest(legs, soles.ball_BK3.double().numpy())
     low_TS = low_TP.reshape(len(low_TP), -1, 2).min(axis=-1)
     planted_TS = planted_TP.reshape(len(low_TP), -1, 2).any(axis=-1)
+    body_T = lowest_of_body(legs, poses, base_T3, base_T33)
     up_TS = np.where(planted_TS, low_TS, -np.inf)
     angle_TD = torch.rad2deg(angle_between(body_map.robot_directions(poses), body_map.human_directions(local_TJ33)))
     share_TN = q_TN.diff(dim=0).abs() * rate / robot.velocity_N
@@ -116,6 +122,8 @@ def score_whole_body(
         sliding=_mean(sliding_TP[planted_TP] > SLIDING),
         sunk=_mean((low_TS < -SUNK_M).any(axis=1)),
         sunk_max_cm=100 * max(0.0, float(-low_TS.min())),
+        body_sunk=_mean(body_T < -SUNK_M),
+        body_sunk_max_cm=100 * max(0.0, float(-body_T.min())),
         floating=_mean((up_TS > FLOATING_M).any(axis=1)),
         floating_max_cm=100 * max(0.0, float(up_TS.max())),
         height_cm=100 * _mean(np.maximum(low_TS[planted_TS], 0.0)),
@@ -154,6 +162,22 @@ def lowest(legs: Legs, ball_TK3: np.ndarray) -> np.ndarray:
     """Height [m] of the lowest ball at each point of a sole (T, P), of places (T, K, 3) whose z is up."""
     height_TK = ball_TK3[..., 2] - legs.radius_K.double().cpu().numpy()
     return np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
+
+
+def lowest_of_body(legs: Legs, poses: LinkPoses, base_T3: Tensor, base_T33: Tensor) -> np.ndarray:
+    """Height (T,) [m] of the lowest of a robot but its soles over z = 0; infinite where nothing else is near the floor.
+
+    Args:
+        legs: the robot's.
+        poses: of the robot.
+        base_T3: place of the base [m], z up.
+        base_T33: its rotation.
+    """
+    low, up_T3 = LowBody(legs), legs.heading(poses, base_T33)[:, 2]
+    height_T = legs.root(poses, base_T3, base_T33)[:, 2]
+    if not low.near(poses, up_T3, height_T):
+        return np.full(len(height_T), np.inf)
+    return low.lowest_of_any(poses, up_T3, height_T).double().numpy()
 
 
 def path_error(root_T3: Tensor, path_T3: Tensor) -> float:

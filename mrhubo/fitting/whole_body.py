@@ -36,6 +36,8 @@ _HEADS = {
     "human_slide_cm_s": ("own", "{:.1f}"),
     "sunk": ("sunk", "{:.1%}"),
     "sunk_max_cm": ("most [cm]", "{:.1f}"),
+    "body_sunk": ("body sunk", "{:.1%}"),
+    "body_sunk_max_cm": ("most [cm]", "{:.1f}"),
     "floating": ("floats", "{:.1%}"),
     "floating_max_cm": ("most [cm]", "{:.1f}"),
     "height_cm": ("height [cm]", "{:.2f}"),

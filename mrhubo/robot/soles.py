@@ -1,25 +1,25 @@
 """Where a robot's feet touch the floor: the lowest parts of what is fixed to a foot's link.
 
-Parts are balls: a capsule is two, a box its corners and a mesh its outermost vertices with no radius. What lies more
-than a little above the lowest of them, with the foot upright, never touches a flat floor before they do.
+Parts are balls (`mrhubo.robot.balls`). What lies more than a little above the lowest of them, with the foot upright,
+never touches a flat floor before they do.
 
 Legend: K balls, F of them where the foot stands flat.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mrhubo.robot.balls import balls_of, placed, points
 from mrhubo.robot.entries import End
 from mrhubo.robot.hulls import extremes
 from mrhubo.robot.joint import stuck
 from mrhubo.robot.meshes import read_meshes
 from mrhubo.robot.parts import OrientedPart
-from mrhubo.robot.shapes import LinkGeometry, read_collision_geometry, read_geometry, without_markers
+from mrhubo.robot.shapes import read_collision_geometry, read_geometry, without_markers
 from mrhubo.robot.standing import StandingRobot
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from mrhubo.robot.keypoints import Keypoints
     from mrhubo.robot.urdf import Description
 
-_RIM = 8
-"""Points that stand for the round edge of a cylinder."""
 _SIDES = 0.5
 """Balls lower than this share of the way from the foot's origin to its lowest part can touch the floor, where the foot
 is tilted."""
@@ -92,15 +90,15 @@ def sole_balls(link: str, description: Description) -> tuple[np.ndarray, bool]:
     meshed = any(shape.geometry is not None and shape.geometry.mesh is not None for shape in shaped)
     for read in (read_collision_geometry, *(() if meshed else (read_geometry,))):
         shapes = without_markers(read(parsed), size)
-        found = [_placed(_of_shape(s), from_44[s.link] @ s.origin_44) for s in shapes if s.link in links]
+        found = [placed(balls_of(s), from_44[s.link] @ s.origin_44) for s in shapes if s.link in links]
         if found:
             return np.concatenate(found), True
     others = {each.name for each in parsed.robot.links} - links
     meshes = read_meshes(description, others)
-    found = [_placed(_points(extremes(mesh.vertices_V3)), from_44[mesh.link]) for mesh in meshes]
+    found = [placed(points(extremes(mesh.vertices_V3)), from_44[mesh.link]) for mesh in meshes]
     if found:
         return np.concatenate(found), True
-    return _points(np.stack([from_44[name][:3, 3] for name in sorted(links)])), False
+    return points(np.stack([from_44[name][:3, 3] for name in sorted(links)])), False
 
 
 def _fixed_to(link: str, description: Description) -> set[str]:
@@ -109,30 +107,3 @@ def _fixed_to(link: str, description: Description) -> set[str]:
     while more := {joint.child for joint in joints if joint.parent in found} - found:
         found |= more
     return found
-
-
-def _of_shape(shape: LinkGeometry) -> np.ndarray:
-    """The balls (K, 4) of a shape, in its own frame."""
-    if shape.kind == "sphere":
-        return np.array([[0.0, 0.0, 0.0, shape.size[0]]])
-    if shape.kind == "capsule":
-        return np.array([[0.0, 0.0, side * shape.size[1], shape.size[0]] for side in (-0.5, 0.5)])
-    return _points(np.array(list(_corners(shape))))
-
-
-def _corners(shape: LinkGeometry) -> Iterator[tuple[float, float, float]]:
-    if shape.kind == "box":
-        x, y, z = (0.5 * side for side in shape.size)
-        yield from ((i * x, j * y, k * z) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1))
-    else:
-        radius, length = shape.size
-        for angle in 2 * np.pi * np.arange(_RIM) / _RIM:
-            yield from ((radius * np.cos(angle), radius * np.sin(angle), side * length) for side in (-0.5, 0.5))
-
-
-def _points(places_K3: np.ndarray) -> np.ndarray:
-    return np.concatenate((places_K3, np.zeros((len(places_K3), 1))), axis=1)
-
-
-def _placed(balls_K4: np.ndarray, pose_44: np.ndarray) -> np.ndarray:
-    return np.concatenate((balls_K4[:, :3] @ pose_44[:3, :3].T + pose_44[:3, 3], balls_K4[:, 3:]), axis=1)

@@ -44,6 +44,7 @@ SCRIPTS = [
     "inference",
     "many_robots",
     "missing_points",
+    "on_the_floor",
     "pair_pictures",
     "pair_quality",
     "pairing",
@@ -237,7 +238,13 @@ def test_whole_body(run: Run, clips: Path, tmp_path: Path, monkeypatch: pytest.M
 def test_ablation(run: Run, clips: Path) -> None:
     found = rows(run("ablation", "--robots", "nao", "--clips", clips, "--rate", 12, "--parts", "2"), "without")
     assert [row[0] for row in found] == ["nothing", "2. flat feet", "limits of speed"]
-    assert found[0][-1] == "1.00" and float(found[0][8]) <= 1.01
+    assert found[0][-1] == "1.00" and float(found[0][9]) <= 1.01
+
+
+def test_on_the_floor(run: Run) -> None:
+    found = rows(run("on_the_floor", "--robots", "nao", "--postures", "all fours", "--rate", 8), "posture")
+    assert [row[:2] for row in found] == [["all fours", "bends and is lifted"], ["", "neither"]]
+    assert float(found[0][2]) == 0.0 and float(found[1][2]) > 1
 
 
 def test_headings(run: Run, clips: Path) -> None:

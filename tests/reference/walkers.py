@@ -13,9 +13,13 @@ SOLE = (0.05, 0.15, 0.06)
 """How far it reaches backwards, forwards and down from the ankle [m]."""
 
 
-def write_urdf(path: Path, root: str = "pelvis", masses: bool = False) -> Path:
+THICK = {"shin": ("0 0 0", 0.14), "fore": ("0 0 -0.2", 0.08), "chest": ("0.02 0 0.15", 0.15)}
+"""Balls of a thick robot: where on their links, and their radii [m]."""
+
+
+def write_urdf(path: Path, root: str = "pelvis", masses: bool = False, thick: bool = False) -> Path:
     """The robot's URDF, hung up at its pelvis or at its chest: then the waist's joint is above the legs. With masses,
-    it carries a load in front of its chest.
+    it carries a load in front of its chest; a thick one has knees, hands and a chest.
     """
     limit = '<limit lower="{}" upper="{}" effort="1" velocity="10"/>'
 
@@ -43,6 +47,10 @@ def write_urdf(path: Path, root: str = "pelvis", masses: bool = False) -> Path:
     box = (f'<collision><origin xyz="{(ahead - back) / 2} 0 {-down / 2}"/><geometry><box size="{ahead + back} 0.08 {down}"/>'
            "</geometry></collision>")  # fmt: skip
     solid = {name: box for name in links if name.endswith("foot")}
+    if thick:
+        for name, (place, radius) in THICK.items():
+            ball = f'<collision><origin xyz="{place}"/><geometry><sphere radius="{radius}"/></geometry></collision>'
+            solid |= {link: ball for link in links if link.endswith(name)}
     if masses:
         inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
         for name in links:
@@ -74,12 +82,13 @@ def walker(
     follows: str = "pelvis",
     balance: float = 0.0,
     masses: bool = False,
+    thick: bool = False,
     **changes: object,
 ) -> BodyMap:
     """The body map of the robot; without a waist, its chest is the pelvis. `follows`: `robot.root_follows`; `balance`:
-    `robot.balance`; `masses`: of its links. Entries that are None are left out.
+    `robot.balance`; `masses` and `thick` as for `write_urdf`. Entries that are None are left out.
     """
-    urdf = write_urdf(folder / f"walker_{root}.urdf", root, masses)
+    urdf = write_urdf(folder / f"walker_{root}.urdf", root, masses, thick)
     names = [f"{s}_{n}" for s in "lr" for n in ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle", "shoulder_pitch",
                                                 "shoulder_roll", "elbow")]  # fmt: skip
     given = {**entries(), **({} if waist else {"chest": root, "pelvis": root}), **changes}

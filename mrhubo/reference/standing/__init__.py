@@ -1,5 +1,6 @@
 """Where a robot with feet stands and goes: its root, and legs that keep planted feet where they are."""
 
+from mrhubo.reference.standing.fields import continuous, standing_fields
 from mrhubo.reference.standing.human import (
     FAR_M,
     HumanSteps,
@@ -11,7 +12,8 @@ from mrhubo.reference.standing.human import (
     stand_flat,
 )
 from mrhubo.reference.standing.legs import Legs
-from mrhubo.reference.standing.stand import PLANTED, UNDER_M, Stand, Standing, continuous, standing_fields
+from mrhubo.reference.standing.low_body import LowBody
+from mrhubo.reference.standing.stand import PLANTED, UNDER_M, Stand, Standing
 
 __all__ = [
     "FAR_M",
@@ -19,6 +21,7 @@ __all__ = [
     "UNDER_M",
     "HumanSteps",
     "Legs",
+    "LowBody",
     "Stand",
     "Standing",
     "continuous",

@@ -8,7 +8,7 @@ Legend: T frames, P points of soles, D directions.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -42,6 +42,12 @@ class HumanSteps:
     frame_rate: float
     place_TP3: np.ndarray
     """The person's own points, where the skeleton's are with the root's way made to fit."""
+
+    def raised(self, lift_T: np.ndarray) -> HumanSteps:
+        """The same with a path that is so much higher (T,) [m]."""
+        path_T3 = self.path_T3.clone()
+        path_T3[:, 1] += torch.from_numpy(lift_T).to(path_T3)
+        return replace(self, path_T3=path_T3)
 
 
 def read_steps(motion: Motion, local_TJ33: Tensor, legs: Legs, as_seen: Motion | None = None) -> HumanSteps | None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -21,6 +22,7 @@ from mrhubo.body.skeleton import JOINT_NAMES, KEYPOINT_NAMES, keypoint_indices
 from mrhubo.errors import InputWarning, UserError
 from mrhubo.frames import human_to_world
 from mrhubo.robot import BodyMap, LinkPoses
+from mrhubo.robot.outline import Outline
 from mrhubo.robot.parts import LimbPart
 from mrhubo.robot.soles import Sole, find_soles
 
@@ -94,6 +96,8 @@ class Legs(nn.Module):
                 chain.insert(0, part)
                 part = parts[part.hangs_on or ""]
             chains.append(chain)
+        self.chains = chains
+        """Of each leg the limbs, outwards."""
         self.starts = keypoint_indices([chain[0].start for chain in chains])
         """Human keypoints between which a person's root is."""
         self.joint = JOINT_NAMES.index(parts[self.carrier].joint)
@@ -119,18 +123,13 @@ class Legs(nn.Module):
         }
         for name, tensor in tensors.items():
             self.register_buffer(name, tensor.to(device), persistent=False)
-        self._measure(chains)
+        self._measure()
 
-    def _measure(self, chains: list[list[LimbPart]]) -> None:
+    def _measure(self) -> None:
         """The root's place, and how long the robot's legs are against a person's."""
-        robot, keypoints = self.body_map.robot, self.body_map.keypoints
+        robot, keypoints, chains = self.body_map.robot, self.body_map.keypoints, self.chains
         poses = robot.forward(robot.home()[None])
-
-        def place(name: str) -> Tensor:
-            point = keypoints.points[name]
-            row = robot.link_index(point.link)
-            return poses.position_BL3[0, row] + poses.rotation_BL33[0, row] @ robot.lower_N.new_tensor(point.offset_3)
-
+        place = partial(self.place, poses)
         row = self._carrier_row
         middle_3 = torch.stack([place(chain[0].start) for chain in chains]).mean(0)
         self.root_3 = poses.rotation_BL33[0, row].mT @ (middle_3 - poses.position_BL3[0, row])
@@ -149,6 +148,12 @@ class Legs(nn.Module):
             self.built.append(LegBuild(self.axes_33.mT @ out_3, bones, _in_foot(self, number, ankle_3)))
         self.scale = sum(lengths) / len(lengths)
         """Length of the robot's legs by that of a person's."""
+
+    def place(self, poses: LinkPoses, name: str) -> Tensor:
+        """Where a keypoint is (3,) [m] in the first of some poses of the robot, in the base frame."""
+        point, robot = self.body_map.keypoints.points[name], self.body_map.robot
+        row = robot.link_index(point.link)
+        return poses.position_BL3[0, row] + poses.rotation_BL33[0, row] @ robot.lower_N.new_tensor(point.offset_3)
 
     def places(self, poses: LinkPoses) -> LegPoses:
         """Where soles are in poses of the robot, seen from what carries the legs: in its human axes, from the root."""
@@ -175,6 +180,24 @@ class Legs(nn.Module):
             for rows, local_X3 in ((self._point_rows, self.points_P3), (self._ball_rows, self.balls_K3))
         ]
         return LegPoses(*(base_B3[:, None] + place_BX3 @ base_B33.mT for place_BX3 in found))
+
+    def upright(self, poses: LinkPoses, up_B3: Tensor) -> Tensor:
+        """The upright direction (B, 3) in the base frame, of that in the human axes of what carries the legs."""
+        return (poses.rotation_BL33[:, self._carrier_row] @ self.axes_33 @ up_B3[..., None])[..., 0]
+
+    def over_floor(self, outline: Outline, poses: LinkPoses, up_B3: Tensor, height_B: Tensor) -> tuple[Tensor, Tensor]:
+        """How far the lowest point of each ball of an outline is over the floor (B, K), and its centre (B, K, 3) in the
+        base frame [m].
+
+        Args:
+            outline: the robot's.
+            poses: of the robot.
+            up_B3: the upright direction, in the human axes of what carries the legs.
+            height_B: how high the root is over the floor [m].
+        """
+        place_BK3, way_B3 = outline.places(poses), self.upright(poses, up_B3)
+        over_BK = ((place_BK3 - self._root(poses)[:, None]) @ way_B3[..., None])[..., 0]
+        return height_B[:, None] + over_BK - outline.radius_K, place_BK3
 
     def asked(self, local_BJ33: Tensor, turns_BJ33: Tensor) -> Tensor:
         """Human axes (B, 3, 3) that what carries the legs is to have, relative to the person's root: the person's, or

@@ -3,7 +3,8 @@
 First the planted feet carry the root (`path`). Where two feet are planted, legs of other proportions than the person's
 cannot both keep still and point as the person's do: so the legs then give way, by the optimiser's own cost with a term
 for the places of soles, within limits and limits of speed. What swings goes where it went, shifted so that it takes off
-and lands where it is planted, and is kept above the floor. At last the feet carry the root once more.
+and lands where it is planted, and is kept above the floor. At last the feet carry the root once more. Of who kneels,
+crawls or lies, trunk and knees lift the root out of the floor, and arms give way (`low_body`).
 
 World: the human's, x left, y up, z forward; m. The floor is at y = 0.
 
@@ -12,25 +13,24 @@ Legend: T frames, P points of soles, K balls or contacts, D directions, N joints
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from torch import Tensor, nn
 
-from mrhubo import rotation
 from mrhubo.fast.plain.ground import UNDER_M
-from mrhubo.fast.together.motion import AHEAD, WINDOW
 from mrhubo.frames import human_to_world
 from mrhubo.reference.avoidance import Avoidance
-from mrhubo.reference.refine import refine_around, widen
+from mrhubo.reference.refine import widen
 from mrhubo.reference.solve import DirectionProblem
-from mrhubo.reference.speed import nearest_slow, speed_bound
 from mrhubo.reference.standing.balance import Balance
+from mrhubo.reference.standing.bending import BendingArms
+from mrhubo.reference.standing.carried import LIFTED_M, Carried, smooth_lift
+from mrhubo.reference.standing.giving_way import GivingWay
 from mrhubo.reference.standing.human import HumanSteps
 from mrhubo.reference.standing.legs import Legs
+from mrhubo.reference.standing.low_body import LowBody
 from mrhubo.reference.standing.path import carry
 from mrhubo.reference.terms import Smoothness
 from mrhubo.reference.terms.soles import SoleTerm
@@ -40,13 +40,11 @@ PLANTED, SWINGING = 2500.0, 50.0
 degrees off, or 0.4."""
 CLEAR = 5000.0
 """Weight [1/m^2] with which a swinging point is kept above the floor besides, by its height alone."""
-SWEEPS, TOLERANCE = 10, 3e-4
-"""How long legs give way, as for `refine`."""
 ROUNDS = 4
 """How often the legs give way: again where soles would still be under the floor, by turns with a root that is lifted
 out of it, so that feet stand on what is lowest of them, and with one that both carry, so that legs meet half-way."""
-LIFTED_M, LIFT_S, FREE_S = 0.002, 0.1, 0.3
-"""From how far [m] on that is; and the times [s] around in which the root is lifted too, and legs are free to move."""
+FREE_S = 0.3
+"""The time [s] around in which legs are free to move."""
 _RISE = 0.25
 """Of how much a point is planted, the power that counts for heights: as long as a sole is planted at all, it is to
 touch the floor, while a place on the floor may be left gradually."""
@@ -68,45 +66,30 @@ class Stand:
     """Place of the root, between the legs' first joints, in the human's world [m]."""
 
 
-@dataclass(frozen=True)
-class _Carried:
-    """A root that planted feet carry, in the world [m]."""
-
-    root_T3: np.ndarray
-    place_K2: np.ndarray
-    """Places of the contacts on the floor."""
-    point_TP3: np.ndarray
-    """Points of soles."""
-    low_TP: np.ndarray
-    """Height of the lowest ball at each of them."""
-
-    def shifted(self, shift_T3: np.ndarray) -> _Carried:
-        """The same with a root that is elsewhere, by so much [m], and soles with it."""
-        point_TP3, low_TP = self.point_TP3 + shift_T3[:, None], self.low_TP + shift_T3[:, [_UP]]
-        return _Carried(self.root_T3 + shift_T3, self.place_K2, point_TP3, low_TP)
-
-
 class Standing(nn.Module):
     """Stands one robot on the floor."""
 
     def __init__(self, legs: Legs) -> None:
         super().__init__()
         self.legs, self.robot = legs, legs.body_map.robot
-        self.problem = DirectionProblem(legs.body_map, [SoleTerm(legs)])
-        moved = set().union(*SoleTerm(legs).couplings())
-        self._avoidance: Avoidance | None = None
+        soles = SoleTerm(legs)
+        moved = set().union(*soles.couplings())
+        self._legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
+        self._legs_way = GivingWay(legs.body_map, [soles], self._legs_N)
+        self._low_body = LowBody(legs)
+        self._bending: BendingArms | None = None
         self.balance = Balance(legs) if self.robot.balance else None
         """What shifts the root of whole motions; None: nothing looks at the centre of mass."""
-        legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
-        self._legs_N = legs_N.to(self.robot.lower_N.device)
-        self._legs_C = self._legs_N.float() @ self.problem.blocks.joints_NC > 0
+
+    @property
+    def problem(self) -> DirectionProblem:
+        """The cost of legs that give way."""
+        return self._legs_way.problem
 
     @property
     def avoidance(self) -> Avoidance:
-        """What makes answers give way that touch the robot itself, with soles in place; made when first asked for."""
-        if self._avoidance is None:
-            self._avoidance = Avoidance(self.legs.body_map, [SoleTerm(self.legs)])
-        return self._avoidance
+        """What makes answers give way that touch the robot itself, with soles in place."""
+        return self._legs_way.avoidance
 
     def forward(
         self,
@@ -125,33 +108,39 @@ class Standing(nn.Module):
             smoothness: of the motion.
             avoid_collisions: frames in which the robot would touch itself give way.
         """
-        carried = self._carried(q_TN, steps)
+        carried, rate = self._carried(q_TN, steps), steps.frame_rate
+        if (carried.body_T < -LIFTED_M).any():  # feet that are not planted then go with the root
+            steps = steps.raised(smooth_lift(np.maximum(-carried.body_T, 0.0), rate))
+            carried = self._carried(q_TN, steps).lifted(rate)
         wanted = self._wanted(carried, steps)
         free_T = torch.ones(len(q_TN), dtype=torch.bool, device=q_TN.device)
         for again in range(ROUNDS):
             if again:
-                lifted_T = torch.from_numpy(_lift(carried) > LIFTED_M).to(q_TN.device)
-                free_T = widen(lifted_T, round(FREE_S * steps.frame_rate))
+                lifted_T = torch.from_numpy(carried.lift_T > LIFTED_M).to(q_TN.device)
+                free_T = widen(lifted_T, round(FREE_S * rate))
                 if not bool(free_T.any()):
                     break
-                carried = _lifted(carried, steps.frame_rate) if again % 2 else carried
+                carried = carried.lifted(rate) if again % 2 else carried
                 wanted = self._reached(carried, steps, wanted[1])
             elif self.balance is not None:
                 off_TP3, poses = wanted[0] - carried.point_TP3, self.robot.forward(q_TN)
                 carried = carried.shifted(self.balance.shift(poses, steps, carried.root_T3, off_TP3))
             extended_TX3 = self._extended(target_TD3, carried, wanted, steps)
-            q_TN = self._give_way(q_TN, extended_TX3, free_T, steps.frame_rate, smoothness, avoid_collisions)
+            q_TN = self._legs_way(q_TN, extended_TX3, free_T, rate, smoothness, avoid_collisions)
             carried = self._carried(q_TN, steps, carried.place_K2)
+        if np.isfinite(carried.body_T).all():
+            q_TN, carried = self._out_of_floor(q_TN, target_TD3, carried, steps, smoothness, avoid_collisions)
         root_T3 = torch.from_numpy(carried.root_T3)
-        root_T3[:, _UP] += torch.from_numpy(_lift(carried))  # no sole is under the floor
+        root_T3[:, _UP] += torch.from_numpy(carried.lift_T)  # no sole is under the floor
         turn_T33 = steps.turn_T33.to(q_TN)
         base_T3, base_T33 = self.legs.base(self.robot.forward(q_TN), human_to_world(root_T3.to(q_TN)), turn_T33)
         return Stand(q_TN, base_T3, base_T33, root_T3)
 
-    def _carried(self, q_TN: Tensor, steps: HumanSteps, place_K2: np.ndarray | None = None) -> _Carried:
+    def _carried(self, q_TN: Tensor, steps: HumanSteps, place_K2: np.ndarray | None = None) -> Carried:
         """Where planted feet carry the root; `place_K2` are the contacts' places, where they are decided."""
         contacts, rate, legs = steps.contacts, steps.frame_rate, self.legs
-        seen = legs.places(self.robot.forward(q_TN))
+        poses = self.robot.forward(q_TN)
+        seen = legs.places(poses)
         point_TP3, ball_TK3 = (self._in_world(x, steps).double().cpu().numpy() for x in (seen.point_BP3, seen.ball_BK3))
         height_TK = ball_TK3[..., _UP] - legs.radius_K.double().cpu().numpy()
         low_TP = np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
@@ -164,13 +153,20 @@ class Standing(nn.Module):
         floor_TP = np.zeros(low_TP.shape, dtype=int)
         rise_T1, _ = carry(above_TP[..., None] - level, weight_TP**_RISE, floor_TP, rate, np.zeros((1, 1)))
         root_T3 = path_T3 + np.stack((off_T2[:, 0], rise_T1[:, 0] - level, off_T2[:, 1]), axis=1)
-        return _Carried(root_T3, place_K2, point_TP3 + root_T3[:, None], low_TP + root_T3[:, [_UP]])
+        up_T3, height_T = steps.turn_T33[:, _UP].to(q_TN), torch.from_numpy(root_T3[:, _UP]).to(q_TN)
+        body_T = np.full(len(root_T3), np.inf)
+        if self._low_body.near(poses, up_T3, height_T):
+            body_T, arm_TS2 = (x.double().cpu().numpy() for x in self._low_body.lowest(poses, up_T3, height_T))
+            clear_T = np.maximum(np.minimum(body_T, low_TP.min(axis=1) + root_T3[:, _UP]), 0.0)
+            arm_T = arm_TS2.min(axis=(1, 2), initial=np.inf)
+            body_T = np.minimum(body_T, np.maximum(arm_T, -clear_T))  # who stands on the hands is lifted by them
+        return Carried(root_T3, place_K2, point_TP3 + root_T3[:, None], low_TP + root_T3[:, [_UP]], body_T)
 
     def _in_world(self, seen_TX3: Tensor, steps: HumanSteps) -> Tensor:
         """What is seen from what carries the legs, along the world's axes."""
         return seen_TX3 @ steps.turn_T33.to(seen_TX3).mT
 
-    def _wanted(self, carried: _Carried, steps: HumanSteps) -> tuple[np.ndarray, np.ndarray]:
+    def _wanted(self, carried: Carried, steps: HumanSteps) -> tuple[np.ndarray, np.ndarray]:
         """Where points of soles are to be (T, P, 3) in the world, and how much that counts (T, P), 0..1."""
         phase_TP, weight_TP = steps.contacts.phase_TP, steps.contacts.weight_TP
         found_TP3, low_TP, frame_T = carried.point_TP3.copy(), carried.low_TP.copy(), np.arange(len(phase_TP))
@@ -187,7 +183,7 @@ class Standing(nn.Module):
         found_TP3[..., _UP] += under_TP
         return found_TP3, np.maximum(weight_TP, np.minimum(under_TP / UNDER_M, 1.0))
 
-    def _reached(self, carried: _Carried, steps: HumanSteps, counted_TP: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _reached(self, carried: Carried, steps: HumanSteps, counted_TP: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The same where legs gave way already: feet that could not be turned flat are to stand on what is lowest, and
         what had to be kept above the floor has to be still.
         """
@@ -199,7 +195,7 @@ class Standing(nn.Module):
         return found_TP3, np.maximum(counts_TP, counted_TP)
 
     def _extended(
-        self, target_TD3: Tensor, carried: _Carried, wanted: tuple[np.ndarray, np.ndarray], steps: HumanSteps
+        self, target_TD3: Tensor, carried: Carried, wanted: tuple[np.ndarray, np.ndarray], steps: HumanSteps
     ) -> Tensor:
         """The directions with the places of soles after them, as `SoleTerm` has it."""
         wanted_TP3, counts_TP = wanted
@@ -212,88 +208,29 @@ class Standing(nn.Module):
         high_TP3 = torch.from_numpy(high_TP).to(seen_TP3).sqrt()[..., None] * up_T3[:, None]
         return torch.cat((target_TD3, seen_TP3 @ steps.turn_T33.to(seen_TP3), weight_TP3, high_TP3), dim=1)
 
-    def _give_way(
+    def _out_of_floor(
         self,
         q_TN: Tensor,
-        target_TX3: Tensor,
-        free_T: Tensor,
-        frame_rate: float,
+        target_TD3: Tensor,
+        carried: Carried,
+        steps: HumanSteps,
         smoothness: Smoothness,
         avoid_collisions: bool,
-    ) -> Tensor:
-        """Joint angles (T, N) of legs whose soles are where they are to be, in the frames that are free (T)."""
-        step_N, around = speed_bound(self.robot.velocity_N, frame_rate)
-        found, settled = [q_TN[:0]], 0
-        while settled < len(q_TN):
-            before_LN = torch.cat(found[-2:])[-smoothness.reach :]
-            part = slice(settled - len(before_LN), settled + WINDOW)
-            motion_XN = torch.cat((before_LN, q_TN[settled : settled + WINDOW]))
-            fixed_X = torch.arange(len(motion_XN), device=q_TN.device) < len(before_LN)
-            fixed_X |= ~free_T[part]
-            if not bool(fixed_X.all()):
-                near = smoothness.at(torch.arange(len(q_TN), device=q_TN.device)[part])
-                motion_XN = self._refine(motion_XN, target_TX3[part], near, step_N, fixed_X)
-                if avoid_collisions:
-                    motion_XN = self._apart(motion_XN, target_TX3[part], near, step_N, around, fixed_X)
-            used = WINDOW - AHEAD if settled + WINDOW < len(q_TN) else WINDOW
-            found.append(motion_XN[len(before_LN) :][:used])
-            settled += used
-        return nearest_slow(torch.cat(found), step_N)
-
-    def _refine(
-        self, q_XN: Tensor, target_XD3: Tensor, smoothness: Smoothness, step_N: Tensor, fixed_X: Tensor
-    ) -> Tensor:
-        """The best legs near others for some frames, of which the first are settled."""
-        if len(q_XN) == 1:
-            found_XN = self.problem.minimise(q_XN, target_XD3)[0]
-        else:
-            q_XN = nearest_slow(q_XN, step_N, fixed_X)
-            found_XN = refine_around(
-                self.problem, q_XN, target_XD3, smoothness, ~fixed_X, SWEEPS, TOLERANCE, step_N, self._legs_C
-            )
-            found_XN = nearest_slow(found_XN, step_N, fixed_X)
-        return torch.where(self._legs_N, found_XN, q_XN)
-
-    def _apart(
-        self, q_XN: Tensor, target_XD3: Tensor, smoothness: Smoothness, step_N: Tensor, around: int, fixed_X: Tensor
-    ) -> Tensor:
-        """The same with frames that gave way where the robot would touch itself."""
-        if len(q_XN) == 1:
-            return self.avoidance(q_XN, target_XD3)
-        return self.avoidance.in_motion(q_XN, target_XD3, smoothness, step_N, around, fixed_X)
-
-
-def _lift(carried: _Carried) -> np.ndarray:
-    """How far (T) the root is to be lifted [m] so that no sole is under the floor."""
-    return np.maximum(-carried.low_TP.min(axis=1), 0.0)
-
-
-def _lifted(carried: _Carried, frame_rate: float) -> _Carried:
-    """A root that is lifted so, smoothly and by no less."""
-    width = 2 * round(LIFT_S * frame_rate) + 1
-    lift_T = uniform_filter1d(maximum_filter1d(_lift(carried), width, mode="nearest"), width, mode="nearest")
-    return carried.shifted(lift_T[:, None] * np.eye(3)[_UP])
-
-
-def standing_fields(position_T3: Tensor, rotation_T33: Tensor, planted_TS: np.ndarray, legs: Legs) -> dict[str, Any]:
-    """What an answer tells of a robot on its floor, by the names of `RobotMotion`.
-
-    Args:
-        position_T3: place of the base in the robot's world [m].
-        rotation_T33: its rotation there.
-        planted_TS: whether each foot is planted.
-        legs: the robot's.
-    """
-    return {
-        "root_position": position_T3,
-        "root_quaternion_wxyz": continuous(rotation.matrix_to_quaternion(rotation_T33)[:, [3, 0, 1, 2]]),
-        "contact": torch.from_numpy(planted_TS).to(position_T3.device),
-        "contact_names": tuple(sole.part.name for sole in legs.soles),
-    }
-
-
-def continuous(quaternion_T4: Tensor) -> Tensor:
-    """Unit quaternions that go on from one another without a change of sign."""
-    turns_T = (quaternion_T4[1:] * quaternion_T4[:-1]).sum(-1) < 0
-    sign_T = torch.nn.functional.pad(1.0 - 2.0 * turns_T.to(quaternion_T4), (1, 0), value=1.0).cumprod(0)
-    return quaternion_T4 * sign_T[:, None]
+    ) -> tuple[Tensor, Carried]:
+        """Joint angles of which arms bend where they would be under the floor, and a root that is lifted by what is
+        left.
+        """
+        rate, low = steps.frame_rate, self._low_body
+        carried = carried.lifted(rate) if (carried.body_T < 0).any() else carried
+        up_T3, height_T = steps.turn_T33[:, _UP].to(q_TN), torch.from_numpy(carried.root_T3[:, _UP]).to(q_TN)
+        still = carried.point_TP3, np.ones_like(carried.low_TP)
+        if (low.lowest(self.robot.forward(q_TN), up_T3, height_T)[1] < -LIFTED_M).any():
+            if self._bending is None:
+                self._bending = BendingArms(low)
+            q_TN = self._bending(
+                q_TN, target_TD3, lambda raised_TD3: self._extended(raised_TD3, carried, still, steps), up_T3, height_T,
+                rate, smoothness, avoid_collisions,
+            )  # fmt: skip
+        lowest_T = low.lowest_of_any(self.robot.forward(q_TN), up_T3, height_T).double().cpu().numpy()
+        left = replace(carried, body_T=lowest_T)
+        return q_TN, left.lifted(rate) if (lowest_T < 0).any() else left

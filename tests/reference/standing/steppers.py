@@ -67,6 +67,36 @@ def lie(frames: int = 24, rate: float = 24.0) -> Motion:
     return still.changed(root_rotation_T33=turn_33.repeat(frames, 1, 1), root_position_T3=up_3.repeat(frames, 1))
 
 
+def crawl(frames: int = 24, rate: float = 24.0) -> Motion:
+    """Is on all fours, and breathes: arms and thighs hang down from a level trunk, shins lie."""
+    return _put_down(1.5, {"hip": (-1.5, 0, 0), "knee": (1.57, 0, 0), "ankle": (0.6, 0, 0), "shoulder": (0, -1.5, 0)},
+                     frames, rate)  # fmt: skip
+
+
+def stand_on_hands(frames: int = 24, rate: float = 24.0) -> Motion:
+    """Stands on straight arms, head down, and breathes."""
+    return _put_down(torch.pi, {"shoulder": (0, 0, 1.4)}, frames, rate)
+
+
+def lie_prone(frames: int = 24, rate: float = 24.0) -> Motion:
+    """Lies face down, arms along the trunk."""
+    return _put_down(torch.pi / 2, {"ankle": (0.8, 0, 0), "shoulder": (0, 0, -1.3)}, frames, rate)
+
+
+def _put_down(pitch: float, turns: dict[str, tuple[float, float, float]], frames: int, rate: float) -> Motion:
+    """Who is turned forwards [rad], with joints of both sides turned so (left; axis-angle), lies on what is lowest."""
+    still = _standing(torch.zeros(frames), torch.zeros(frames), rate, 0.0)
+    turn_TJ3, breath_T = torch.zeros(frames, len(POSED_JOINT_NAMES), 3), torch.linspace(0, 2 * torch.pi, frames).sin()
+    for name, (x, y, z) in turns.items():
+        turn_TJ3[:, POSED_JOINT_NAMES.index(f"left_{name}")] = torch.tensor([x, y, z])
+        turn_TJ3[:, POSED_JOINT_NAMES.index(f"right_{name}")] = torch.tensor([x, -y, -z])
+    turn_TJ3[:, POSED_JOINT_NAMES.index("spine1"), 0] = 0.01 * breath_T
+    local_TJ33, root_T33 = rotation.axis_angle_to_matrix(turn_TJ3), _pitch(torch.full((frames,), pitch))
+    lowest_T = (Skeleton().keypoints(local_TJ33) @ root_T33.mT)[..., 1].amin(dim=1)
+    place_T3 = torch.stack((0 * lowest_T, -lowest_T, 0 * lowest_T), dim=1)
+    return still.changed(local_TJ33=local_TJ33, root_rotation_T33=root_T33, root_position_T3=place_T3)
+
+
 def walk(frames: int, speed: float = 0.6) -> Motion:
     """Goes straight on with bent knees [m/s]: each foot is planted for half a second and swings forward for another; at
     60 frames a second.

@@ -196,8 +196,8 @@ def test_a_root_that_is_none_is_refused(
 def test_long_motions_are_worked_on_in_windows(
     retargeter: OptimizationRetargeter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mrhubo.reference.standing.stand.WINDOW", 30)
-    monkeypatch.setattr("mrhubo.reference.standing.stand.AHEAD", 12)
+    monkeypatch.setattr("mrhubo.reference.standing.giving_way.WINDOW", 30)
+    monkeypatch.setattr("mrhubo.reference.standing.giving_way.AHEAD", 12)
     motion = squat()
     result = retargeter(motion)
     score = score_whole_body(retargeter.body_map, motion, result.q, *base(result))

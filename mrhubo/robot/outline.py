@@ -1,0 +1,78 @@
+"""The outline of a robot: balls (`mrhubo.robot.balls`) of its collision shapes and its joint centres, and where they
+are in poses of it. What lies on the floor, when it kneels, crawls or falls, are they.
+
+Legend: B poses, K balls, A driven joints, L bodies: the base, and the child of each driven joint.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from mrhubo.robot.balls import balls_of, placed
+from mrhubo.robot.body_map import BodyMap
+from mrhubo.robot.model import LinkPoses
+from mrhubo.robot.urdf import link_poses
+
+
+class Outline(nn.Module):
+    """The balls of one robot, on the robot's device."""
+
+    centre_K3: Tensor
+    radius_K: Tensor
+    above_KA: Tensor
+    """1 where a driven joint moves a ball against the base."""
+    body_K: Tensor
+
+    def __init__(self, body_map: BodyMap, with_shapes: bool = True) -> None:
+        """Reads collision shapes, meshes among them; without, there are the joint centres alone."""
+        super().__init__()
+        self.body_map, self.robot = body_map, body_map.robot
+        description = self.robot.description
+        joints = [description.joints[name] for name in self.robot.driven_joints]
+        bodies = [description.root, *(joint.child for joint in joints)]
+        self._rows = [self.robot.link_index(joint.child) for joint in joints]
+        rest = link_poses(description.parsed, self.robot.configuration(self.robot.home().cpu().numpy()))
+
+        def body_of(link: str) -> str:
+            above = (joint.child for joint in description.joints_above(link) if joint.name in self.robot.driven_joints)
+            return next(above, description.root)
+
+        found, body_K = [np.zeros((0, 4))], []
+        points = body_map.keypoints.points.values()
+        marks = [(point.link, np.array([[*point.offset_3, 0.0]])) for point in points]
+        solids = description.solids.shapes if with_shapes else ()
+        shapes = [(shape.link, placed(balls_of(shape), shape.origin_44)) for shape in solids]
+        for link, balls_K4 in (*marks, *shapes):
+            body = body_of(link)
+            found.append(placed(balls_K4, np.linalg.inv(rest[body]) @ rest[link]))
+            body_K += [bodies.index(body)] * len(balls_K4)
+        ball_K4 = np.concatenate(found)
+        above = [{joint.name for joint in description.joints_above(body)} for body in bodies]
+        above_LA = torch.tensor([[float(joint.name in names) for joint in joints] for names in above])
+        tensors = {
+            "centre_K3": torch.from_numpy(ball_K4[:, :3]).float(),
+            "radius_K": torch.from_numpy(ball_K4[:, 3]).float(),
+            "body_K": torch.tensor(body_K, dtype=torch.long),
+            "above_KA": above_LA.reshape(len(bodies), -1)[body_K],
+        }
+        for name, tensor in tensors.items():
+            self.register_buffer(name, tensor.to(self.robot.lower_N.device), persistent=False)
+
+    def moving(self, link: str) -> Tensor:
+        """1 where a driven joint moves a link against the base (A,)."""
+        names = {joint.name for joint in self.robot.description.joints_above(link)}
+        return self.above_KA.new_tensor([float(name in names) for name in self.robot.driven_joints])
+
+    def moved_against(self, link: str) -> Tensor:
+        """1 where a driven joint moves a ball against a link, -1 where it moves that against the ball (K, A)."""
+        return self.above_KA - self.moving(link)
+
+    def places(self, poses: LinkPoses) -> Tensor:
+        """Centres (B, K, 3) [m] in the base frame."""
+        eye_B133 = torch.eye(3).to(poses.position_BL3).expand(len(poses.position_BL3), 1, 3, 3)
+        rotation_BL33 = torch.cat((eye_B133, poses.rotation_BL33[:, self._rows]), dim=1)
+        position_BL3 = torch.cat((0 * eye_B133[..., 0], poses.position_BL3[:, self._rows]), dim=1)
+        turned_BK3 = (rotation_BL33[:, self.body_K] @ self.centre_K3[..., None])[..., 0]
+        return position_BL3[:, self.body_K] + turned_BK3
