@@ -1,7 +1,7 @@
 """What a description holds of a robot with feet: how it stands on the floor.
 
-Legend: R feet, H = 2 R points of their soles (rear and front of each), J balls of all soles, L human joints on the way
-to feet, N joints of q, D directions.
+Legend: R feet, H = 2 R points of their soles (rear and front of each), J balls of soles and of what else can touch the
+floor, L human joints on the way to feet, N joints of q, D directions.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Legs:
     radius_J: np.ndarray
     """and radii [m],"""
     near_HJ: np.ndarray
-    """and 1 where it is at that end of its sole at which a point is."""
+    """and 1 where it is at that end of its sole at which a point is; balls at none are of hands, knees, trunk, head."""
     scale_1: np.ndarray
     """Length of the robot's legs by that of a person's."""
     hip_R3: np.ndarray

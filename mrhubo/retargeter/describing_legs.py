@@ -35,6 +35,10 @@ def describe_legs(body_map: BodyMap, bodies: Bodies) -> tuple[Legs | None, Names
     carrier_44 = bodies.inside(legs.link)
     feet = [bodies.inside(sole.link) for sole in legs.soles]
     balls = [ball for sole in legs.soles for ball in [sole.link] * len(sole.balls_K4)]
+    low = standing.LowBody(legs)
+    others_K = torch.nonzero(low.counts_K)[:, 0]
+    bodies_K = [low.outline.bodies[body] for body in low.outline.body_K[others_K].tolist()]
+    centre_K3 = [*legs.balls_K3, *low.outline.centre_K3[others_K]]
     found = Legs(
         **_person(legs),
         carrier_1=whole([bodies.number(legs.link)]),
@@ -42,10 +46,10 @@ def describe_legs(body_map: BodyMap, bodies: Bodies) -> tuple[Legs | None, Names
         root_3=_placed(carrier_44, legs.root_3),
         body_H=whole([bodies.number(sole.link) for sole in legs.soles for _ in range(2)]),
         point_H3=real([_placed(feet[h // 2], point_3) for h, point_3 in enumerate(legs.points_P3)]),
-        ball_body_J=whole([bodies.number(link) for link in balls]),
-        ball_J3=real([_placed(bodies.inside(link), b) for link, b in zip(balls, legs.balls_K3, strict=True)]),
-        radius_J=real(legs.radius_K),
-        near_HJ=whole(legs.ball_PK),
+        ball_body_J=whole([bodies.number(link) for link in (*balls, *bodies_K)]),
+        ball_J3=real([_placed(bodies.inside(x), b) for x, b in zip((*balls, *bodies_K), centre_K3, strict=True)]),
+        radius_J=real(torch.cat((legs.radius_K, low.outline.radius_K[others_K]))),
+        near_HJ=whole(np.pad(legs.ball_PK, ((0, 0), (0, len(others_K))))),
         scale_1=real([legs.scale]),
         hip_R3=real(torch.stack([leg.hip_3 for leg in legs.built])),
         limb_R2=whole([[columns(name) for name, _ in leg.bones] for leg in legs.built]),

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mrhubo.robot.hulls import all_around
 from mrhubo.robot.shapes import LinkGeometry
 
 _RIM = 8
@@ -23,6 +24,12 @@ def balls_of(shape: LinkGeometry) -> np.ndarray:
     if shape.kind == "capsule":
         return np.array([[0.0, 0.0, side * shape.size[1], shape.size[0]] for side in (-0.5, 0.5)])
     return points(np.array(list(_corners(shape))))
+
+
+def outermost(balls_K4: np.ndarray, most: int) -> np.ndarray:
+    """Those of some balls (K, 4) that reach farthest in so many directions all around: at most as many."""
+    reach_KF = balls_K4[:, :3] @ all_around(most) + balls_K4[:, 3:]
+    return balls_K4[np.unique(reach_KF.argmax(axis=0))]
 
 
 def points(places_K3: np.ndarray) -> np.ndarray:

@@ -82,10 +82,7 @@ def _fitted(found: list[Capsule], hull: ConvexHull | None, inside_X3: np.ndarray
 def extremes(vertices_V3: np.ndarray) -> np.ndarray:
     """The vertices (H, 3) that lie farthest in directions all around."""
     vertices_V3 = _corners(_outermost(vertices_V3) if len(vertices_V3) > _MANY else vertices_V3)
-    number = np.arange(_DIRECTIONS) + 0.5
-    height, turn = 1 - 2 * number / _DIRECTIONS, np.pi * (1 + 5**0.5) * number  # R. Swinbank and R. J. Purser, 2006
-    across = np.sqrt(1 - height**2)
-    directions_3 = np.stack((across * np.cos(turn), across * np.sin(turn), height))
+    directions_3 = all_around(_DIRECTIONS)
     size = _AT_ONCE // _DIRECTIONS
     best, chosen = np.full(_DIRECTIONS, -np.inf), np.zeros(_DIRECTIONS, int)
     for first in range(0, len(vertices_V3), size):
@@ -94,6 +91,14 @@ def extremes(vertices_V3: np.ndarray) -> np.ndarray:
         found = along[farthest, np.arange(_DIRECTIONS)]
         chosen, best = np.where(found > best, farthest + first, chosen), np.maximum(found, best)
     return vertices_V3[np.unique(chosen)]
+
+
+def all_around(count: int) -> np.ndarray:
+    """Directions (3, count) all around, evenly (R. Swinbank and R. J. Purser, 2006)."""
+    number = np.arange(count) + 0.5
+    height, turn = 1 - 2 * number / count, np.pi * (1 + 5**0.5) * number
+    across = np.sqrt(1 - height**2)
+    return np.stack((across * np.cos(turn), across * np.sin(turn), height))
 
 
 def _corners(vertices_V3: np.ndarray) -> np.ndarray:

@@ -10,10 +10,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from mrhubo.robot.balls import balls_of, placed
+from mrhubo.robot.balls import balls_of, outermost, placed
 from mrhubo.robot.body_map import BodyMap
 from mrhubo.robot.model import LinkPoses
 from mrhubo.robot.urdf import link_poses
+
+_MOST = 128
+"""Most balls of the shapes of one body; of more those count that are farthest out."""
 
 
 class Outline(nn.Module):
@@ -32,6 +35,8 @@ class Outline(nn.Module):
         description = self.robot.description
         joints = [description.joints[name] for name in self.robot.driven_joints]
         bodies = [description.root, *(joint.child for joint in joints)]
+        self.bodies = tuple(bodies)
+        """Links, of which one carries each ball: `body_K` is which."""
         self._rows = [self.robot.link_index(joint.child) for joint in joints]
         rest = link_poses(description.parsed, self.robot.configuration(self.robot.home().cpu().numpy()))
 
@@ -39,21 +44,26 @@ class Outline(nn.Module):
             above = (joint.child for joint in description.joints_above(link) if joint.name in self.robot.driven_joints)
             return next(above, description.root)
 
-        found, body_K = [np.zeros((0, 4))], []
-        points = body_map.keypoints.points.values()
-        marks = [(point.link, np.array([[*point.offset_3, 0.0]])) for point in points]
-        solids = description.solids.shapes if with_shapes else ()
-        shapes = [(shape.link, placed(balls_of(shape), shape.origin_44)) for shape in solids]
-        for link, balls_K4 in (*marks, *shapes):
+        def in_body(link: str, balls_K4: np.ndarray) -> tuple[int, np.ndarray]:
             body = body_of(link)
-            found.append(placed(balls_K4, np.linalg.inv(rest[body]) @ rest[link]))
-            body_K += [bodies.index(body)] * len(balls_K4)
-        ball_K4 = np.concatenate(found)
+            return bodies.index(body), placed(balls_K4, np.linalg.inv(rest[body]) @ rest[link])
+
+        points = body_map.keypoints.points.values()
+        found = [in_body(point.link, np.array([[*point.offset_3, 0.0]])) for point in points]
+        solid: dict[int, list[np.ndarray]] = {}
+        for shape in description.solids.shapes if with_shapes else ():
+            body, balls_K4 = in_body(shape.link, placed(balls_of(shape), shape.origin_44))
+            solid.setdefault(body, []).append(balls_K4)
+        for body, several in solid.items():
+            balls_K4 = np.concatenate(several)
+            found.append((body, balls_K4 if len(balls_K4) <= _MOST else outermost(balls_K4, _MOST)))
+        ball_K4 = np.concatenate([balls_K4 for _, balls_K4 in found])
+        body_K = [body for body, balls_K4 in found for _ in balls_K4]
         above = [{joint.name for joint in description.joints_above(body)} for body in bodies]
         above_LA = torch.tensor([[float(joint.name in names) for joint in joints] for names in above])
         tensors = {
-            "centre_K3": torch.from_numpy(ball_K4[:, :3]).float(),
-            "radius_K": torch.from_numpy(ball_K4[:, 3]).float(),
+            "centre_K3": torch.tensor(ball_K4[:, :3].tolist()),
+            "radius_K": torch.tensor(ball_K4[:, 3].tolist()),
             "body_K": torch.tensor(body_K, dtype=torch.long),
             "above_KA": above_LA.reshape(len(bodies), -1)[body_K],
         }

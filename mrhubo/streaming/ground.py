@@ -23,7 +23,7 @@ from torch import Tensor
 from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
 from mrhubo.fast.plain.ground import FLAT, FREE, PLANTED, RETURN_S, RETURN_SPEED, SETTLE_S, UNDER_M, UP, USUAL_S
 from mrhubo.frames import human_to_world
-from mrhubo.reference.standing import Legs, stand_flat
+from mrhubo.reference.standing import Legs, LowBody, stand_flat
 from mrhubo.robot import LinkPoses
 
 
@@ -98,6 +98,7 @@ class Ground:
         the people's world, None: it is learned.
         """
         self.legs, self.longest_step, self.floor = legs, longest_step, floor
+        self._low_body = LowBody(legs)
 
     def begin(self, people: int) -> GroundState:
         """Nobody has been seen."""
@@ -200,7 +201,11 @@ class Ground:
         root_B3 = planned_B3.copy()
         root_B3[:, FLAT] = (flat_B2 + rest_B1 * planned_B3[:, FLAT]) / (whole_B1 + rest_B1)
         rise_B = (-(weight_BP * low_BP).sum(axis=1) + rest_B1[:, 0] * planned_B3[:, UP]) / (whole_B1 + rest_B1)[:, 0]
-        root_B3[:, UP] = np.maximum(rise_B, -low_BP.min(axis=1))  # no sole is under the floor
+        up_B3, level_B = turn_B33[:, UP], turn_B33.new_zeros(len(turn_B33))
+        lowest_B = low_BP.min(axis=1)
+        if self._low_body.near(poses, up_B3, torch.from_numpy(rise_B).to(turn_B33)):
+            lowest_B = np.minimum(lowest_B, _array(self._low_body.lowest_of_any(poses, up_B3, level_B)))
+        root_B3[:, UP] = np.maximum(rise_B, -lowest_B)  # nothing is under the floor
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         loose_BP1 = 1.0 - weight_BP[..., None]
         anchor_BP2 = anchor_BP2 + loose_BP1 * ((root_B3[:, None] + point_BP3)[..., FLAT] - anchor_BP2)

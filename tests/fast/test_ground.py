@@ -30,7 +30,7 @@ from mrhubo.rotation import axis_angle_to_matrix
 from mrhubo.streaming import Stream
 from tests.fast.altered import Altered
 from tests.fast.exact import double, in_double
-from tests.reference.standing.steppers import bow, jump, kneel, lie, moved, squat, walk
+from tests.reference.standing.steppers import bow, crawl, jump, kneel, lie, moved, squat, walk
 from tests.reference.walkers import walker, write_urdf
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -123,6 +123,11 @@ def kneeling() -> Frames:
     return frames_of(kneel(12))
 
 
+def crawling() -> Frames:
+    """Somebody on all fours, whose robot's hands would be in the floor."""
+    return frames_of(crawl(8))
+
+
 def lying() -> Frames:
     """Feet that lie on their sides."""
     return frames_of(lie(10))
@@ -190,6 +195,7 @@ def quickly(fast: FastRetargeter, frames: Frames, settings: StreamSettings) -> l
         ("chest", told),
         ("pelvis", flying),
         ("nao", kneeling),
+        ("nao", crawling),
         ("pelvis", lying),
         ("chest", lost),
         ("pelvis", climbing),

@@ -10,6 +10,7 @@ import torch
 
 from mrhubo.config import load_config
 from mrhubo.robot import BodyMap, build_body_map
+from mrhubo.robot.balls import outermost
 from mrhubo.robot.outline import Outline
 from mrhubo.robot.urdf import link_poses
 from tests.reference.walkers import THICK, walker
@@ -59,3 +60,13 @@ def test_what_moves_against_a_link_is_told_by_its_joints(nao: BodyMap, link: str
     assert float(outline.moving(link).sum()) == sum(
         joint.name in robot.driven_joints for joint in robot.description.joints_above(link)
     )
+
+
+def test_of_many_balls_the_outermost_are_kept() -> None:
+    """What is left reaches nearly as far in every direction, and the largest ball is there."""
+    random = np.random.default_rng(0)
+    balls_K4 = np.concatenate((random.normal(size=(3000, 3)), random.uniform(0, 0.3, (3000, 1))), axis=1)
+    found_K4, ways_F3 = outermost(balls_K4, 128), random.normal(size=(500, 3))
+    ways_F3 /= np.linalg.norm(ways_F3, axis=1, keepdims=True)
+    all_F, kept_F = ((some[:, :3] @ ways_F3.T + some[:, 3:]).max(axis=0) for some in (balls_K4, found_K4))
+    assert len(found_K4) <= 128 and (kept_F <= all_F + 1e-12).all() and (all_F - kept_F).max() < 0.1 * all_F.max()

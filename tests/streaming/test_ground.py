@@ -20,7 +20,7 @@ from mrhubo.retargeter import Retargeter
 from mrhubo.retargeter.nearest import NearestJoints
 from mrhubo.robot import BodyMap, Robot
 from mrhubo.streaming import Stream, StreamSettings
-from tests.reference.standing.steppers import jump, kneel, moved, squat, walk
+from tests.reference.standing.steppers import crawl, jump, kneel, lie_prone, moved, squat, stand_on_hands, walk
 from tests.reference.walkers import walker
 
 SETTINGS = StreamSettings(avoid_collisions=False)
@@ -77,6 +77,14 @@ def test_who_kneels_on_the_instep_points_as_the_person_does() -> None:
     assert max(score.parts_deg[part] for part in ("knee", "ankle", "foot")) < 3
     assert score.sunk == 0 and score.floating_max_cm < 1
     assert answer[1][:, 2].diff().abs().max() < 0.01
+
+
+@pytest.mark.parametrize("motion", [crawl(12), lie_prone(12), stand_on_hands(12)], ids=["crawls", "prone", "on hands"])
+def test_nothing_else_is_under_the_floor(motion: Motion) -> None:
+    body_map = BodyMap.of(Robot.from_config("nao-whole-body"))
+    retargeter = Retargeter(NearestJoints(body_map), body_map, BodyPrior.open(), None, phi_threshold=0.01)
+    score = score_whole_body(body_map, motion, *followed(retargeter, motion))
+    assert score.body_sunk_max_cm < 0.01 and score.sunk_max_cm < 0.01
 
 
 def test_a_root_that_jumps_leaves_the_robot_where_it_stands(biped: Retargeter, squatting) -> None:  # noqa: ANN001

@@ -182,14 +182,18 @@ def in_world(f, work, point, root):
 @njit(**INNER)
 def stand(t, work, f):
     """Takes the root along with what is planted, where the robot is placed; the base stands in `f.base_43`."""
-    root, points = carrier(t, work), len(f.weight_H)
+    root, points, balls = carrier(t, work), len(f.weight_H), size(t, RADIUS_J)
     planned = (f.path_3[0] + f.off_3[0], f.path_3[1] + f.off_3[1], f.path_3[2] + f.off_3[2])
     total, lowest, rise, flat = 0.0, np.inf, 0.0, (0.0, 0.0, 0.0)
+    for b in range(balls):
+        lowest = min(lowest, _height(t, work, f, b, root))
     for h in range(points):
         point = in_world(f, work, turned_point(work, whole(t, BODY_H, h), vector(t, POINT_H3, h)), root)
         put(f.sole_H3, h, point)
-        low = _lowest(t, work, f, h, root)
-        lowest = min(lowest, low)
+        low = np.inf
+        for b in range(balls):
+            if whole(t, NEAR_HJ, h * balls + b):
+                low = min(low, _height(t, work, f, b, root))
         f.above_H[h] = point[1] - low
         if not f.held_H[h]:
             put(f.anchor_H3, h, (planned[0] + point[0], 0.0, planned[2] + point[2]))
@@ -226,11 +230,7 @@ def _base(work, f, found, root):
 
 
 @njit(**INNER)
-def _lowest(t, work, f, h, root):
-    """How high the lowest ball at a point is over the root [m]."""
-    found, balls = np.inf, size(t, RADIUS_J)
-    for b in range(balls):
-        if whole(t, NEAR_HJ, h * balls + b):
-            place = turned_point(work, whole(t, BALL_BODY_J, b), vector(t, BALL_J3, b))
-            found = min(found, in_world(f, work, place, root)[1] - real(t, RADIUS_J, b))
-    return found
+def _height(t, work, f, b, root):
+    """How high the lowest point of a ball is over the root [m]."""
+    place = turned_point(work, whole(t, BALL_BODY_J, b), vector(t, BALL_J3, b))
+    return in_world(f, work, place, root)[1] - real(t, RADIUS_J, b)

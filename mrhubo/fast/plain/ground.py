@@ -193,7 +193,8 @@ class PlainGround:
         axes_33, from_3 = (found[0] for found in carrier(legs, placed))
         turn_33 = axes_33 @ state.turn_33.T  # from the base to the world's axes, rows times it
         point_H3 = (turned_points(placed, legs.body_H, legs.point_H3)[0] - from_3) @ turn_33
-        low_H = self._lowest(placed, from_3, turn_33)
+        height_J = self._heights(placed, from_3, turn_33)
+        low_H = np.where(legs.near_HJ > 0, height_J, np.inf).min(axis=1)
         whole = float(weight_H.sum())
         rest = max(1.0 - whole, 0.0)
         planned_3 = state.path_3 + state.off_3
@@ -201,19 +202,18 @@ class PlainGround:
         root_3 = planned_3.copy()
         root_3[FLAT] = (weight_H @ (anchor_H2 - point_H3[:, FLAT]) + rest * planned_3[FLAT]) / (whole + rest)
         rise = (-float(weight_H @ low_H) + rest * planned_3[UP]) / (whole + rest)
-        root_3[UP] = max(rise, -low_H.min())  # no sole is under the floor
+        root_3[UP] = max(rise, -height_J.min())  # nothing is under the floor
         # What is hardly planted yet, or no more, goes along; what is planted stays.
         anchor_H2 = anchor_H2 + (1.0 - weight_H[:, None]) * ((root_3 + point_H3)[:, FLAT] - anchor_H2)
         self._state = replace(state, off_3=root_3 - state.path_3, anchor_H2=anchor_H2, above_H=point_H3[:, UP] - low_H)
         base_33 = state.turn_33[WORLD] @ axes_33.T
         return Base(root_3[WORLD] - base_33 @ from_3, base_33)
 
-    def _lowest(self, placed: Placed, from_3: np.ndarray, turn_33: np.ndarray) -> np.ndarray:
-        """How high the lowest ball at each point (H,) is over the root [m]."""
+    def _heights(self, placed: Placed, from_3: np.ndarray, turn_33: np.ndarray) -> np.ndarray:
+        """How high the lowest point of each ball (J,) is over the root [m]."""
         legs = self._legs
         ball_J3 = (turned_points(placed, legs.ball_body_J, legs.ball_J3)[0] - from_3) @ turn_33
-        height_J = ball_J3[:, UP] - legs.radius_J
-        return np.where(legs.near_HJ > 0, height_J, np.inf).min(axis=1)
+        return ball_J3[:, UP] - legs.radius_J
 
 
 def person_points(legs: Legs, seen: Seen) -> tuple[np.ndarray, np.ndarray]:

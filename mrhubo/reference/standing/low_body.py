@@ -53,6 +53,14 @@ class LowBody(nn.Module):
         return self._arms
 
     @property
+    def counts_K(self) -> Tensor:
+        """Which balls of the outline are looked at (K,)."""
+        found_K = self._lifting_K if self.outline is not None else self._marks_K
+        for arm in self._arms:
+            found_K = found_K | arm.upper_K | arm.lower_K
+        return found_K
+
+    @property
     def arms_N(self) -> Tensor:
         """Which joints move arms (N,)."""
         none_N = torch.zeros_like(self.outline.robot.lower_N, dtype=torch.bool)
