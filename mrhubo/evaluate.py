@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mrhubo.config import CommandParser, Config, parse_arguments, run_command, whole_number
+from mrhubo.config import CommandParser, Config, number, parse_arguments, run_command, whole_number
 from mrhubo.errors import UserError
+from mrhubo.robot_motion import read_joint_order
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
@@ -31,6 +32,10 @@ def build_parser() -> CommandParser[Config]:
         " streams (docs/whole-body.md)"
     )
     what.add_argument("--optimiser", action="store_true", help=optimiser)
+    order = "names the joints of predictions that do not: a URDF, a MuJoCo model, or a name a line"
+    parser.add_argument("--joint-order", metavar="FILE", help=order)
+    rate = "frames per second of predictions that do not tell"
+    parser.add_argument("--rate", metavar="HERTZ", type=number(0), help=rate)
     polish = (
         "so many steps of optimisation after the networks, each frame on its own (default: the networks alone, then"
         " every way of answering: frame by frame, whole clips, stream; and the same motions re-shared)"
@@ -50,6 +55,8 @@ def main(argv: list[str]) -> None:
     from mrhubo.fitting.preparation import prepare
 
     report = Reporter(options.quiet)
+    if options.predictions is None and (options.joint_order or options.rate):
+        raise UserError("command line: --joint-order and --rate are for --predictions")
     if options.optimiser:
         from mrhubo.fitting.whole_body import measure_optimiser
 
@@ -64,7 +71,10 @@ def main(argv: list[str]) -> None:
     if options.polish is not None or options.validation:
         raise UserError("command line: --polish and --validation are for a package; predictions stay as they are")
     prepared = prepare(config, split=False)
-    print(measure_predictions(prepared, report, [Path(name) for name in options.predictions]))
+    files, names = [Path(name) for name in options.predictions], ()
+    if options.joint_order is not None:
+        names = read_joint_order(Path(options.joint_order)).names
+    print(measure_predictions(prepared, report, files, names, options.rate))
 
 
 if __name__ == "__main__":

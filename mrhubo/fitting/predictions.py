@@ -39,7 +39,13 @@ class _Prediction:
     notes: tuple[str, ...]
 
 
-def measure_predictions(prepared: Prepared, report: Reporter, files: Sequence[Path]) -> str:
+def measure_predictions(
+    prepared: Prepared,
+    report: Reporter,
+    files: Sequence[Path],
+    joint_names: Sequence[str] = (),
+    frame_rate: float | None = None,
+) -> str:
     """The tables of the motions that are predicted and their means.
 
     Each is measured at its own frame rate: the human motion is brought to it (`mrhubo.motion.resample`), and the
@@ -49,6 +55,8 @@ def measure_predictions(prepared: Prepared, report: Reporter, files: Sequence[Pa
         prepared: the robot, and the motions that measure.
         report: told of the motions.
         files: robot motions (`mrhubo.robot_motion`), or LeRobot datasets of one.
+        joint_names: of files that do not tell them.
+        frame_rate: of files that do not tell it [1/s].
 
     Raises:
         UserError: a file is none, of a motion that is not there, or of another length; joints of the robot are missing
@@ -58,7 +66,7 @@ def measure_predictions(prepared: Prepared, report: Reporter, files: Sequence[Pa
     found: dict[str, _Prediction] = {}
     for file in files:
         with naming(file):
-            prediction = _match(file, read_robot_motion(file), known, robot)
+            prediction = _match(file, read_robot_motion(file, joint_names, frame_rate), known, robot)
         name = prediction.motion.name
         if name in found:
             raise UserError(f"{file}: answers '{name}', as another file does; measure one retargeter at a time")
@@ -80,7 +88,7 @@ def _match(file: Path, found: RobotMotion, known: dict[str, Motion], robot: Robo
     """A file's joint angles in the robot's order, and the motion that they answer."""
     found = found.single()
     if found.frame_rate is None:
-        raise UserError(f"{file}: has no frame rate; give it as 'frame_rate'")
+        raise UserError(f"{file}: has no frame rate; give it as 'frame_rate', or with --rate")
     name = found.name if found.name in known else file.stem
     if name not in known:
         named = found.name or name

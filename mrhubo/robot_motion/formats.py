@@ -146,7 +146,8 @@ def read_robot_motion(
     line = text.partition("\n")[0].strip()
     if re.fullmatch(r"[-+0-9.eE,\s]+", line):
         if not joint_names:
-            raise UserError(f"{path}: has no header, so its joints have to be named: joint_names=[...]")
+            names = "joint_names=[...], or --joint-order FILE"
+            raise UserError(f"{path}: has no header, so its joints have to be named: {names}")
         return read_unitree(path, joint_names, frame_rate)
     if "," in line and not re.match(r"[\w\"']+ *:", line):
         return read_csv(path)

@@ -73,7 +73,8 @@ def read_gmr(path: Path, joint_names: Sequence[str] = ()) -> RobotMotion:
     names = list(joint_names) or ([] if told is None else told.texts())
     q, place, turn = (tree[key].array() for key in ("dof_pos", "root_pos", "root_rot"))
     if not names:
-        raise UserError(f"{path}: does not tell its joints, so they have to be named: joint_names=[...]")
+        asked = "joint_names=[...], or --joint-order FILE"
+        raise UserError(f"{path}: does not tell its joints, so they have to be named: {asked}")
     if q.ndim != 2 or (q.shape, place.shape, turn.shape) != ((len(q), len(names)), (len(q), 3), (len(q), 4)):
         raise UserError(
             f"{path}: 'dof_pos', 'root_pos' and 'root_rot' have shapes {q.shape}, {place.shape} and {turn.shape};"

@@ -118,6 +118,17 @@ def test_the_command(root: Path, prepared: Prepared, answer: RobotMotion, tmp_pa
     capsys.readouterr()
     main(given)
     assert rows(capsys.readouterr().out)["wave"][2] == "0.000"
+    write_robot_motion(answer, tmp_path / "wave.csv", "unitree")  # which names no joints
+    (tmp_path / "order.txt").write_text("\n".join(answer.joint_names))
+    bare = ["nao", "--predictions", str(tmp_path / "wave.csv"), "--quiet", *settings]
+    with pytest.raises(UserError, match="--joint-order FILE"):
+        main(bare)
+    with pytest.raises(UserError, match="has no frame rate"):
+        main([*bare, "--joint-order", str(tmp_path / "order.txt")])
+    main([*bare, "--joint-order", str(tmp_path / "order.txt"), "--rate", f"{answer.frame_rate}"])
+    assert rows(capsys.readouterr().out)["wave"][2] == "0.000"
+    with pytest.raises(UserError, match="--joint-order and --rate are for --predictions"):
+        main(["nao", "--optimiser", "--rate", "30"])
     with pytest.raises(UserError, match="--polish and --validation are for a package"):
         main([*given, "--polish", "1"])
     with pytest.raises(UserError, match="--retargeter --predictions --optimiser is required"):

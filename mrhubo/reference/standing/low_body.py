@@ -55,7 +55,7 @@ class LowBody(nn.Module):
     @property
     def counts_K(self) -> Tensor:
         """Which balls of the outline are looked at (K,)."""
-        found_K = self._lifting_K if self.outline is not None else self._marks_K
+        found_K = torch.zeros_like(self.outline.radius_K, dtype=torch.bool) | self._lifting_K
         for arm in self._arms:
             found_K = found_K | arm.upper_K | arm.lower_K
         return found_K

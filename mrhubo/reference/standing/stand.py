@@ -34,6 +34,7 @@ from mrhubo.reference.standing.low_body import LowBody
 from mrhubo.reference.standing.path import carry
 from mrhubo.reference.terms import Smoothness
 from mrhubo.reference.terms.soles import SoleTerm
+from mrhubo.robot import LinkPoses
 
 PLANTED, SWINGING = 2500.0, 50.0
 """Weights [1/m^2] of a planted point's place and of a swinging one's: a millimetre costs as much as a limb that is 3
@@ -138,12 +139,9 @@ class Standing(nn.Module):
 
     def _carried(self, q_TN: Tensor, steps: HumanSteps, place_K2: np.ndarray | None = None) -> Carried:
         """Where planted feet carry the root; `place_K2` are the contacts' places, where they are decided."""
-        contacts, rate, legs = steps.contacts, steps.frame_rate, self.legs
+        contacts, rate = steps.contacts, steps.frame_rate
         poses = self.robot.forward(q_TN)
-        seen = legs.places(poses)
-        point_TP3, ball_TK3 = (self._in_world(x, steps).double().cpu().numpy() for x in (seen.point_BP3, seen.ball_BK3))
-        height_TK = ball_TK3[..., _UP] - legs.radius_K.double().cpu().numpy()
-        low_TP = np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
+        point_TP3, low_TP = self._soles(poses, steps)
         path_T3 = steps.path_T3.double().cpu().numpy()
         off_T2, place_K2 = carry(
             path_T3[:, None, _FLAT] + point_TP3[..., _FLAT], contacts.weight_TP, contacts.phase_TP, rate, place_K2
@@ -161,6 +159,13 @@ class Standing(nn.Module):
             arm_T = arm_TS2.min(axis=(1, 2), initial=np.inf)
             body_T = np.minimum(body_T, np.maximum(arm_T, -clear_T))  # who stands on the hands is lifted by them
         return Carried(root_T3, place_K2, point_TP3 + root_T3[:, None], low_TP + root_T3[:, [_UP]], body_T)
+
+    def _soles(self, poses: LinkPoses, steps: HumanSteps) -> tuple[np.ndarray, np.ndarray]:
+        """Points of soles (T, P, 3) from the root, and the height of the lowest ball at each (T, P) [m]."""
+        legs, seen = self.legs, self.legs.places(poses)
+        point_TP3, ball_TK3 = (self._in_world(x, steps).double().cpu().numpy() for x in (seen.point_BP3, seen.ball_BK3))
+        height_TK = ball_TK3[..., _UP] - legs.radius_K.double().cpu().numpy()
+        return point_TP3, np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
 
     def _in_world(self, seen_TX3: Tensor, steps: HumanSteps) -> Tensor:
         """What is seen from what carries the legs, along the world's axes."""
@@ -231,6 +236,9 @@ class Standing(nn.Module):
                 q_TN, target_TD3, lambda raised_TD3: self._extended(raised_TD3, carried, still, steps), up_T3, height_T,
                 rate, smoothness, avoid_collisions,
             )  # fmt: skip
+            point_TP3, low_TP = self._soles(self.robot.forward(q_TN), steps)  # which give way to the robot's own arms
+            root_T3 = carried.root_T3
+            carried = replace(carried, point_TP3=point_TP3 + root_T3[:, None], low_TP=low_TP + root_T3[:, [_UP]])
         lowest_T = low.lowest_of_any(self.robot.forward(q_TN), up_T3, height_T).double().cpu().numpy()
         left = replace(carried, body_T=lowest_T)
         return q_TN, left.lifted(rate) if (lowest_T < 0).any() else left
