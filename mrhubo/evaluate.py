@@ -6,7 +6,6 @@ from pathlib import Path
 
 from mrhubo.config import CommandParser, Config, number, parse_arguments, run_command, whole_number
 from mrhubo.errors import UserError
-from mrhubo.robot_motion import read_joint_order
 from mrhubo.runtime.progress import Reporter
 
 DESCRIPTION = (
@@ -73,6 +72,8 @@ def main(argv: list[str]) -> None:
     prepared = prepare(config, split=False)
     files, names = [Path(name) for name in options.predictions], ()
     if options.joint_order is not None:
+        from mrhubo.robot_motion import read_joint_order
+
         names = read_joint_order(Path(options.joint_order)).names
     print(measure_predictions(prepared, report, files, names, options.rate))
 
