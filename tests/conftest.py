@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import filelock
+import hypothesis
 import pytest
 
 from tests.processes import new_server
@@ -27,6 +28,11 @@ if TYPE_CHECKING:
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 if "PYTEST_XDIST_WORKER" in os.environ:  # there is one for each core
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# A slow machine is no fault of the program; in CI hypothesis has a profile of its own, without deadline too.
+hypothesis.settings.register_profile("any machine", deadline=None)
+if not os.environ.get("CI"):
+    hypothesis.settings.load_profile("any machine")
 
 ROOT = Path(__file__).resolve().parent.parent
 
