@@ -106,7 +106,7 @@ def score_whole_body(
     planted_TP = steps.contacts.planted_TP
     sliding_TP = horizontal_speed(soles.point_BP3.double().numpy(), rate)
     human_TP = horizontal_speed(human_to_world(steps.place_TP3), rate)
-    low_TP = lowest(legs, soles.ball_BK3.double().numpy())
+    low_TP = legs.lowest(soles.ball_BK3[..., 2].double().numpy())
     low_TS = low_TP.reshape(len(low_TP), -1, 2).min(axis=-1)
     planted_TS = planted_TP.reshape(len(low_TP), -1, 2).any(axis=-1)
     body_T = lowest_of_body(legs, poses, base_T3, base_T33)
@@ -156,12 +156,6 @@ def horizontal_speed(place_TP3: np.ndarray, frame_rate: float) -> np.ndarray:
     if len(place_TP3) < 2:
         return np.zeros(place_TP3.shape[:-1])
     return np.linalg.norm(np.gradient(place_TP3[..., :2], 1 / frame_rate, axis=0), axis=-1)
-
-
-def lowest(legs: Legs, ball_TK3: np.ndarray) -> np.ndarray:
-    """Height [m] of the lowest ball at each point of a sole (T, P), of places (T, K, 3) whose z is up."""
-    height_TK = ball_TK3[..., 2] - legs.radius_K.double().cpu().numpy()
-    return np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
 
 
 def lowest_of_body(legs: Legs, poses: LinkPoses, base_T3: Tensor, base_T33: Tensor) -> np.ndarray:

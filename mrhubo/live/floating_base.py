@@ -8,14 +8,14 @@ it is turned and where it is, from those that are sent:
   without any error, and a foot that stands flat keeps its turn in the world, so that the base turns and tilts as the
   leg above it does.
 - As far as nothing is planted, the base moves by as much as the stream's does from frame to frame.
-- No sole is under the floor.
+- Nothing of the robot is under the floor, neither soles nor hands, knees, trunk or head.
 
 What the stream's base does while the robot is not following is never made up for: the path goes on from where the robot
 is, in the direction in which it looks. So the robot's world begins where the robot stands at the start.
 
 World: x forward, y left, z up; m. The floor is at z = 0.
 
-Legend: N joints, H points of soles, R feet, J balls of soles.
+Legend: N joints, H points of soles, R feet.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ class _Place(NamedTuple):
     point_H3: np.ndarray
     """Points of soles from the base's place, along the world's axes [m]."""
     low_H: np.ndarray
-    """How high the lowest ball at each point is over the base [m]."""
+    """How high the lowest ball at each point is over the base [m],"""
+    low: float
+    """and the lowest of the whole robot."""
 
 
 class FloatingBase:
@@ -91,15 +93,15 @@ class FloatingBase:
         (soles,), (axes_33, root_3) = self._kinematics.soles(q_N), self._kinematics.carrier(q_N)
         turn_33 = np.eye(3)[WORLD] @ axes_33.T
         self._stop_soles = soles
-        point_H3, low_H = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
+        point_H3, (low_H, low) = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
         place_3 = -turn_33 @ root_3
-        place_3[UP] = -low_H.min()
+        place_3[UP] = -low
         self._anchor_H2, self._orient_R33 = (place_3 + point_H3)[:, FLAT], turn_33 @ soles.turn_R33
         self._theirs_R33 = self._orient_R33.copy()
         """How the stream has the feet turned."""
         self._begun = True
         """Whether what is followed began anew with the newest stance."""
-        self._at = _Place(turn_33, place_3, point_H3, low_H)
+        self._at = _Place(turn_33, place_3, point_H3, low_H, low)
         self._weight_H = self._near(STANDS_M, LIFTED_M)
         self._flat_R = self._weight_H.reshape(-1, 2).min(axis=1)
         """How far each foot stands with its whole sole (R,), 0..1, so that its turn counts."""
@@ -211,7 +213,7 @@ class FloatingBase:
 
     def _sunk(self, height: float, sinks: bool) -> float:
         """A height [m], or a lower one, if the robot is in the air and should not be."""
-        above = height + float(self._at.low_H.min())
+        above = height + self._at.low
         if not sinks or above <= 1e-9 or self._weight_H.sum() >= 1:
             self._sinking = 0.0
             return height
@@ -261,14 +263,14 @@ class FloatingBase:
         flat_R, weight_H, anchor_H2 = self._flat_R, self._weight_H, self._anchor_H2
         away_R3 = turns_of(self._orient_R33 @ soles.turn_R33.mT @ free_33.T)
         turn_33 = rotation_of(flat_R @ away_R3 / max(float(flat_R.sum()), 1.0)) @ free_33
-        point_H3, low_H = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
+        point_H3, (low_H, low) = soles.point_H3 @ turn_33.T, self._kinematics.lowest(soles, turn_33)
         whole = float(weight_H.sum())
         rest = max(1.0 - whole, 0.0)
         place_3 = planned_3.copy()
         place_3[FLAT] = (weight_H @ (anchor_H2 - point_H3[:, FLAT]) + rest * planned_3[FLAT]) / (whole + rest)
         rise = (-float(weight_H @ low_H) + rest * planned_3[UP]) / (whole + rest)
-        place_3[UP] = max(rise, -float(low_H.min()))
-        return _Place(turn_33, place_3, point_H3, low_H)
+        place_3[UP] = max(rise, -low)
+        return _Place(turn_33, place_3, point_H3, low_H, low)
 
 
 def _norm(vector_3: np.ndarray) -> float:

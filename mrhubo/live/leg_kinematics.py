@@ -1,6 +1,6 @@
-"""Where the soles of a robot are at joint angles: forward kinematics of its legs alone.
+"""Where the soles of a robot are at joint angles, and what else of it could be in the floor.
 
-Legend: B joint angles, N joints, H points of soles, R feet, J balls of soles.
+Legend: B joint angles, N joints, H points of soles, R feet, J balls of soles and of the rest of the body.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _OF_DIRECTIONS = (
 
 
 class Soles(NamedTuple):
-    """A robot's soles at some joint angles, base frame."""
+    """A robot's soles at some joint angles, and balls of all that touches the floor, base frame."""
 
     point_H3: np.ndarray
     ball_J3: np.ndarray
@@ -32,11 +32,11 @@ class Soles(NamedTuple):
 
 
 class LegKinematics:
-    """The legs of one robot."""
+    """What of one robot touches the floor."""
 
     def __init__(self, kinematics: Kinematics, legs: Legs) -> None:
         """Of the whole robot's."""
-        self._kinematics, self._legs = _legs_alone(kinematics, legs)
+        self._kinematics, self._legs = _without_others(kinematics, legs)
 
     def soles(self, *q_N: np.ndarray) -> list[Soles]:
         """Soles at some joint angles each, all at once, as that takes hardly longer than one."""
@@ -51,14 +51,16 @@ class LegKinematics:
         axes_B33, root_B3 = carrier(self._legs, place(self._kinematics, q_N[None]))
         return axes_B33[0], root_B3[0]
 
-    def lowest(self, soles: Soles, turn_33: np.ndarray) -> np.ndarray:
-        """How high the lowest ball at each point is (H,) [m] over the base, which is turned so in the world."""
+    def lowest(self, soles: Soles, turn_33: np.ndarray) -> tuple[np.ndarray, float]:
+        """How high [m] over the base, which is turned so in the world, the lowest ball at each point is (H,), and the
+        lowest of all.
+        """
         height_J = soles.ball_J3 @ turn_33[2] - self._legs.radius_J
-        return np.where(self._legs.near_HJ > 0, height_J, np.inf).min(axis=1)
+        return np.where(self._legs.near_HJ > 0, height_J, np.inf).min(axis=1), float(height_J.min())
 
 
-def _legs_alone(kinematics: Kinematics, legs: Legs) -> tuple[Kinematics, Legs]:
-    """Both without joints that move no sole, and without directions: half of the time of forward kinematics."""
+def _without_others(kinematics: Kinematics, legs: Legs) -> tuple[Kinematics, Legs]:
+    """Both without joints that move nothing of that, and without directions, which take time."""
     wanted, parents = set(), [-1, *kinematics.parent_A.tolist()]
     for body in {int(legs.carrier_1[0]), *legs.body_H.tolist(), *legs.ball_body_J.tolist()}:
         while body > 0 and body not in wanted:

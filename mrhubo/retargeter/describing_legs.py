@@ -29,15 +29,15 @@ def describe_legs(body_map: BodyMap, bodies: Bodies) -> tuple[Legs | None, Names
         "feet": [sole.part.name for sole in legs.soles],
         "contact_points": [KEYPOINT_NAMES[point] for point in legs.contacts],
     }
-    blocks = standing.Standing(legs).problem.blocks
+    stand = standing.Standing(legs)
+    low, blocks = stand.low_body, stand.problem.blocks
     block_D = torch.where(blocks.directions_DC.sum(dim=1) > 0, blocks.directions_DC.argmax(dim=1), -1)
     columns = body_map.direction_names.index
     carrier_44 = bodies.inside(legs.link)
     feet = [bodies.inside(sole.link) for sole in legs.soles]
     balls = [ball for sole in legs.soles for ball in [sole.link] * len(sole.balls_K4)]
-    low = standing.LowBody(legs)
     others_K = torch.nonzero(low.counts_K)[:, 0]
-    bodies_K = [low.outline.bodies[body] for body in low.outline.body_K[others_K].tolist()]
+    bodies_K = [low.outline.bodies.links[body] for body in low.outline.body_K[others_K].tolist()]
     centre_K3 = [*legs.balls_K3, *low.outline.centre_K3[others_K]]
     found = Legs(
         **_person(legs),

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.errors import UserError
+from mrhubo.robot.driven_bodies import DrivenBodies
 from mrhubo.robot.model import LinkPoses, Robot
-from mrhubo.robot.urdf import link_poses
 
 
 class CentreOfMass(nn.Module):
@@ -34,11 +34,10 @@ class CentreOfMass(nn.Module):
             raise UserError(
                 f"robot.balance: {robot.urdf} tells no masses, so nobody knows where its centre of mass is; set it to 0"
             )
-        rest = link_poses(robot.description.parsed, robot.configuration(robot.home().cpu().numpy()))
+        bodies = DrivenBodies(robot)
         moments: dict[str, np.ndarray] = {}
         for link, (mass, *centre) in masses.items():
-            body = self._body(robot, link)
-            place_4 = np.linalg.inv(rest[body]) @ rest[link] @ np.array([*centre, 1.0])
+            body, place_4 = bodies.link_of(link), bodies.inside(link) @ np.array([*centre, 1.0])
             moments[body] = moments.get(body, np.zeros(4)) + mass * place_4
         moments[robot.description.root] = moments.pop(robot.description.root, np.zeros(4))  # is the last
         self.links = tuple(moments)
@@ -47,12 +46,6 @@ class CentreOfMass(nn.Module):
         centre_K3 = moment_K4[:, :3] / moment_K4[:, 3:].clamp_min(1e-12)
         for name, tensor in (("share_K", moment_K4[:, 3] / moment_K4[:, 3].sum()), ("centre_K3", centre_K3)):
             self.register_buffer(name, tensor.to(robot.lower_N), persistent=False)
-
-    @staticmethod
-    def _body(robot: Robot, link: str) -> str:
-        """The link of the body that a link belongs to."""
-        driven = (joint.child for joint in robot.description.joints_above(link) if joint.name in robot.driven_joints)
-        return next(driven, robot.description.root)
 
     def forward(self, poses: LinkPoses) -> Tensor:
         """The centre of mass (B, 3) of poses of the robot, base frame [m]."""

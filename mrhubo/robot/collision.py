@@ -28,6 +28,7 @@ import torch
 from torch import Tensor, nn
 
 from mrhubo.robot.capsules import SHORT, closest_points
+from mrhubo.robot.driven_bodies import DrivenBodies
 from mrhubo.robot.link_capsules import link_capsules
 from mrhubo.robot.model import LinkPoses, Robot
 
@@ -86,10 +87,8 @@ class _Close:
 class SelfCollision(nn.Module):
     """Capsule pairs of one robot, on the robot's device."""
 
-    _children_A: Tensor
     _axes_A3: Tensor
     _rotary_A: Tensor
-    _above_LA: Tensor
     _body_C: Tensor
     _ends_C23: Tensor
     _radius_C: Tensor
@@ -103,52 +102,42 @@ class SelfCollision(nn.Module):
         super().__init__()
         self.robot = robot
         joints = [robot.description.joints[name] for name in robot.driven_joints]
-        self._bodies = [robot.description.root, *(joint.child for joint in joints)]
-        above = [{joint.name for joint in robot.description.joints_above(link)} for link in self._bodies]
-        self._keep("_children_A", torch.tensor([robot.link_index(joint.child) for joint in joints]))
+        self._bodies = DrivenBodies(robot)
         self._keep("_axes_A3", torch.tensor(np.array([joint.axis_3 for joint in joints]), dtype=torch.float32))
         self._keep("_rotary_A", torch.tensor([float(joint.rotary) for joint in joints]))
-        self._keep("_above_LA", torch.tensor([[float(j.name in names) for j in joints] for names in above]))
         self._read_capsules()
-        self._choose_pairs({frozenset((joint.child, self._body(joint.parent))) for joint in joints})
+        self._choose_pairs({frozenset((self._bodies.number(j.child), self._bodies.number(j.parent))) for j in joints})
 
     def _keep(self, name: str, tensor: Tensor) -> None:
         """A constant, where the robot is."""
         self.register_buffer(name, tensor.to(self.robot.lower_N.device), persistent=False)
 
-    def _body(self, link: str) -> str:
-        """The link that stands for all that move with this one."""
-        above = self.robot.description.joints_above(link)
-        found = (joint.child for joint in above if joint.name in self.robot.driven_joints)
-        return next(found, self.robot.description.root)
-
     def _read_capsules(self) -> None:
         urdf = self.robot.description.parsed
-        solids, found = self.robot.description.solids, link_capsules(self.robot, self._body)
+        solids, found = self.robot.description.solids, link_capsules(self.robot, self._bodies)
         unread = self.robot.description.unread_collisions
         solid = (link.name for link in urdf.robot.links if link.collisions or link.name in unread)
         self.uncovered = tuple(name for name in solid if name not in found or name in solids.gaps)
         """Links of which something is not looked at: a mesh that is not there, what cannot be read, or is too much."""
         joints = [self.robot.description.joints[name] for name in self.robot.driven_joints]
         carrying = {joint.parent for joint in joints}
-        moved = {name for name in self.uncovered if self._body(name) != self.robot.description.root}
+        moved = {name for name in self.uncovered if self._bodies.number(name)}
         self.unknown = tuple(name for name in self.uncovered if name in moved | carrying)
         """Those of `uncovered` that move, or carry what moves: whether they touch anything is not known."""
         self._links = [link for link, some in found.items() for _ in some]
         ends = [(start_3, end_3) for some in found.values() for start_3, end_3, _ in some]
         radii = [radius for some in found.values() for _, _, radius in some]
-        body_C = [self._bodies.index(self._body(link)) for link in self._links]
+        body_C = [self._bodies.number(link) for link in self._links]
         self._keep("_body_C", torch.tensor(body_C, dtype=torch.long))
         self._keep("_ends_C23", torch.tensor(np.array(ends, dtype=np.float32).reshape(-1, 2, 3)))
         self._keep("_radius_C", torch.tensor(radii, dtype=torch.float32))
         self._keep("_reach_C", (self._ends_C23[:, 1] - self._ends_C23[:, 0]).norm(dim=-1) / 2 + self._radius_C)
 
-    def _choose_pairs(self, neighbours: set[frozenset[str]]) -> None:
+    def _choose_pairs(self, neighbours: set[frozenset[int]]) -> None:
         """All pairs of capsules of different bodies that can be kept apart; `neighbours` share a joint."""
-        count = len(self._bodies)
+        count = len(self._bodies.links)
         apart_LL = ~torch.eye(count, dtype=torch.bool)
-        for names in neighbours:
-            i, j = (self._bodies.index(name) for name in names)
+        for i, j in neighbours:
             apart_LL[i, j] = apart_LL[j, i] = False
         body_C = self._body_C.cpu()
         every_2P = torch.triu_indices(len(body_C), len(body_C), offset=1)
@@ -253,11 +242,7 @@ class SelfCollision(nn.Module):
 
     def _place(self, poses: LinkPoses) -> _Placed:
         """Bodies and capsules where the links are."""
-        rotation_BA33 = poses.rotation_BL33.index_select(1, self._children_A)
-        position_BA3 = poses.position_BL3.index_select(1, self._children_A)
-        eye_B133 = torch.eye(3, dtype=position_BA3.dtype, device=position_BA3.device).expand(len(position_BA3), 1, 3, 3)
-        rotation_BL33 = torch.cat((eye_B133, rotation_BA33), dim=1)
-        position_BL3 = torch.cat((eye_B133[..., 0] * 0, position_BA3), dim=1)
+        rotation_BL33, position_BL3 = self._bodies.place(poses)
         ends_BC23 = self._ends_C23 @ rotation_BL33[:, self._body_C].mT + position_BL3[:, self._body_C, None]
         return _Placed(rotation_BL33, position_BL3, ends_BC23)
 
@@ -295,6 +280,6 @@ class SelfCollision(nn.Module):
         moment_X31 = torch.linalg.cross(close.point_X3, close.normal_X3)[..., None]
         turn_XA = (axis_XA3 @ moment_X31 - lever_XA3 @ close.normal_X3[..., None])[..., 0]
         slide_XA = (axis_XA3 @ close.normal_X3[..., None])[..., 0]
-        sign_XA = self._above_LA[self._body_C[i_X]] - self._above_LA[self._body_C[j_X]]
+        sign_XA = self._bodies.above_LA[self._body_C[i_X]] - self._bodies.above_LA[self._body_C[j_X]]
         moved_XA = torch.where(self._rotary_A > 0, turn_XA, slide_XA) * sign_XA
         return Contacts(close.row_X, close.pair_X, close.distance_X, moved_XA @ self.robot.drive_DN)

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-
-import numpy as np
 
 from mrhubo.errors import InputWarning
 from mrhubo.robot.capsules import Capsule, capsules
+from mrhubo.robot.driven_bodies import DrivenBodies
 from mrhubo.robot.model import Robot
-from mrhubo.robot.urdf import link_poses
 
 _MOST = 2_000
 """Most capsules."""
 
 
-def link_capsules(robot: Robot, body_of: Callable[[str], str]) -> dict[str, list[Capsule]]:
+def link_capsules(robot: Robot, bodies: DrivenBodies) -> dict[str, list[Capsule]]:
     """Capsules by link, each in the frame of the link that stands for all that move with it.
 
     Args:
         robot: its URDF tells the shapes.
-        body_of: that link, by link.
+        bodies: of the robot.
     """
-    rest = link_poses(robot.description.parsed, robot.configuration(robot.home().cpu().numpy()))
     found: dict[str, list[Capsule]] = {}
     for shape in robot.description.solids.shapes:
-        pose_44 = np.linalg.inv(rest[body_of(shape.link)]) @ rest[shape.link] @ shape.origin_44
+        pose_44 = bodies.inside(shape.link) @ shape.origin_44
         found.setdefault(shape.link, []).extend(capsules(shape, pose_44))
     _leave_out(found, robot)
     return found

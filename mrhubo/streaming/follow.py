@@ -59,7 +59,7 @@ class Follower:
         """
         body_map = retargeter.body_map
         self.retargeter, self.settings, self.longest_step = retargeter, settings, longest_step
-        self.ground = None if standing is None else Ground(standing.legs, longest_step, floor)
+        self.ground = None if standing is None else Ground(standing, longest_step, floor)
         self.problem = retargeter.directions if standing is None else standing.problem
         avoidance = None
         if settings.avoid_collisions:

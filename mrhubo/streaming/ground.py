@@ -23,7 +23,7 @@ from torch import Tensor
 from mrhubo.fast.plain.contacts import LiveContacts, next_contacts
 from mrhubo.fast.plain.ground import FLAT, FREE, PLANTED, RETURN_S, RETURN_SPEED, SETTLE_S, UNDER_M, UP, USUAL_S
 from mrhubo.frames import human_to_world
-from mrhubo.reference.standing import Legs, LowBody, stand_flat
+from mrhubo.reference.standing import Standing, stand_flat
 from mrhubo.robot import LinkPoses
 
 
@@ -93,12 +93,16 @@ class GroundState:
 class Ground:
     """The floor under one robot."""
 
-    def __init__(self, legs: Legs, longest_step: float, floor: float | None = None) -> None:
-        """`longest_step`: who was not seen for longer [s] goes on from where the robot is; `floor`: its height [m] in
-        the people's world, None: it is learned.
+    def __init__(self, standing: Standing, longest_step: float, floor: float | None = None) -> None:
+        """What is worked with.
+
+        Args:
+            standing: of the robot.
+            longest_step: who was not seen for longer [s] goes on from where the robot is.
+            floor: its height [m] in the people's world; None: it is learned.
         """
-        self.legs, self.longest_step, self.floor = legs, longest_step, floor
-        self._low_body = LowBody(legs)
+        self.legs, self.longest_step, self.floor = standing.legs, longest_step, floor
+        self._low_body = standing.low_body
 
     def begin(self, people: int) -> GroundState:
         """Nobody has been seen."""
@@ -189,8 +193,7 @@ class Ground:
         legs, contacts, weight_BP = self.legs, state.contacts, state.contacts.weight_BP
         seen, turn_B33 = legs.places(poses), state.turn_B33.to(poses.position_BL3)
         point_BP3, ball_BK3 = (_array(place @ turn_B33.mT) for place in (seen.point_BP3, seen.ball_BK3))
-        height_BK = ball_BK3[..., UP] - _array(legs.radius_K)
-        low_BP = np.stack([height_BK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
+        low_BP = legs.lowest(ball_BK3[..., UP])
         whole_B1 = weight_BP.sum(axis=1)[:, None]
         rest_B1 = np.maximum(1.0 - whole_B1, 0.0)
         held_BP1 = (last.contacts.planted_BP & contacts.planted_BP & ~contacts.began_BP)[..., None]

@@ -17,17 +17,18 @@ from mrhubo.body.joints import POSED_JOINT_NAMES
 from mrhubo.config.live import LiveConfig
 from mrhubo.errors import UserError
 from mrhubo.fast import Description, FastRetargeter
+from mrhubo.fast.rotations import axis_angle_to_matrix, matrix_to_axis_angle
 from mrhubo.live.body import Root, SeenPose
 from mrhubo.live.messages import Landmarks
 from mrhubo.live.pilot import Pilot
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.roots import AGAIN_S
-from mrhubo.motion import read_motion
+from mrhubo.motion import Motion, read_motion
 from mrhubo.retargeter import without_training
 from mrhubo.retargeter.confidence import STANDARD
 from tests.live.messages import beat, message
 from tests.live.walkers import Sent, drive, make_legged, poses_of
-from tests.reference.standing.steppers import jump, squat, walk
+from tests.reference.standing.steppers import crawl, jump, kneel, lie, lie_prone, squat, stand_on_hands, walk
 
 PERIOD = 1 / 60
 CLIPS = ["16_17", "49_03", "127_05"]
@@ -151,6 +152,31 @@ def test_who_jumps_and_is_stopped_lands(legged: FastRetargeter) -> None:
     assert_inside(pilot, sent)
     assert sent.lowest_T[-1] < 2e-3 and sent.contact_TR[-1].all()
     assert_rests(sent, len(frames) + 60)
+
+
+def between(one: SeenPose, other: SeenPose, frames: int) -> list[SeenPose]:
+    """Poses on the way from one to another."""
+    assert one.root is not None and other.root is not None
+    turn_J3 = matrix_to_axis_angle(one.local_J33.mT @ other.local_J33)
+    root_3 = matrix_to_axis_angle(one.root.turn_33.T @ other.root.turn_33)
+    found = []
+    for share in (np.arange(frames) + 0.5) / frames:
+        turn_33 = one.root.turn_33 @ axis_angle_to_matrix(share * root_3)
+        place_3 = (1 - share) * one.root.place_3 + share * other.root.place_3
+        local_J33 = one.local_J33 @ axis_angle_to_matrix(share * turn_J3)
+        found.append(SeenPose(local_J33, one.sure_J, Root(turn_33, place_3)))
+    return found
+
+
+@pytest.mark.parametrize("posture", [kneel, crawl, lie, lie_prone, stand_on_hands])
+def test_nothing_of_who_lies_or_kneels_is_in_the_floor(tmp_path: Path, posture: Callable[..., Motion]) -> None:
+    """Also on the way down, and when the robot is stopped there, on its side without a sole on the floor."""
+    stood, down = poses_of(squat(20, 60.0)), poses_of(posture(60, 60.0))
+    frames = [*stood, *between(stood[-1], down[0], 60), *down]
+    pilot, sent = drive(make_legged(tmp_path, thick=True), frames, LiveConfig(ramp_time=0.3), lambda t: t < 110)
+    assert_inside(pilot, sent, fastest=4.0)
+    assert sent.lowest_T[-1] < 2e-3, "it floats"
+    assert_rests(sent, len(frames) - 3)
 
 
 # What is not seen

@@ -26,11 +26,11 @@ from mrhubo.retargeter.nearest import NearestJoints
 from tests.reference.walkers import walker
 
 
-def make_legged(folder: Path, root: str = "pelvis") -> FastRetargeter:
+def make_legged(folder: Path, root: str = "pelvis", thick: bool = False) -> FastRetargeter:
     """A robot of two legs and arms with a waist, hung up at its pelvis or chest, answered by the optimiser, and by a
-    confidence that knows nothing.
+    confidence that knows nothing. `thick` as for `write_urdf`.
     """
-    body_map = walker(folder, root)
+    body_map = walker(folder, root, thick=thick)
     torch.manual_seed(1)
     prior = BodyPrior(hidden=20).eval()
     return FastRetargeter(Retargeter(NearestJoints(body_map), body_map, prior, None, phi_threshold=0.01).describe())
@@ -47,7 +47,7 @@ class Sent:
     point_TH3: np.ndarray
     """Ends of soles in the world [m]."""
     lowest_T: np.ndarray
-    """Height of the lowest sole [m]."""
+    """Height of what is lowest of the robot [m]."""
     contact_TR: np.ndarray
 
     @classmethod

@@ -185,15 +185,19 @@ def stand(t, work, f):
     root, points, balls = carrier(t, work), len(f.weight_H), size(t, RADIUS_J)
     planned = (f.path_3[0] + f.off_3[0], f.path_3[1] + f.off_3[1], f.path_3[2] + f.off_3[2])
     total, lowest, rise, flat = 0.0, np.inf, 0.0, (0.0, 0.0, 0.0)
+    for h in range(points):
+        f.above_H[h] = np.inf
     for b in range(balls):
-        lowest = min(lowest, _height(t, work, f, b, root))
+        place = turned_point(work, whole(t, BALL_BODY_J, b), vector(t, BALL_J3, b))
+        height = in_world(f, work, place, root)[1] - real(t, RADIUS_J, b)
+        lowest = min(lowest, height)
+        for h in range(points):
+            if whole(t, NEAR_HJ, h * balls + b):
+                f.above_H[h] = min(f.above_H[h], height)
     for h in range(points):
         point = in_world(f, work, turned_point(work, whole(t, BODY_H, h), vector(t, POINT_H3, h)), root)
         put(f.sole_H3, h, point)
-        low = np.inf
-        for b in range(balls):
-            if whole(t, NEAR_HJ, h * balls + b):
-                low = min(low, _height(t, work, f, b, root))
+        low = f.above_H[h]
         f.above_H[h] = point[1] - low
         if not f.held_H[h]:
             put(f.anchor_H3, h, (planned[0] + point[0], 0.0, planned[2] + point[2]))
@@ -227,10 +231,3 @@ def _base(work, f, found, root):
             f.base_43[1 + i, j] = entry
             place -= entry * root[j]
         f.base_43[0, i] = place
-
-
-@njit(**INNER)
-def _height(t, work, f, b, root):
-    """How high the lowest point of a ball is over the root [m]."""
-    place = turned_point(work, whole(t, BALL_BODY_J, b), vector(t, BALL_J3, b))
-    return in_world(f, work, place, root)[1] - real(t, RADIUS_J, b)

@@ -181,6 +181,11 @@ class Legs(nn.Module):
         ]
         return LegPoses(*(base_B3[:, None] + place_BX3 @ base_B33.mT for place_BX3 in found))
 
+    def lowest(self, height_BK: np.ndarray) -> np.ndarray:
+        """Height (B, P) [m] of the lowest ball at each point of a sole, of heights (B, K) of the balls' centres."""
+        low_BK = height_BK - self.radius_K.double().cpu().numpy()
+        return np.stack([low_BK[:, ball_K].min(axis=1) for ball_K in self.ball_PK], axis=1)
+
     def upright(self, poses: LinkPoses, up_B3: Tensor) -> Tensor:
         """The upright direction (B, 3) in the base frame, of that in the human axes of what carries the legs."""
         return (poses.rotation_BL33[:, self._carrier_row] @ self.axes_33 @ up_B3[..., None])[..., 0]

@@ -9,6 +9,8 @@ Legend: T frames, K balls, A driven joints, S arms.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import torch
 from torch import Tensor, nn
 
@@ -31,34 +33,32 @@ class LowBody(nn.Module):
         self.legs = legs
         self._marks = Outline(legs.body_map, with_shapes=False)
         self._marks_K = self._counting(self._marks)
-        self._outline: Outline | None = None
-        self._arms: list[Arm] = []
-        self._lifting_K = self._marks_K
 
-    @property
+    @cached_property
     def outline(self) -> Outline:
         """The balls."""
-        if self._outline is None:
-            self._outline = Outline(self.legs.body_map)
-            self._arms = find_arms(self.legs, self._outline)
-            self._lifting_K = self._counting(self._outline)
-            for arm in self._arms:
-                self._lifting_K = self._lifting_K & ~(arm.upper_K | arm.lower_K)
-        return self._outline
+        return Outline(self.legs.body_map)
 
-    @property
+    @cached_property
     def arms(self) -> list[Arm]:
         """The arms (S)."""
-        assert self.outline is not None
-        return self._arms
+        return find_arms(self.legs, self.outline)
+
+    @cached_property
+    def _arms_K(self) -> Tensor:
+        """Which balls of the outline belong to arms (K,)."""
+        none_K = torch.zeros_like(self.outline.radius_K, dtype=torch.bool)
+        return sum((arm.upper_K | arm.lower_K for arm in self.arms), none_K)
+
+    @cached_property
+    def _lifting_K(self) -> Tensor:
+        """Which of the others are looked at (K,)."""
+        return self._counting(self.outline) & ~self._arms_K
 
     @property
     def counts_K(self) -> Tensor:
         """Which balls of the outline are looked at (K,)."""
-        found_K = torch.zeros_like(self.outline.radius_K, dtype=torch.bool) | self._lifting_K
-        for arm in self._arms:
-            found_K = found_K | arm.upper_K | arm.lower_K
-        return found_K
+        return self._lifting_K | self._arms_K
 
     @property
     def arms_N(self) -> Tensor:
@@ -86,7 +86,7 @@ class LowBody(nn.Module):
         where the robot has no such ball. Arguments as for `Legs.over_floor`.
         """
         outline = self.outline
-        groups = [self._lifting_K, *(some_K for arm in self._arms for some_K in (arm.upper_K, arm.lower_K))]
+        groups = [self._lifting_K, *(some_K for arm in self.arms for some_K in (arm.upper_K, arm.lower_K))]
         frames, found = max(1, _AT_ONCE // max(1, len(outline.radius_K))), []
         for first in range(0, len(up_T3), frames):
             part = slice(first, first + frames)
@@ -95,7 +95,7 @@ class LowBody(nn.Module):
             far_T1 = torch.full_like(height_TK[:, :1], torch.inf)
             found.append(torch.stack([torch.cat((height_TK[:, k], far_T1), 1).amin(1) for k in groups], dim=1))
         found_TG = torch.cat(found)
-        return found_TG[:, 0], found_TG[:, 1:].unflatten(1, (len(self._arms), 2))
+        return found_TG[:, 0], found_TG[:, 1:].unflatten(1, (len(self.arms), 2))
 
     def lowest_of_any(self, poses: LinkPoses, up_T3: Tensor, height_T: Tensor) -> Tensor:
         """The least of these heights (T,)."""

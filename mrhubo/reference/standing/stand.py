@@ -75,9 +75,10 @@ class Standing(nn.Module):
         self.legs, self.robot = legs, legs.body_map.robot
         soles = SoleTerm(legs)
         moved = set().union(*soles.couplings())
-        self._legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
-        self._legs_way = GivingWay(legs.body_map, [soles], self._legs_N)
-        self._low_body = LowBody(legs)
+        legs_N = torch.tensor([n in moved for n in range(len(self.robot.joint_names))])
+        self._legs_way = GivingWay(legs.body_map, [soles], legs_N)
+        self.low_body = LowBody(legs)
+        """What besides soles touches the floor."""
         self._bending: BendingArms | None = None
         self.balance = Balance(legs) if self.robot.balance else None
         """What shifts the root of whole motions; None: nothing looks at the centre of mass."""
@@ -153,8 +154,8 @@ class Standing(nn.Module):
         root_T3 = path_T3 + np.stack((off_T2[:, 0], rise_T1[:, 0] - level, off_T2[:, 1]), axis=1)
         up_T3, height_T = steps.turn_T33[:, _UP].to(q_TN), torch.from_numpy(root_T3[:, _UP]).to(q_TN)
         body_T = np.full(len(root_T3), np.inf)
-        if self._low_body.near(poses, up_T3, height_T):
-            body_T, arm_TS2 = (x.double().cpu().numpy() for x in self._low_body.lowest(poses, up_T3, height_T))
+        if self.low_body.near(poses, up_T3, height_T):
+            body_T, arm_TS2 = (x.double().cpu().numpy() for x in self.low_body.lowest(poses, up_T3, height_T))
             clear_T = np.maximum(np.minimum(body_T, low_TP.min(axis=1) + root_T3[:, _UP]), 0.0)
             arm_T = arm_TS2.min(axis=(1, 2), initial=np.inf)
             body_T = np.minimum(body_T, np.maximum(arm_T, -clear_T))  # who stands on the hands is lifted by them
@@ -164,8 +165,7 @@ class Standing(nn.Module):
         """Points of soles (T, P, 3) from the root, and the height of the lowest ball at each (T, P) [m]."""
         legs, seen = self.legs, self.legs.places(poses)
         point_TP3, ball_TK3 = (self._in_world(x, steps).double().cpu().numpy() for x in (seen.point_BP3, seen.ball_BK3))
-        height_TK = ball_TK3[..., _UP] - legs.radius_K.double().cpu().numpy()
-        return point_TP3, np.stack([height_TK[:, ball_K].min(axis=1) for ball_K in legs.ball_PK], axis=1)
+        return point_TP3, legs.lowest(ball_TK3[..., _UP])
 
     def _in_world(self, seen_TX3: Tensor, steps: HumanSteps) -> Tensor:
         """What is seen from what carries the legs, along the world's axes."""
@@ -225,7 +225,7 @@ class Standing(nn.Module):
         """Joint angles of which arms bend where they would be under the floor, and a root that is lifted by what is
         left.
         """
-        rate, low = steps.frame_rate, self._low_body
+        rate, low = steps.frame_rate, self.low_body
         carried = carried.lifted(rate) if (carried.body_T < 0).any() else carried
         up_T3, height_T = steps.turn_T33[:, _UP].to(q_TN), torch.from_numpy(carried.root_T3[:, _UP]).to(q_TN)
         still = carried.point_TP3, np.ones_like(carried.low_TP)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from mrhubo import rotation
 from mrhubo.errors import InputWarning, UserError
-from mrhubo.evaluation.whole_body import lowest, score_whole_body
+from mrhubo.evaluation.whole_body import score_whole_body
 from mrhubo.motion import Motion, read_motion
 from mrhubo.reference import OptimizationRetargeter
 from mrhubo.reference.result import OptimizationResult
@@ -35,7 +35,7 @@ def soles(retargeter: OptimizationRetargeter, result: OptimizationResult) -> tup
     """Points (T, P, 3) and lowest heights (T, P) [m], z up."""
     legs = Legs(retargeter.body_map)
     found = legs.on_floor(retargeter.body_map.robot.forward(result.q), *base(result))
-    return found.point_BP3.double().numpy(), lowest(legs, found.ball_BK3.double().numpy())
+    return found.point_BP3.double().numpy(), legs.lowest(found.ball_BK3[..., 2].double().numpy())
 
 
 def test_planted_feet_keep_still_and_flat(retargeter: OptimizationRetargeter) -> None:
