@@ -53,7 +53,7 @@ from tests.motion.readers import (
     test_soma_and_points,
     test_trc_file,
 )
-from tests.motion.readers.markers import test_convert
+from tests.motion.readers.markers import test_convert, test_segments
 from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
 
@@ -227,6 +227,10 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "mvnx": ("damaged.mvnx", lambda path: path.write_text(test_mvnx.mvnx(test_mvnx.subject()))),
     "motive": ("damaged.csv", lambda path: path.write_text(test_motive.motive())),
     "c3d": ("damaged.c3d", lambda path: path.write_bytes(c3d(*test_convert.marked()))),
+    "c3d, segments": (
+        "damaged.c3d",
+        lambda path: path.write_bytes(c3d(np.empty((60, 0, 3)), [], segmented=test_segments.theia())),
+    ),
     "qualisys": ("damaged.csv", lambda path: path.write_text(qualisys(*test_convert.marked()))),
     "vicon": ("damaged.csv", lambda path: path.write_text(vicon(*test_convert.marked()))),
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),

@@ -94,8 +94,22 @@ class Manner:
     """Whether the header's count of frames is full, and a parameter tells it."""
 
 
-def c3d(point_TK3: np.ndarray, labels: Sequence[str], how: Manner = Manner()) -> bytes:
-    """A C3D file of points, NaN where one is not seen."""
+@dataclass(frozen=True)
+class Segmented:
+    """Segments of a body in a C3D file."""
+
+    names: Sequence[str]
+    matrix_TS44: np.ndarray
+    """From their axes to the world's; NaN where one is not known."""
+    ratio: int = 1
+    """Frames of segments for one of points."""
+    frames_told: bool = True
+
+
+def c3d(
+    point_TK3: np.ndarray, labels: Sequence[str], how: Manner = Manner(), segmented: Segmented | None = None
+) -> bytes:
+    """A C3D file of points, NaN where one is not seen, and of segments."""
     order, frames = ">" if how.processor == 86 else "<", len(point_TK3)
 
     def floating(values: np.ndarray) -> bytes:
@@ -115,12 +129,12 @@ def c3d(point_TK3: np.ndarray, labels: Sequence[str], how: Manner = Manner()) ->
         return entry(name, group, struct.pack("bb", kind, len(sizes)) + bytes(sizes) + data + b"\0")
 
     scale = 0.1 if how.is_whole else -1.0
-    body = entry("POINT", -1, b"\0") + entry("TRIAL", -2, b"\0")
+    body = entry("POINT", -1, b"\0") + entry("TRIAL", -2, b"\0") + entry("ROTATION", -3, b"\0")
     body += parameter("USED", 2, [], whole(len(labels)))
     body += parameter("SCALE", 4, [], floating(np.array([scale])))
     body += parameter("RATE", 4, [], floating(np.array([how.rate])))
     body += parameter("UNITS", -1, [2], b"mm")
-    size = max(map(len, labels))
+    size = max(map(len, labels), default=0)
     for number, begin in enumerate(range(0, len(labels), how.labels_a_parameter), start=1):
         some = labels[begin : begin + how.labels_a_parameter]
         text = b"".join(label.encode("latin1").ljust(size) for label in some)
@@ -128,6 +142,20 @@ def c3d(point_TK3: np.ndarray, labels: Sequence[str], how: Manner = Manner()) ->
     if how.long:
         body += parameter("ACTUAL_START_FIELD", 2, [2], whole(1, 0), group=2)
         body += parameter("ACTUAL_END_FIELD", 2, [2], whole(frames % 65_536, frames // 65_536), group=2)
+    width = (2 if how.is_whole else 4) * (4 * len(labels) + how.analog)
+    of_points = -(-width * frames // 512)  # blocks
+    turns = segmented.matrix_TS44 if segmented is not None else np.zeros((0, 0, 4, 4))
+    if segmented is not None:
+        size, names = max(map(len, segmented.names)), [name.encode("latin1") for name in segmented.names]
+        text = b"".join(name.ljust(size) for name in names)
+        numbers = {"USED": len(names), "RATIO": segmented.ratio}
+        numbers |= {"FRAMES": len(turns)} if segmented.frames_told else {}
+        for name, number in numbers.items():
+            body += parameter(name, 2, [], whole(number), group=3)
+        body += parameter("RATE", 4, [], floating(np.array([segmented.ratio * how.rate])), group=3)
+        body += parameter("LABELS", -1, [size, len(names)], text, group=3)
+        there = (4 + len(body) + 22) // 512 + 1  # with the parameter that is about to come
+        body += parameter("DATA_START", 2, [], whole(2 + there + of_points), group=3)
     blocks = (4 + len(body)) // 512 + 1
     parameters = (bytes([1, 0x50, blocks, how.processor]) + body).ljust(512 * blocks, b"\0")
     header = b"\x02\x50" + whole(len(labels), how.analog, 1, 65_535 if how.long else frames, 10)
@@ -139,6 +167,10 @@ def c3d(point_TK3: np.ndarray, labels: Sequence[str], how: Manner = Manner()) ->
             data += (np.rint(value_K4 * [10, 10, 10, 1])).astype(f"{order}i2").tobytes() + whole(*[7] * how.analog)
         else:
             data += floating(value_K4.ravel()) + floating(np.full(how.analog, 7.0))
+    data = data.ljust(of_points * 512, b"\0")
+    columns_TX = np.swapaxes(turns, -1, -2).reshape(*turns.shape[:2], 16)
+    sure_TX = np.where(np.isnan(columns_TX[..., :1]), -1.0, 0.9)
+    data += floating(np.concatenate((columns_TX, sure_TX), axis=-1).ravel())
     return header.ljust(512, b"\0") + parameters + data.ljust(-(-len(data) // 512) * 512, b"\0")
 
 

@@ -57,7 +57,7 @@ FORMATS: tuple[Format, ...] = (
     Format("glTF and VRM", "scene.gltf", "is_gltf", "read_gltf", (".glb", ".gltf", ".vrm", ".vrma")),
     Format("Xsens' MVNX", "mvnx", "is_mvnx", "read_mvnx", (".mvnx",)),
     Format("skeletons of OptiTrack Motive (.csv)", "scene.motive", "is_motive", "read_motive", ()),
-    Format("markers and joints in C3D", "markers.convert", "is_c3d", "read_c3d", (".c3d",)),
+    Format("markers, segments and joints in C3D", "markers.convert", "is_c3d", "read_c3d", (".c3d",)),
     Format("markers in tables of Qualisys (.tsv)", "markers.tables", "is_qualisys", "read_qualisys", ()),
     Format("markers in tables of Vicon (.csv)", "markers.tables", "is_vicon", "read_vicon", ()),
     Format("ASF/AMC", "amc", "is_amc", "read_acclaim", (".amc",)),

@@ -24,6 +24,7 @@ from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points, rate_of_po
 from mrhubo.motion.readers.markers.c3d_file import read_c3d_file
 from mrhubo.motion.readers.markers.joints import body_of_markers
 from mrhubo.motion.readers.markers.labels import has_body, marker_places
+from mrhubo.motion.readers.markers.segments import has_segments, motion_of_segments
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import by_names
@@ -44,13 +45,25 @@ def is_c3d(content: Content) -> bool:
 
 
 def read_c3d(path: Path, options: ReadOptions) -> Motion:
-    """Reads the motion of a body with markers, or with points that are joints, as cameras without markers find them.
+    """Reads the motion of a body with markers, or with segments or points that are joints, as cameras without markers
+    find them.
 
     Raises:
-        NoMotion: its points are neither.
+        NoMotion: it has none of these.
         UserError: the file is missing, damaged or too large, or its rate is not known.
     """
-    file, notes = read_c3d_file(path), list[str]()
+    file = read_c3d_file(path)
+    if file.segments is not None:
+        names = file.segments.names
+        if has_segments(names):
+            return motion_of_segments(path, file.segments, options.of_one(), options)
+        if not file.names:
+            raise NoMotion(
+                f"{path}: is a C3D file of segments of no body that is known by their names:"
+                f" {shortened(listed(names), 160)}; upper arms and thighs are needed, by names such as l_uarm_4X4 and"
+                " l_thigh_4X4"
+            )
+    notes: list[str] = []
     if len(file.point_TK3) < file.frames_told:
         notes.append(f"the file ends after {len(file.point_TK3):,} of {file.frames_told:,} frames")
     found = Keypoints(file.point_TK3, list(file.names), None, file.rate, "the C3D file", notes)
