@@ -13,6 +13,11 @@ _FILM = "convert it to MP4, by ffmpeg for instance: ffmpeg -i FILE film.mp4"
 _ADVICE: tuple[tuple[str, str, str], ...] = (
     (r"\s*<\?xml.{0,400}<COLLADA|\s*<COLLADA", "a COLLADA file", _BLENDER),
     (r"PXR-USDC|#usda", "a USD file", _BLENDER),
+    (
+        r"\s*+(?:<\?xml[^>]{0,200}+>\s*+)?(?:<!--.{0,2000}?-->\s*+)*<MMM\b",
+        "a motion of the Master Motor Map (KIT), in angles of a model that is not in it",
+        "name the .c3d file of the same recording, or the one that AMASS has of it (.npz)",
+    ),
     (r"FLV\x01", "a video (FLV)", _FILM),
     (r"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "a video or a sound (WMV, WMA)", _FILM),
     (r"\x00\x00\x01\xba", "a video (MPEG)", _FILM),

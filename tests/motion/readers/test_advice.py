@@ -27,6 +27,7 @@ _FILES = {
     "robot's joints": (b"time [s],left_knee_joint [rad],right_knee_joint [rad]\n0,0,1\n", "human motion"),
     "without a header": (b"0.1,-0.2,1e-3," * 12 + b"0.5\n" + b"0,0,0," * 12 + b"0.5\n", "first line"),
     "COLLADA": (b'<?xml version="1.0"?>\n<COLLADA xmlns="x">', "Blender"),
+    "Master Motor Map": (b"<?xml version='1.0'?>\n<!-- KIT -->\n<MMM version='1.0'>\n<Motion name='walk'>", "c3d"),
     "web page": (b"<!DOCTYPE html><html><head><title>Sign in</title>", "downloaded"),
     "zip archive": (_zipped("clips/walk 01.bvh"), "unpack it"),
     "a table of Vicon": (b"Joints,,\r\n120,,\r\n,,Hips,,,\r\n", "BVH"),
