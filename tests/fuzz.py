@@ -107,6 +107,28 @@ def _points_json(path: Path) -> None:
     path.write_text(json.dumps({"names": SETS["COCO"], "fps": 30, "keypoints": _points().round(3).tolist()}, indent=0))
 
 
+def _bones() -> dict[str, np.ndarray]:
+    """Places of bones by their names."""
+    ours, point_TK3 = SETS["COCO"], _points()
+    return {
+        theirs: point_TK3[:, ours.index(name)]
+        for name, theirs in test_keypoints.skeleton_names().items()
+        if name in ours
+    }
+
+
+def _take(path: Path) -> None:
+    bones = {name: place_T3.round(3).tolist() for name, place_T3 in _bones().items()}
+    frames = [
+        {
+            "timestamp": frame / 30,
+            "joints": {name: {"position": places[frame], "rotation": [0, 0, 0, 1]} for name, places in bones.items()},
+        }
+        for frame in range(_FRAMES)
+    ]
+    path.write_text(json.dumps({"frames": frames}, indent=0))
+
+
 def _ntu(path: Path) -> None:
     """One person, of whom COCO's points stand in for the joints."""
     rows = [" ".join(f"{x:.4f}" for x in point) + " 1 1 1 1 1 0 0 0 2" for frame in _points() for point in frame]
@@ -235,6 +257,8 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "vicon": ("damaged.csv", lambda path: path.write_text(vicon(*test_convert.marked()))),
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
+    "take": ("damaged.json", _take),
+    "points by joint": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"fps": 30.0, **_bones()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},
     **{name: ("damaged", write) for name, write in test_soma_and_points.WRITERS.items()},

@@ -1,4 +1,5 @@
-"""Whether points of a person are told in left-handed axes, as Unity's are: nose and toes then point backward.
+"""Whether points of a person are told in left-handed axes, as Unity's are: nose, toes and bent knees then point
+backward.
 
 It is what `mrhubo.motion.readers.keypoints` finds out for a whole file. A stream has to say it at its first frame, and
 may think again when many frames say otherwise.
@@ -7,10 +8,12 @@ may think again when many frames say otherwise.
 from __future__ import annotations
 
 from mrhubo.body.joints import SIDES
-from mrhubo.live.vectors import Vector, cross, dot, mean, minus, plus, unit
+from mrhubo.live.vectors import Vector, across, cross, dot, mean, minus, norm, plus, unit
 
 CLEAR = 0.3
-"""How clearly nose and toes must point forward or backward, of 1, for a frame to say anything."""
+"""How clearly nose, toes and knees must point forward or backward, of 1, for a frame to say anything."""
+_BENT = 0.08
+"""How far a knee is beside the line from hip to ankle, of the leg's length, where it tells which way it bends."""
 _MOST = 60
 """Frames that are remembered of what was said: so many that say otherwise, and as many again, change it."""
 
@@ -36,7 +39,9 @@ class Handedness:
 
 
 def way_forward(points: dict[str, Vector]) -> float:
-    """How far nose and toes point forward, -1 to 1, for a body whose left is where names say; 0: nothing tells."""
+    """How far nose, toes and bent knees point forward, -1 to 1, for a body whose left is where names say; 0 where
+    nothing tells.
+    """
     trunk = [f"{side}_{name}" for name in ("hip", "shoulder") for side in SIDES]
     if not all(name in points for name in trunk):
         return 0.0
@@ -51,6 +56,11 @@ def way_forward(points: dict[str, Vector]) -> float:
         toe = next((points[name] for name in (f"{side}_toe", f"{side}_foot") if name in points), None)
         if toe is not None and f"{side}_ankle" in points:
             ways.append(minus(toe, points[f"{side}_ankle"]))
+        if all(f"{side}_{joint}" in points for joint in ("hip", "knee", "ankle")):
+            hip, knee, ankle = (points[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle"))
+            beside = across(minus(knee, hip), unit(minus(ankle, hip)))
+            if norm(beside) > _BENT * 2 * norm(minus(knee, hip)):
+                ways.append(beside)
     return sum(dot(unit(way), forward) for way in ways) / len(ways) if ways else 0.0
 
 

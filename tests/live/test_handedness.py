@@ -74,6 +74,17 @@ def test_it_thinks_again_only_after_many_frames(people: list[dict[str, Vector]],
     assert handedness.mirrored != left
 
 
+@pytest.mark.parametrize("bend", [0.1, 0.6])
+def test_knees_that_are_bent_tell(people: list[dict[str, Vector]], bend: float) -> None:
+    """Of points without a nose and toes."""
+    person = {name: at for name, at in people[0].items() if name.split("_")[-1] in ("shoulder", "hip", "knee", "ankle")}
+    for side in ("left", "right"):  # shins go backward
+        (x, y, z), shin = person[f"{side}_knee"], 0.4
+        person[f"{side}_ankle"] = (x, y - shin * np.cos(bend), z - shin * np.sin(bend))
+    assert Handedness().right(person) == person
+    assert Handedness().right(mirrored(person)) == (person if bend > 0.3 else mirrored(person))
+
+
 def test_nothing_is_said_where_nothing_tells(people: list[dict[str, Vector]]) -> None:
     blind = {name: at for name, at in people[0].items() if name.split("_")[-1] in ("shoulder", "elbow", "wrist", "hip")}
     assert way_forward(blind) == way_forward({}) == 0.0

@@ -27,6 +27,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
     points_of_rows,
     split_points,
 )
+from mrhubo.motion.readers.keypoint_joints import points_by_joint
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import rate_in, rate_of_all
 from mrhubo.motion.readers.tracks import Person, choose
@@ -71,9 +72,9 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
         return samples
     if point_key(tree.keys) is not None and not tree[_key(tree)].is_mapping:
         return _named_in(tree, options)
-    bodies = _kinect_bodies(tree, options)
-    if bodies is not None:
-        return bodies
+    found = _kinect_bodies(tree, options) or points_by_joint(tree, options)
+    if found is not None:
+        return found
     people = {name: child for name, child in tree.items() if point_key(child.keys) is not None}
     if not people:
         return _clip(tree, options)

@@ -31,9 +31,10 @@ from mrhubo.files.tree import tree_of
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_numbers import in_order
 from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, NAME_KEYS, Keypoints, point_key
+from mrhubo.motion.readers.keypoint_joints import points_by_joint
 from mrhubo.motion.readers.keypoint_rows import NOTHING, Row, people_of, row_of
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import rate_in
+from mrhubo.motion.readers.rate import TIME_KEYS, rate_in, rate_of_even
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
 
 _FRAMES = ("instance_info", "frames", "data")
@@ -53,6 +54,9 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
         UserError: what it holds is no points of frames, or the person that is asked for is not there.
     """
     names, confidence, whole, where = None, None, value, "the list"
+    by_joint = points_by_joint(tree_of(value, path, ""), options)
+    if by_joint is not None:
+        return by_joint
     if isinstance(value, dict):
         names = next((value[key] for key in NAME_KEYS if key in value), None)
         told = (value.get(key) for key in CONFIDENCE_KEYS)
@@ -83,8 +87,19 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     if found.names is None:
         found.names = _names_of(names, meta, found.point_TK3.shape[1])
     told = rate_in(tree_of(whole, path, ""), found.notes)
-    found.rate = None if told is None else told[1]
+    found.rate = _rate_of_frames(numbers, frames) if told is None else told[1]
     return found
+
+
+def _rate_of_frames(numbers: Sequence[int], frames: Sequence[Any]) -> float | None:
+    """Frames per second by the times that frames have, one each; None where they tell none."""
+    if list(numbers) != list(range(len(numbers))):
+        return None
+    for key in TIME_KEYS:
+        times = [frame.get(key) if isinstance(frame, dict) else None for frame in frames]
+        if all(type(time) in (int, float) for time in times):
+            return rate_of_even(np.array(times))
+    return None
 
 
 def _frames(path: Path, where: str, value: Any) -> list[tuple[int, Any]]:

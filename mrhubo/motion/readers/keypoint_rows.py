@@ -17,6 +17,22 @@ from mrhubo.motion.readers.keypoint_arrays import LIFT, point_key
 
 _PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons")
 _SURE = ("visibility", "confidence", "score", "presence")
+_MORE_POINTS = ("jointdata", "bones", "bodyparts", "transforms")
+"""What frames call points beside what arrays of them are called."""
+_PLACES = (
+    "position",
+    "pos",
+    "worldposition",
+    "globalposition",
+    "translation",
+    "location",
+    "coordinates",
+    "coords",
+    "xyz",
+)
+"""What a point that has more than a place, as a bone's rotation, calls that."""
+_NAMES = ("name", "jointname", "joint", "bonename", "bone", "label", "part", "keypoint", "landmark")
+"""What points in a list call the joint that they are."""
 _FLAT = 4
 """Numbers of a single point, at most."""
 
@@ -47,25 +63,26 @@ def people_of(frame: Any) -> list[Any] | None:
     """The people of a frame: dictionaries, or lists of points; None where it is one person's, or nobody's."""
     if isinstance(frame, dict):
         found = next((frame[key] for key in _PEOPLE if isinstance(frame.get(key), list)), None)
-        key = point_key(frame)
+        key = _points_key(frame)
         return found if found is not None or key is None else people_of(frame[key])
     first = frame[0] if isinstance(frame, list) and frame else None
     if isinstance(first, dict):
-        return frame if point_key(first) is not None else None
+        return frame if _points_key(first) is not None else None
     return frame if isinstance(first, list) and first and isinstance(first[0], dict | list) else None
 
 
 def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
     """The points of one person in a frame."""
-    key = point_key(frame) if isinstance(frame, dict) else None
+    key = _points_key(frame) if isinstance(frame, dict) else None
     frame = frame if key is None else frame[key]
     if frame is None:
         return NOTHING
     names: list[str] = []
     if isinstance(frame, dict):
-        names, frame = [str(name) for name in frame], list(frame.values())
+        points = {str(name): point for name, point in frame.items() if not isinstance(point, str | int | float)}
+        names, frame = list(points), list(points.values())  # what is left out is a time, say
     elif isinstance(frame, list):
-        names = [str(point["name"]) for point in frame if isinstance(point, dict) and "name" in point]
+        names = [name for point in frame if isinstance(point, dict) and (name := _name(point)) is not None]
     if not isinstance(frame, list):
         raise UserError(f"{path}: {where} has no list of points in frame {number}")
     if len(frame) > _FLAT and all(type(x) in (int, float) for x in frame):  # COCO's way, without an axis for the points
@@ -74,8 +91,7 @@ def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
     points = []
     for point in frame:
         if isinstance(point, dict):
-            sure = next((point[key] for key in _SURE if key in point), None)
-            point = [point.get("x"), point.get("y"), point.get("z"), *([] if sure is None else [sure])]
+            point = _listed(point)
         if point is None:
             point = [None, None, None]
         if not isinstance(point, list) or len(point) not in (3, 4):
@@ -90,6 +106,33 @@ def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
         twice = next(name for place, name in enumerate(names) if name in names[:place])
         raise UserError(f"{path}: {where} has two points '{shortened(twice, 30)}' in frame {number}")
     return Row(points, names or None)
+
+
+def _points_key(frame: dict[str, Any]) -> str | None:
+    """The key under which a frame has its points."""
+    return point_key(frame) or next((key for key in frame if _plain(key) in _MORE_POINTS), None)
+
+
+def _name(point: dict[str, Any]) -> str | None:
+    """The name that a point has; None where it has none."""
+    plain = point if "name" in point else {_plain(key): value for key, value in point.items()}
+    name = next((plain[key] for key in _NAMES if isinstance(plain.get(key), str | int)), None)
+    return None if name is None else str(name)
+
+
+def _listed(point: dict[str, Any]) -> Any:
+    """A point's numbers in a list, where they stand under keys."""
+    plain = point if "x" in point else {_plain(key): value for key, value in point.items()}
+    place = next((plain[key] for key in _PLACES if key in plain), plain)
+    if isinstance(place, dict):
+        by_axis = {str(key).lower(): value for key, value in place.items()}
+        place = [by_axis.get(axis) for axis in "xyz"]
+    sure = next((plain[key] for key in _SURE if key in plain), None)
+    return [*place, sure] if sure is not None and isinstance(place, list) and len(place) == 3 else place
+
+
+def _plain(key: Any) -> str:
+    return "".join(filter(str.isalnum, str(key).lower()))
 
 
 def _number(path: Path, where: str, frame: int, value: Any) -> float:

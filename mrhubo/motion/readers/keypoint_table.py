@@ -26,10 +26,10 @@ from mrhubo.motion.readers.content import Content
 from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
-from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
+from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.point_names import by_names
-from mrhubo.motion.readers.rate import rate_of_seconds
+from mrhubo.motion.readers.point_names import NEEDED, by_names
+from mrhubo.motion.readers.rate import rate_of_even, rate_of_seconds
 from mrhubo.motion.readers.sightings import check_size, placed
 
 _KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3}
@@ -39,6 +39,8 @@ _FIRST = re.compile(
     r"([xyzv])[ _.]?(\d+)|(x|y|z|visibility|confidence|conf|score|presence)[ _.]([a-z].*)", re.IGNORECASE
 )
 _NUMBERED = re.compile(r"(.*?)(\d{1,9})")
+_TURNED_TOO = re.compile(r"(.+?[ _.:\-])([TR])([XYZ])", re.IGNORECASE)
+"""`Hips_Tx` beside `Hips_Rx`, or alone: places and angles of bones."""
 FRAMES, TIMES = (
     ("frame", "frames", "frameid", "frameindex", "frameidx", "framenumber"),
     ("time", "timestamp", "times", "timestampms", "timems", "timemilliseconds"),
@@ -96,8 +98,8 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
         numbers = numbers_in_column(path, value_TX[:, frame])
     numbers = numbers or list(range(len(point_TK4)))
     if time is not None and numbers == list(range(len(numbers))):
-        unit = 1e-3 if _MILLISECONDS.search(header.columns[time][len("time") :]) else 1.0
-        rate = rate_of_seconds(unit * value_TX[:, time])
+        in_ms = _MILLISECONDS.search(header.columns[time][len("time") :])
+        rate = rate_of_seconds(1e-3 * value_TX[:, time]) if in_ms else rate_of_even(value_TX[:, time])
     placed_TK4 = placed(path, "the table", numbers, point_TK4)
     sure_TK = placed_TK4[..., 3] if None not in wanted else None
     names = list(header.points) if by_names(list(header.points)).keys() >= set(NEEDED) else None
@@ -172,7 +174,13 @@ def _read_header(line: str) -> _Header | None:
     if not 3 * _FEWEST <= len(columns) <= _MAX_COLUMNS:
         return None
     points: dict[str, list[int | None]] = {}
+    bones = {part[1] for column in columns if (part := _TURNED_TOO.fullmatch(column.strip())) and part[2] in "tT"}
     for place, column in enumerate(map(str.strip, columns)):
+        bone = _TURNED_TOO.fullmatch(column)
+        if bone is not None and bone[1] in bones:
+            if bone[2] in "rR":
+                continue
+            column = bone[1] + bone[3]
         first, last = _FIRST.fullmatch(column), _LAST.fullmatch(column)
         if last is not None:
             name, kind = last[1], last[2]

@@ -21,7 +21,7 @@ from mrhubo.motion.readers.keypoint_fit import NONSENSE, fitting_sets
 from mrhubo.motion.readers.keypoint_sets import SETS
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.point_names import by_names
+from mrhubo.motion.readers.point_names import NEEDED, by_names
 from mrhubo.motion.readers.rate import asked_rate, told_rate
 from mrhubo.motion.readers.sightings import check_size, known_points
 from mrhubo.motion.readers.tree.world import mean_direction, named_axis, nearest_unit, to_y_up
@@ -36,15 +36,17 @@ _PIXELS = 50.0
 _LEG_OVER_TRUNK = 1.7
 """Thigh and shin over the way from hips to shoulders (Winter, fig. 4.1: 0.49 and 0.288 of the height)."""
 _LEFT_HANDED = 0.3
-"""How clearly nose and toes must point backward, of 1, to say that axes are left-handed."""
+"""How clearly nose, toes and knees must point backward, of 1, to say that axes are left-handed."""
+_BENT = 0.08
+"""How far a knee is beside the line from hip to ankle, of the leg's length, where it tells which way it bends: 18
+degrees.
+"""
 _BESIDE, _NEARLY_ALL = 0.05, 0.9
 """How far beside a picture, in shares of it, points are seen; and which share of them is in it."""
 _FEW = 0.5
 """A point that is at the origin in fewer of the frames is not put there, but missing."""
 _CENTRED = 0.01
 """How far [m] from the origin the pelvis stays, in all frames, of points that are centred on it."""
-NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
-"""Points without which nothing can be made of the others."""
 
 
 def is_keypoints(content: Content) -> bool:
@@ -139,7 +141,9 @@ def refuse_far(path: Path, found: Keypoints) -> None:
 
 
 def _refuse_flat(path: Path, found: Keypoints) -> None:
-    """Refuses points in a picture, whose third number is a score."""
+    """Refuses points in a picture, whose third number is a score, and such as are nowhere."""
+    if not np.isfinite(found.point_TK3).any():
+        raise UserError(f"{path}: {found.where} tells of no point where it is; expected x, y and z, or a 'position'")
     known_X3 = found.point_TK3[np.isfinite(found.point_TK3).all(-1)]
     spread_3, third = (np.ptp(known_X3, axis=0), known_X3[:, 2]) if len(known_X3) else (np.zeros(3), np.ones(1))
     is_score = third.min() >= 0 and third.max() <= 1 and min(spread_3[:2]) > _PIXELS
@@ -181,7 +185,9 @@ def to_world(points: dict[str, np.ndarray], notes: list[str]) -> tuple[dict[str,
     """
     if way_forward(points) < -_LEFT_HANDED:
         points = {name: point_T3 * [-1.0, 1.0, 1.0] for name, point_T3 in points.items()}
-        notes.append("nose and feet point backward: the file's axes are taken to be left-handed, and x is mirrored")
+        notes.append(
+            "nose, feet and knees point backward: the file's axes are taken to be left-handed, and x is mirrored"
+        )
     low = next((joint for joint in ("ankle", "knee", "hip") if _seen(points, joint)), "hip")
     up_T3 = np.sum([points[f"{side}_shoulder"] - points[f"{side}_{low}"] for side in SIDES], axis=0)
     up_T3 = up_T3[np.isfinite(up_T3).all(-1)]
@@ -215,8 +221,8 @@ def _is_centred(points: Mapping[str, np.ndarray]) -> bool:
 
 
 def way_forward(points: Mapping[str, np.ndarray]) -> float:
-    """How far nose and toes point forward, -1 to 1, for a body whose left is where the names say; 0 where nothing
-    tells.
+    """How far nose, toes and bent knees point forward, -1 to 1, for a body whose left is where the names say; 0 where
+    nothing tells.
     """
     left_T3 = points["left_hip"] - points["right_hip"]
     up_T3 = sum(points[f"{side}_shoulder"] - points[f"{side}_hip"] for side in SIDES)
@@ -234,6 +240,14 @@ def way_forward(points: Mapping[str, np.ndarray]) -> float:
                 way = _unit(points[f"{side}_{toe}"] - points[f"{side}_ankle"])
                 ways.append(typical((way * forward_T3).sum(-1)))
                 break
+    for side in SIDES:
+        if all(f"{side}_{joint}" in points for joint in ("hip", "knee", "ankle")):
+            thigh_T3 = points[f"{side}_knee"] - points[f"{side}_hip"]
+            leg_T3 = points[f"{side}_ankle"] - points[f"{side}_hip"]
+            along_T3 = _unit(leg_T3)
+            off_T3 = thigh_T3 - along_T3 * (thigh_T3 * along_T3).sum(-1, keepdims=True)
+            bent_T = np.linalg.norm(off_T3, axis=-1) > _BENT * 2 * np.linalg.norm(thigh_T3, axis=-1)
+            ways.append(typical((_unit(off_T3[bent_T]) * forward_T3[bent_T]).sum(-1)))
     known = [way for way in ways if np.isfinite(way)]
     return float(np.mean(known)) if known else 0.0
 

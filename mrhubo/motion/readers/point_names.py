@@ -30,6 +30,8 @@ _CENTRAL = {
 _SPINE = ("spine1", "spine2", "spine3")
 _OF_NO_POINT = ("mixamorig", "bip", "def", "position", "pos", "loc", "location", "world", "joint", "jnt", "marker")
 """Words that say of which program a name is, or that it is a place."""
+NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
+"""Points without which nothing can be made of the others."""
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _LEFT, _RIGHT = ("left", "l", "lft"), ("right", "r", "rgt")
 

@@ -84,10 +84,14 @@ def rate_of_times(node: Tree) -> float | None:
         array = node.array() if node.text() is None else np.zeros(0)
     except UserError:
         return None
-    time_T = np.ravel(array)
-    if array.dtype.kind not in "fiu" or len(time_T) < 3 or len(time_T) != max(array.shape):
+    return rate_of_even(array.ravel()) if array.size == max(array.shape, default=0) else None
+
+
+def rate_of_even(time_T: np.ndarray) -> float | None:
+    """The same of an array (T,)."""
+    if time_T.dtype.kind not in "fiu" or len(time_T) < 3:
         return None
-    step_T = np.diff(time_T - time_T[0] if array.dtype.kind == "f" else time_T.astype(np.int64) - int(time_T[0]))
+    step_T = np.diff(time_T - time_T[0] if time_T.dtype.kind == "f" else time_T.astype(np.int64) - int(time_T[0]))
     step = float(np.median(step_T))
     low, high = RATES
     unit = next((unit for unit in _UNITS if 1 / high < step * unit < 1 / low), None)

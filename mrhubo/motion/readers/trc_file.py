@@ -21,11 +21,11 @@ from mrhubo.motion.readers.frame_numbers import numbers_in_column
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoint_table import filled_row, numbers_of
-from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points
+from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.markers.convert import motion_of_markers
 from mrhubo.motion.readers.markers.labels import has_body
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.point_names import by_names
+from mrhubo.motion.readers.point_names import NEEDED, by_names
 from mrhubo.motion.readers.rate import rate_in_words
 from mrhubo.motion.readers.sightings import check_size, placed
 

@@ -323,6 +323,80 @@ def test_points_with_names_go_by_their_names(
     assert arms == [True, False]
 
 
+@pytest.mark.parametrize("form", ["objects", "lists", "lists of objects", "no key", "biomechanics"])
+def test_points_of_a_skeleton_have_a_place_among_other_things(
+    form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """As Move's API writes them, or whoever dumps the bones of a game's character; times tell the rate."""
+    names = skeleton_names()
+    frames: list[Any] = []
+    for frame in range(FRAMES):
+        places = {theirs: points[ours][frame].round(5).tolist() for ours, theirs in names.items()}
+        more = {"rotation": [0.0, 0.0, 0.0, 1.0], "type": "euler_xyz", "torques": [0.0] * 3}
+        bones: Any = {name: {"position": place, **more, "confidence": 0.9} for name, place in places.items()}
+        if form == "lists":
+            bones = [{"joint": name, **bone} for name, bone in bones.items()]
+        elif form == "lists of objects":
+            as_axes = {name: dict(zip("XYZ", place, strict=True)) for name, place in places.items()}
+            bones = [{"boneName": name, "worldPosition": place, **more} for name, place in as_axes.items()]
+        own = {"timestamp": frame / 50, "label": "dance"}
+        key = {"lists": "joints", "lists of objects": "bones", "biomechanics": "joint_data"}.get(form, "joints")
+        frames.append({**own, **bones} if form == "no key" else {**own, key: bones})
+    path = tmp_path / "take.json"
+    path.write_text(json.dumps(frames if form == "biomechanics" else {"id": "take", "frames": frames}))
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == 50 and "by their names" in found.source and len(found) == FRAMES
+    assert bone_error(found, pose) < 5  # a chest that points tell, and hips
+    sure = None if found.confidence_TJ is None else float(found.confidence_TJ[:, 0].max())
+    assert sure == (pytest.approx(0.9) if form != "lists of objects" else 1.0)
+
+
+def skeleton_names() -> dict[str, str]:
+    """What an animation calls our points."""
+    names = {"pelvis": "Hips", "spine1": "Spine", "spine3": "Chest", "neck": "Neck", "head": "Head"}
+    parts = {"collar": "Shoulder", "shoulder": "Arm", "elbow": "ForeArm", "wrist": "Hand", "hip": "UpLeg", "knee": "Leg",
+             "ankle": "Foot", "foot": "ToeBase"}  # fmt: skip
+    return names | {f"{side}_{ours}": f"{side.title()}{theirs}" for side in SIDES for ours, theirs in parts.items()}
+
+
+@pytest.mark.parametrize("ending", [".npz", ".pkl", ".json"])
+@pytest.mark.parametrize("form", ["arrays", "positions", "axes"])
+def test_a_joint_may_have_an_array_of_its_own(
+    ending: str, form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    if ending == ".npz" and form != "arrays":
+        pytest.skip("entries of an .npz file are arrays")
+    path, array = tmp_path / f"take{ending}", {theirs: points[ours] for ours, theirs in skeleton_names().items()}
+    joints: dict[str, Any] = dict(array)
+    if form == "positions":
+        sure_T = np.full(FRAMES, 0.8)
+        joints = {name: {"positions": place_T3, "confidence": sure_T} for name, place_T3 in array.items()}
+    elif form == "axes":
+        joints = {name: dict(zip("xyz", place_T3.T, strict=True)) for name, place_T3 in array.items()}
+    if ending == ".npz":
+        np.savez(path, **joints, fps=50)
+    elif ending == ".pkl":
+        path.write_bytes(pickle.dumps({"fps": 50, **joints}))
+    else:
+        path.write_text(json.dumps({"fps": 50, "joints": joints}, default=lambda array: array.tolist()))
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == 50 and "by their names" in found.source and len(found) == FRAMES
+    assert bone_error(found, pose) < 5
+    sure = None if found.confidence_TJ is None else float(found.confidence_TJ[:, 0].max())
+    assert sure == (pytest.approx(0.8) if form == "positions" else 1.0)
+
+
+@pytest.mark.parametrize("rotation", ["random", "zero", "still"])
+def test_rotations_by_joint_are_no_places(rotation: str, tmp_path: Path) -> None:
+    random, still = np.random.default_rng(0), np.ones((FRAMES, 1))
+    ways = {"random": lambda: np.cumsum(random.normal(0, 0.1, (FRAMES, 3)), 0), "zero": lambda: np.zeros((FRAMES, 3)),
+            "still": lambda: still * random.normal(0, 0.5, (1, 3))}  # fmt: skip
+    turns = {name: ways[rotation]() for name in skeleton_names().values()}
+    np.savez(tmp_path / "take.npz", fps=50, **turns)
+    with pytest.raises(mrhubo.motion.NoMotion, match="in which there is no human motion that is known here"):
+        mrhubo.read_motion(tmp_path / "take.npz")
+
+
 def test_names_that_are_numbers_are_places(points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
     array = array_of(points, SETS["COCO"])
     frames = [{str(place): array[frame, place].tolist() for place in range(16, -1, -1)} for frame in range(FRAMES)]
@@ -342,6 +416,7 @@ def test_names_that_are_numbers_are_places(points: dict[str, np.ndarray], pose: 
         ({"keypoints": [*[[]] * 500_000, [[0, 0, 0]]]}, "500,001 frames"),
         ({"keypoints": [*[[]] * 60_000, [[0, 0, 0]] * 900]}, "60,001 frames of 900 points"),
         ({"frames": [{"999999999": [1, 2, 3]}]}, "1,000,000,000 points a frame"),
+        ({"frames": [{"joints": {"Hips": {"rotation": [0, 0, 0, 1]}}}] * 3}, "tells of no point where it is"),
     ],
 )
 def test_json_that_is_refused(content: dict, words: str, tmp_path: Path) -> None:
@@ -533,6 +608,7 @@ def _table(point_TK3: np.ndarray, columns: str, separator: str = ",", point: str
         ("NUMBER_AXIS", ",", ".", "as MediaPipe has them"),
         ("landmark_NUMBER_AXIS", ",", ".", "as MediaPipe has them"),
         ("AXIS_NAME", ",", ".", "by their names"),
+        ("NAME_TAXIS", ",", ".", "by their names"),
     ],
 )
 def test_tables(
@@ -554,6 +630,28 @@ def test_tables(
         mrhubo.read_motion(path)
 
 
+@pytest.mark.parametrize(
+    "columns", ["NAME_RAXIS NAME_TAXIS", "NAME_position_AXIS NAME_rotation_AXIS", "NAME.rotAXIS NAME.AXIS"]
+)
+def test_angles_beside_places_in_a_table_are_passed_over(
+    columns: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """As Rokoko writes bones, with left-handed axes, or who exports channels."""
+    names, header, value_XT = skeleton_names(), ["Timestamp"], [1000 / 60 * np.arange(FRAMES)]
+    for ours, theirs in names.items():
+        for group in columns.split():
+            is_place = "rot" not in group and "_R" not in group
+            for axis in range(3):
+                header.append(group.replace("AXIS", "xyz"[axis]).replace("NAME", theirs))
+                value_XT.append([-1, 1, 1][axis] * points[ours][:, axis] if is_place else np.full(FRAMES, 90.0 * axis))
+    path = tmp_path / "bones.csv"
+    rows = [",".join(f"{x:.4f}" for x in row) for row in zip(*value_XT, strict=True)]
+    path.write_text("\n".join([",".join(header), *rows]))
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == 60 and "left-handed" in " ".join(found.notes)
+    assert bone_error(found, pose) < 5
+
+
 def test_tables_tell_their_rate_and_their_gaps(
     points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
 ) -> None:
@@ -563,8 +661,11 @@ def test_tables_tell_their_rate_and_their_gaps(
     assert mrhubo.read_motion(path).frame_rate == 30
     path.write_text("\n".join([f"timestamp_ms,{header}", *(f"{t / 0.03:.3f},{row}" for t, row in enumerate(rows))]))
     assert mrhubo.read_motion(path).frame_rate == 30
-    path.write_text("\n".join([f"time,{header}", *(f"{t * 33.3:.1f},{row}" for t, row in enumerate(rows))]))
-    with pytest.raises(UserError, match="--rate"):  # milliseconds, or so it seems
+    for step, unit in ((33.3, 1e-3), (20.0, 1e-3), (1 / 48, 1.0), (16_666.7, 1e-6)):  # of no other unit is it a frame's
+        path.write_text("\n".join([f"Timestamp,{header}", *(f"{t * step:.4f},{row}" for t, row in enumerate(rows))]))
+        assert mrhubo.read_motion(path).frame_rate == pytest.approx(1 / (step * unit), rel=1e-4)
+    path.write_text("\n".join([f"time,{header}", *(f"{t},{row}" for t, row in enumerate(rows))]))
+    with pytest.raises(UserError, match="--rate"):  # numbers of frames, or so it seems
         mrhubo.read_motion(path)
     kept = [t for t in range(FRAMES) if t not in (4, 5)]
     path.write_text("\n".join([f"frame,label,{header}", *(f"{100 + t},wave,{rows[t]}" for t in kept)]))

@@ -20,14 +20,14 @@ from mrhubo.motion.readers.advice import SOLVE
 from mrhubo.motion.readers.assemble import standing_feet
 from mrhubo.motion.readers.content import Content, NoMotion
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
-from mrhubo.motion.readers.keypoints import NEEDED, motion_of_points, rate_of_points, refuse_far, to_world
+from mrhubo.motion.readers.keypoints import motion_of_points, rate_of_points, refuse_far, to_world
 from mrhubo.motion.readers.markers.c3d_file import read_c3d_file
 from mrhubo.motion.readers.markers.joints import body_of_markers
 from mrhubo.motion.readers.markers.labels import has_body, marker_places
 from mrhubo.motion.readers.markers.segments import has_segments, motion_of_segments
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.point_names import by_names
+from mrhubo.motion.readers.point_names import NEEDED, by_names
 from mrhubo.motion.readers.tracks import Person, check_span, choose
 
 _STANDS_FOR = {"shoulder": "acromion", "hip": "front_pelvis", "knee": "lateral_knee", "ankle": "lateral_ankle"}

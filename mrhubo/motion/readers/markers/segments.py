@@ -22,10 +22,11 @@ from mrhubo.motion.gaps import fill_directions
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
-from mrhubo.motion.readers.keypoints import NEEDED, rate_of_points, refuse_far, to_world, typical
+from mrhubo.motion.readers.keypoints import rate_of_points, refuse_far, to_world, typical
 from mrhubo.motion.readers.markers.c3d_file import Segments
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.point_names import NEEDED
 from mrhubo.motion.readers.tracks import check_span
 
 _LIMBS = {
