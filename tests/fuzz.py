@@ -20,6 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from scipy.io import savemat
 
 import mrhubo
 from mrhubo.body.joints import REST_K3
@@ -258,6 +259,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "take": ("damaged.json", _take),
+    "matlab": ("damaged.mat", lambda path: savemat(path, {"fps": 30.0, **_bones()}, do_compression=True)),
     "points by joint": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"fps": 30.0, **_bones()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},

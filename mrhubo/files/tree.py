@@ -18,6 +18,7 @@ from mrhubo.errors import UserError, listed, shortened
 from mrhubo.files.array_pickle import MODULES, load_pickle, steps_of
 from mrhubo.files.checkpoint import SAVE_ANEW, is_old_torch, read_torch
 from mrhubo.files.joblib_stream import Later
+from mrhubo.files.matlab import is_matlab, read_matlab
 from mrhubo.files.npz import open_npz, read_member
 from mrhubo.files.packed import is_packed, open_unpacked
 from mrhubo.files.records import RecordedObject, UnreadablePickle
@@ -244,7 +245,7 @@ def tree_of(value: Any, path: Path, where: str) -> Tree:
 
 
 def read_tree(path: Path) -> Tree:
-    """What a file holds: a PyTorch file, an .npz or .npy file, or a pickle, packed or not.
+    """What a file holds: a PyTorch file, an .npz or .npy file, a MATLAB file, or a pickle, packed or not.
 
     Raises:
         UserError: it is none of these, damaged, hostile, or too large.
@@ -254,6 +255,8 @@ def read_tree(path: Path) -> Tree:
             start = handle.read(64)
         if start.startswith(b"PK"):
             return _read_zip(path)
+        if is_matlab(start):
+            return Tree(read_matlab(path), Source(path))
         if is_old_torch(start):
             raise UserError(f"was saved by torch before 1.6; {SAVE_ANEW}")
         with open_unpacked(path, MAX_BYTES, MAX_FILE) as handle:

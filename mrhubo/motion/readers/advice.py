@@ -18,6 +18,7 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "a motion of the Master Motor Map (KIT), in angles of a model that is not in it",
         "name the .c3d file of the same recording, or the one that AMASS has of it (.npz)",
     ),
+    (r"\x89HDF", "an HDF5 file", "save its arrays as .npz, for instance by h5py and numpy.savez"),
     (r"FLV\x01", "a video (FLV)", _FILM),
     (r"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "a video or a sound (WMV, WMA)", _FILM),
     (r"\x00\x00\x01\xba", "a video (MPEG)", _FILM),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mrhubo.errors import listed, shortened
+from mrhubo.files.matlab import is_matlab
 from mrhubo.files.packed import is_packed
 from mrhubo.files.tree import Tree, read_tree
 from mrhubo.motion.motion import Motion
@@ -49,6 +50,7 @@ def is_container(content: Content) -> bool:
         is_pickle
         or start.startswith(_OLD_STARTS)
         or is_packed(start)
+        or is_matlab(start)
         or content.is_torch
         or bool(content.arrays)
         or content.is_npy

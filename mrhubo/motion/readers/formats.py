@@ -48,7 +48,7 @@ class Format:
         return importlib.import_module(f"mrhubo.motion.readers.{self.module}")
 
 
-_PYTHON = (".pkl", ".pickle", ".joblib", ".pt", ".pth", ".npy", ".motion")
+_PYTHON = (".pkl", ".pickle", ".joblib", ".pt", ".pth", ".npy", ".motion", ".mat")
 
 FORMATS: tuple[Format, ...] = (
     Format("AMASS and SMPL-family .npz", "amass", "is_amass", "read_amass", (".npz",)),

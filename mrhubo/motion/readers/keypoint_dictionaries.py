@@ -133,6 +133,9 @@ def _in_node(path: Path, node: Tree, options: ReadOptions) -> Keypoints:
     whole = node[key].array()
     if whole.ndim == 2 and whole.shape[1] % 3 == 0:  # a row a frame
         whole = whole.reshape(len(whole), -1, 3)
+    names = node.get(*NAME_KEYS)
+    if names is not None:
+        whole = _time_first(whole, len(names.texts()))
     array, person = of_one_person(path, whole, f"'{key}'", options, notes)
     point_TK3, confidence_TK = split_points(path, array, f"'{key}'")
     found = Keypoints(point_TK3, confidence_TK=confidence_TK, where=f"'{key}'", notes=notes)
@@ -150,6 +153,16 @@ def _in_node(path: Path, node: Tree, options: ReadOptions) -> Keypoints:
     told = rate_in(node, found.notes)
     found.rate = None if told is None else told[1]
     return found
+
+
+def _time_first(array: np.ndarray, points: int) -> np.ndarray:
+    """The same with the axis of the frames first, where it is last, as MATLAB's users have it: (K, 3, T), (3, K, T)."""
+    if array.ndim == 3 and array.shape[2] not in (3, 4):
+        if array.shape[:2] == (points, 3):
+            return array.transpose(2, 0, 1)
+        if array.shape[:2] == (3, points):
+            return array.transpose(2, 1, 0)
+    return array
 
 
 def _key(node: Tree) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 from hypothesis import HealthCheck, given, settings
+from scipy.io import savemat
 
 import mrhubo
 import mrhubo.rotation
@@ -384,6 +385,22 @@ def test_a_joint_may_have_an_array_of_its_own(
     assert bone_error(found, pose) < 5
     sure = None if found.confidence_TJ is None else float(found.confidence_TJ[:, 0].max())
     assert sure == (pytest.approx(0.8) if form == "positions" else 1.0)
+
+
+@pytest.mark.parametrize("axes", ["frames first", "frames last", "axes first", "rows", "a structure"])
+def test_matlab(axes: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path) -> None:
+    path, ours = tmp_path / "take.mat", skeleton_names()
+    array = np.stack([points[name] for name in ours], axis=1)
+    laid_out = {"frames last": array.transpose(1, 2, 0), "axes first": array.transpose(2, 1, 0),
+                "rows": array.reshape(FRAMES, -1)}  # fmt: skip
+    told = {
+        "keypoints": laid_out.get(axes, array),
+        "names": np.array(list(ours.values()), dtype=object),
+        "fps": 50.0,
+    }
+    savemat(path, {"take": told} if axes == "a structure" else told)
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == 50 and len(found) == FRAMES and bone_error(found, pose) < 5
 
 
 @pytest.mark.parametrize("rotation", ["random", "zero", "still"])

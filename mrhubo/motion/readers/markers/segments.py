@@ -20,6 +20,7 @@ from mrhubo.body.joints import SIDES
 from mrhubo.fast.plain.human import normalize
 from mrhubo.motion.gaps import fill_directions
 from mrhubo.motion.motion import Motion
+from mrhubo.motion.orientations import known_frames
 from mrhubo.motion.positions import BodyPoints, motion_from_points
 from mrhubo.motion.readers.keypoint_arrays import Keypoints
 from mrhubo.motion.readers.keypoints import rate_of_points, refuse_far, to_world, typical
@@ -132,7 +133,7 @@ def _body(points: Mapping[str, np.ndarray], turns: Mapping[str, np.ndarray]) -> 
             turned[f"{side}_ankle"] = turns[f"{side}_ankle"] @ _UPRIGHT
         for joint, bends in (("shoulder", 1.0), ("hip", -1.0)):
             axis_T3 = bends * turns[f"{side}_{joint}"][..., 0]
-            known_T = np.isfinite(axis_T3).all(-1)
+            known_T = known_frames(axis_T3)
             hinges[f"{side}_{joint}"] = fill_directions(np.nan_to_num(axis_T3), known_T)
     return BodyPoints(_without_trunk(points), turned, hinges)
 
