@@ -41,6 +41,11 @@ _ADVICE: tuple[tuple[str, str, str], ...] = (
         "it was downloaded in place of the file, perhaps as that needs a login",
     ),
     (
+        r"PK\x03\x04.{26}(?:\[Content_Types\]\.xml|_rels/|docProps/|xl/)",
+        "a workbook of Excel, or another document of Office",
+        "save the table as CSV, with a header that names its columns",
+    ),
+    (
         r"PK\x03\x04.{26}[\w ./()-]{0,200}?\.(?:bvh|amc|asf|fbx|glb|c3d|trc|csv|json|usdc?|usda)",
         "a zip archive of files",
         "unpack it, and name the file in it",

@@ -21,6 +21,7 @@ from mrhubo.motion.readers.interhuman import read_interhuman
 from mrhubo.motion.readers.key_words import nested
 from mrhubo.motion.readers.keypoint_dictionaries import points_in
 from mrhubo.motion.readers.keypoint_files import checked
+from mrhubo.motion.readers.keypoint_json import points_of_frames
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
 from mrhubo.motion.readers.motionstreamer import read_streamed
@@ -85,7 +86,7 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         or read_mimickit(tree, options, rate)
     )
     found = found or smpl_motion(path, tree, options)
-    points = points_in(tree, options) if found is None else None
+    points = points_in(tree, options) or points_of_frames(tree, options) if found is None else None
     if points is not None:
         return motion_of_points(path, checked(path, points), options)
     if found is None:

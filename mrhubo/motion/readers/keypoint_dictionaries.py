@@ -27,7 +27,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
     points_of_rows,
     split_points,
 )
-from mrhubo.motion.readers.keypoint_joints import points_by_joint
+from mrhubo.motion.readers.keypoint_joints import names_beside, points_beside_names, points_by_joint
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.rate import rate_in, rate_of_all
 from mrhubo.motion.readers.tracks import Person, choose
@@ -67,12 +67,12 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
         if rows is not None:
             return in_array(path, tree, options, rows)
         return in_array(path, tree, options) if shape is not None and may_be_points(shape) else None
-    samples = _samples(tree, options)
-    if samples is not None:
-        return samples
+    found = _samples(tree, options) or points_by_joint(tree, options)
+    if found is not None:
+        return found
     if point_key(tree.keys) is not None and not tree[_key(tree)].is_mapping:
         return _named_in(tree, options)
-    found = _kinect_bodies(tree, options) or points_by_joint(tree, options)
+    found = _kinect_bodies(tree, options) or points_beside_names(tree, options)
     if found is not None:
         return found
     people = {name: child for name, child in tree.items() if point_key(child.keys) is not None}
@@ -124,7 +124,7 @@ def _clip(tree: Tree, options: ReadOptions) -> Keypoints | None:
 def _named_in(node: Tree, options: ReadOptions) -> Keypoints:
     found = _in_node(node.path, node, options)
     names = node.get(*NAME_KEYS)
-    found.names = (names.texts() or None) if names is not None else None
+    found.names = (names.texts() or None) if names is not None else names_beside(node)
     return found
 
 

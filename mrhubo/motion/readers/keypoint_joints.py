@@ -1,17 +1,21 @@
-"""Keypoints of which each has an array of its own: dictionaries `{"LeftArm": (T, 3), "LeftForeArm": (T, 3), ...}`, or
-with a dictionary a joint, that has its `position` (T, 3), or lists of x, y and z.
+"""Keypoints by what joints are called, whatever arrays are.
 
-Rotations of joints are kept so too. Such arrays are taken for places if they are called so, or else if limbs keep their
-lengths and have a body's proportions.
+Each may have an array of its own: dictionaries `{"LeftArm": (T, 3), "LeftForeArm": (T, 3), ...}`, or with a dictionary
+a joint, that has its `position` (T, 3), or lists of x, y and z; or a list of such dictionaries with a name each. Or one
+array (T, K, 3) stands beside a list of K names. Rotations and speeds are kept so too. Arrays are taken for places if
+they are called so, or else if limbs keep their lengths and have a body's proportions.
 
 Legend: T frames, K keypoints.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mrhubo.body.joints import SIDES
+from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, Keypoints
 from mrhubo.motion.readers.options import ReadOptions
@@ -29,15 +33,63 @@ _OF_UPPER_ARM = (0.8, 2.5)
 """Lengths of a thigh, of the upper arm's."""
 
 
+def points_beside_names(tree: Tree, options: ReadOptions) -> Keypoints | None:
+    """The points of an array beside which a dictionary has the names of joints, whatever it calls both; None of any
+    other dictionary, and of one whose points have a key that is known.
+    """
+    names = names_beside(tree)
+    if names is None:
+        return None
+    for key, child in tree.items():
+        shape = None if child.is_mapping else child.shape()
+        if shape is None or len(shape) != 3 or shape[1:] != (len(names), 3) or not shape[0]:
+            continue
+        point_TK3 = child.array()
+        if point_TK3.dtype.kind in "fiu" and _is_body(point_TK3.astype(np.float64), names):
+            found = Keypoints(point_TK3.astype(np.float64), names, where=f"'{key}'", notes=options.of_one())
+            told = rate_in(tree, found.notes)
+            found.rate = None if told is None else told[1]
+            return found
+    return None
+
+
+def names_beside(tree: Tree) -> list[str] | None:
+    """The names of joints in a dictionary, whatever it calls them; None where it has none."""
+    if not tree.is_mapping or len(tree.keys) > _MOST:
+        return None
+    for _, child in tree.items():
+        shape = None if child.is_mapping else child.shape()
+        if child.is_mapping or (shape is not None and len(shape) != 1) or len(child) > _MOST:
+            continue
+        try:
+            names = child.texts()
+        except UserError:
+            continue
+        if len(set(names)) == len(names) <= _MOST and by_names(names).keys() >= set(NEEDED):
+            return names
+    return None
+
+
 def points_by_joint(tree: Tree, options: ReadOptions) -> Keypoints | None:
     """The points of a dictionary of joints, or of one in a dictionary; None of any other."""
-    for node in (tree, *(child for _, child in tree.items() if child.is_mapping)):
+    for node in (tree, *(child for _, child in tree.items())):
+        node = _under_names(node)
         if 0 < len(node.keys) <= _MOST and (found := _in_node(node)) is not None:
             found.notes = options.of_one()
             told = rate_in(tree, found.notes) or rate_in(node, found.notes)
             found.rate = None if told is None else told[1]
             return found
     return None
+
+
+def _under_names(node: Tree) -> Tree:
+    """A list of dictionaries with a name each as a dictionary by their names."""
+    if not node.is_list or not 0 < len(node) <= _MOST:
+        return node
+    named = [child.get("name", "joint", "bone") if child.is_mapping else None for child in node]
+    names = [name.text() for name in named if name is not None]
+    texts = [name for name in names if name is not None]
+    return node.by_names(texts) if len(set(texts)) == len(texts) == len(node) else node
 
 
 def _in_node(node: Tree) -> Keypoints | None:
@@ -53,11 +105,10 @@ def _in_node(node: Tree) -> Keypoints | None:
             if told is not None and told.shape == place_T3.shape[:1] and told.dtype.kind in "fiu":
                 sure[name] = told.astype(np.float64)
     frames = {len(place_T3) for place_T3 in places.values()}
-    ours = by_names(list(places))
-    if len(frames) != 1 or not ours.keys() >= set(NEEDED):
+    if len(frames) != 1 or not by_names(list(places)).keys() >= set(NEEDED):
         return None
     point_TK3 = np.stack(list(places.values()), axis=1)
-    if not are_called and not _is_body({name: point_TK3[:, place] for name, place in ours.items()}):
+    if not are_called and not _is_body(point_TK3, list(places)):
         return None
     sure_TK = np.stack([sure[name] for name in places], axis=1) if sure.keys() == places.keys() else None
     where = f"'{node.where}'" if node.where else "the arrays"
@@ -82,8 +133,9 @@ def _place(node: Tree) -> tuple[np.ndarray | None, bool]:
 
 
 @np.errstate(all="ignore")
-def _is_body(points: dict[str, np.ndarray]) -> bool:
+def _is_body(point_TK3: np.ndarray, names: Sequence[str]) -> bool:
     """Whether upper arms and thighs keep their lengths, and those are a body's."""
+    points = {name: point_TK3[:, place] for name, place in by_names(names).items()}
     lengths = []
     for start, end in (("shoulder", "elbow"), ("hip", "knee")):
         for side in SIDES:

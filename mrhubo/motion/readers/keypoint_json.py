@@ -19,6 +19,7 @@ Legend: T frames, K keypoints.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,13 +28,14 @@ from typing import Any
 import numpy as np
 
 from mrhubo.errors import UserError, shortened
-from mrhubo.files.tree import tree_of
+from mrhubo.files.tree import Tree, tree_of
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.frame_numbers import in_order
 from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, NAME_KEYS, Keypoints, point_key
-from mrhubo.motion.readers.keypoint_joints import points_by_joint
-from mrhubo.motion.readers.keypoint_rows import NOTHING, Row, people_of, row_of
+from mrhubo.motion.readers.keypoint_joints import points_beside_names, points_by_joint
+from mrhubo.motion.readers.keypoint_rows import NOTHING, Row, people_of, points_key, row_of
 from mrhubo.motion.readers.options import ReadOptions
+from mrhubo.motion.readers.point_names import NEEDED, by_names
 from mrhubo.motion.readers.rate import TIME_KEYS, rate_in, rate_of_even
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
 
@@ -43,6 +45,8 @@ _NUMBERS = ("frame_id", "frame", "frame_idx", "frame_index", "frame_number")
 _IDS = ("track_id", "body_id", "person_id", "id")
 _PICTURE = "image_id"
 """What lists of detections, as COCO has them, call the frame in which somebody was seen."""
+_FEWEST, _MOST_VALUES = 2, 10**7
+"""Frames of a list in a container other than JSON, at least; and values in that, at most."""
 _DIGIT = re.compile(r"[0-9]")
 
 
@@ -54,9 +58,10 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
         UserError: what it holds is no points of frames, or the person that is asked for is not there.
     """
     names, confidence, whole, where = None, None, value, "the list"
-    by_joint = points_by_joint(tree_of(value, path, ""), options)
-    if by_joint is not None:
-        return by_joint
+    tree = tree_of(value, path, "")
+    in_arrays = points_by_joint(tree, options) or points_beside_names(tree, options)
+    if in_arrays is not None:
+        return in_arrays
     if isinstance(value, dict):
         names = next((value[key] for key in NAME_KEYS if key in value), None)
         told = (value.get(key) for key in CONFIDENCE_KEYS)
@@ -86,16 +91,53 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     meta = whole.get("meta_info") if isinstance(whole, dict) else None
     if found.names is None:
         found.names = _names_of(names, meta, found.point_TK3.shape[1])
-    told = rate_in(tree_of(whole, path, ""), found.notes)
+    told = rate_in(tree, found.notes)
     found.rate = _rate_of_frames(numbers, frames) if told is None else told[1]
     return found
+
+
+def points_of_frames(tree: Tree, options: ReadOptions) -> Keypoints | None:
+    """The same of a list of frames in another container, or of a dictionary that has one; None where it has none.
+
+    Raises:
+        UserError: the person that is asked for is not there.
+    """
+    lists = [tree, *(child for key, child in tree.items() if key in _FRAMES)]
+    frames = next((node for node in lists if node.is_list and next(iter(node), tree).is_mapping), None)
+    if frames is None or len(frames) < _FEWEST:
+        return None
+    try:
+        value = _plain(tree, [_MOST_VALUES])
+        found = points_of_json(tree.path, value, options)
+    except NoMotion:
+        return None
+    except UserError:
+        if options.person is not None:
+            raise
+        return None
+    return found if by_names(found.names or ()).keys() >= set(NEEDED) else None
+
+
+def _plain(node: Tree, left: list[int]) -> Any:
+    """What a node holds, as JSON would have it; `left`: how many values more may be in it."""
+    left[0] -= 1
+    if node.is_mapping:
+        return {name: _plain(child, left) for name, child in node.items()}
+    shape = node.shape()
+    if shape is None and node.is_list:
+        return [_plain(child, left) for child in node]
+    if shape is not None:
+        left[0] -= math.prod(shape)
+    if left[0] < 0:
+        raise NoMotion(f"{node.path}: has more than {_MOST_VALUES:,} values")
+    return node.text() if shape is None else node.array().tolist()
 
 
 def _rate_of_frames(numbers: Sequence[int], frames: Sequence[Any]) -> float | None:
     """Frames per second by the times that frames have, one each; None where they tell none."""
     if list(numbers) != list(range(len(numbers))):
         return None
-    for key in TIME_KEYS:
+    for key in (*TIME_KEYS, "t"):
         times = [frame.get(key) if isinstance(frame, dict) else None for frame in frames]
         if all(type(time) in (int, float) for time in times):
             return rate_of_even(np.array(times))
@@ -139,7 +181,7 @@ def _of_one(
     seen: list[Sighting] = []
     for number, frame, people in frames:
         for one in [frame] * bool(frame) if people is None else people:
-            if isinstance(one, dict) and point_key(one) is None:
+            if isinstance(one, dict) and points_key(one) is None:
                 continue
             row = row_of(path, where, number, one)
             told = {} if not isinstance(one, dict) else one

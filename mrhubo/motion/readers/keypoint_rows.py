@@ -15,9 +15,9 @@ from mrhubo.errors import UserError, shortened
 from mrhubo.motion.readers.content import NoMotion
 from mrhubo.motion.readers.keypoint_arrays import LIFT, point_key
 
-_PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons")
+_PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons", "actors")
 _SURE = ("visibility", "confidence", "score", "presence")
-_MORE_POINTS = ("jointdata", "bones", "bodyparts", "transforms")
+_MORE_POINTS = ("jointdata", "bones", "bodyparts", "transforms", "body")
 """What frames call points beside what arrays of them are called."""
 _PLACES = (
     "position",
@@ -63,17 +63,20 @@ def people_of(frame: Any) -> list[Any] | None:
     """The people of a frame: dictionaries, or lists of points; None where it is one person's, or nobody's."""
     if isinstance(frame, dict):
         found = next((frame[key] for key in _PEOPLE if isinstance(frame.get(key), list)), None)
-        key = _points_key(frame)
+        key = points_key(frame)
+        if found is None and key is None:  # a scene around them
+            inner = [child for child in frame.values() if isinstance(child, dict)]
+            return people_of(inner[0]) if len(inner) == 1 and not _is_point(inner[0]) else None
         return found if found is not None or key is None else people_of(frame[key])
     first = frame[0] if isinstance(frame, list) and frame else None
     if isinstance(first, dict):
-        return frame if _points_key(first) is not None else None
+        return frame if points_key(first) is not None else None
     return frame if isinstance(first, list) and first and isinstance(first[0], dict | list) else None
 
 
 def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
     """The points of one person in a frame."""
-    key = _points_key(frame) if isinstance(frame, dict) else None
+    key = points_key(frame) if isinstance(frame, dict) else None
     frame = frame if key is None else frame[key]
     if frame is None:
         return NOTHING
@@ -92,6 +95,8 @@ def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
     for point in frame:
         if isinstance(point, dict):
             point = _listed(point)
+        if isinstance(point, list) and len(point) == 2 and all(isinstance(part, list) for part in point):
+            point = point[0]  # a bone's place, and its rotation
         if point is None:
             point = [None, None, None]
         if not isinstance(point, list) or len(point) not in (3, 4):
@@ -108,9 +113,14 @@ def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
     return Row(points, names or None)
 
 
-def _points_key(frame: dict[str, Any]) -> str | None:
-    """The key under which a frame has its points."""
+def points_key(frame: dict[str, Any]) -> str | None:
+    """The key under which a frame, or one of the people in it, has points."""
     return point_key(frame) or next((key for key in frame if _plain(key) in _MORE_POINTS), None)
+
+
+def _is_point(found: dict[str, Any]) -> bool:
+    """Whether a dictionary is a point and no more."""
+    return any(_plain(key) in ("x", *_PLACES) for key in found)
 
 
 def _name(point: dict[str, Any]) -> str | None:

@@ -15,12 +15,15 @@ from mrhubo.robot_motion.clock import find_rate as find_even_rate
 
 RATE_KEYS = (
     "mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "frameRate", "fps", "FPS", "video_fps",
-    "motion_fps", "mocap_fps",
+    "motion_fps", "mocap_fps", "sample_rate", "sampling_rate", "sampleRate", "samplingRate", "sampling_frequency",
+    "frames_per_second", "hz", "Hz",
 )  # fmt: skip
 """What files call it; the first two are AMASS's."""
 TIME_KEYS = ("timestamps", "timestamps_s", "timestamps_ms", "timestamps_us", "timestamps_ns", "timestamp", "times",
              "time", "frame_times", "frame_timestamps")  # fmt: skip
 """What files call the times of their frames."""
+_STEP_KEYS = ("dt", "frame_time", "frametime", "frameTime", "time_step", "timestep")
+"""What files call the time from a frame to the next [s]."""
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9)
 """Seconds, and what else times are told in: of a usual rate, in each unit steps are of another size."""
 _NUMBERS = 8.0
@@ -74,6 +77,10 @@ def rate_in(node: Tree, notes: list[str]) -> tuple[str, float] | None:
         number = rate_of_times(node[key]) if key in keys else None
         if number is not None:
             return key, number
+    for key in _STEP_KEYS:
+        step = number_told(node[key]) if key in keys else None
+        if step is not None and 1 / RATES[1] <= step <= 1 / RATES[0]:
+            return key, 1 / step
     notes += open_ones
     return None
 

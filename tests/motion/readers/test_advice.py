@@ -32,6 +32,7 @@ _FILES = {
     "zip archive": (_zipped("clips/walk 01.bvh"), "unpack it"),
     "a table of Vicon": (b"Joints,,\r\n120,,\r\n,,Hips,,,\r\n", "BVH"),
     "HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(64), "npz"),
+    "workbook of Excel": (_zipped("[Content_Types].xml"), "CSV"),
     "FLV": (b"FLV\x01\x01\0\0\0\x09", "MP4"),
     "WMV": (b"\x30\x26\xb2\x75\x8e\x66\xcf\x11\xa6\xd9", "MP4"),
     r"\(MPEG\)": (b"\0\0\x01\xba\x44\0", "MP4"),

@@ -360,13 +360,13 @@ def skeleton_names() -> dict[str, str]:
     return names | {f"{side}_{ours}": f"{side.title()}{theirs}" for side in SIDES for ours, theirs in parts.items()}
 
 
-@pytest.mark.parametrize("ending", [".npz", ".pkl", ".json"])
-@pytest.mark.parametrize("form", ["arrays", "positions", "axes"])
+@pytest.mark.parametrize(
+    ("ending", "form"),
+    [(".npz", "arrays"), *((ending, form) for ending in (".pkl", ".json") for form in ("arrays", "positions", "axes"))],
+)
 def test_a_joint_may_have_an_array_of_its_own(
     ending: str, form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
 ) -> None:
-    if ending == ".npz" and form != "arrays":
-        pytest.skip("entries of an .npz file are arrays")
     path, array = tmp_path / f"take{ending}", {theirs: points[ours] for ours, theirs in skeleton_names().items()}
     joints: dict[str, Any] = dict(array)
     if form == "positions":
@@ -385,6 +385,54 @@ def test_a_joint_may_have_an_array_of_its_own(
     assert bone_error(found, pose) < 5
     sure = None if found.confidence_TJ is None else float(found.confidence_TJ[:, 0].max())
     assert sure == (pytest.approx(0.8) if form == "positions" else 1.0)
+
+
+@pytest.mark.parametrize("ending", [".npz", ".pkl", ".json"])
+@pytest.mark.parametrize("keys", [("body_pos_w", "body_names"), ("data", "labels"), ("positions", "bones")])
+def test_names_beside_an_array_tell_whatever_they_are_called(
+    ending: str, keys: tuple[str, str], points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """Speeds and rotations have as many numbers."""
+    path, ours = tmp_path / f"take{ending}", skeleton_names()
+    array = np.stack([points[name] for name in ours], axis=1)
+    told = {"body_lin_vel_w": np.gradient(array, axis=0), "angles": np.ones_like(array), keys[0]: array,
+            keys[1]: list(ours.values()), "dt": 0.02}  # fmt: skip
+    if ending == ".npz":
+        np.savez(path, **{key: np.array(value) for key, value in told.items()})
+    elif ending == ".pkl":
+        path.write_bytes(pickle.dumps(told))
+    else:
+        path.write_text(json.dumps(told, default=lambda array: array.tolist()))
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == 50 and f"'{keys[0]}'" in found.source and bone_error(found, pose) < 5
+
+
+@pytest.mark.parametrize("form", ["places", "places and rotations", "named", "of a scene", "joints in a list"])
+def test_frames_of_bones_in_other_containers(
+    form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    ours, path = skeleton_names(), tmp_path / "take.pkl"
+    array = np.stack([points[name] for name in ours], axis=1)
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    value: Any = [dict(zip(ours.values(), place_K3, strict=True)) for place_K3 in array]
+    if form == "places and rotations":
+        value = [{name: (place_3, still) for name, place_3 in frame.items()} for frame in value]
+    elif form == "named":
+        value = {"frames": [{"joints": place_K3, "root": still} for place_K3 in array], "names": list(ours.values())}
+    elif form == "of a scene":
+        people = [[{"name": "Ann", "body": {n: {"position": x} for n, x in frame.items()}}] for frame in value]
+        value = [{"scene": {"actors": here, "timestamp": 0.1}} for here in people]
+    elif form == "joints in a list":
+        value = {"joints": [{"name": n, "positions": array[:, i]} for i, n in enumerate(ours.values())]}
+    path.write_bytes(pickle.dumps(value))
+    found = mrhubo.read_motion(path, RATE)
+    assert len(found) == FRAMES and bone_error(found, pose) < 5
+    if form == "of a scene":
+        path = tmp_path / "take.json"
+        path.write_text(json.dumps(value, default=lambda array: array.tolist()))
+        assert mrhubo.read_motion(path, RATE).checksum == found.checksum
+        with pytest.raises(UserError, match="Ben"):
+            mrhubo.read_motion(tmp_path / "take.pkl", ReadOptions(rate=30, person="Ben"))
 
 
 @pytest.mark.parametrize("axes", ["frames first", "frames last", "axes first", "rows", "a structure"])
