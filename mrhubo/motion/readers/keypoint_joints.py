@@ -58,8 +58,7 @@ def names_beside(tree: Tree) -> list[str] | None:
     if not tree.is_mapping or len(tree.keys) > _MOST:
         return None
     for _, child in tree.items():
-        shape = None if child.is_mapping else child.shape()
-        if child.is_mapping or (shape is not None and len(shape) != 1) or len(child) > _MOST:
+        if child.is_mapping or len(child) > _MOST or ((shape := child.shape()) is not None and len(shape) != 1):
             continue
         try:
             names = child.texts()
